@@ -1,0 +1,347 @@
+"use strict";
+// The page of a plan: header, player, tables; `scene.js` draws the robot and `plots.js` the curves.
+//
+// The data, written by the program as JSON into the script element #data. SI units, radians; null: none or unknown
+// (a number that is not finite becomes null too). N knots have a control, N + 1 a state.
+//
+//   robot, title      names: of the robot; the heading of the page
+//   status            "converged", or in a few words why the solver stopped
+//   frame             name of the end-effector frame, or null
+//   target            [x, y, z] that it is to reach, m, or null
+//   miss, tolerance   distance at the last knot, and what counts as reached, m, or null
+//   dt, times         step (s); [N + 1] times of the knots (s), increasing
+//   joints            [J] of { name, unit: "rad" | "m", lower, upper, velocity, effort }: one per coordinate of v that is
+//                     shown; its limits, or null each (|v| ≤ velocity, |tau| ≤ effort)
+//   q, v, tau         [N + 1][J], [N + 1][J], [N][J]: rad, rad/s, N·m, or m, m/s, N
+//   iterations        [] of { iteration, cost, gap, step, regularisation, stop }; step and stop may be null
+//   budget            { budget_ms, knots, per, rows: [] of { name, us_per_knot, ms_per_horizon }, total_ms }, or null;
+//                     `per` says what is timed ("one solver iteration"); budget_ms null: no budget
+//   scene.bodies      [B] of { name, parent (index, −1 for the world), shapes: [] of { kind, size, position [3],
+//                     quaternion [x, y, z, w], color "#rrggbb" } }; position and quaternion: pose in the body, null for
+//                     the identity; color null: the page's own for bones and joints, light or dark. By kind, size is
+//                       box [x, y, z] · sphere [radius] · cylinder [radius, length], axis z ·
+//                       capsule [radius, length of its straight part], axis z · segment [from (3), to (3), radius]
+//   scene.poses       [N + 1][B][7]: pose of each body in the world, px py pz qx qy qz qw
+//   scene.trail       [N + 1][3]: the end-effector in the world, or null
+//   violations        [] of { what: "position" | "velocity" | "torque", joint (its name), at_knot, amount, limit }: the
+//                     worst knot of each joint and quantity that leaves its limits; amount beyond, limit that it crosses
+//   version, command  of the program that wrote the page; the command line, or null
+//
+// `#t=0.4` in the address opens the page at rest at 0.4 s.
+
+const UNITS_NOTE = "Dashed lines are limits, in the colour of their joint; a limit far beyond the curves is left out.";
+
+const $ = (id) => document.getElementById(id);
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+/** A number for reading: some significant digits, a real minus, no ragged exponents. */
+function number(x, digits = 4) {
+  if (x == null) return "–";
+  if (x === 0) return "0";
+  const size = Math.abs(x);
+  if (size >= 1e-3 && size < 1e5) return x.toFixed(Math.min(Math.max(digits - 1 - Math.floor(Math.log10(size)), 0), 5)).replace("-", "−");
+  const [mantissa, exponent] = x.toExponential(Math.min(digits, 3) - 1).split("e");
+  return `${mantissa}·10${superscript(Number(exponent))}`.replace("-", "−");
+}
+/** The same without trailing zeros: for a figure in a sentence. */
+const brief = (x, digits = 3) => number(x, digits).replace(/(\.\d*?)0+(?=$|·)/, "$1").replace(/\.(?=$|·)/, "");
+const length = (metres) => (metres == null ? "–" : metres < 0.1 ? `${brief(1000 * metres)} mm` : `${brief(metres)} m`);
+
+/** The knot at or before time t, and the fraction of the way to the next. */
+function knotAt(times, t) {
+  let low = 0, high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    times[middle] <= t + 1e-12 ? (low = middle) : (high = middle - 1);
+  }
+  const step = times[low + 1] - times[low];
+  return { k: low, s: step > 0 ? Math.min(Math.max((t - times[low]) / step, 0), 1) : 0 };
+}
+
+/** An element with its attributes and children; text is never read as markup. */
+function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) key === "style" ? (made.style.cssText = value) : made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+function header(data) {
+  document.title = `${data.title} · Condyle`;
+  $("title").textContent = data.title;
+  const last = data.times.at(-1) - data.times[0];
+  const fact = (name, value) => element("span", {}, `${name} `, element("b", {}, value));
+  const knots = data.times.length - 1;
+  $("facts").append(
+    fact("robot", data.robot),
+    ...(data.frame ? [fact("end-effector", data.frame)] : []),
+    ...(data.target ? [fact("target", `(${data.target.map((x) => x.toFixed(3).replace("-", "−")).join(", ")}) m`)] : []),
+    fact("horizon", `${knots} × ${brief(1000 * data.dt)} ms = ${brief(last)} s`),
+    fact("iterations", String(data.iterations.at(-1)?.iteration ?? 0)),
+  );
+
+  const badge = (state, text) => {
+    const path = { good: "m5 13 4 4L19 7", warn: "M12 6v8M12 18.5v.1", bad: "m6 6 12 12M18 6 6 18" }[state];
+    const item = element("li", { class: state });
+    item.innerHTML = `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${path}"/></svg>`;
+    item.append(text);
+    $("badges").append(item);
+  };
+  badge(data.status === "converged" ? "good" : "bad", data.status === "converged" ? "Converged" : `Not converged: ${data.status}`);
+  if (data.miss != null) {
+    const reached = data.tolerance == null || data.miss <= data.tolerance;
+    const within = data.tolerance == null ? "" : reached ? ` (within ${length(data.tolerance)})` : ` (more than ${length(data.tolerance)})`;
+    badge(reached ? "good" : "bad", `${reached ? "Target reached" : "Target missed"}: ${length(data.miss)} off${within}`);
+  }
+  if (data.budget?.budget_ms != null) {
+    const { total_ms: total, budget_ms: budget } = data.budget;
+    badge(total <= budget ? "good" : "warn", `${total <= budget ? "Within" : "Over"} budget: ${brief(total)} of ${brief(budget)} ms`);
+  }
+  const breaches = data.violations.length;
+  badge(breaches ? "bad" : "good", breaches ? `${breaches} ${breaches === 1 ? "limit" : "limits"} exceeded` : "All limits kept");
+  $("footer").append("Made by Condyle", data.version ? ` ${data.version}` : "", ...(data.command ? [" with ", element("code", {}, data.command)] : []), ". Drawn with three.js and uPlot (MIT).");
+}
+
+function budgetTable({ budget_ms: budget, knots, per, rows, total_ms: total }) {
+  const listed = rows.reduce((sum, row) => sum + row.ms_per_horizon, 0);
+  const sum = $("budget-sum");
+  sum.append(per ? `${per}: ` : "", element("b", {}, `${brief(total)} ms`), budget == null ? "" : ` of ${brief(budget)} ms (${brief((100 * total) / budget, 2)} %)`);
+  const full = Math.max(total, listed, budget ?? 0), widest = Math.max(...rows.map((row) => row.us_per_knot));
+  const bar = $("budget-bar"), body = $("budget").tBodies[0];
+  const scale = (ms) => (100 * ms) / full;
+  let from = 0;
+  rows.forEach((row, i) => {
+    const tint = `--tint: var(--hue-${i % HUES.light.length})`;
+    bar.append(element("i", { style: `${tint}; left: ${scale(from)}%; width: ${scale(row.ms_per_horizon)}%`, title: `${row.name}: ${number(row.ms_per_horizon, 3)} ms` }));
+    from += row.ms_per_horizon;
+    body.append(element("tr", { style: tint },
+      element("th", { scope: "row" }, element("span", { class: "chip" }), row.name),
+      element("td", { class: "n" }, number(row.us_per_knot, 3)),
+      element("td", { class: "meter" }, element("i", { style: `width: ${(100 * row.us_per_knot) / widest}%` })),
+      element("td", { class: "n" }, number(row.ms_per_horizon, 3)),
+      element("td", { class: "n" }, budget == null ? "–" : `${number((100 * row.ms_per_horizon) / budget, 2)} %`)));
+  });
+  if (budget != null) {
+    const mark = element("b", { style: `left: calc(${scale(budget)}% - 1px)` }, element("span", {}, `budget ${brief(budget)} ms`));
+    if (scale(budget) < 25) mark.firstChild.style.cssText = "right: auto; left: 0";
+    bar.append(mark);
+  }
+  bar.setAttribute("aria-label", `${brief(total)} ms${budget == null ? "" : ` of a budget of ${brief(budget)} ms`}; the table below has the phases.`);
+  const line = (name, ms) => element("tr", {}, element("td", {}, name), element("td", { class: "n" }, number((1000 * ms) / knots, 3)), element("td", { class: "meter" }),
+    element("td", { class: "n" }, number(ms, 3)), element("td", { class: "n" }, budget == null ? "–" : `${number((100 * ms) / budget, 2)} %`));
+  $("budget").tFoot.append(line("total", total), ...(budget == null ? [] : [line("budget", budget)]));
+}
+
+function iterationTable(iterations) {
+  for (const row of iterations) {
+    $("iterations").tBodies[0].append(element("tr", {}, ...[String(row.iteration), number(row.cost, 6), number(row.gap, 3), number(row.step, 3), number(row.regularisation, 3), number(row.stop, 3)]
+      .map((text) => element("td", { class: "n" }, text))));
+  }
+}
+
+function iterationLine(row) {
+  const part = (name, value) => [` · ${name} `, element("b", {}, value)];
+  $("iteration").replaceChildren("iteration ", element("b", {}, String(row.iteration)), ...part("cost", brief(row.cost, 6)), ...part("gap", brief(row.gap)),
+    ...part("step", brief(row.step)), ...part("regularisation", brief(row.regularisation)), ...part("stop", brief(row.stop)));
+}
+
+/** The table of the joints: legend of the plots, switch of each curve, and numbers at the time of the playback. */
+function makeJoints(data, plots, focus) {
+  const shown = new Set(data.joints.keys());
+  const body = $("joints").querySelector("tbody");
+  const rows = data.joints.map((joint, j) => {
+    const button = element("button", { type: "button", title: "Show or hide; double-click: this one alone" }, element("span", { class: "chip" }), joint.name);
+    const cells = plots.quantities.map(() => element("td", { class: "n" }, element("span"), element("i")));
+    const row = element("tr", {}, element("th", { scope: "row" }, button), ...cells);
+    row.addEventListener("pointerenter", () => focus(j));
+    row.addEventListener("pointerleave", () => focus(null));
+    button.addEventListener("focus", () => focus(j));
+    button.addEventListener("blur", () => focus(null));
+    button.addEventListener("click", () => { shown.has(j) ? shown.delete(j) : shown.add(j); apply(); });
+    button.addEventListener("dblclick", () => { shown.clear(); shown.add(j); apply(); });
+    body.append(row);
+    return { row, button, cells };
+  });
+  $("all").addEventListener("click", () => {
+    const every = shown.size === 0;
+    shown.clear();
+    if (every) for (const j of data.joints.keys()) shown.add(j);
+    apply();
+  });
+  function apply() {
+    rows.forEach(({ row, button }, j) => {
+      row.classList.toggle("off", !shown.has(j));
+      button.setAttribute("aria-pressed", shown.has(j));
+    });
+    $("all").textContent = shown.size === 0 ? "Show all" : "Hide all";
+    plots.filter((j) => shown.has(j));
+  }
+  function recolour() {
+    rows.forEach(({ row }, j) => {
+      const { colour, dash } = strokeOf(j);
+      row.style.setProperty("--tint", colour);
+      row.querySelector(".chip").style.borderTop = `3.5px ${dash.length ? "dashed" : "solid"} ${colour}`;
+    });
+  }
+  let at = -1;
+  function show(k) {
+    if (k === at) return;
+    at = k;
+    rows.forEach(({ cells }, j) => plots.quantities.forEach((quantity, i) => {
+      const joint = data.joints[j], value = plots.valueAt(quantity, k, j), share = shareOf(value, quantity.limits(joint));
+      const cell = cells[i], size = Math.abs(share ?? 0);
+      const digits = joint.unit === "m" && i < 2 ? 4 : Math.abs(value) >= 10 ? 2 : 3;
+      cell.firstChild.textContent = value == null ? "–" : value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+      cell.title = `${quantity.unit(joint.unit)}${share == null ? "" : `, ${Math.round(100 * size)} % of the way to its limit`}`;
+      cell.classList.toggle("over", size > 1 + 1e-6);
+      cell.lastChild.style.setProperty("--share", Math.min(size, 1));
+    }));
+  }
+  // With the units, so that no number stands without one.
+  const units = [...new Set(data.joints.map((joint) => joint.unit))];
+  plots.quantities.forEach((quantity, i) => {
+    $("joints").tHead.rows[0].cells[i + 1].append(" ", element("small", {}, units.map(quantity.unit).join(", ")));
+  });
+  apply();
+  recolour();
+  return { show, recolour, reveal(j) { shown.add(j); apply(); }, mark(j) { rows.forEach(({ row }, i) => row.classList.toggle("focus", i === j)); } };
+}
+
+function violationTable(data, quantities, go) {
+  if (!data.violations.length) return;
+  $("violations").hidden = false;
+  for (const { what, joint, at_knot: k, amount, limit } of data.violations) {
+    const unit = quantities.find((quantity) => quantity.what === what)?.unit(data.joints.find((j) => j.name === joint)?.unit ?? "") ?? "";
+    const button = element("button", { type: "button", class: "quiet" }, `knot ${k}, ${brief(data.times[k])} s`);
+    button.addEventListener("click", () => go(k, data.joints.findIndex((j) => j.name === joint)));
+    $("violations").querySelector("tbody").append(element("tr", {}, element("th", { scope: "row" }, what), element("td", {}, joint ?? "–"),
+      element("td", { class: "n" }, `${brief(amount)} ${unit}`), element("td", { class: "n" }, `${brief(limit)} ${unit}`), element("td", { class: "n" }, button)));
+  }
+}
+
+/** The clock: playing, holding still under the pointer, stepping. Every picture follows `show`. */
+function makePlayer(times, show) {
+  const start = times[0], end = times.at(-1), scrub = $("scrub"), play = $("play");
+  let t = start, playing = false, held = false, before = null;
+  Object.assign(scrub, { min: start, max: end, step: times.length > 1 ? (end - start) / (times.length - 1) : 1 });
+
+  function seek(to) {
+    t = Math.min(Math.max(to, start), end);
+    const { k } = knotAt(times, t);
+    scrub.value = t;
+    scrub.setAttribute("aria-valuetext", `${t.toFixed(2)} seconds, knot ${k} of ${times.length - 1}`);
+    $("clock").replaceChildren(element("b", {}, t.toFixed(2)), ` / ${end.toFixed(2)} s`, element("span", {}, ` · knot ${k}`));
+    show(t);
+  }
+  function frame(stamp) {
+    if (!playing) return;
+    if (before != null && !held) {
+      let to = t + ((stamp - before) / 1000) * Number($("speed").value);
+      if (to >= end) {
+        if ($("loop").getAttribute("aria-pressed") === "true") to = start + ((to - end) % (end - start || 1));
+        else run(false);
+      }
+      seek(to);
+    }
+    before = stamp;
+    requestAnimationFrame(frame);
+  }
+  function run(yes) {
+    if (yes && !playing) {
+      if (t >= end - 1e-9) seek(start);
+      before = null;
+      requestAnimationFrame(frame);
+    }
+    playing = yes;
+    play.classList.toggle("playing", yes);
+    play.setAttribute("aria-label", yes ? "Pause" : "Play");
+  }
+  function step(by) {
+    run(false);
+    const { k, s } = knotAt(times, t);
+    seek(times[Math.min(Math.max(by < 0 && s > 1e-9 ? k : k + by, 0), times.length - 1)]);
+  }
+  play.addEventListener("click", () => run(!playing));
+  $("back").addEventListener("click", () => step(-1));
+  $("forth").addEventListener("click", () => step(1));
+  scrub.addEventListener("input", () => { run(false); seek(Number(scrub.value)); });
+  $("loop").addEventListener("click", ({ currentTarget: loop }) => loop.setAttribute("aria-pressed", loop.getAttribute("aria-pressed") !== "true"));
+  // Keys of a control that has the focus stay its own.
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
+    const on = event.target.closest?.("button, select, summary, a, input")?.matches("input[type=range]") ? "range" : event.target.closest?.("button, select, summary, a, input") ? "control" : "page";
+    if (event.key === " " && on !== "control") run(!playing);
+    else if (event.key === "ArrowLeft" && on !== "range" && !event.target.matches("select, input")) step(-1);
+    else if (event.key === "ArrowRight" && on !== "range" && !event.target.matches("select, input")) step(1);
+    else return;
+    event.preventDefault();
+  });
+  return { seek, run, hold(yes) { held = yes; before = null; }, pause() { run(false); } };
+}
+
+const data = JSON.parse($("data").textContent);
+header(data);
+const hues = () => { for (let i = 0; i < HUES.light.length; i++) document.documentElement.style.setProperty(`--hue-${i}`, strokeOf(i).colour); };
+hues();
+
+$("key-target").hidden = !data.target;
+$("key-trail").hidden = !data.scene.trail;
+let view = null;
+try {
+  view = makeScene(data, $("view"));
+} catch (error) {
+  // No WebGL, or no memory for it: all else on the page works without.
+  console.warn(error);
+  for (const part of $("view").children) part.hidden = part.id !== "view-note";
+  $("view-note").hidden = false;
+  $("view-note").textContent = "The 3-D view needs WebGL, which this browser does not offer. The plots, the table and the time slider work without it.";
+}
+
+const focus = (j) => { plots.focus(j); joints.mark(j); };
+const plots = makePlots(data, { seek: (t) => player.seek(t), hold: (yes) => player.hold(yes), focus });
+const joints = makeJoints(data, plots, focus);
+const player = makePlayer(data.times, (t) => {
+  const { k, s } = knotAt(data.times, t);
+  view?.show(k, s);
+  plots.show(t);
+  joints.show(k);
+});
+violationTable(data, plots.quantities, (k, j) => {
+  player.pause();
+  player.seek(data.times[k]);
+  if (j >= 0) joints.reveal(j);
+  $("plots").scrollIntoView({ behavior: "smooth", block: "nearest" });
+});
+
+let progress = null;
+if (data.iterations.length) {
+  iterationTable(data.iterations);
+  const pick = (i) => iterationLine(data.iterations[i] ?? data.iterations.at(-1));
+  if (data.iterations.length > 1) progress = makeProgress(data.iterations, { pick });
+  iterationLine(data.iterations.at(-1));
+} else $("iterations").closest("section").hidden = true;
+if (data.budget) budgetTable(data.budget);
+else $("budget").closest("section").hidden = true;
+
+$("limits-note").textContent = UNITS_NOTE;
+$("reset").addEventListener("click", () => view?.reset());
+for (const input of document.querySelectorAll("input[name=scale]")) {
+  input.addEventListener("change", () => {
+    plots.scale(input.value === "share");
+    $("limits-note").textContent = input.value === "share"
+      ? "0 % is the middle between the limits, ±100 % the limits; joints without limits are not drawn."
+      : UNITS_NOTE;
+  });
+}
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  hues();
+  view?.recolour();
+  plots.rebuild();
+  progress?.rebuild();
+  joints.recolour();
+});
+
+const at = /[#&]t=([\d.]+)/.exec(location.hash);
+player.seek(at ? Number(at[1]) : data.times[0]);
+// The motion is shown once by itself, unless the reader's system asks for calm.
+if (!at && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.run(true);

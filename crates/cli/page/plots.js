@@ -1,0 +1,334 @@
+"use strict";
+// The plots: joint positions, velocities and torques over time, and the solver's progress.
+
+// Hues that stay apart for the colour-blind and on both backgrounds; red is kept for what is wrong.
+const HUES = {
+  light: ["#2563c9", "#d0700b", "#12805c", "#8b4fd1", "#0a86a8", "#c0307f", "#7d7a10", "#7a5540"],
+  dark: ["#79aefc", "#f5a04c", "#54cf9b", "#bd97ff", "#48cbe6", "#f584bd", "#d3cf55", "#cfa58a"],
+};
+const DASHES = [[], [9, 4], [3, 3], [12, 3, 3, 3]]; // after eight joints the hues come again, dashed
+
+/** Hue and dash of joint j. */
+function strokeOf(j) {
+  const hues = HUES[matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"];
+  return { colour: hues[j % hues.length], dash: DASHES[Math.floor(j / hues.length) % DASHES.length] };
+}
+
+/** The three quantities: unit, limits and values of each joint. */
+function quantitiesOf(data) {
+  const rate = (unit) => `${unit}/s`;
+  const effort = (unit) => (unit === "m" ? "N" : "N·m");
+  return [
+    { id: "q", what: "position", rows: data.q, unit: (u) => u, limits: (joint) => [joint.lower, joint.upper] },
+    { id: "v", what: "velocity", rows: data.v, unit: rate, limits: ({ velocity: m }) => [m == null ? null : -m, m] },
+    { id: "tau", what: "torque", rows: data.tau, unit: effort, limits: ({ effort: m }) => [m == null ? null : -m, m], held: true },
+  ];
+}
+
+/** Where `value` lies between its limits: −1 at the lower, 1 at the upper; null where there are none. */
+function shareOf(value, [lower, upper]) {
+  if (value == null || lower == null || upper == null || upper <= lower) return null;
+  return (2 * value - lower - upper) / (upper - lower);
+}
+
+function axis(more) {
+  const font = "12px system-ui, sans-serif";
+  return { stroke: css("--muted"), grid: { stroke: css("--line"), width: 1 }, ticks: { stroke: css("--line"), width: 1, size: 5 },
+    font, labelFont: font, labelGap: 2, gap: 4, ...more };
+}
+
+/**
+ * The three plots over time.
+ * `on.seek(t)`: the pointer is at time t; `on.hold(yes)`: it is over a plot; `on.focus(j)`: it is near joint j's curve, or null.
+ */
+function makePlots(data, on) {
+  const joints = data.joints, times = data.times, last = times.length - 1;
+  const quantities = quantitiesOf(data);
+  const mixed = new Set(joints.map((joint) => joint.unit)).size > 1; // metres and radians: an axis for each
+  const hidden = new Set();
+  let inShares = false, focus = null, plots = [], now = times[0], zoom = null;
+
+  // A torque acts from its knot to the next: the last one is drawn to the end of the motion.
+  const valueAt = (quantity, k, j) => quantity.rows[Math.min(k, quantity.rows.length - 1)]?.[j] ?? null;
+
+  function build(quantity) {
+    const host = document.getElementById(`plot-${quantity.id}`);
+    const columns = joints.map((joint, j) => times.map((_, k) => {
+      const value = valueAt(quantity, k, j);
+      if (!inShares) return value;
+      const share = shareOf(value, quantity.limits(joint));
+      return share == null ? null : 100 * share;
+    }));
+    const scaleOf = (joint) => (inShares || joint.unit === joints[0].unit ? "y" : "y2");
+    const inScale = (key) => joints.map((joint, j) => j).filter((j) => scaleOf(joints[j]) === key);
+
+    // All the curves that are shown, and their limits as long as these do not flatten the curves.
+    function range(key) {
+      let low = Infinity, high = -Infinity;
+      const take = (y) => { if (y != null) { low = Math.min(low, y); high = Math.max(high, y); } };
+      const shown = inScale(key).filter((j) => !hidden.has(j));
+      for (const j of shown) columns[j].forEach(take);
+      if (inShares) [-100, 100].forEach(take);
+      else {
+        const reach = 3 * Math.max(Math.abs(low), Math.abs(high));
+        for (const j of shown) for (const limit of quantity.limits(joints[j])) if (Math.abs(limit) <= reach) take(limit);
+      }
+      if (!(low <= high)) return [-1, 1];
+      // Two axes side by side share their zero, where zero means rest.
+      if (mixed && quantity.id !== "q") low = -(high = Math.max(high, -low));
+      const room = 0.05 * (high - low) || 0.1 * Math.abs(high) || 1;
+      return [low - room, high + room];
+    }
+
+    function drawLimits(u) {
+      const { ctx } = u, { left, top, width, height } = u.bbox, ratio = devicePixelRatio;
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(left, top, width, height);
+      ctx.clip();
+      const line = (value, scale) => {
+        const y = Math.round(u.valToPos(value, scale, true)) + 0.5;
+        ctx.beginPath();
+        ctx.moveTo(left, y);
+        ctx.lineTo(left + width, y);
+        ctx.stroke();
+      };
+      ctx.lineWidth = 1.25 * ratio;
+      ctx.setLineDash([5 * ratio, 4 * ratio]);
+      if (inShares) {
+        ctx.fillStyle = css("--bad");
+        ctx.globalAlpha = 0.07;
+        const upper = u.valToPos(100, "y", true), lower = u.valToPos(-100, "y", true);
+        ctx.fillRect(left, top, width, upper - top);
+        ctx.fillRect(left, lower, width, top + height - lower);
+        ctx.globalAlpha = 0.8;
+        ctx.strokeStyle = css("--bad");
+        line(100, "y");
+        line(-100, "y");
+      } else {
+        joints.forEach((joint, j) => {
+          if (hidden.has(j)) return;
+          ctx.strokeStyle = strokeOf(j).colour;
+          ctx.globalAlpha = focus == null ? 0.55 : focus === j ? 1 : 0.1;
+          for (const limit of quantity.limits(joint)) if (limit != null) line(limit, scaleOf(joint));
+        });
+      }
+      ctx.restore();
+    }
+
+    // Knots outside of the limits, marked whatever the scale.
+    function drawBreaches(u) {
+      const { ctx } = u, ratio = devicePixelRatio;
+      ctx.save();
+      ctx.setLineDash([]); // a dashed curve leaves its own
+      ctx.fillStyle = css("--bad");
+      ctx.strokeStyle = css("--card");
+      ctx.lineWidth = 1.5 * ratio;
+      for (const { what, joint: name, at_knot: k } of data.violations) {
+        const j = joints.findIndex((joint) => joint.name === name);
+        if (what !== quantity.what || j < 0 || hidden.has(j) || columns[j][k] == null) continue;
+        ctx.beginPath();
+        ctx.arc(u.valToPos(times[k], "x", true), u.valToPos(columns[j][k], scaleOf(joints[j]), true), 4.5 * ratio, 0, 7);
+        ctx.fill();
+        ctx.stroke();
+      }
+      ctx.restore();
+    }
+
+    const label = (unit) => `${quantity.what} (${inShares ? "% of limit" : quantity.unit(unit)})`;
+    const second = mixed && joints.find((joint) => joint.unit !== joints[0].unit)?.unit;
+    const axes = [
+      axis({ label: "time (s)", labelSize: 18, size: 26 }),
+      axis({ scale: "y", label: label(joints[0]?.unit ?? ""), labelSize: 20, size: 50 }),
+    ];
+    if (mixed) axes.push(axis({ scale: inShares ? "y" : "y2", side: 1, size: 50, labelSize: 20, label: inShares ? " " : label(second), grid: { show: false }, ...(inShares && { values: () => [], ticks: { show: false } }) }));
+
+    const u = new uPlot({
+      width: host.clientWidth || 600,
+      height: 216,
+      legend: { show: false },
+      padding: [8, mixed ? 0 : 12, 0, 0],
+      scales: {
+        x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) },
+        y: { range: () => range("y") },
+        ...(mixed && !inShares && { y2: { range: () => range("y2") } }),
+      },
+      focus: { alpha: 0.18 },
+      cursor: {
+        y: false,
+        focus: { prox: -1 },
+        points: { size: 7 },
+        drag: { x: true, y: false, dist: 6 },
+        bind: { mouseleave: () => () => null }, // the cursor is the playback's: it stays when the pointer goes
+      },
+      axes,
+      series: [{}, ...joints.map((joint, j) => {
+        const { colour, dash } = strokeOf(j);
+        return { label: joint.name, scale: scaleOf(joint), stroke: colour, width: 2, pxAlign: 0, dash, show: !hidden.has(j), points: { show: last < 2 },
+          ...(quantity.held && { paths: uPlot.paths.stepped({ align: 1 }) }) };
+      })],
+      hooks: {
+        drawAxes: [drawLimits],
+        draw: [drawBreaches],
+        setScale: [(self, key) => { if (key === "x") follow(self); }],
+      },
+    }, [times, ...columns], host);
+    host.setAttribute("aria-label", `${quantity.what} of ${joints.length} joints over ${times[last].toFixed(2)} s, with their limits. The joint table has the numbers at the time of the playback.`);
+    wire(u, quantity, columns, scaleOf);
+    return u;
+  }
+
+  function wire(u, quantity, columns, scaleOf) {
+    const tag = document.createElement("div");
+    tag.className = "tag";
+    tag.hidden = true;
+    u.over.append(tag);
+    const point = (event) => {
+      const box = u.over.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
+      const t = u.posToVal(Math.min(Math.max(x, 0), box.width), "x");
+      on.seek(t);
+      const { k, s } = knotAt(times, t);
+      let near = null, distance = 16;
+      joints.forEach((joint, j) => {
+        if (hidden.has(j) || columns[j][k] == null) return;
+        const slope = quantity.held ? 0 : (columns[j][Math.min(k + 1, last)] - columns[j][k]) * s;
+        const d = Math.abs(u.valToPos(columns[j][k] + slope, scaleOf(joint)) - y);
+        if (d < distance) [near, distance] = [j, d];
+      });
+      on.focus(near);
+      tag.hidden = near == null;
+      if (near == null) return;
+      tag.style.setProperty("--tint", strokeOf(near).colour);
+      const unit = quantity.unit(joints[near].unit);
+      tag.textContent = `${joints[near].name}  ${number(valueAt(quantity, k, near))} ${unit}`;
+      const left = x + 14 + tag.offsetWidth < box.width ? x + 14 : x - 14 - tag.offsetWidth;
+      tag.style.transform = `translate(${left}px, ${Math.min(Math.max(y - 32, 0), box.height - 26)}px)`;
+    };
+    u.over.addEventListener("pointerenter", () => on.hold(true));
+    u.over.addEventListener("pointerdown", (event) => { on.hold(true); point(event); });
+    u.over.addEventListener("pointermove", point);
+    for (const leave of ["pointerleave", "pointercancel"]) {
+      u.over.addEventListener(leave, () => { tag.hidden = true; on.focus(null); on.hold(false); });
+    }
+  }
+
+  // One zoom for all: a part of the motion is looked at in every quantity.
+  function follow(from) {
+    if (!plots.includes(from)) return;
+    const { min, max } = from.scales.x;
+    zoom = min > times[0] || max < times[last] ? { min, max } : null;
+    for (const u of plots) if (u !== from) u.setScale("x", { min, max }); // ends there: equal scales call no hook
+    show(now);
+  }
+
+  /** Puts the cursor of every plot at time t. */
+  function show(t) {
+    now = t;
+    for (const u of plots) {
+      const left = u.valToPos(t, "x");
+      u.setCursor({ left: left < 0 || left > u.over.clientWidth + 0.5 ? -10 : left, top: u.over.clientHeight / 2 }, false);
+    }
+  }
+
+  function rebuild() {
+    const kept = zoom;
+    for (const u of plots) u.destroy();
+    plots = [];
+    plots = quantities.map(build);
+    if (kept) plots[0].setScale("x", kept);
+    show(now);
+  }
+  new ResizeObserver(() => {
+    for (const u of plots) u.setSize({ width: u.root.parentElement.clientWidth, height: u.height });
+    show(now);
+  }).observe(document.getElementById("plot-q"));
+  rebuild();
+
+  return {
+    show,
+    rebuild,
+    quantities,
+    valueAt,
+    /** Draws every quantity in its unit, or all joints between the same two limits. */
+    scale(shares) { inShares = shares; rebuild(); },
+    /** Shows the joints that `visible(j)` names. */
+    filter(visible) {
+      joints.forEach((_, j) => {
+        visible(j) ? hidden.delete(j) : hidden.add(j);
+        for (const u of plots) if (u.series[j + 1].show === hidden.has(j)) u.setSeries(j + 1, { show: !hidden.has(j) });
+      });
+    },
+    /** Brings joint j forward, or none. */
+    focus(j) {
+      if (j === focus) return;
+      focus = j;
+      for (const u of plots) {
+        u.setSeries(j == null ? null : j + 1, { focus: true });
+        u.redraw(false); // the limits follow the focus
+      }
+    },
+  };
+}
+
+/** Cost and gap over the iterations, on logarithmic scales. `on.pick(i)`: the pointer is at row i, or null. */
+function makeProgress(iterations, on) {
+  const host = document.getElementById("plot-iterations");
+  const x = iterations.map((row) => row.iteration);
+  // A closed gap is zero, which no logarithm shows: it is drawn one decade under the smallest other value.
+  const logarithmic = (values) => {
+    const positive = values.filter((y) => y > 0);
+    if (!positive.length) return { values, log: false };
+    if (values.some((y) => y < 0)) return { values, log: false };
+    const floor = 10 ** (Math.floor(Math.log10(Math.min(...positive))) - 1);
+    return { values: values.map((y) => (y === 0 ? floor : y)), log: true, floor: values.includes(0) ? floor : null };
+  };
+  const series = [["cost", "--accent"], ["gap", "--target"]].map(([key, tint]) => ({ key, tint, ...logarithmic(iterations.map((row) => row[key] ?? null)) }));
+  let u = null;
+
+  function rebuild() {
+    u?.destroy();
+    const scale = ({ values, log }) => {
+      const known = values.filter((y) => y != null);
+      if (!known.length) return { range: [0, 1] };
+      const low = Math.min(...known), high = Math.max(...known);
+      if (!log) return { range: [low - 0.05 * (high - low || 1), high + 0.05 * (high - low || 1)] };
+      const bottom = Math.floor(Math.log10(low) + 1e-9), top = Math.max(Math.ceil(Math.log10(high) - 1e-9), bottom + 1);
+      return { distr: 3, log: 10, range: [10 ** bottom, 10 ** top] };
+    };
+    // Whole decades only, as many as there is room for; the value that stands for zero says so.
+    const decades = ({ floor }) => (_, splits) => {
+      const whole = splits.map((y) => (y > 0 ? Math.log10(y) : NaN)).map((e) => (Math.abs(e - Math.round(e)) < 1e-6 ? Math.round(e) : null));
+      const exponents = whole.filter((e) => e != null);
+      const every = Math.max(1, Math.ceil((exponents.at(-1) - exponents[0]) / 6));
+      return whole.map((e, i) => (e == null ? "" : floor != null && Math.abs(splits[i] / floor - 1) < 1e-6 ? "0" : (e - exponents.at(-1)) % every ? "" : `10${superscript(e)}`));
+    };
+    const vertical = (s, more) => axis({ scale: s.key, label: s.key, labelSize: 20, size: 48, stroke: css(s.tint), ...(s.log && { values: decades(s), space: 1 }), ...more });
+    u = new uPlot({
+      width: host.clientWidth || 600,
+      height: 240,
+      legend: { show: false },
+      padding: [8, 0, 0, 0],
+      scales: {
+        x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 1, low + 1]) },
+        cost: scale(series[0]),
+        gap: scale(series[1]),
+      },
+      cursor: { y: false, drag: { x: false, y: false }, points: { size: 8 } },
+      axes: [
+        axis({ label: "iteration", labelSize: 18, size: 26, incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] }),
+        vertical(series[0], { grid: { stroke: css("--line"), width: 1, filter: wholeDecades(series[0]) }, ticks: { show: false } }),
+        vertical(series[1], { side: 1, gap: 9, grid: { show: false }, ticks: { show: false } }),
+      ],
+      series: [{}, ...series.map(({ key, tint }) => ({ label: key, scale: key, stroke: css(tint), width: 2.25, pxAlign: 0, points: { show: x.length <= 80, size: 6, fill: css(tint) } }))],
+      hooks: { setCursor: [(self) => on.pick(self.cursor.left >= 0 ? self.cursor.idx : null)] },
+    }, [x, ...series.map((s) => s.values)], host);
+  }
+  const wholeDecades = ({ log }) => (_, splits) => (log ? splits.map((y) => (Math.abs(Math.log10(y) - Math.round(Math.log10(y))) < 1e-6 ? y : null)) : splits);
+
+  host.setAttribute("aria-label", `Cost and gap over ${iterations.length} iterations, on logarithmic scales. The table below has the numbers.`);
+  rebuild();
+  new ResizeObserver(() => u.setSize({ width: host.clientWidth, height: u.height })).observe(host);
+  return { rebuild };
+}
+
+const superscript = (n) => [...String(n)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");

@@ -1,0 +1,286 @@
+"use strict";
+// The 3-D playback. World frame as in the data: metres, z up.
+
+/** Draws `data.scene` into `host`. Returns what the player needs of it; throws where the browser offers no WebGL. */
+function makeScene(data, host) {
+  const { bodies, poses, trail } = data.scene;
+  const renderer = new THREE.WebGLRenderer({ antialias: true });
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  renderer.shadowMap.enabled = true;
+  renderer.shadowMap.type = THREE.PCFShadowMap;
+  const canvas = renderer.domElement;
+  canvas.tabIndex = 0;
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", `${data.robot} in motion. Drag to turn, right button to move, wheel to zoom; by keyboard Shift and the arrow keys turn, plus and minus zoom.`);
+  host.prepend(canvas);
+
+  const scene = new THREE.Scene();
+  scene.fog = new THREE.Fog(0, 1, 10);
+  const camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
+  camera.up.set(0, 0, 1);
+  const controls = new THREE.OrbitControls(camera, canvas);
+  controls.maxPolarAngle = Math.PI * 0.62;
+
+  // --- extent of the whole motion: it sizes camera, light, floor and markers, so that a gripper and a humanoid both fit
+  const { cloud, lowest } = cloudOf(data);
+  const box = new THREE.Box3().setFromPoints(cloud);
+  const centre = box.getCenter(new THREE.Vector3());
+  const size = Math.max(box.getSize(new THREE.Vector3()).length(), 1e-3);
+  // A robot on the ground stands on z = 0; one that swings below it must not be cut by the floor.
+  const floorZ = lowest < -0.05 * size ? lowest - 0.04 * size : 0;
+  controls.minDistance = 0.2 * size;
+  controls.maxDistance = 8 * size;
+  camera.near = 0.02 * size;
+  camera.far = 30 * size;
+
+  // --- light: a soft room, one lamp that casts shadows
+  const environment = new THREE.PMREMGenerator(renderer);
+  scene.environment = environment.fromScene(new THREE.RoomEnvironment(), 0.04).texture;
+  scene.environmentRotation.x = Math.PI / 2; // the room is y up
+  environment.dispose();
+  const lamp = new THREE.DirectionalLight(0xffffff, 1.3);
+  lamp.position.copy(centre).add(new THREE.Vector3(0.5, -0.45, 1.3).multiplyScalar(size));
+  lamp.target.position.copy(centre);
+  lamp.castShadow = true;
+  lamp.shadow.mapSize.set(2048, 2048);
+  lamp.shadow.radius = 5;
+  lamp.shadow.normalBias = 0.004 * size;
+  Object.assign(lamp.shadow.camera, { left: -size, right: size, top: size, bottom: -size, near: 0.05 * size, far: 4 * size });
+  scene.add(lamp, lamp.target);
+
+  // --- floor: lines every decimetre or so, fading into the background, and the robot's shadow
+  const pitch = 10 ** Math.round(Math.log10(size / 8));
+  const grid = new THREE.LineSegments(gridGeometry(pitch, 60), new THREE.LineBasicMaterial());
+  grid.position.set(Math.round(centre.x / pitch) * pitch, Math.round(centre.y / pitch) * pitch, floorZ - 0.002 * size);
+  const ground = new THREE.Mesh(new THREE.PlaneGeometry(20 * size, 20 * size), new THREE.ShadowMaterial());
+  ground.position.set(centre.x, centre.y, floorZ - 0.001 * size);
+  ground.receiveShadow = true;
+  scene.add(grid, ground);
+
+  // --- the robot: one group per body, posed at every frame
+  const themed = []; // [material, name of its colour in the style sheet]
+  const paint = (kind) => {
+    const material = new THREE.MeshStandardMaterial({ roughness: 0.5, metalness: 0.05 });
+    themed.push([material, kind === "sphere" ? "--ball" : "--bone"]);
+    return material;
+  };
+  const materials = {}; // one per colour, not one per shape
+  const groups = bodies.map((body) => {
+    const group = new THREE.Group();
+    for (const shape of body.shapes) {
+      const geometry = geometryOf(shape);
+      if (!geometry) continue;
+      const material = materials[shape.color ?? shape.kind] ??= shape.color
+        ? new THREE.MeshStandardMaterial({ color: shape.color, roughness: 0.5, metalness: 0.05 })
+        : paint(shape.kind);
+      const mesh = new THREE.Mesh(geometry, material);
+      if (shape.position) mesh.position.fromArray(shape.position);
+      if (shape.quaternion) mesh.quaternion.fromArray(shape.quaternion);
+      mesh.castShadow = mesh.receiveShadow = true;
+      group.add(mesh);
+    }
+    scene.add(group);
+    return group;
+  });
+
+  // --- path of the end-effector: all of it faint, what has been travelled strong
+  const tip = new THREE.Mesh(new THREE.SphereGeometry(0.009 * size, 24, 16), new THREE.MeshBasicMaterial());
+  let travelled = null;
+  if (trail && trail.length > 1) {
+    const flat = trail.flat();
+    const path = (opacity) => {
+      const geometry = new THREE.LineGeometry().setPositions(flat);
+      const material = new THREE.LineMaterial({ linewidth: 3, transparent: opacity < 1, opacity });
+      themed.push([material, "--accent"]);
+      const line = new THREE.Line2(geometry, material);
+      scene.add(line);
+      return geometry;
+    };
+    path(0.3);
+    travelled = path(1);
+    themed.push([tip.material, "--accent"]);
+    scene.add(tip);
+  }
+
+  // --- target: a dot in three rings, seen from every side
+  if (data.target) {
+    const material = new THREE.MeshBasicMaterial();
+    themed.push([material, "--target"]);
+    const mark = new THREE.Group();
+    mark.add(new THREE.Mesh(new THREE.SphereGeometry(0.007 * size, 24, 16), material));
+    const ring = new THREE.TorusGeometry(0.024 * size, 0.0016 * size, 8, 48);
+    for (const [x, y] of [[0, 0], [Math.PI / 2, 0], [0, Math.PI / 2]]) {
+      const mesh = new THREE.Mesh(ring, material);
+      mesh.rotation.set(x, y, 0);
+      mark.add(mesh);
+    }
+    mark.position.fromArray(data.target);
+    scene.add(mark);
+  }
+
+  // --- drawing, only when something has changed
+  let asked = false;
+  function redraw() {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      const distance = camera.position.distanceTo(controls.target);
+      scene.fog.near = distance + 0.3 * size;
+      scene.fog.far = distance + 2.6 * size;
+      renderer.render(scene, camera);
+    });
+  }
+
+  const q0 = new THREE.Quaternion(), q1 = new THREE.Quaternion(), p1 = new THREE.Vector3();
+  /** Poses the robot between knot k and the next one, at the fraction s of the way. */
+  function show(k, s) {
+    const next = Math.min(k + 1, poses.length - 1);
+    groups.forEach((group, b) => {
+      const from = poses[k][b], to = poses[next][b];
+      group.position.fromArray(from).lerp(p1.fromArray(to), s);
+      group.quaternion.slerpQuaternions(q0.fromArray(from, 3), q1.fromArray(to, 3), s);
+    });
+    if (travelled) {
+      tip.position.fromArray(trail[k]).lerp(p1.fromArray(trail[Math.min(k + 1, trail.length - 1)]), s);
+      travelled.instanceCount = k; // segments
+    }
+    redraw();
+  }
+
+  /** Looks at the whole motion from the front right, as near as it fits. */
+  function reset() {
+    moved = false;
+    const back = new THREE.Vector3(1, -1.15, 0.62).normalize(); // from the robot to the camera
+    const right = new THREE.Vector3(0, 0, 1).cross(back).normalize();
+    const up = back.clone().cross(right);
+    const tanV = Math.tan((camera.fov * Math.PI) / 360), tanH = tanV * camera.aspect;
+    let distance = 0;
+    for (const point of cloud) {
+      const d = point.clone().sub(centre);
+      distance = Math.max(distance, d.dot(back) + Math.max(Math.abs(d.dot(right)) / tanH, Math.abs(d.dot(up)) / tanV));
+    }
+    controls.target.copy(centre);
+    camera.position.copy(centre).addScaledVector(back, 1.12 * distance);
+    controls.update();
+    redraw();
+  }
+
+  // The page must stay scrollable under wheel and finger: the wheel zooms once the view has been clicked, and a finger
+  // turns it sideways (two fingers move and zoom).
+  canvas.style.touchAction = "pan-y";
+  canvas.addEventListener("wheel", (event) => { if (document.activeElement !== canvas) event.stopImmediatePropagation(); }, { capture: true });
+
+  let moved = false; // by the user: then a new size of the window keeps the view
+  controls.addEventListener("start", () => { moved = true; });
+  controls.addEventListener("change", redraw);
+  canvas.addEventListener("keydown", (event) => {
+    const turn = event.shiftKey && { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    const zoom = { "+": 0.9, "=": 0.9, "-": 1 / 0.9 }[event.key];
+    if (!turn && !zoom) return;
+    event.preventDefault();
+    moved = true;
+    const arm = camera.position.clone().sub(controls.target).multiplyScalar(zoom || 1);
+    if (turn) {
+      arm.applyAxisAngle(camera.up, 0.1 * turn[0]);
+      const polar = arm.angleTo(camera.up), side = camera.up.clone().cross(arm).normalize();
+      arm.applyAxisAngle(side, Math.min(Math.max(polar + 0.1 * turn[1], 0.05), controls.maxPolarAngle) - polar);
+    }
+    camera.position.copy(controls.target).add(arm);
+    controls.update();
+  });
+
+  /** Takes the colours of the style sheet, light or dark. */
+  function recolour() {
+    scene.background = scene.fog.color = new THREE.Color(css("--sky"));
+    grid.material.color.set(css("--floor"));
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    ground.material.opacity = dark ? 0.4 : 0.16;
+    scene.environmentIntensity = dark ? 0.4 : 0.55;
+    for (const [material, name] of themed) material.color.set(css(name));
+    redraw();
+  }
+
+  new ResizeObserver(() => {
+    const { clientWidth: width, clientHeight: height } = host;
+    if (!width || !height) return;
+    renderer.setSize(width, height, false);
+    camera.aspect = width / height;
+    camera.updateProjectionMatrix();
+    moved ? redraw() : reset();
+  }).observe(host);
+
+  recolour();
+  reset();
+  return { show, reset, recolour };
+}
+
+/**
+ * Points that enclose the motion: origins and shapes of the bodies at some knots, the path, the target;
+ * and the height of the lowest middle of a shape, which says whether the robot stays above the ground.
+ */
+function cloudOf({ scene: { bodies, poses, trail }, target }) {
+  const points = [...(trail ?? []), ...(target ? [target] : [])].map((p) => new THREE.Vector3().fromArray(p));
+  const q = new THREE.Quaternion(), o = new THREE.Vector3();
+  let lowest = 0;
+  const stride = Math.max(1, Math.floor(poses.length / 24));
+  for (let k = 0; k < poses.length; k += stride) {
+    bodies.forEach((body, b) => {
+      o.fromArray(poses[k][b]);
+      q.fromArray(poses[k][b], 3);
+      if (body.shapes.length || b === 0) points.push(o.clone());
+      for (const { kind, size, position } of body.shapes) {
+        const middle = new THREE.Vector3().fromArray(kind === "segment" ? size : position ?? [0, 0, 0], kind === "segment" ? 3 : 0);
+        middle.applyQuaternion(q).add(o);
+        lowest = Math.min(lowest, middle.z);
+        const reach = { box: Math.hypot(...size) / 2, sphere: size[0], cylinder: Math.hypot(size[0], size[1] / 2), capsule: size[0] + size[1] / 2, segment: size[6] }[kind] ?? 0;
+        points.push(middle.clone().addScalar(reach), middle.addScalar(-reach));
+      }
+    });
+  }
+  return { cloud: points, lowest };
+}
+
+/** The geometry of a shape of the data, or nothing where it has no extent. */
+function geometryOf({ kind, size }) {
+  switch (kind) {
+    case "box": return new THREE.BoxGeometry(...size);
+    case "sphere": return new THREE.SphereGeometry(size[0], 40, 24);
+    // three.js draws these along y; the data has them along z, as a URDF does
+    case "cylinder": return new THREE.CylinderGeometry(size[0], size[0], size[1], 40).rotateX(Math.PI / 2);
+    case "capsule": return new THREE.CapsuleGeometry(size[0], size[1], 12, 32).rotateX(Math.PI / 2);
+    case "segment": return boneGeometry(size);
+    default: return null;
+  }
+}
+
+/** A round bone from one point to another, a little thinner at its far end: it shows which way the chain runs. */
+function boneGeometry([ax, ay, az, bx, by, bz, radius]) {
+  const from = new THREE.Vector3(ax, ay, az), along = new THREE.Vector3(bx, by, bz).sub(from);
+  const length = along.length();
+  if (length < 1e-9) return null;
+  const far = 0.68 * radius, outline = [];
+  for (let i = 0; i <= 10; i++) {
+    const a = (Math.PI / 2) * (i / 10);
+    outline.push(new THREE.Vector2(radius * Math.sin(a), -radius * Math.cos(a)));
+  }
+  for (let i = 0; i <= 10; i++) {
+    const a = (Math.PI / 2) * (i / 10);
+    outline.push(new THREE.Vector2(far * Math.cos(a), length + far * Math.sin(a)));
+  }
+  const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.normalize());
+  return new THREE.LatheGeometry(outline, 28).applyQuaternion(turn).translate(ax, ay, az);
+}
+
+/** A square grid in the plane z = 0, cut into cells so that the fog takes each by its own distance. */
+function gridGeometry(pitch, cells) {
+  const points = [], half = (cells / 2) * pitch;
+  for (let i = 0; i <= cells; i++) {
+    const x = i * pitch - half;
+    for (let j = 0; j < cells; j++) {
+      const y = j * pitch - half;
+      points.push(x, y, 0, x, y + pitch, 0, y, x, 0, y + pitch, x, 0);
+    }
+  }
+  return new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+}

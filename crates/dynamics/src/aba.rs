@@ -1,0 +1,200 @@
+//! Forward dynamics by the articulated-body algorithm.
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1; in the world's frame, where children are
+//! added to their parent without a change of coordinates. A joint of several degrees of freedom is a chain of joints
+//! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
+//! matrix is inverted.
+
+use crate::cholesky;
+use crate::data::{Data, Size, check, check_forces};
+use crate::kinematics::{World, place};
+use crate::layout::{Layout, Single};
+use crate::model::Model;
+use crate::{crba::crba, rnea::rnea};
+use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
+
+/// In the world's frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace<S> {
+    /// Rigid inertia. Shape: bodies. Written by: `factorize`.
+    I: Vec<Inertia<S>>,
+    /// Articulated inertia. Shape: bodies. Written by: `factorize`.
+    IA: Vec<ArticulatedInertia<S>>,
+    /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`.
+    pub U: Vec<Force<S>>,
+    /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`.
+    pub D_inv: Vec<S>,
+    /// Velocity. Shape: bodies. Written by: `pass`.
+    v: Vec<Motion<S>>,
+    /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
+    a: Vec<Motion<S>>,
+    /// v × v_J. Shape: bodies. Written by: `pass`.
+    c: Vec<Motion<S>>,
+    /// Articulated bias force. Shape: bodies. Written by: `pass`.
+    pA: Vec<Force<S>>,
+    /// τ − Sᵀ pᴬ. Shape: columns. Written by: `pass`.
+    u: Vec<S>,
+    /// Joint accelerations. Shape: nv. Written by: `pass`.
+    qdd: Vec<S>,
+    /// A factor of M, of robots whose joints share coordinates. Shape: nv × nv. Written by: `by_inertia_matrix`.
+    factor: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            I: vec![Inertia::zero(); size.bodies],
+            IA: vec![ArticulatedInertia::zero(); size.bodies],
+            U: vec![Force::zero(); size.columns],
+            D_inv: vec![S::zero(); size.columns],
+            v: vec![Motion::zero(); size.bodies],
+            a: vec![Motion::zero(); size.bodies],
+            c: vec![Motion::zero(); size.bodies],
+            pA: vec![Force::zero(); size.bodies],
+            u: vec![S::zero(); size.columns],
+            qdd: vec![S::zero(); size.nv],
+            factor: if size.columns == size.nv { Vec::new() } else { vec![S::zero(); size.nv * size.nv] },
+        }
+    }
+}
+
+impl<S> Workspace<S> {
+    pub(crate) fn qdd(&self) -> &[S] {
+        &self.qdd
+    }
+}
+
+/// Places the bodies and eliminates all degrees of freedom from the tips to the root: what depends on q alone.
+#[inline(always)]
+pub(crate) fn factorize<L: Layout>(l: &L, w: &mut World<L::S>, d: &mut Workspace<L::S>, q: &[L::S]) {
+    place(l, w, q);
+    let Workspace { I, IA, U, D_inv, .. } = d;
+    for i in l.bodies() {
+        I[i] = w.oX[i].act(l.inertia(i));
+        IA[i] = I[i].into();
+    }
+    for i in l.bodies().rev() {
+        let mut Ia = IA[i];
+        for k in (0..l.joint(i).nv()).rev() {
+            let c = l.slot(i) + k;
+            U[c] = Ia * w.S[c]; // U = Iᴬ S
+            D_inv[c] = (w.S[c].dot(U[c]) + l.armature(i, k)).recip(); // D = Sᵀ U
+            Ia = Ia.minus_outer(U[c], D_inv[c]); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
+        }
+        IA[i] = Ia; // from here on Iᵃ, what the parent feels
+        l.push(IA, i, Ia); // Iᴬ_λ += Iᵃ
+    }
+}
+
+/// The whole algorithm.
+#[inline(always)]
+fn pass<L: Layout>(
+    l: &L,
+    w: &mut World<L::S>,
+    d: &mut Workspace<L::S>,
+    q: &[L::S],
+    qd: &[L::S],
+    tau: &[L::S],
+    f_ext: &[Force<L::S>],
+) {
+    factorize(l, w, d, q);
+    let Workspace { I, IA, U, D_inv, v, a, c, pA, u, qdd, .. } = d;
+    let (oX, S) = (&w.oX, &w.S);
+    for i in l.bodies() {
+        let mut vJ = Motion::zero();
+        for k in 0..l.joint(i).nv() {
+            vJ = S[l.slot(i) + k].scale_add(l.load(qd, i, k), vJ); // v_J = S q̇
+        }
+        v[i] = l.parent(v, i) + vJ; // v_i = v_λ + v_J
+        c[i] = v[i].cross(vJ); // c_i = v_i × v_J
+        pA[i] = v[i].cross(I[i] * v[i]); // p_i = v_i ×* I_i v_i
+        if let Some(external) = l.force(f_ext, i) {
+            pA[i] -= oX[i].act(external);
+        }
+    }
+    for i in l.bodies().rev() {
+        let mut pa = pA[i] + IA[i] * c[i]; // pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
+        for k in (0..l.joint(i).nv()).rev() {
+            let s = l.slot(i) + k;
+            u[s] = l.load(tau, i, k) - S[s].dot(pA[i]); // u = τ − Sᵀ pᴬ
+            let x = D_inv[s] * u[s];
+            pA[i] = U[s].scale_add(x, pA[i]);
+            pa = U[s].scale_add(x, pa);
+        }
+        l.push(pA, i, pa); // pᴬ_λ += pᵃ
+    }
+    a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
+    qdd.fill(L::S::zero());
+    for i in l.bodies() {
+        let mut ai = l.parent(a, i) + c[i]; // a' = a_λ + c
+        for k in 0..l.joint(i).nv() {
+            let s = l.slot(i) + k;
+            let x = D_inv[s] * (u[s] - ai.dot(U[s])); // q̈ = D⁻¹ (u − Uᵀ a')
+            l.add(qdd, i, k, x);
+            ai = S[s].scale_add(x, ai); // a = a' + S q̈
+        }
+        a[i] = ai;
+    }
+}
+
+/// M q̈ = τ − h solved with a dense factor of M: the way for joints that share a coordinate.
+fn by_inertia_matrix<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) {
+    crba(model, data, q);
+    data.aba.factor.copy_from_slice(data.crba.matrix().as_slice());
+    data.aba.qdd.fill(S::zero());
+    let zero = core::mem::take(&mut data.aba.qdd);
+    rnea(model, data, q, v, &zero, f_ext);
+    data.aba.qdd = zero;
+    let d = &mut data.aba;
+    for (k, h) in data.rnea.tau().iter().enumerate() {
+        d.qdd[k] = tau[k] - *h;
+    }
+    cholesky::factorize(&mut d.factor, model.nv);
+    cholesky::solve(&d.factor, &mut d.qdd);
+}
+
+/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, in O(n).
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
+/// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
+/// Source: Featherstone (2008), table 7.1. Robots whose joints share a coordinate (mimic) take the way over a factor
+/// of M, O(n³).
+///
+/// ```
+/// use condyle_dynamics::{Data, aba, robots, rnea};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
+/// let a = aba(&arm, &mut data, &q, &v, &tau, &[]).to_vec();
+/// let back = rnea(&arm, &mut data, &q, &v, &a, &[]);
+/// assert!(back.iter().all(|&tau| f64::abs(tau - 1.0) < 1e-10));
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn aba<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> &'d [S] {
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    check("tau", tau.len(), model.nv);
+    check_forces(f_ext.len(), model.nodes.len());
+    if model.has_mimic() {
+        by_inertia_matrix(model, data, q, v, tau, f_ext);
+    } else {
+        pass(&Single::new(model), &mut data.world, &mut data.aba, q, v, tau, f_ext);
+    }
+    &data.aba.qdd
+}

@@ -1,0 +1,117 @@
+//! The derivatives of forward dynamics, by hand.
+//!
+//! M(q) q̈ + h(q, v) = τ holds for every q and v, so with the derivatives of inverse dynamics at that q̈ (Carpentier and
+//! Mansard, *Analytical derivatives of rigid body dynamics algorithms*, 2018, equation 18)
+//!
+//! ```text
+//! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
+//! ```
+
+use crate::aba::aba;
+use crate::data::{Data, Size};
+use crate::layout::Single;
+use crate::minv::{self, minv};
+use crate::model::Model;
+use crate::rnea_derivatives;
+use condyle_spatial::{Constant, Force, Scalar};
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace<S> {
+    /// The acceleration. Shape: nv. Written by: `aba_derivatives`.
+    a: Vec<S>,
+    /// Shape: nv × nv. Written by: `aba_derivatives`.
+    da_dq: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `aba_derivatives`.
+    da_dv: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square }
+    }
+}
+
+/// C = −A B, of square matrices; four columns of A at a time, so that C is loaded and stored a quarter as often.
+#[inline(always)]
+fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], n: usize) {
+    for j in 0..n {
+        let (b, c) = (&B[j * n..(j + 1) * n], &mut C[j * n..(j + 1) * n]);
+        c.fill(S::zero());
+        let mut k = 0;
+        while k + 4 <= n {
+            let (b0, b1, b2, b3) = (-b[k], -b[k + 1], -b[k + 2], -b[k + 3]);
+            let (a0, rest) = A[k * n..(k + 4) * n].split_at(n);
+            let (a1, rest) = rest.split_at(n);
+            let (a2, a3) = rest.split_at(n);
+            for i in 0..n {
+                c[i] = a0[i].mul_add(b0, a1[i].mul_add(b1, a2[i].mul_add(b2, a3[i].mul_add(b3, c[i]))));
+            }
+            k += 4;
+        }
+        for k in k..n {
+            let (a, b) = (&A[k * n..(k + 1) * n], -b[k]);
+            for i in 0..n {
+                c[i] = a[i].mul_add(b, c[i]);
+            }
+        }
+    }
+}
+
+/// q̈ = aba(q, v, τ) and its derivatives, each a full nv × nv matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct AbaDerivatives<'d, S> {
+    /// q̈ itself, nv numbers.
+    pub a: &'d [S],
+    /// ∂q̈/∂q in the tangent space: the change of q̈ when q moves to q ⊕ δ, per δ.
+    pub da_dq: &'d DMatrix<S>,
+    /// ∂q̈/∂v.
+    pub da_dv: &'d DMatrix<S>,
+    /// ∂q̈/∂τ = M(q)⁻¹.
+    pub da_dtau: &'d DMatrix<S>,
+}
+
+/// [`aba`](crate::aba) and its derivatives with respect to q, v and τ, exact.
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
+/// Returns q̈ and three nv × nv matrices, in O(n · depth) for what goes into them and O(n³) for the products with M⁻¹.
+/// Allocates nothing. Source: Carpentier and Mansard (2018), equation 18.
+///
+/// ```
+/// use condyle_dynamics::{Data, aba_derivatives, minv, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
+/// let da_dtau = aba_derivatives(&arm, &mut data, &q, &v, &tau, &[]).da_dtau.clone();
+/// assert_eq!(&da_dtau, minv(&arm, &mut data, &q));
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> AbaDerivatives<'d, S> {
+    let a = aba(model, data, q, v, tau, f_ext);
+    let nv = a.len();
+    let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
+    a_kept.copy_from_slice(data.aba.qdd());
+    if model.has_mimic() {
+        minv(model, data, q);
+    } else {
+        minv::from_factors(model, data); // the factors are those of `aba`
+    }
+    rnea_derivatives::pass(&Single::new(model), &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext);
+    let tau_derivatives = data.rnea_derivatives.view();
+    let d = &mut data.aba_derivatives;
+    d.a = a_kept;
+    let Minv = data.minv.matrix();
+    minus_product(Minv.as_slice(), tau_derivatives.dtau_dq.as_slice(), d.da_dq.as_mut_slice(), nv); // −M⁻¹ ∂τ/∂q
+    minus_product(Minv.as_slice(), tau_derivatives.dtau_dv.as_slice(), d.da_dv.as_mut_slice(), nv); // −M⁻¹ ∂τ/∂v
+    AbaDerivatives { a: &d.a, da_dq: &d.da_dq, da_dv: &d.da_dv, da_dtau: Minv }
+}

@@ -1,0 +1,169 @@
+//! The space of positions: a product of vector spaces and groups, with q ⊕ v on the tangent vectors v.
+
+use crate::data::check;
+use crate::joint::{GroupJacobian, Joint};
+use crate::model::Model;
+use condyle_spatial::Scalar;
+use core::ops::Range;
+use nalgebra::DMatrix;
+
+/// Where a random position lies in a coordinate that has no limits: within this of zero (rad, m).
+const UNLIMITED: f64 = 3.0;
+
+impl<R> Model<R> {
+    /// Each joint that has coordinates of its own, with where they stand in q and in v.
+    fn coordinates(&self) -> impl Iterator<Item = (Joint, Range<usize>, Range<usize>)> + '_ {
+        self.nodes
+            .iter()
+            .skip(1)
+            .filter(|n| n.mimic.is_none())
+            .map(|n| (n.joint, n.idx_q..n.idx_q + n.joint.nq(), n.idx_v..n.idx_v + n.joint.nv()))
+    }
+}
+
+/// The position in which every body is at its joint's frame: zeros, and rotations by nothing.
+///
+/// ```
+/// use condyle_dynamics::{neutral, robots};
+/// assert_eq!(neutral(&robots::quadruped())[..7], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+/// ```
+pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
+    let mut q = vec![0.0; model.nq];
+    for (joint, iq, _) in model.coordinates() {
+        joint.neutral(&mut q[iq]);
+    }
+    q
+}
+
+/// A position drawn uniformly: between its limits, within ±3 (rad, m) where a coordinate has none, over the whole group
+/// for rotations. The result depends on nothing but the model and the generator.
+///
+/// ```
+/// use condyle_dynamics::{random_configuration, robots};
+/// use rand::SeedableRng;
+/// let q = random_configuration(&robots::arm7(), &mut rand::rngs::StdRng::seed_from_u64(1));
+/// assert_eq!(q.len(), 7);
+/// ```
+pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Vec<f64> {
+    let mut q = vec![0.0; model.nq];
+    for (joint, iq, _) in model.coordinates() {
+        let bound = |limits: &[f64], otherwise: f64| -> Vec<f64> {
+            limits.iter().map(|&x| if x.abs() < 1e6 { x } else { otherwise }).collect()
+        };
+        let lower = bound(&model.limits.lower[iq.clone()], -UNLIMITED);
+        let upper = bound(&model.limits.upper[iq.clone()], UNLIMITED);
+        joint.random(rng, &lower, &upper, &mut q[iq]);
+    }
+    q
+}
+
+/// q ⊕ v: the position after moving with the velocity v for one unit of time.
+///
+/// q: nq numbers; v: nv; out: nq. Allocates nothing.
+///
+/// ```
+/// use condyle_dynamics::{difference, integrate, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let (q, v) = (neutral(&quadruped), vec![0.1; 18]);
+/// let (mut moved, mut back) = (vec![0.0; 19], vec![0.0; 18]);
+/// integrate(&quadruped, &q, &v, &mut moved);
+/// difference(&quadruped, &q, &moved, &mut back);
+/// assert!(back.iter().all(|x| (x - 0.1).abs() < 1e-15));
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]) {
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    check("out", out.len(), model.nq);
+    for (joint, iq, iv) in model.coordinates() {
+        joint.integrate(&q[iq.clone()], &v[iv], &mut out[iq]);
+    }
+}
+
+/// q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one.
+///
+/// q0, q1: nq numbers; out: nv. Allocates nothing.
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut [S]) {
+    check("q0", q0.len(), model.nq);
+    check("q1", q1.len(), model.nq);
+    check("out", out.len(), model.nv);
+    for (joint, iq, iv) in model.coordinates() {
+        joint.difference(&q0[iq.clone()], &q1[iq], &mut out[iv]);
+    }
+}
+
+/// Which argument a Jacobian of [`integrate`] is taken with respect to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IntegrateArgument {
+    /// The position q.
+    Position,
+    /// The velocity v.
+    Velocity,
+}
+
+/// ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v, nv × nv, block-diagonal, between tangent spaces; it does not depend on q.
+///
+/// v: nv numbers; J is overwritten. Allocates nothing.
+///
+/// # Panics
+/// If `v` has not nv numbers or `J` is not nv × nv.
+pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
+    let which = match argument {
+        IntegrateArgument::Position => GroupJacobian::Transport,
+        IntegrateArgument::Velocity => GroupJacobian::Exp,
+    };
+    block_diagonal(model, v, which, S::one(), J);
+}
+
+/// Which argument a Jacobian of [`difference`] is taken with respect to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DifferenceArgument {
+    /// The position q₀ that is subtracted.
+    From,
+    /// The position q₁.
+    To,
+}
+
+/// ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁, nv × nv, block-diagonal, between tangent spaces, given d = q₁ ⊖ q₀.
+///
+/// d: nv numbers; J is overwritten. Allocates nothing.
+///
+/// # Panics
+/// If `d` has not nv numbers or `J` is not nv × nv.
+pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
+    let sign = match argument {
+        DifferenceArgument::From => -S::one(), // −J_log(−d)
+        DifferenceArgument::To => S::one(),
+    };
+    block_diagonal(model, d, GroupJacobian::Log, sign, J);
+}
+
+/// sign · J(sign · v), joint by joint.
+fn block_diagonal<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, sign: S, J: &mut DMatrix<S>) {
+    check("v", v.len(), model.nv);
+    assert!(J.shape() == (model.nv, model.nv), "J: expected {0} × {0}, found {1:?}", model.nv, J.shape());
+    J.fill(S::zero());
+    for (joint, _, iv) in model.coordinates() {
+        let mut signed = [S::zero(); 6];
+        for (signed, &v) in signed.iter_mut().zip(&v[iv.clone()]) {
+            *signed = v * sign;
+        }
+        match joint.jacobian(which, &signed[..iv.len()]) {
+            None => iv.for_each(|k| J[(k, k)] = sign),
+            Some(map) => {
+                let columns = map.columns();
+                for (k, &column) in joint.axes().iter().enumerate() {
+                    let column = columns[column].scale(sign).to_array();
+                    for (r, &row) in joint.axes().iter().enumerate() {
+                        J[(iv.start + r, iv.start + k)] = column[row];
+                    }
+                }
+            }
+        }
+    }
+}

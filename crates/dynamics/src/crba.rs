@@ -1,0 +1,83 @@
+//! The joint-space inertia matrix by the composite-rigid-body algorithm.
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2; in the world's frame, where a composite is
+//! a plain sum.
+
+use crate::data::{Data, Size, check};
+use crate::kinematics::place;
+use crate::layout::{Layout, Single};
+use crate::model::Model;
+use condyle_spatial::{Act, Constant, Inertia, Scalar};
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace<S> {
+    /// Inertia of the body and all that it carries, in the world's frame. Shape: bodies. Written by: `pass`.
+    IC: Vec<Inertia<S>>,
+    /// Shape: nv × nv. Written by: `pass`.
+    M: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self { IC: vec![Inertia::zero(); size.bodies], M: DMatrix::from_element(size.nv, size.nv, S::zero()) }
+    }
+}
+
+impl<S> Workspace<S> {
+    pub(crate) fn matrix(&self) -> &DMatrix<S> {
+        &self.M
+    }
+}
+
+/// The whole algorithm.
+#[inline(always)]
+fn pass<L: Layout>(l: &L, data: &mut Data<L::S>, q: &[L::S]) {
+    place(l, &mut data.world, q);
+    let (oX, S) = (&data.world.oX, &data.world.S);
+    let Workspace { IC, M } = &mut data.crba;
+    let M = M.as_mut_slice();
+    M.fill(L::S::zero());
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+    }
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        for k in 0..nv {
+            let F = IC[i] * S[l.slot(i) + k]; // F = Iᶜ S
+            let own = support.len() - nv + k;
+            for &e in &support[..own] {
+                let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
+                l.add_at(M, e, support[own], x);
+                l.add_at(M, support[own], e, x);
+            }
+            l.add_at(M, support[own], support[own], l.at(S, support[own]).dot(F));
+        }
+        let IC_i = IC[i];
+        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+    }
+    l.add_armature(M);
+}
+
+/// M(q), the joint-space inertia matrix: τ = M a + h, kinetic energy ½ vᵀ M v. In O(n · depth).
+///
+/// q: nq numbers. Returns the full symmetric nv × nv matrix, armature included. Allocates nothing.
+/// Source: Featherstone (2008), table 6.2.
+///
+/// ```
+/// use condyle_dynamics::{Data, crba, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let M = crba(&arm, &mut data, &[0.3; 7]);
+/// assert_eq!(M[(0, 6)], M[(6, 0)]);
+/// assert!(M.clone().cholesky().is_some()); // positive definite
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers.
+pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+    check("q", q.len(), model.nq);
+    pass(&Single::new(model), data, q);
+    &data.crba.M
+}

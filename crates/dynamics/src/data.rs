@@ -1,0 +1,76 @@
+//! All that algorithms write: scratch and results.
+
+use crate::kinematics::World;
+use crate::model::Model;
+use crate::{aba, aba_derivatives, crba, minv, rnea, rnea_derivatives};
+use condyle_spatial::Scalar;
+
+/// Scratch and results of every algorithm, for one model and one kind of scalar.
+///
+/// Each algorithm keeps its own workspace, which its file defines, and reads nothing that another left behind, so calls
+/// may come in any order. All memory is allocated here, none later. One `Data` for each thread.
+///
+/// ```
+/// use condyle_dynamics::{Data, robots};
+/// let arm = robots::arm7();
+/// let data = Data::<f64>::new(&arm);
+/// # let _ = data;
+/// ```
+#[derive(Clone, Debug)]
+pub struct Data<S> {
+    pub(crate) world: World<S>,
+    pub(crate) rnea: rnea::Workspace<S>,
+    pub(crate) crba: crba::Workspace<S>,
+    pub(crate) aba: aba::Workspace<S>,
+    pub(crate) minv: minv::Workspace<S>,
+    pub(crate) rnea_derivatives: rnea_derivatives::Workspace<S>,
+    pub(crate) aba_derivatives: aba_derivatives::Workspace<S>,
+}
+
+/// How large the arrays of a workspace are.
+#[derive(Clone, Copy)]
+pub(crate) struct Size {
+    /// Bodies, the world included.
+    pub bodies: usize,
+    /// Degrees of freedom of all joints.
+    pub columns: usize,
+    /// Columns on the longest way from the root.
+    pub depth: usize,
+    /// Coordinates.
+    pub nv: usize,
+}
+
+impl<S: Scalar> Data<S> {
+    /// Allocates everything for a model.
+    pub fn new<R>(model: &Model<R>) -> Self {
+        let size = Size {
+            bodies: model.nodes.len(),
+            columns: model.columns.len(),
+            depth: model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0),
+            nv: model.nv,
+        };
+        Self {
+            world: World::new(size),
+            rnea: rnea::Workspace::new(size),
+            crba: crba::Workspace::new(size),
+            aba: aba::Workspace::new(size),
+            minv: minv::Workspace::new(size),
+            rnea_derivatives: rnea_derivatives::Workspace::new(size),
+            aba_derivatives: aba_derivatives::Workspace::new(size),
+        }
+    }
+}
+
+/// Panics unless an argument has as many numbers as it must have.
+#[inline]
+#[track_caller]
+pub(crate) fn check(argument: &str, found: usize, expected: usize) {
+    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
+}
+
+/// Panics unless there is a force for each body, the world included, or none at all.
+#[inline]
+#[track_caller]
+pub(crate) fn check_forces(found: usize, bodies: usize) {
+    assert!(found == 0 || found == bodies, "f_ext: expected no force or {bodies} (one for each body), found {found}");
+}

@@ -1,0 +1,69 @@
+//! What can be wrong with a robot model.
+
+/// What is wrong with a robot's description, or with a name that was looked up in it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file could not be read.
+    #[error("{file}: {what}")]
+    File {
+        /// Path as given.
+        file: String,
+        /// The operating system's word.
+        what: String,
+    },
+    /// The text is not XML.
+    #[error("{file}:{line}: not well-formed XML: {what}")]
+    Xml {
+        /// Path, or `<string>`.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// The parser's word.
+        what: String,
+    },
+    /// An element of a URDF is wrong.
+    #[error("{file}:{line}: {element}: {what}")]
+    Urdf {
+        /// Path, or `<string>`.
+        file: String,
+        /// Where the element begins, counted from 1.
+        line: u32,
+        /// For example ``joint `elbow` ``.
+        element: String,
+        /// What is wrong, with the numbers.
+        what: String,
+    },
+    /// A body given to a builder is wrong.
+    #[error("body `{body}`: {what}")]
+    Body {
+        /// The body's name.
+        body: String,
+        /// What is wrong, with the numbers.
+        what: String,
+    },
+    /// Two bodies, joints or frames of one kind have the same name.
+    #[error("two {kind}s are named `{name}`")]
+    Duplicate {
+        /// `body`, `joint` or `frame`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// No frame has this name.
+    #[error("unknown frame `{name}`; nearest is `{nearest}`")]
+    UnknownFrame {
+        /// As asked for.
+        name: String,
+        /// The most similar name there is.
+        nearest: String,
+    },
+    /// No joint has this name.
+    #[error("unknown joint `{name}`; nearest is `{nearest}`")]
+    UnknownJoint {
+        /// As asked for.
+        name: String,
+        /// The most similar name there is.
+        nearest: String,
+    },
+}

@@ -1,0 +1,182 @@
+//! How one pass of an algorithm sees model and state.
+//!
+//! An algorithm is written once, over [`Layout`]. It reaches its parent, its children's sums and its coordinates only
+//! through the verbs below, so that one source runs on
+//!
+//! - one state: the scalar is `f64` (or `f32`, or a dual number), the constants are `f64`;
+//! - several knots of a horizon side by side: the scalar holds a number for each knot, the constants are broadcast;
+//! - the limbs of one robot side by side: a body of the pass stands for a body of each limb, all of one joint kind.
+//!
+//! The first two are [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v: several
+//! joints may share a coordinate (mimic joints), v_joint = G v with one entry in each row of G. [`load`](Layout::load)
+//! applies G, [`add`](Layout::add) and [`add_at`](Layout::add_at) apply Gᵀ and Gᵀ · G, and no algorithm knows more.
+
+use crate::joint::Joint;
+use crate::model::Model;
+use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3};
+use core::marker::PhantomData;
+use core::ops::{AddAssign, Range};
+
+/// How one pass sees model and state.
+pub(crate) trait Layout {
+    /// The number that the pass computes with.
+    type S: Scalar;
+    /// Names a column, in the list of a body's ancestors.
+    type Column: Copy;
+
+    /// The bodies in order, parents first; 0 is the world and not among them.
+    fn bodies(&self) -> Range<usize>;
+    /// The kind of joint that carries body i, its axis turned to z.
+    fn joint(&self, i: usize) -> Joint;
+    /// X_T: the joint's frame in the parent's.
+    fn placement(&self, i: usize) -> Se3<Self::S>;
+    /// The body's inertia in its frame.
+    fn inertia(&self, i: usize) -> Inertia<Self::S>;
+    /// The acceleration of the world that stands for gravity, −g.
+    fn minus_gravity(&self) -> condyle_spatial::Vec3<Self::S>;
+    /// The armature at degree of freedom k of joint i.
+    fn armature(&self, i: usize, k: usize) -> Self::S;
+    /// The external force on body i, given per body in the body's public frame (or none at all).
+    fn force(&self, f_ext: &[Force<Self::S>], i: usize) -> Option<Force<Self::S>>;
+
+    /// The parent's entry.
+    fn parent<T: Copy>(&self, of: &[T], i: usize) -> T;
+    /// Adds to the parent's entry.
+    fn push<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
+
+    /// The k-th number of the position of joint i.
+    fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
+    /// The k-th number of the velocity (or acceleration, or effort) of joint i.
+    fn load(&self, x: &[Self::S], i: usize, k: usize) -> Self::S;
+    /// Adds to the coordinate of degree of freedom k of joint i: the transpose of `load`.
+    fn add(&self, x: &mut [Self::S], i: usize, k: usize, value: Self::S);
+
+    /// The first of the places of joint i's columns, in an array with an entry for each column.
+    fn slot(&self, i: usize) -> usize;
+    /// The columns of all joints from the root to joint i, its own last.
+    fn support(&self, i: usize) -> &[Self::Column];
+    /// The entry of a column.
+    fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
+    /// Adds to the entry (row, column) of a matrix in coordinates, stored by columns.
+    fn add_at(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
+    /// The armature of all coordinates, added to the diagonal of such a matrix.
+    fn add_armature(&self, matrix: &mut [Self::S]);
+    /// Armature times acceleration, added to the coordinates of an effort.
+    fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
+}
+
+/// One body at a time: one state, or several knots of a horizon in the lanes of the scalar.
+pub(crate) struct Single<'m, S, R> {
+    model: &'m Model<R>,
+    scalar: PhantomData<S>,
+}
+
+impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
+    pub(crate) fn new(model: &'m Model<R>) -> Self {
+        Self { model, scalar: PhantomData }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
+    type S = S;
+    type Column = usize;
+
+    #[inline(always)]
+    fn bodies(&self) -> Range<usize> {
+        1..self.model.nodes.len()
+    }
+    #[inline(always)]
+    fn joint(&self, i: usize) -> Joint {
+        self.model.nodes[i].joint
+    }
+    #[inline(always)]
+    fn placement(&self, i: usize) -> Se3<S> {
+        self.model.nodes[i].placement.lift()
+    }
+    #[inline(always)]
+    fn inertia(&self, i: usize) -> Inertia<S> {
+        self.model.nodes[i].inertia.lift()
+    }
+    #[inline(always)]
+    fn minus_gravity(&self) -> condyle_spatial::Vec3<S> {
+        -self.model.gravity.lift()
+    }
+    #[inline(always)]
+    fn armature(&self, i: usize, k: usize) -> S {
+        self.model.armature[self.model.nodes[i].idx_v + k].lift()
+    }
+    #[inline(always)]
+    fn force(&self, f_ext: &[Force<S>], i: usize) -> Option<Force<S>> {
+        let reframing = Se3::new(self.model.nodes[i].reframing, condyle_spatial::Vec3::zero());
+        f_ext.get(i).map(|&f| reframing.lift().act_inv(f))
+    }
+
+    #[inline(always)]
+    fn parent<T: Copy>(&self, of: &[T], i: usize) -> T {
+        of[self.model.nodes[i].parent]
+    }
+    #[inline(always)]
+    fn push<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        onto[self.model.nodes[i].parent] += x;
+    }
+
+    #[inline(always)]
+    fn position(&self, q: &[S], i: usize, k: usize) -> S {
+        let node = &self.model.nodes[i];
+        match node.mimic {
+            None => q[node.idx_q + k],
+            Some(mimic) => q[node.idx_q + k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
+        }
+    }
+    #[inline(always)]
+    fn load(&self, x: &[S], i: usize, k: usize) -> S {
+        let node = &self.model.nodes[i];
+        match node.mimic {
+            None => x[node.idx_v + k],
+            Some(mimic) => x[node.idx_v + k] * S::splat(mimic.ratio),
+        }
+    }
+    #[inline(always)]
+    fn add(&self, x: &mut [S], i: usize, k: usize, value: S) {
+        let node = &self.model.nodes[i];
+        match node.mimic {
+            None => x[node.idx_v + k] += value,
+            Some(mimic) => x[node.idx_v + k] += value * S::splat(mimic.ratio),
+        }
+    }
+
+    #[inline(always)]
+    fn slot(&self, i: usize) -> usize {
+        self.model.nodes[i].column
+    }
+    #[inline(always)]
+    fn support(&self, i: usize) -> &[usize] {
+        let node = &self.model.nodes[i];
+        &self.model.support[node.support..node.support + node.depth]
+    }
+    #[inline(always)]
+    fn at<T: Copy>(&self, of: &[T], column: usize) -> T {
+        of[column]
+    }
+    #[inline(always)]
+    fn add_at(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
+        if self.model.has_mimic() {
+            let (r, c) = (&self.model.columns[row], &self.model.columns[column]);
+            matrix[r.coordinate + self.model.nv * c.coordinate] += value * S::splat(r.ratio * c.ratio);
+        } else {
+            matrix[row + self.model.nv * column] += value;
+        }
+    }
+    #[inline(always)]
+    fn add_armature(&self, matrix: &mut [S]) {
+        for (k, &armature) in self.model.armature.iter().enumerate() {
+            matrix[k * (self.model.nv + 1)] += armature.lift();
+        }
+    }
+    #[inline(always)]
+    fn add_armature_torque(&self, a: &[S], tau: &mut [S]) {
+        for (k, &armature) in self.model.armature.iter().enumerate() {
+            tau[k] += armature.lift() * a[k];
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The inverse of the joint-space inertia matrix, without the matrix.
+//!
+//! Source: Carpentier, *Analytical inverse of the joint space inertia matrix* (2018): the articulated-body algorithm
+//! for all unit efforts at once, of which only those in the subtree of a joint reach it. In the world's frame one
+//! array of bias forces serves all bodies.
+
+use crate::aba;
+use crate::cholesky;
+use crate::crba::crba;
+use crate::data::{Data, Size, check};
+use crate::kinematics::World;
+use crate::layout::Single;
+use crate::model::{Column, Model};
+use condyle_spatial::{Constant, Scalar};
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace<S> {
+    /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
+    P: Vec<S>,
+    /// Acceleration for each unit effort, at each depth of the tree. Shape: depth × 6 × columns. Written by: `sweep`.
+    A: Vec<S>,
+    /// Shape: nv × nv. Written by: `minv`.
+    Minv: DMatrix<S>,
+    /// A factor of M, of robots whose joints share coordinates. Shape: nv × nv. Written by: `minv`.
+    factor: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            P: vec![S::zero(); 6 * size.columns],
+            A: vec![S::zero(); size.depth * 6 * size.columns],
+            Minv: DMatrix::from_element(size.nv, size.nv, S::zero()),
+            factor: if size.columns == size.nv { Vec::new() } else { vec![S::zero(); size.nv * size.nv] },
+        }
+    }
+}
+
+impl<S> Workspace<S> {
+    pub(crate) fn matrix(&self) -> &DMatrix<S> {
+        &self.Minv
+    }
+}
+
+/// y += x s, entry by entry.
+#[inline(always)]
+fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
+    for (y, &x) in y.iter_mut().zip(x) {
+        *y = x.mul_add(s, *y);
+    }
+}
+
+/// Row c of M⁻¹ for the efforts j ≥ c; the factors of the articulated bodies are those of `aba::factorize`.
+#[inline(always)]
+fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
+    let n = columns.len();
+    let Workspace { P, A, Minv, .. } = d;
+    // Row c of M⁻¹ is stored as column c: they are the same, and a column is contiguous.
+    let rows = Minv.as_mut_slice();
+    P.fill(S::zero());
+    for c in (0..n).rev() {
+        let (S_c, U) = (w.S[c].to_array(), f.U[c].to_array());
+        let end = columns[c].end;
+        let row = &mut rows[c * n..(c + 1) * n];
+        row.fill(S::zero());
+        row[c] = f.D_inv[c];
+        for r in 0..6 {
+            axpy(-(f.D_inv[c] * S_c[r]), &P[r * n + c + 1..r * n + end], &mut row[c + 1..end]); // −D⁻¹ Sᵀ P
+        }
+        for r in 0..6 {
+            axpy(U[r], &row[c..end], &mut P[r * n + c..r * n + end]); // P += U u/D
+        }
+    }
+    for c in 0..n {
+        let (S_c, U) = (w.S[c].to_array(), f.U[c].to_array());
+        let row = &mut rows[c * n..(c + 1) * n];
+        let depth = columns[c].depth;
+        let (above, here) = A.split_at_mut(depth * 6 * n);
+        if depth > 0 {
+            let above = &above[(depth - 1) * 6 * n..];
+            for r in 0..6 {
+                axpy(-(f.D_inv[c] * U[r]), &above[r * n + c..(r + 1) * n], &mut row[c..]); // −D⁻¹ Uᵀ A_λ
+            }
+            for r in 0..6 {
+                here[r * n + c..(r + 1) * n].copy_from_slice(&above[r * n + c..(r + 1) * n]);
+                axpy(S_c[r], &row[c..], &mut here[r * n + c..(r + 1) * n]); // A = A_λ + S q̈
+            }
+        } else {
+            for r in 0..6 {
+                here[r * n + c..(r + 1) * n].fill(S::zero());
+                axpy(S_c[r], &row[c..], &mut here[r * n + c..(r + 1) * n]);
+            }
+        }
+    }
+    for c in 0..n {
+        for j in 0..c {
+            rows[c * n + j] = rows[j * n + c];
+        }
+    }
+}
+
+/// M⁻¹ for the articulated bodies that `aba::factorize` has left in the data.
+#[inline(always)]
+pub(crate) fn from_factors<'d, S: Scalar, R>(model: &Model<R>, data: &'d mut Data<S>) -> &'d DMatrix<S> {
+    sweep(&model.columns, &data.world, &data.aba, &mut data.minv);
+    &data.minv.Minv
+}
+
+/// M⁻¹ from a dense factor of M: the way for joints that share a coordinate.
+fn by_inertia_matrix<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) {
+    crba(model, data, q);
+    data.minv.factor.copy_from_slice(data.crba.matrix().as_slice());
+    let Workspace { Minv, factor, .. } = &mut data.minv;
+    cholesky::factorize(factor, model.nv);
+    Minv.fill(S::zero());
+    for (j, mut column) in Minv.column_iter_mut().enumerate() {
+        column[j] = S::one();
+        cholesky::solve(factor, column.as_mut_slice());
+    }
+}
+
+/// M(q)⁻¹, the accelerations for unit efforts, in O(n²).
+///
+/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018). Robots
+/// whose joints share a coordinate (mimic) take the way over a factor of M, O(n³).
+///
+/// ```
+/// use condyle_dynamics::{Data, crba, minv, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let M = crba(&arm, &mut data, &[0.3; 7]).clone();
+/// let identity = M * minv(&arm, &mut data, &[0.3; 7]);
+/// assert!((identity - nalgebra::DMatrix::identity(7, 7)).amax() < 1e-12);
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers.
+pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+    check("q", q.len(), model.nq);
+    if model.has_mimic() {
+        by_inertia_matrix(model, data, q);
+        return &data.minv.Minv;
+    }
+    aba::factorize(&Single::new(model), &mut data.world, &mut data.aba, q);
+    from_factors(model, data)
+}

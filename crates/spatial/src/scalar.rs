@@ -1,0 +1,155 @@
+//! The numbers an algorithm can run on.
+
+use core::fmt::Debug;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// A number: `f64`, `f32`, a dual number of num-dual, or several numbers side by side (lanes).
+///
+/// There is no order on scalars, so generic code cannot branch on a value, which is right for lanes (each has its own
+/// answer) and for dual numbers (each branch has its own derivative) alike: compare with [`lt`](Self::lt), choose with
+/// [`select`](Self::select).
+///
+/// ```
+/// use condyle_spatial::Scalar;
+/// fn hypot<S: Scalar>(x: S, y: S) -> S {
+///     x.mul_add(x, y * y).sqrt()
+/// }
+/// assert_eq!(hypot(3.0, 4.0), 5.0);
+/// assert!((hypot(num_dual::Dual64::new(3.0, 1.0), 4.0.into()).eps - 0.6).abs() < 1e-15); // ∂√(x² + y²)/∂x = x/√(x² + y²)
+/// ```
+pub trait Scalar:
+    Copy
+    + Debug
+    + PartialEq
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + 'static
+{
+    /// The outcome of a comparison: `bool`, or one for each lane.
+    type Mask: Copy;
+    /// How many numbers lie side by side in one value.
+    const LANES: usize;
+
+    /// The constant `x`, in every lane, without derivative.
+    fn splat(x: f64) -> Self;
+    /// self · b + c, fused where the instruction set in use has it.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// 1 / self.
+    fn recip(self) -> Self;
+    /// √self.
+    fn sqrt(self) -> Self;
+    /// (sin self, cos self).
+    fn sin_cos(self) -> (Self, Self);
+    /// The angle of the point (x, self), in (−π, π].
+    fn atan2(self, x: Self) -> Self;
+    /// |self|.
+    fn abs(self) -> Self;
+    /// self < other.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// a where the mask holds, b elsewhere.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Both masks hold.
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// At least one of the masks holds.
+    fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+
+    /// 0.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(0.0)
+    }
+    /// 1.
+    #[inline(always)]
+    fn one() -> Self {
+        Self::splat(1.0)
+    }
+}
+
+/// A constant of a model, as the scalar `S` of a pass sees it.
+///
+/// Model constants are `f64` and take part in a pass on any scalar. They can also be of the scalar's own type: a model
+/// whose inertias are dual numbers gives the derivatives with respect to inertias.
+pub trait Constant<S>: Copy + Debug + Send + Sync + 'static {
+    /// This constant as a scalar.
+    fn lift(self) -> S;
+    /// The constant `x`.
+    fn of(x: f64) -> Self;
+}
+
+impl<S: Scalar> Constant<S> for f64 {
+    #[inline(always)]
+    fn lift(self) -> S {
+        S::splat(self)
+    }
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        x
+    }
+}
+
+macro_rules! impl_float {
+    ($($float:ident),*) => {$(
+        impl Scalar for $float {
+            type Mask = bool;
+            const LANES: usize = 1;
+
+            #[inline(always)]
+            fn splat(x: f64) -> Self {
+                x as $float
+            }
+            #[inline(always)]
+            fn mul_add(self, b: Self, c: Self) -> Self {
+                // Without the instruction, a fused product is a library call, thirty times slower than two roundings.
+                if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
+                    $float::mul_add(self, b, c)
+                } else {
+                    self * b + c
+                }
+            }
+            #[inline(always)]
+            fn recip(self) -> Self {
+                1.0 / self
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $float::sqrt(self)
+            }
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                $float::sin_cos(self)
+            }
+            #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                $float::atan2(self, x)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $float::abs(self)
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> bool {
+                self < other
+            }
+            #[inline(always)]
+            fn select(mask: bool, a: Self, b: Self) -> Self {
+                if mask { a } else { b }
+            }
+            #[inline(always)]
+            fn and(a: bool, b: bool) -> bool {
+                a && b
+            }
+            #[inline(always)]
+            fn or(a: bool, b: bool) -> bool {
+                a || b
+            }
+        }
+    )*};
+}
+impl_float!(f64, f32);
