@@ -14,7 +14,8 @@
 //                     shown; its limits, or null each (|v| ≤ velocity, |tau| ≤ effort)
 //   q, v, tau         [N + 1][J], [N + 1][J], [N][J]: rad, rad/s, N·m, or m, m/s, N
 //   iterations        [] of { iteration, cost, gap, step, regularisation, stop }; step and stop may be null
-//   budget            { budget_ms, knots, per, rows: [] of { name, us_per_knot, ms_per_horizon }, total_ms }, or null;
+//   budget            { budget_ms, knots, per, rows: [] of { name, us_per_knot, ms_per_horizon }, total_ms,
+//                     alone: [] of the same, functions timed by themselves, no part of the total }, or null;
 //                     `per` says what is timed ("one solver iteration"); budget_ms null: no budget
 //   scene.bodies      [B] of { name, parent (index, −1 for the world), shapes: [] of { kind, size, position [3],
 //                     quaternion [x, y, z, w], color "#rrggbb" } }; position and quaternion: pose in the body, null for
@@ -102,7 +103,7 @@ function header(data) {
   $("footer").append("Made by Condyle", data.version ? ` ${data.version}` : "", ...(data.command ? [" with ", element("code", {}, data.command)] : []), ". Drawn with three.js and uPlot (MIT).");
 }
 
-function budgetTable({ budget_ms: budget, knots, per, rows, total_ms: total }) {
+function budgetTable({ budget_ms: budget, knots, per, rows, alone, total_ms: total }) {
   const listed = rows.reduce((sum, row) => sum + row.ms_per_horizon, 0);
   const sum = $("budget-sum");
   sum.append(per ? `${per}: ` : "", element("b", {}, `${brief(total)} ms`), budget == null ? "" : ` of ${brief(budget)} ms (${brief((100 * total) / budget, 2)} %)`);
@@ -130,6 +131,11 @@ function budgetTable({ budget_ms: budget, knots, per, rows, total_ms: total }) {
   const line = (name, ms) => element("tr", {}, element("td", {}, name), element("td", { class: "n" }, number((1000 * ms) / knots, 3)), element("td", { class: "meter" }),
     element("td", { class: "n" }, number(ms, 3)), element("td", { class: "n" }, budget == null ? "–" : `${number((100 * ms) / budget, 2)} %`));
   $("budget").tFoot.append(line("total", total), ...(budget == null ? [] : [line("budget", budget)]));
+  for (const row of alone ?? []) {
+    const timed = line(`${row.name}, alone`, row.ms_per_horizon);
+    timed.className = "alone";
+    $("budget").tFoot.append(timed);
+  }
 }
 
 function iterationTable(iterations) {

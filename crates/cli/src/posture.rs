@@ -1,0 +1,61 @@
+//! A posture that reaches a point: where a plan ends, found before it is planned.
+
+use condyle::{Data, Model, ReferenceFrame, Vec3, difference, forward_kinematics, integrate, random_configuration};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use rand::{SeedableRng, rngs::StdRng};
+
+/// Postures to start from, beside the given one.
+const STARTS: usize = 40;
+/// Steps from each.
+const STEPS: usize = 100;
+/// Damping of a step (m), small against the arm and large against rounding.
+const DAMPING: f64 = 0.02;
+/// Close enough to count as reached (m): what is left is the plan's affair.
+const REACHED: f64 = 1e-4;
+
+/// A posture within the limits whose frame is at the target: of all found, the one nearest to `q0`; where none is
+/// found, the one whose frame comes nearest to the target. And how far from the target its frame is (m).
+///
+/// Damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), stopped at the limits (Nakamura and Hanafusa 1986).
+pub(crate) fn reaching(model: &Model, frame: usize, target: Vec3<f64>, q0: &[f64]) -> (Vec<f64>, f64) {
+    let mut data = Data::new(model);
+    let mut rng = StdRng::seed_from_u64(0);
+    let mut J = DMatrix::zeros(6, model.nv());
+    let mut best: Option<(f64, f64, Vec<f64>)> = None;
+    for start in 0..=STARTS {
+        let mut q = if start == 0 { q0.to_vec() } else { random_configuration(model, &mut rng) };
+        let mut miss = f64::INFINITY;
+        for _ in 0..STEPS {
+            let placements = forward_kinematics(model, &mut data, &q);
+            let e = target - placements.frame(frame).translation;
+            miss = e.norm_squared().sqrt();
+            if miss < REACHED {
+                break;
+            }
+            placements.frame_jacobian(frame, ReferenceFrame::LocalWorldAligned, &mut J);
+            let J = J.rows(0, 3);
+            let damped = J * J.transpose() + DAMPING * DAMPING * Matrix3::identity();
+            let Some(x) = damped.try_inverse() else { break };
+            let step = J.transpose() * (x * Vector3::new(e.x, e.y, e.z));
+            let mut moved = q.clone();
+            integrate(model, &q, step.as_slice(), &mut moved);
+            q = within_limits(model, moved);
+        }
+        let mut d = vec![0.0; model.nv()];
+        difference(model, q0, &q, &mut d);
+        let distance: f64 = d.iter().map(|x| x * x).sum();
+        let rank = (miss.max(REACHED), distance);
+        if best.as_ref().is_none_or(|(m, d, _)| rank < (*m, *d)) {
+            best = Some((rank.0, rank.1, q));
+        }
+    }
+    best.map_or((q0.to_vec(), f64::INFINITY), |(miss, _, q)| (q, miss))
+}
+
+/// Each coordinate that has limits moved between them.
+fn within_limits(model: &Model, mut q: Vec<f64>) -> Vec<f64> {
+    for ((q, lower), upper) in q.iter_mut().zip(&model.limits().lower).zip(&model.limits().upper) {
+        *q = q.clamp(*lower, *upper);
+    }
+    q
+}

@@ -1,0 +1,186 @@
+//! What `condyle plan` prints: iterations, where the time went, what is beyond its limits.
+
+use crate::plan::Plan;
+use condyle::optimal::{Iteration, Status};
+use condyle::{Data, aba, aba_derivatives, rnea};
+use serde::Serialize;
+use std::time::{Duration, Instant};
+
+/// Beyond a limit by less than this share of the range is rounding, and not reported.
+const ROUNDING: f64 = 1e-6;
+/// How often a function is timed; the median counts.
+const REPETITIONS: usize = 11;
+
+pub(crate) fn iteration_header() {
+    println!("iteration           cost        gap    step  regularisation");
+}
+
+pub(crate) fn iteration(i: &Iteration) {
+    let step = if i.accepted { format!("{:.4}", i.step) } else { "none".to_owned() };
+    println!("{:9}  {:13.6}  {:9.2e}  {step:>6}  {:14.0e}", i.iteration, i.cost, i.gap, i.regularisation);
+}
+
+/// One line of the table of times.
+#[derive(Serialize)]
+pub(crate) struct Row {
+    pub name: &'static str,
+    pub us_per_knot: f64,
+    pub ms_per_horizon: f64,
+}
+
+/// Where the time goes.
+#[derive(Serialize)]
+pub(crate) struct Budget {
+    pub budget_ms: f64,
+    pub knots: usize,
+    pub per: &'static str,
+    /// The parts of one iteration of the solver.
+    pub rows: Vec<Row>,
+    /// Their sum.
+    pub total_ms: f64,
+    /// The dynamics that they call, timed by itself.
+    pub alone: Vec<Row>,
+    #[serde(skip)]
+    pub solve_ms: f64,
+}
+
+/// The median time of a pass over all knots.
+fn median(knots: usize, mut f: impl FnMut(usize)) -> Duration {
+    let mut times = [Duration::ZERO; REPETITIONS];
+    for time in &mut times {
+        let start = Instant::now();
+        (0..knots).for_each(&mut f);
+        *time = start.elapsed();
+    }
+    times.sort();
+    times[REPETITIONS / 2]
+}
+
+/// Times the dynamics on the planned motion, and takes sweep and rollout from the solve.
+pub(crate) fn measure(plan: &Plan) -> Budget {
+    let (model, solution) = (&plan.model, &plan.solution);
+    let (nq, nv) = (model.nq(), model.nv());
+    let knots = solution.K.len();
+    let mut data = Data::new(model);
+    let no_acceleration = vec![0.0; nv];
+    let state = |t: usize| solution.x(t).split_at(nq);
+    let aba_time = median(knots, |t| {
+        let (q, v) = state(t);
+        aba(model, &mut data, q, v, solution.u(t), &[]);
+    });
+    let derivatives_time = median(knots, |t| {
+        let (q, v) = state(t);
+        aba_derivatives(model, &mut data, q, v, solution.u(t), &[]);
+    });
+    let rnea_time = median(knots, |t| {
+        let (q, v) = state(t);
+        rnea(model, &mut data, q, v, &no_acceleration, &[]);
+    });
+    let iterations = u32::try_from(solution.trace.len().max(1)).unwrap_or(u32::MAX);
+    let timings = &solution.timings;
+    let row = |name, time: Duration| Row {
+        name,
+        us_per_knot: 1e6 * time.as_secs_f64() / knots as f64,
+        ms_per_horizon: 1e3 * time.as_secs_f64(),
+    };
+    let rows = vec![
+        row("Derivatives and costs", timings.calc_diff / iterations),
+        row("Riccati sweep", timings.sweep / iterations),
+        row("Rollout", timings.rollout / iterations),
+    ];
+    Budget {
+        budget_ms: plan.budget_ms,
+        knots,
+        per: "one solver iteration",
+        total_ms: rows.iter().map(|row| row.ms_per_horizon).sum(),
+        rows,
+        alone: vec![row("ABA", aba_time), row("ABA derivatives", derivatives_time), row("RNEA", rnea_time)],
+        solve_ms: 1e3 * timings.total.as_secs_f64(),
+    }
+}
+
+/// A quantity beyond its limit, at the knot where it is farthest beyond.
+#[derive(Serialize)]
+pub(crate) struct Violation {
+    /// `position`, `velocity` or `torque`.
+    pub what: &'static str,
+    pub joint: String,
+    pub at_knot: usize,
+    /// How far beyond.
+    pub amount: f64,
+    pub limit: f64,
+}
+
+/// All quantities that are beyond their limits.
+pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
+    let (model, solution) = (&plan.model, &plan.solution);
+    let (limits, knots) = (model.limits(), solution.K.len());
+    let mut found = Vec::new();
+    let mut examine = |what, joint: &str, lower: f64, upper: f64, values: &mut dyn Iterator<Item = f64>| {
+        let beyond = |x: f64| if x > upper { (x - upper, upper) } else { (lower - x, lower) };
+        let worst = values.map(beyond).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let range = if (upper - lower).is_finite() { upper - lower } else { 1.0 };
+        if let Some((at_knot, (amount, limit))) = worst
+            && amount > ROUNDING * range
+        {
+            found.push(Violation { what, joint: joint.to_owned(), at_knot, amount, limit });
+        }
+    };
+    for body in model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1) {
+        let (iq, iv) = (body.idx_q, body.idx_v);
+        if body.joint.nq() == 1 {
+            let mut q = (0..=knots).map(|t| solution.x(t)[iq]);
+            examine("position", &body.joint_name, limits.lower[iq], limits.upper[iq], &mut q);
+        }
+        let mut v = (0..=knots).map(|t| solution.x(t)[model.nq() + iv]);
+        if limits.velocity[iv] > 0.0 {
+            examine("velocity", &body.joint_name, -limits.velocity[iv], limits.velocity[iv], &mut v);
+        }
+        let mut tau = (0..knots).map(|t| solution.u(t)[iv]);
+        if limits.effort[iv] > 0.0 {
+            examine("torque", &body.joint_name, -limits.effort[iv], limits.effort[iv], &mut tau);
+        }
+    }
+    found
+}
+
+/// How the solve ended, in words.
+pub(crate) fn status(status: Status) -> &'static str {
+    match status {
+        Status::Converged => "converged",
+        Status::MaxIterations => "iteration limit",
+        Status::RegularisationLimit => "no descent found",
+        _ => "not finite",
+    }
+}
+
+/// Everything after the iterations.
+pub(crate) fn print(plan: &Plan, budget: &Budget, violations: &[Violation]) {
+    let iterations = plan.solution.trace.len();
+    println!("\n{} after {iterations} iterations, {:.1} ms", status(plan.solution.status), budget.solve_ms);
+    println!("`{}` ends {:.2} mm from the target\n", plan.model.frames()[plan.frame].name, 1e3 * plan.miss);
+    println!("{:<22}  µs per knot  ms per horizon of {}", "", budget.knots);
+    let line = |name: &str, row: &Row| println!("{name:<22}  {:11.2}  {:14.3}", row.us_per_knot, row.ms_per_horizon);
+    for row in &budget.alone {
+        line(&format!("{}, alone", row.name), row);
+    }
+    for row in &budget.rows {
+        line(row.name, row);
+    }
+    let total = Row {
+        name: "One iteration",
+        us_per_knot: 1e3 * budget.total_ms / budget.knots as f64,
+        ms_per_horizon: budget.total_ms,
+    };
+    line(total.name, &total);
+    let verdict = if budget.total_ms <= budget.budget_ms { "within" } else { "OVER" };
+    println!("one iteration is {verdict} the budget of {} ms", budget.budget_ms);
+    if violations.is_empty() {
+        println!("\nall positions, velocities and torques are within their limits");
+    } else {
+        println!("\nbeyond its limit:");
+    }
+    for v in violations {
+        println!("  {} of `{}` by {:.3e} (limit {}) at knot {}", v.what, v.joint, v.amount, v.limit, v.at_knot);
+    }
+}

@@ -1,0 +1,128 @@
+//! One knot's dynamics and cost, asked for many knots at a time.
+
+use crate::error::assert_length;
+use crate::lq::LqNode;
+use std::any::Any;
+
+/// The dynamics x⁺ = φₜ(x, u) and the cost ℓₜ(x, u) of the knots t that it serves.
+///
+/// Only the methods for a single knot must be written. The solver calls those for a **group**: consecutive knots of
+/// the horizon, or the trials of a line search at one knot. Their defaults loop; an implementation that computes
+/// several states at a time in the lanes of a vector register overrides them and says in [`lanes`](Self::lanes) how
+/// many states it likes to be given.
+///
+/// Each knot of a group comes with its index t in the horizon, so that one model can serve all knots that differ only
+/// in a reference (a foot's path, a tracked posture) and these still make one group.
+///
+/// # The terminal knot
+/// A terminal action has nu = 0 and only a cost. It is called like any other, but what it writes to `next` and `A` is
+/// never read: it may leave them alone.
+///
+/// # Rules for implementations
+/// - The result depends on the arguments only, not on what was called before.
+/// - All of what a method returns is written, whatever was there; entries that are always zero too.
+/// - Nothing panics on a state far away: let the result be infinite or NaN, and the solver tries a shorter step.
+/// - Nothing is allocated, so that a solve allocates nothing either.
+///
+/// # Examples
+/// The double integrator x⁺ = x + Δt (v, u) with the cost ½ Δt (‖x‖² + u²):
+/// ```
+/// use condyle_optimal::{ActionModel, LqNode};
+///
+/// struct DoubleIntegrator { dt: f64 }
+///
+/// impl ActionModel for DoubleIntegrator {
+///     fn nx(&self) -> usize { 2 }
+///     fn nu(&self) -> usize { 1 }
+///     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+///         next[0] = x[0] + self.dt * x[1];
+///         next[1] = x[1] + self.dt * u[0];
+///         0.5 * self.dt * (x[0] * x[0] + x[1] * x[1] + u[0] * u[0])
+///     }
+///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+///         node.A.copy_from_slice(&[1.0, 0.0, self.dt, 1.0]); // column after column
+///         node.B.copy_from_slice(&[0.0, self.dt]);
+///         node.Q.copy_from_slice(&[self.dt, 0.0, 0.0, self.dt]);
+///         node.S.fill(0.0);
+///         node.R[0] = self.dt;
+///         node.q.copy_from_slice(&[self.dt * x[0], self.dt * x[1]]);
+///         node.r[0] = self.dt * u[0];
+///     }
+/// }
+///
+/// let mut action = DoubleIntegrator { dt: 0.5 };
+/// let (mut next, mut costs) = ([0.0; 4], [0.0; 2]);
+/// action.calc_group(&[0, 1], &[1.0, 2.0, 3.0, 4.0], &[0.0, 1.0], &mut next, &mut costs);
+/// assert_eq!(next, [2.0, 2.0, 5.0, 4.5]);
+/// ```
+pub trait ActionModel: Any + Send {
+    /// The number of entries of a state x.
+    fn nx(&self) -> usize;
+
+    /// The number of entries of a change of state δx; nx unless the state lives on a manifold.
+    fn ndx(&self) -> usize {
+        self.nx()
+    }
+
+    /// The number of entries of a control u; zero at a terminal knot and at one that only jumps (an impact).
+    fn nu(&self) -> usize;
+
+    /// How many states a group call computes at the price of one; 1 unless it uses vector lanes.
+    ///
+    /// A line search tries so many step lengths side by side.
+    fn lanes(&self) -> usize {
+        1
+    }
+
+    /// x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64;
+
+    /// The derivatives of both at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B = ∂x⁺/∂u, q = ∂ℓ/∂x,
+    /// r = ∂ℓ/∂u, and the Hessian of ℓ or its Gauss–Newton approximation, Q, S, R. The gap f is the solver's.
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode);
+
+    /// [`calc`](Self::calc) for a group: knot `knots[i]` at the i-th state of `xs` and the i-th control of `us`, which
+    /// lie one after the other, as do the states written to `next`.
+    ///
+    /// # Panics
+    /// If the lengths are not knots.len() times nx, nu, nx and 1.
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        let (nx, nu) = (self.nx(), self.nu());
+        assert_length("xs", xs.len(), knots.len() * nx);
+        assert_length("us", us.len(), knots.len() * nu);
+        assert_length("next", next.len(), knots.len() * nx);
+        assert_length("costs", costs.len(), knots.len());
+        for (i, &t) in knots.iter().enumerate() {
+            let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
+            costs[i] = self.calc(t, x, u, &mut next[i * nx..][..nx]);
+        }
+    }
+
+    /// [`calc_diff`](Self::calc_diff) for a group.
+    ///
+    /// # Panics
+    /// If the lengths are not knots.len() times nx, nu and 1.
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        let (nx, nu) = (self.nx(), self.nu());
+        assert_length("xs", xs.len(), knots.len() * nx);
+        assert_length("us", us.len(), knots.len() * nu);
+        assert_length("nodes", nodes.len(), knots.len());
+        for (i, &t) in knots.iter().enumerate() {
+            self.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
+        }
+    }
+
+    /// x ⊕ δx into `out` (nx); the sum in a vector space.
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        for ((o, x), dx) in out.iter_mut().zip(x).zip(dx) {
+            *o = x + dx;
+        }
+    }
+
+    /// x₁ ⊖ x₀ into `out` (ndx), the δ with x₀ ⊕ δ = x₁; the difference in a vector space.
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        for ((o, x0), x1) in out.iter_mut().zip(x0).zip(x1) {
+            *o = x1 - x0;
+        }
+    }
+}

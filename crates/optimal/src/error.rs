@@ -1,0 +1,104 @@
+//! What can be wrong with a problem, a warm start or the settings, found before a solve begins.
+
+/// What is wrong with a problem, a warm start or the settings.
+///
+/// How a solve *ends* is no error: see [`Status`](crate::Status).
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A horizon needs at least one knot before the terminal one.
+    #[error("the horizon is empty: a problem needs at least one knot before the terminal one")]
+    EmptyHorizon,
+
+    /// A knot names an action model that the problem does not hold.
+    #[error("knot {knot}: there is no action model {index}, the problem holds {models}")]
+    UnknownModel {
+        /// The knot that names the model.
+        knot: usize,
+        /// The index it names.
+        index: usize,
+        /// The number of models in the problem.
+        models: usize,
+    },
+
+    /// A dimension of one knot's action model differs from what the problem or the solver needs.
+    #[error("node {node}: expected {name} = {expected}, found {found}")]
+    Dimension {
+        /// The knot; the horizon itself for the terminal one.
+        node: usize,
+        /// `nx`, `ndx` or `nu`.
+        name: &'static str,
+        /// What the problem or the solver needs.
+        expected: usize,
+        /// What the action model says.
+        found: usize,
+    },
+
+    /// A vector or a horizon has another length than the problem needs.
+    #[error("`{name}`: expected length {expected}, found {found}")]
+    Length {
+        /// The argument.
+        name: &'static str,
+        /// The length that the problem needs.
+        expected: usize,
+        /// The length given.
+        found: usize,
+    },
+
+    /// An entry of the initial state or of the warm start is infinite or not a number.
+    #[error("`{name}[{index}]` is {value}, which is not finite")]
+    NotFinite {
+        /// The argument.
+        name: &'static str,
+        /// The position in the flattened argument.
+        index: usize,
+        /// The entry.
+        value: f64,
+    },
+
+    /// A term of a robot's cost does not fit the robot.
+    #[error("cost `{name}`: {what}")]
+    Cost {
+        /// The term's name.
+        name: String,
+        /// What does not fit, with the numbers.
+        what: String,
+    },
+
+    /// A knot's duration must be above zero.
+    #[error("a knot of {dt} s: its duration must be above 0")]
+    TimeStep {
+        /// The duration (s).
+        dt: f64,
+    },
+
+    /// A setting lies outside of the range in which it makes sense.
+    #[error("setting `{name}` is {value}, but it must be {allowed}")]
+    Setting {
+        /// The field of [`Settings`](crate::Settings).
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range.
+        allowed: &'static str,
+    },
+}
+
+impl Error {
+    /// `Ok` if `found` has `expected` entries, all of them finite.
+    pub(crate) fn check(name: &'static str, found: &[f64], expected: usize) -> Result<(), Self> {
+        if found.len() != expected {
+            return Err(Self::Length { name, expected, found: found.len() });
+        }
+        match found.iter().position(|x| !x.is_finite()) {
+            Some(index) => Err(Self::NotFinite { name, index, value: found[index] }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Panics with the argument's name if its length is wrong: for callers inside a program, in release builds too.
+#[track_caller]
+pub(crate) fn assert_length(name: &str, found: usize, expected: usize) {
+    assert!(found == expected, "`{name}` has length {found}, expected {expected}");
+}

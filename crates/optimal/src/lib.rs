@@ -1,0 +1,87 @@
+//! Optimal control over a horizon: find the controls that minimise a sum of costs along a trajectory.
+//!
+//! ```text
+//! minimise   ℓ_N(x_N) + Σₜ ℓₜ(xₜ, uₜ)      subject to   x₀ = x̂₀,   xₜ₊₁ = φₜ(xₜ, uₜ),   t = 0 … N − 1
+//! ```
+//!
+//! # The pieces
+//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. It is asked for a group of knots,
+//!   or of step lengths, at a time, so that it can compute several in the lanes of a vector register.
+//! - A [`Problem`] is a horizon of them.
+//! - Around a trajectory the problem is linear and quadratic in the changes δx, δu; each knot is then an [`LqNode`].
+//!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
+//! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
+//!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`].
+//! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
+//!
+//! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖
+//! ([`integrate`](ActionModel::integrate), [`difference`](ActionModel::difference)) with ndx numbers for a change.
+//!
+//! # Conventions
+//! - Trajectories are flat: x₀ … x_N one after the other, then u₀ … u_{N−1}, each with the nu of its knot.
+//! - Derivatives are taken in the tangent space: A is ndx × ndx, whatever nx is.
+//! - The gap at a knot is f = φ(x, u) ⊖ x⁺; at the start x̂₀ ⊖ x₀. A warm start may have gaps.
+//! - The feedback is u = ū + α k + K (x ⊖ x̄). Crocoddyl has the opposite sign of k and K; otherwise the iterates of
+//!   [`Fddp`] are those of its `SolverFDDP`.
+//! - A wrong shape inside a program panics with the argument's name; a wrong problem, warm start or setting is an
+//!   [`Error`] before a solve begins; how a solve ended is its [`Status`].
+//!
+//! # Example
+//! A pendulum swings up, from hanging (θ = 0) to upright (θ = π).
+//! ```
+//! use condyle_optimal::{ActionModel, Fddp, LqNode, NumDiff, Problem, Status};
+//!
+//! /// x = (θ, θ̇), u = torque: θ̈ = u − sin θ, by semi-implicit Euler steps of 0.1 s.
+//! struct Pendulum { terminal: bool }
+//!
+//! impl ActionModel for Pendulum {
+//!     fn nx(&self) -> usize { 2 }
+//!     fn nu(&self) -> usize { if self.terminal { 0 } else { 1 } }
+//!     fn calc(&mut self, _t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+//!         if self.terminal {
+//!             let (angle, rate) = (x[0] - std::f64::consts::PI, x[1]);
+//!             return 50.0 * (angle * angle + rate * rate);
+//!         }
+//!         next[1] = x[1] + 0.1 * (u[0] - x[0].sin()); // θ̇⁺ = θ̇ + Δt (u − sin θ)
+//!         next[0] = x[0] + 0.1 * next[1];             // θ⁺ = θ + Δt θ̇⁺
+//!         0.5 * 0.1 * u[0] * u[0]                     // ℓ = ½ Δt u²
+//!     }
+//!     fn calc_diff(&mut self, _t: usize, _x: &[f64], _u: &[f64], _node: &mut LqNode) {
+//!         unreachable!("NumDiff stands in for it")
+//!     }
+//! }
+//!
+//! let knot = NumDiff(Pendulum { terminal: false });
+//! let end = NumDiff(Pendulum { terminal: true });
+//! let mut problem = Problem::new(vec![0.0, 0.0], vec![Box::new(knot)], vec![0; 40], Box::new(end))?;
+//!
+//! let mut solver = Fddp::new(&problem);
+//! let solution = solver.solve_with(&mut problem, &[0.0; 2 * 41], &[0.0; 40], |iteration| {
+//!     println!("{:3}  cost {:9.6}  step {}", iteration.iteration, iteration.cost, iteration.step);
+//! })?;
+//!
+//! assert_eq!(solution.status, Status::Converged);
+//! assert!((solution.x(40)[0] - std::f64::consts::PI).abs() < 0.05);
+//! # Ok::<(), condyle_optimal::Error>(())
+//! ```
+
+mod action;
+mod dense;
+mod error;
+mod fddp;
+mod lq;
+mod numdiff;
+mod problem;
+pub mod robot;
+mod rollout;
+mod settings;
+mod solution;
+
+pub use action::ActionModel;
+pub use error::Error;
+pub use fddp::Fddp;
+pub use lq::{LqKnot, LqNode, Sweep, SweepError};
+pub use numdiff::NumDiff;
+pub use problem::Problem;
+pub use settings::Settings;
+pub use solution::{Iteration, Solution, Status, Timings};

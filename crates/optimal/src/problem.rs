@@ -1,0 +1,294 @@
+//! The optimal control problem over a horizon of knots.
+
+use crate::action::ActionModel;
+use crate::error::{Error, assert_length};
+use crate::lq::LqNode;
+use std::any::Any;
+use std::ops::Range;
+
+/// An optimal control problem in discrete time, with N knots and a terminal one:
+///
+/// ```text
+/// minimise   ℓ_N(x_N) + Σₜ ℓₜ(xₜ, uₜ)      subject to   x₀ = x̂₀,   xₜ₊₁ = φₜ(xₜ, uₜ),   t = 0 … N − 1
+/// ```
+///
+/// It holds action models, and for each knot the index of its model; consecutive knots with the same model are asked
+/// as one group. All models share nx and ndx; nu may differ from model to model.
+///
+/// Trajectories are flat: `xs` is x₀ … x_N one after the other, (N + 1)·nx numbers; `us` is u₀ … u_{N−1}, each with
+/// the nu of its knot.
+///
+/// # Examples
+/// ```
+/// use condyle_optimal::{ActionModel, LqNode, Problem};
+///
+/// /// x⁺ = x + u, ℓ = ½ (x² + u²); as a terminal action (nu = 0): ℓ = ½ x².
+/// struct Integrator { nu: usize }
+/// impl ActionModel for Integrator {
+///     fn nx(&self) -> usize { 1 }
+///     fn nu(&self) -> usize { self.nu }
+///     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+///         let u: f64 = u.iter().sum();
+///         next[0] = x[0] + u;
+///         0.5 * (x[0] * x[0] + u * u)
+///     }
+///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+///         (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[0]);
+///         node.B.fill(1.0);
+///         node.S.fill(0.0);
+///         node.R.fill(1.0);
+///         node.r.copy_from_slice(u);
+///     }
+/// }
+///
+/// let models: Vec<Box<dyn ActionModel>> = vec![Box::new(Integrator { nu: 1 })];
+/// let mut problem = Problem::new(vec![2.0], models, vec![0; 3], Box::new(Integrator { nu: 0 }))?;
+/// assert_eq!(problem.rollout(&[1.0, 0.0, -1.0])?, [2.0, 3.0, 3.0, 2.0]);
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+pub struct Problem {
+    x0: Vec<f64>,
+    models: Vec<Box<dyn ActionModel>>,
+    stages: Vec<usize>,
+    terminal: Box<dyn ActionModel>,
+    shape: Shape,
+    /// Maximal runs of knots with one model: (model, knots).
+    runs: Vec<(usize, Range<usize>)>,
+    /// 0, 1, …, N: the knots of a group are a slice of it.
+    knots: Vec<usize>,
+    /// Where the terminal action may write a next state.
+    unread: Vec<f64>,
+}
+
+/// The dimensions of a horizon: what trajectories and workspaces are allocated by.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Shape {
+    pub(crate) nx: usize,
+    pub(crate) ndx: usize,
+    /// Where uₜ starts in the flat controls; N + 1 entries, the last is their length.
+    pub(crate) offsets: Vec<usize>,
+}
+
+impl Shape {
+    pub(crate) fn horizon(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    pub(crate) fn nu(&self, t: usize) -> usize {
+        self.offsets.get(t + 1).map_or(0, |end| end - self.offsets[t])
+    }
+
+    /// The place of xₜ in a flat trajectory.
+    pub(crate) fn x(&self, t: usize) -> Range<usize> {
+        t * self.nx..(t + 1) * self.nx
+    }
+
+    /// The place of δxₜ in a flat trajectory of changes.
+    pub(crate) fn dx(&self, t: usize) -> Range<usize> {
+        t * self.ndx..(t + 1) * self.ndx
+    }
+
+    /// The place of uₜ in flat controls; empty at the terminal knot.
+    pub(crate) fn u(&self, t: usize) -> Range<usize> {
+        self.offsets[t]..self.offsets[t] + self.nu(t)
+    }
+}
+
+impl Problem {
+    /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
+    ///
+    /// # Errors
+    /// [`Error`] if the horizon is empty, an index has no model, nx or ndx differ, the terminal model has controls, or
+    /// x̂₀ has a wrong length or an entry that is not finite.
+    pub fn new(
+        x0: Vec<f64>,
+        models: Vec<Box<dyn ActionModel>>,
+        stages: Vec<usize>,
+        terminal: Box<dyn ActionModel>,
+    ) -> Result<Self, Error> {
+        if stages.is_empty() {
+            return Err(Error::EmptyHorizon);
+        }
+        let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
+        let (mut offsets, mut runs) = (vec![0], Vec::<(usize, Range<usize>)>::new());
+        for (knot, &index) in stages.iter().enumerate() {
+            let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
+            for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
+                if expected != found {
+                    return Err(Error::Dimension { node: knot, name, expected, found });
+                }
+            }
+            offsets.push(offsets[knot] + model.nu());
+            match runs.last_mut() {
+                Some((last, knots)) if *last == index => knots.end = knot + 1,
+                _ => runs.push((index, knot..knot + 1)),
+            }
+        }
+        if terminal.nu() != 0 {
+            return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
+        }
+        Error::check("x0", &x0, nx)?;
+        let shape = Shape { nx, ndx, offsets };
+        Ok(Self { x0, models, stages, terminal, shape, runs, knots: (0..=horizon).collect(), unread: vec![0.0; nx] })
+    }
+
+    /// The number of knots before the terminal one, N.
+    pub fn horizon(&self) -> usize {
+        self.stages.len()
+    }
+
+    /// The number of entries of a state.
+    pub fn nx(&self) -> usize {
+        self.shape.nx
+    }
+
+    /// The number of entries of a change of state.
+    pub fn ndx(&self) -> usize {
+        self.shape.ndx
+    }
+
+    /// The number of controls of knot t; 0 for the terminal one, t = N.
+    ///
+    /// # Panics
+    /// If t > N.
+    pub fn nu(&self, t: usize) -> usize {
+        assert!(t <= self.horizon(), "`t` is {t}, beyond the horizon of {} knots", self.horizon());
+        self.shape.nu(t)
+    }
+
+    /// The place of uₜ in the flat controls.
+    ///
+    /// # Panics
+    /// If t > N.
+    pub fn control_range(&self, t: usize) -> Range<usize> {
+        assert!(t <= self.horizon(), "`t` is {t}, beyond the horizon of {} knots", self.horizon());
+        self.shape.u(t)
+    }
+
+    /// The initial state x̂₀.
+    pub fn x0(&self) -> &[f64] {
+        &self.x0
+    }
+
+    /// Sets the initial state, as an MPC does before each solve.
+    ///
+    /// # Errors
+    /// [`Error`] if its length is not nx or an entry is not finite; the old one then stays.
+    pub fn set_x0(&mut self, x0: &[f64]) -> Result<(), Error> {
+        Error::check("x0", x0, self.nx())?;
+        self.x0.copy_from_slice(x0);
+        Ok(())
+    }
+
+    /// The action model `index`, if there is one and it is a `T`; to change a reference between solves. Its dimensions
+    /// must stay.
+    pub fn model_mut<T: ActionModel>(&mut self, index: usize) -> Option<&mut T> {
+        let model: &mut dyn Any = self.models.get_mut(index)?.as_mut();
+        model.downcast_mut()
+    }
+
+    /// The terminal model, if it is a `T`.
+    pub fn terminal_mut<T: ActionModel>(&mut self) -> Option<&mut T> {
+        let model: &mut dyn Any = self.terminal.as_mut();
+        model.downcast_mut()
+    }
+
+    /// The states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates them.
+    ///
+    /// # Errors
+    /// [`Error`] if `us` has a wrong length or an entry that is not finite.
+    pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
+        Error::check("us", us, self.shape.offsets[self.horizon()])?;
+        let mut xs = vec![0.0; (self.horizon() + 1) * self.nx()];
+        xs[..self.shape.nx].copy_from_slice(&self.x0);
+        for t in 0..self.horizon() {
+            let (done, ahead) = xs.split_at_mut((t + 1) * self.shape.nx);
+            let u = &us[self.shape.u(t)];
+            self.models[self.stages[t]].calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
+        }
+        Ok(xs)
+    }
+
+    /// The next states φₜ(xₜ, uₜ) into `next` (N·nx) and the costs ℓₜ(xₜ, uₜ) into `costs` (N + 1, the terminal one
+    /// last), for all knots of a trajectory. Allocates nothing.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub fn calc(&mut self, xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        let (nx, horizon) = (self.nx(), self.horizon());
+        self.assert_trajectory(xs, us);
+        assert_length("next", next.len(), horizon * nx);
+        assert_length("costs", costs.len(), horizon + 1);
+        for (model, knots) in &self.runs {
+            let (x, u) = self.places(knots);
+            let (next, costs) = (&mut next[x.clone()], &mut costs[knots.clone()]);
+            self.models[*model].calc_group(&self.knots[knots.clone()], &xs[x], &us[u], next, costs);
+        }
+        let x = &xs[self.shape.x(horizon)];
+        self.terminal.calc_group(&self.knots[horizon..], x, &[], &mut self.unread, &mut costs[horizon..]);
+    }
+
+    /// The derivatives at all knots of a trajectory, into `nodes` (N + 1, the terminal one last). Allocates nothing.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        let horizon = self.horizon();
+        self.assert_trajectory(xs, us);
+        assert_length("nodes", nodes.len(), horizon + 1);
+        for (model, knots) in &self.runs {
+            let (x, u) = self.places(knots);
+            let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);
+            self.models[*model].calc_diff_group(t, &xs[x], &us[u], nodes);
+        }
+        let x = &xs[self.shape.x(horizon)];
+        self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
+    }
+
+    /// Nodes of zeros with the dimensions of the knots, the terminal one last.
+    pub fn nodes(&self) -> Vec<LqNode> {
+        (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
+    }
+
+    pub(crate) fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// The model of knot t; the terminal one for t = N.
+    pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
+        self.stages.get(t).map_or(&*self.terminal, |&stage| &*self.models[stage])
+    }
+
+    /// As [`action`](Self::action), to compute with.
+    pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
+        self.stages.get(t).map_or(&mut *self.terminal, |&stage| &mut *self.models[stage])
+    }
+
+    /// The largest number of lanes that one of the models uses.
+    pub(crate) fn lanes(&self) -> usize {
+        self.models.iter().map(|model| model.lanes()).max().unwrap_or(1).max(1)
+    }
+
+    /// The places of the states and controls of a run of knots in flat trajectories.
+    fn places(&self, knots: &Range<usize>) -> (Range<usize>, Range<usize>) {
+        let Shape { nx, offsets, .. } = &self.shape;
+        (knots.start * nx..knots.end * nx, offsets[knots.start]..offsets[knots.end])
+    }
+
+    #[track_caller]
+    fn assert_trajectory(&self, xs: &[f64], us: &[f64]) {
+        assert_length("xs", xs.len(), (self.horizon() + 1) * self.nx());
+        assert_length("us", us.len(), self.shape.offsets[self.horizon()]);
+    }
+}
+
+impl std::fmt::Debug for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Problem")
+            .field("x0", &self.x0)
+            .field("models", &self.models.len())
+            .field("stages", &self.stages)
+            .field("shape", &self.shape)
+            .finish()
+    }
+}

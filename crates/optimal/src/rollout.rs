@@ -1,0 +1,138 @@
+//! Rollouts of several step lengths side by side.
+
+use crate::dense::add_scaled_product;
+use crate::lq::{DIVERGED, LqKnot};
+use crate::problem::{Problem, Shape};
+
+/// Trial trajectories, one per step length, that go through the horizon together: at each knot the trials are one
+/// group. Storage is knot after knot and, within a knot, trial after trial.
+#[derive(Debug, Clone)]
+pub(crate) struct Trials {
+    shape: Shape,
+    /// Trials of the last run; at most `width`.
+    count: usize,
+    width: usize,
+    xs: Vec<f64>,
+    us: Vec<f64>,
+    /// φₜ(xₜ, uₜ), N knots. It differs from the next x by what is left of the gap.
+    next: Vec<f64>,
+    /// Sum of the costs; meaningless where `failed`.
+    costs: Vec<f64>,
+    /// Trials in which something grew beyond bounds.
+    failed: Vec<bool>,
+    knot_costs: Vec<f64>,
+    knot: Vec<usize>,
+    dx: Vec<f64>,
+    /// Where a terminal action may write a next state nobody reads.
+    unread: Vec<f64>,
+}
+
+/// The trajectory that trials start from, and the direction.
+pub(crate) struct Nominal<'a> {
+    pub(crate) xs: &'a [f64],
+    pub(crate) us: &'a [f64],
+    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` when there are none.
+    pub(crate) gaps: Option<&'a [f64]>,
+    pub(crate) knots: &'a [LqKnot],
+}
+
+impl Trials {
+    /// Room for `width` trials of `problem`.
+    pub(crate) fn new(problem: &Problem, width: usize) -> Self {
+        let shape = problem.shape().clone();
+        let horizon = shape.horizon();
+        Self {
+            count: 0,
+            width,
+            xs: vec![0.0; (horizon + 1) * shape.nx * width],
+            us: vec![0.0; shape.offsets[horizon] * width],
+            next: vec![0.0; horizon * shape.nx * width],
+            costs: vec![0.0; width],
+            failed: vec![false; width],
+            knot_costs: vec![0.0; width],
+            knot: vec![0; width],
+            dx: vec![0.0; shape.ndx],
+            unread: vec![0.0; shape.nx * width],
+            shape,
+        }
+    }
+
+    /// The number of trials that fit.
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rolls out one trial per step length α:
+    ///
+    /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
+    pub(crate) fn run(&mut self, problem: &mut Problem, nominal: &Nominal, steps: &[f64]) {
+        let Self { shape, xs, us, next, costs, failed, knot_costs, knot, dx, unread, .. } = self;
+        let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
+        self.count = count;
+        costs[..count].fill(0.0);
+        failed[..count].fill(false);
+        for t in 0..=horizon {
+            let nu = shape.nu(t);
+            let (done, ahead) = next.split_at_mut(t * nx * count);
+            let x_all = &mut xs[t * nx * count..][..nx * count];
+            let u_all = &mut us[shape.offsets[t] * count..][..nu * count];
+            for (i, &step) in steps.iter().enumerate() {
+                let (x, u) = (&mut x_all[i * nx..][..nx], &mut u_all[i * nu..][..nu]);
+                let (x_nominal, u_nominal) = (&nominal.xs[shape.x(t)], &nominal.us[shape.u(t)]);
+                u.copy_from_slice(u_nominal);
+                if failed[i] {
+                    x.copy_from_slice(x_nominal); // a state that the action can be asked for
+                    continue;
+                }
+                let action = problem.action(t);
+                let predicted = if t == 0 { problem.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
+                match nominal.gaps {
+                    Some(gaps) if step != 1.0 => {
+                        for (dx, f) in dx.iter_mut().zip(&gaps[shape.dx(t)]) {
+                            *dx = (step - 1.0) * f;
+                        }
+                        action.integrate(predicted, dx, x);
+                    }
+                    _ => x.copy_from_slice(predicted),
+                }
+                action.difference(x_nominal, x, dx);
+                let gains = &nominal.knots[t];
+                add_scaled_product(u, step, gains.k.as_slice(), &[1.0]);
+                add_scaled_product(u, 1.0, gains.K.as_slice(), dx);
+            }
+            knot[..count].fill(t);
+            let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
+            let action = problem.action_mut(t);
+            action.calc_group(&knot[..count], x_all, u_all, next_all, &mut knot_costs[..count]);
+            for i in 0..count {
+                costs[i] += knot_costs[i];
+                let bounded = |x: f64| x.abs() < DIVERGED; // false for NaN
+                let finite = |x: &[f64]| x.iter().all(|x| bounded(*x));
+                failed[i] |= !(bounded(costs[i]) && (t == horizon || finite(&next_all[i * nx..][..nx])));
+            }
+        }
+    }
+
+    /// The cost of trial `i`, or `None` if it left all bounds.
+    pub(crate) fn cost(&self, i: usize) -> Option<f64> {
+        (!self.failed[i]).then_some(self.costs[i])
+    }
+
+    /// The state xₜ of trial `i`.
+    pub(crate) fn x(&self, i: usize, t: usize) -> &[f64] {
+        &self.xs[(t * self.count + i) * self.shape.nx..][..self.shape.nx]
+    }
+
+    /// Copies trial `i` out.
+    pub(crate) fn copy_to(&self, i: usize, xs: &mut [f64], us: &mut [f64], next: &mut [f64]) {
+        for t in 0..=self.shape.horizon() {
+            xs[self.shape.x(t)].copy_from_slice(self.x(i, t));
+        }
+        for t in 0..self.shape.horizon() {
+            let (nx, nu) = (self.shape.nx, self.shape.nu(t));
+            let u = self.shape.offsets[t] * self.count + i * nu;
+            us[self.shape.u(t)].copy_from_slice(&self.us[u..u + nu]);
+            next[self.shape.x(t)].copy_from_slice(&self.next[(t * self.count + i) * nx..][..nx]);
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! The settings of the FDDP family.
+
+use crate::error::Error;
+use serde::{Deserialize, Serialize};
+
+/// The settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Iterations after which a solve stops.
+    pub max_iterations: usize,
+    /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
+    pub tolerance: f64,
+    /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
+    pub step_lengths: usize,
+    /// A step is accepted if the cost falls by more than this times the expected decrease.
+    pub accept: f64,
+    /// While there are gaps, a step that was expected to raise the cost is accepted if the cost rises by less than
+    /// this times what was expected.
+    pub accept_ascent: f64,
+    /// Any step that was expected to lower the cost is accepted if |d₁| is below this.
+    pub flat: f64,
+    /// Regularisation of the first iteration.
+    pub regularisation_start: f64,
+    /// Least regularisation.
+    pub regularisation_min: f64,
+    /// Largest regularisation; a solve that reaches it stops.
+    pub regularisation_max: f64,
+    /// Factor by which the regularisation rises and falls.
+    pub regularisation_factor: f64,
+    /// The regularisation falls after a step longer than this.
+    pub regularisation_decrease_above: f64,
+    /// The regularisation rises after a step of this length or shorter.
+    pub regularisation_increase_below: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            max_iterations: 100,
+            tolerance: 1e-9,
+            step_lengths: 10,
+            accept: 0.1,
+            accept_ascent: 2.0,
+            flat: 1e-12,
+            regularisation_start: 1e-9,
+            regularisation_min: 1e-9,
+            regularisation_max: 1e9,
+            regularisation_factor: 10.0,
+            regularisation_decrease_above: 0.5,
+            regularisation_increase_below: 0.01,
+        }
+    }
+}
+
+impl Settings {
+    /// # Errors
+    /// [`Error::Setting`] for the first field that makes no sense.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        let from_zero = |x: f64| x >= 0.0 && x.is_finite();
+        let steps = self.step_lengths as f64;
+        for (name, value, good, allowed) in [
+            ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
+            ("step_lengths", steps, (1..=60).contains(&self.step_lengths), "from 1 to 60"),
+            ("accept", self.accept, from_zero(self.accept), "at least 0"),
+            ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),
+            ("flat", self.flat, from_zero(self.flat), "at least 0"),
+            ("regularisation_min", self.regularisation_min, positive(self.regularisation_min), "above 0"),
+            (
+                "regularisation_max",
+                self.regularisation_max,
+                self.regularisation_max > self.regularisation_min && self.regularisation_max.is_finite(),
+                "above regularisation_min",
+            ),
+            (
+                "regularisation_start",
+                self.regularisation_start,
+                (self.regularisation_min..self.regularisation_max).contains(&self.regularisation_start),
+                "at least regularisation_min and below regularisation_max",
+            ),
+            (
+                "regularisation_factor",
+                self.regularisation_factor,
+                self.regularisation_factor > 1.0 && self.regularisation_factor.is_finite(),
+                "above 1",
+            ),
+        ] {
+            if !good {
+                return Err(Error::Setting { name, value, allowed });
+            }
+        }
+        Ok(())
+    }
+}

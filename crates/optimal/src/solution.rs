@@ -1,0 +1,137 @@
+//! What a solve gives back: the trajectory, its feedback, how the solve ended and what happened on the way.
+#![allow(non_snake_case)] // K beside k, the names of the literature
+
+use crate::problem::{Problem, Shape};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use std::time::Duration;
+
+/// How a solve ended. Whatever it says, the [`Solution`] holds the best iterate found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[non_exhaustive]
+pub enum Status {
+    /// The iterate has no gaps and the expected decrease of its cost is below the tolerance.
+    Converged,
+    /// The allowed iterations are spent.
+    MaxIterations,
+    /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
+    RegularisationLimit,
+    /// Cost, dynamics or derivatives of the iterate are infinite or NaN, so that no direction can be computed. States
+    /// and controls of the solution are finite nevertheless; its cost may be infinite.
+    NotFinite,
+}
+
+/// What happened in one iteration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Iteration {
+    /// Its number, from 0.
+    pub iteration: usize,
+    /// Cost of the iterate after the step.
+    pub cost: f64,
+    /// Largest gap, ‖f‖∞, of the iterate before the step.
+    pub gap: f64,
+    /// |d₁ + ½ d₂|, the decrease of the cost expected of the full step; compared with the tolerance.
+    pub stop: f64,
+    /// The step length α tried last, which is the accepted one if one was.
+    pub step: f64,
+    /// Regularisation after the iteration.
+    pub regularisation: f64,
+    /// Slope of the expected change: the cost should fall by α (d₁ + ½ α d₂).
+    pub d1: f64,
+    /// Curvature of the expected change.
+    pub d2: f64,
+    /// By how much the cost fell with the step tried last.
+    pub decrease: f64,
+    /// By how much it was expected to.
+    pub expected_decrease: f64,
+    /// Whether the iterate after the step satisfies the dynamics.
+    pub feasible: bool,
+    /// Whether a step was accepted; if not, the iterate is as before.
+    pub accepted: bool,
+}
+
+/// Where the time of a solve went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Timings {
+    /// Dynamics and cost of the warm start.
+    pub calc: Duration,
+    /// Derivatives.
+    pub calc_diff: Duration,
+    /// Backward sweeps, repeated ones included.
+    pub sweep: Duration,
+    /// Trial rollouts of the line searches, accepted or not.
+    pub rollout: Duration,
+    /// The whole solve, observer included.
+    pub total: Duration,
+}
+
+/// The result of a solve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// States x₀ … x_N, flat: (N + 1)·nx.
+    pub xs: Vec<f64>,
+    /// Controls u₀ … u_{N−1}, flat.
+    pub us: Vec<f64>,
+    /// Feedback gains of the last sweep, per knot nu × ndx: uₜ + Kₜ (x ⊖ xₜ) is the control near the trajectory.
+    pub K: Vec<DMatrix<f64>>,
+    /// Feed-forward of the last sweep, per knot nu: the full step it asked for.
+    pub k: Vec<DVector<f64>>,
+    /// Cost of the trajectory; infinite if it is not a number.
+    pub cost: f64,
+    /// Largest gap of the trajectory, ‖f‖∞; infinite if it is not a number.
+    pub gap: f64,
+    /// Whether the trajectory satisfies the dynamics: it is a plain rollout from x̂₀.
+    pub feasible: bool,
+    /// Regularisation at the end.
+    pub regularisation: f64,
+    /// How the solve ended.
+    pub status: Status,
+    /// A record per iteration.
+    pub trace: Vec<Iteration>,
+    /// Where the time went.
+    pub timings: Timings,
+    shape: Shape,
+}
+
+impl Solution {
+    /// Zeros for a problem that is yet to be solved.
+    pub(crate) fn new(problem: &Problem) -> Self {
+        let shape = problem.shape().clone();
+        let horizon = shape.horizon();
+        Self {
+            xs: vec![0.0; (horizon + 1) * shape.nx],
+            us: vec![0.0; shape.offsets[horizon]],
+            K: (0..horizon).map(|t| DMatrix::zeros(shape.nu(t), shape.ndx)).collect(),
+            k: (0..horizon).map(|t| DVector::zeros(shape.nu(t))).collect(),
+            cost: f64::INFINITY,
+            gap: f64::INFINITY,
+            feasible: false,
+            regularisation: 0.0,
+            status: Status::MaxIterations,
+            trace: Vec::new(),
+            timings: Timings::default(),
+            shape,
+        }
+    }
+
+    /// The state xₜ, t = 0 … N.
+    ///
+    /// # Panics
+    /// If t > N.
+    pub fn x(&self, t: usize) -> &[f64] {
+        &self.xs[self.shape.x(t)]
+    }
+
+    /// The control uₜ, t = 0 … N − 1.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    pub fn u(&self, t: usize) -> &[f64] {
+        assert!(t < self.shape.horizon(), "`t` is {t}, but there are {} controls", self.shape.horizon());
+        &self.us[self.shape.u(t)]
+    }
+
+    pub(crate) fn shape(&self) -> &Shape {
+        &self.shape
+    }
+}

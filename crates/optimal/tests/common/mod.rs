@@ -1,0 +1,261 @@
+//! Actions without a robot, for the tests.
+#![allow(dead_code)] // each test file uses some of them
+
+use condyle_optimal::{ActionModel, LqNode, Problem};
+use nalgebra::DMatrix;
+use rand::{Rng, RngExt, SeedableRng, rngs::StdRng};
+
+pub(crate) fn random() -> StdRng {
+    StdRng::seed_from_u64(7)
+}
+
+/// An m×n matrix with entries in (−1, 1).
+pub(crate) fn random_matrix(random: &mut impl Rng, m: usize, n: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(m, n, |_, _| random.random_range(-1.0..1.0))
+}
+
+/// An LQ knot with random entries and a cost that is strictly convex in (δx, δu).
+pub(crate) fn random_node(random: &mut impl Rng, ndx: usize, nu: usize) -> LqNode {
+    let mut node = LqNode::zeros(ndx, nu);
+    let root = random_matrix(random, ndx + nu, ndx + nu);
+    let hessian = &root * root.transpose() + DMatrix::identity(ndx + nu, ndx + nu);
+    node.A = random_matrix(random, ndx, ndx);
+    node.B = random_matrix(random, ndx, nu);
+    node.f = random_matrix(random, ndx, 1).column(0).into_owned();
+    node.Q.copy_from(&hessian.view((0, 0), (ndx, ndx)));
+    node.S.copy_from(&hessian.view((0, ndx), (ndx, nu)));
+    node.R.copy_from(&hessian.view((ndx, ndx), (nu, nu)));
+    node.q = random_matrix(random, ndx, 1).column(0).into_owned();
+    node.r = random_matrix(random, nu, 1).column(0).into_owned();
+    node
+}
+
+/// x⁺ = A x + B u + f with a quadratic cost: an LQ knot as an action.
+pub(crate) struct Linear(pub(crate) LqNode);
+
+impl ActionModel for Linear {
+    fn nx(&self) -> usize {
+        self.0.ndx()
+    }
+    fn nu(&self) -> usize {
+        self.0.nu()
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let node = &self.0;
+        let (x, u) = (nalgebra::DVectorView::from_slice(x, x.len()), nalgebra::DVectorView::from_slice(u, u.len()));
+        next.copy_from_slice((&node.A * x + &node.B * u + &node.f).as_slice());
+        (&node.Q * x).dot(&x) / 2.0
+            + (&node.S * u).dot(&x)
+            + (&node.R * u).dot(&u) / 2.0
+            + node.q.dot(&x)
+            + node.r.dot(&u)
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], out: &mut LqNode) {
+        let (x, u) = (nalgebra::DVectorView::from_slice(x, x.len()), nalgebra::DVectorView::from_slice(u, u.len()));
+        let f = std::mem::replace(&mut out.f, nalgebra::DVector::zeros(0));
+        *out = self.0.clone();
+        out.q = &self.0.q + &self.0.Q * x + &self.0.S * u;
+        out.r = &self.0.r + &self.0.R * u + self.0.S.transpose() * x;
+        out.f = f;
+    }
+}
+
+/// x = (x, y, θ), u = (v, ω): x⁺ = x + Δt (v cos θ, v sin θ, ω), ℓ = ½ (‖10 x‖² + ‖u‖²); at the end without u.
+pub(crate) struct Unicycle {
+    pub(crate) nu: usize,
+    pub(crate) lanes: usize,
+}
+
+const UNICYCLE_STEP: f64 = 0.1;
+const UNICYCLE_WEIGHT: f64 = 100.0;
+
+impl ActionModel for Unicycle {
+    fn nx(&self) -> usize {
+        3
+    }
+    fn nu(&self) -> usize {
+        self.nu
+    }
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        if let [v, w] = u {
+            next[0] = x[0] + UNICYCLE_STEP * v * x[2].cos();
+            next[1] = x[1] + UNICYCLE_STEP * v * x[2].sin();
+            next[2] = x[2] + UNICYCLE_STEP * w;
+        }
+        let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+        0.5 * (UNICYCLE_WEIGHT * square(x) + square(u))
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        let (s, c) = x[2].sin_cos();
+        node.Q.fill_with_identity();
+        node.Q *= UNICYCLE_WEIGHT;
+        for (q, x) in node.q.iter_mut().zip(x) {
+            *q = UNICYCLE_WEIGHT * x;
+        }
+        if let [v, _] = u {
+            let h = UNICYCLE_STEP;
+            node.A.copy_from_slice(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -h * v * s, h * v * c, 1.0]);
+            node.B.copy_from_slice(&[h * c, h * s, 0.0, 0.0, 0.0, h]);
+            node.S.fill(0.0);
+            node.R.fill_with_identity();
+            node.r.copy_from_slice(u);
+        }
+    }
+}
+
+pub(crate) fn unicycle(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
+    let models: Vec<Box<dyn ActionModel>> = vec![Box::new(Unicycle { nu: 2, lanes })];
+    Problem::new(x0.to_vec(), models, vec![0; horizon], Box::new(Unicycle { nu: 0, lanes })).unwrap()
+}
+
+/// A pole on a cart, θ = 0 upright, x = (y, θ, ẏ, θ̇), u = (f): semi-implicit Euler steps of Δt = 0.03 s.
+///
+/// ```text
+/// μ = m₁ + m₂ sin²θ
+/// ÿ = (f + m₂ g cos θ sin θ − m₂ l sin θ θ̇²) / μ
+/// θ̈ = (cos θ f / l + (m₁ + m₂) g sin θ / l − m₂ cos θ sin θ θ̇²) / μ
+/// x⁺ = x + Δt (ẏ + Δt ÿ, θ̇ + Δt θ̈, ÿ, θ̈)
+/// ```
+///
+/// ℓ = ½ Σ wᵢ² (θ, y, ẏ, θ̇, f)ᵢ², times Δt before the end.
+pub(crate) struct Cartpole {
+    pub(crate) nu: usize,
+    pub(crate) lanes: usize,
+    pub(crate) weights: [f64; 5],
+}
+
+const CART: f64 = 1.0;
+const POLE: f64 = 0.1;
+const LENGTH: f64 = 0.5;
+const GRAVITY: f64 = 9.81;
+const CARTPOLE_STEP: f64 = 0.03;
+
+impl Cartpole {
+    /// The weights of y, θ, ẏ, θ̇, f in the cost.
+    fn cost_weights(&self) -> [f64; 5] {
+        let scale = if self.nu == 0 { 1.0 } else { CARTPOLE_STEP };
+        let [angle, position, velocity, rate, force] = self.weights.map(|w| scale * w * w);
+        [position, angle, velocity, rate, force]
+    }
+}
+
+impl ActionModel for Cartpole {
+    fn nx(&self) -> usize {
+        4
+    }
+    fn nu(&self) -> usize {
+        self.nu
+    }
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        if let [f] = u {
+            let ((s, c), rate, h) = (x[1].sin_cos(), x[3], CARTPOLE_STEP);
+            let mu = CART + POLE * s * s;
+            let cart = (f + POLE * c * s * GRAVITY - POLE * LENGTH * s * rate * rate) / mu;
+            let pole = (c * f / LENGTH + (CART + POLE) * GRAVITY * s / LENGTH - POLE * c * s * rate * rate) / mu;
+            next[0] = x[0] + h * (x[2] + h * cart);
+            next[1] = x[1] + h * (x[3] + h * pole);
+            next[2] = x[2] + h * cart;
+            next[3] = x[3] + h * pole;
+        }
+        let weights = self.cost_weights();
+        0.5 * x.iter().chain(u).zip(weights).map(|(z, w)| w * z * z).sum::<f64>()
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        let weights = self.cost_weights();
+        node.Q.fill(0.0);
+        for i in 0..4 {
+            node.Q[(i, i)] = weights[i];
+            node.q[i] = weights[i] * x[i];
+        }
+        if let [f] = u {
+            let ((s, c), rate, h) = (x[1].sin_cos(), x[3], CARTPOLE_STEP);
+            let (double, mu) = (c * c - s * s, CART + POLE * s * s);
+            let cart = (f + POLE * c * s * GRAVITY - POLE * LENGTH * s * rate * rate) / mu;
+            let pole = (c * f / LENGTH + (CART + POLE) * GRAVITY * s / LENGTH - POLE * c * s * rate * rate) / mu;
+            let d_mu = 2.0 * POLE * s * c;
+            // ∂ÿ/∂θ, ∂θ̈/∂θ, ∂ÿ/∂θ̇, ∂θ̈/∂θ̇, ∂ÿ/∂f, ∂θ̈/∂f
+            let cart_angle = (POLE * GRAVITY * double - POLE * LENGTH * c * rate * rate - cart * d_mu) / mu;
+            let pole_angle =
+                (-s * f / LENGTH + (CART + POLE) * GRAVITY * c / LENGTH - POLE * double * rate * rate - pole * d_mu)
+                    / mu;
+            let (cart_rate, pole_rate) = (-2.0 * POLE * LENGTH * s * rate / mu, -2.0 * POLE * c * s * rate / mu);
+            let (cart_force, pole_force) = (1.0 / mu, c / (LENGTH * mu));
+            node.A.fill_with_identity();
+            for (column, cart, pole) in [(1, cart_angle, pole_angle), (3, cart_rate, pole_rate)] {
+                node.A[(0, column)] += h * h * cart;
+                node.A[(1, column)] += h * h * pole;
+                node.A[(2, column)] += h * cart;
+                node.A[(3, column)] += h * pole;
+            }
+            node.A[(0, 2)] += h;
+            node.A[(1, 3)] += h;
+            node.B.copy_from_slice(&[h * h * cart_force, h * h * pole_force, h * cart_force, h * pole_force]);
+            node.S.fill(0.0);
+            node.R[0] = weights[4];
+            node.r[0] = weights[4] * f;
+        }
+    }
+}
+
+/// The start of the swing-up in Crocoddyl's examples.
+#[allow(clippy::approx_constant)] // nearly hanging, not π
+pub(crate) const HANGING: [f64; 4] = [0.0, 3.14, 0.0, 0.0];
+
+pub(crate) fn cartpole(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
+    let running = Cartpole { nu: 1, lanes, weights: [1.0, 0.1, 0.1, 0.1, 0.3] };
+    let terminal = Cartpole { nu: 0, lanes, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
+    Problem::new(x0.to_vec(), vec![Box::new(running)], vec![0; horizon], Box::new(terminal)).unwrap()
+}
+
+/// `horizon` + 1 states on the straight line from `first` to `last`, flat.
+pub(crate) fn straight(first: &[f64], last: &[f64], horizon: usize) -> Vec<f64> {
+    let at = |t: usize| {
+        let s = t as f64 / horizon as f64;
+        first.iter().zip(last).map(move |(first, last)| first + (last - first) * s)
+    };
+    (0..=horizon).flat_map(at).collect()
+}
+
+/// A unit circle as a manifold state: x = (cos φ, sin φ), nx = 2, ndx = 1; u turns it, ℓ = ½ (φ² + 0.1 u²).
+pub(crate) struct Circle {
+    pub(crate) nu: usize,
+}
+
+impl ActionModel for Circle {
+    fn nx(&self) -> usize {
+        2
+    }
+    fn ndx(&self) -> usize {
+        1
+    }
+    fn nu(&self) -> usize {
+        self.nu
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.integrate(x, &[u.iter().sum()], next);
+        let angle = x[1].atan2(x[0]);
+        0.5 * (angle * angle + 0.1 * u.iter().map(|u| u * u).sum::<f64>())
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[1].atan2(x[0]));
+        node.B.fill(1.0);
+        node.S.fill(0.0);
+        node.R.fill(0.1);
+        for (r, u) in node.r.iter_mut().zip(u) {
+            *r = 0.1 * u;
+        }
+    }
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        let (s, c) = dx[0].sin_cos();
+        (out[0], out[1]) = (x[0] * c - x[1] * s, x[0] * s + x[1] * c);
+    }
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        out[0] = (x0[0] * x1[1] - x0[1] * x1[0]).atan2(x0[0] * x1[0] + x0[1] * x1[1]);
+    }
+}

@@ -1,0 +1,117 @@
+//! The iterates are Crocoddyl's, one by one. `data/make_crocoddyl.py` wrote the numbers, with Crocoddyl 3.2.1.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::{cartpole, straight, unicycle};
+use condyle_optimal::{Fddp, Problem, Status};
+use serde_json::Value;
+
+/// Relative. Two implementations that round differently drift apart by about the condition of the problem times 1e-16;
+/// Crocoddyl with a warm start moved by 1e-12 repeats its own costs to 1e-11.
+const COST: f64 = 1e-9;
+
+/// Relative, for what is a difference of nearly equal numbers: states and gains that the optimum determines less well
+/// than its cost.
+const DETAIL: f64 = 1e-6;
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|v| if v.is_array() { numbers(v) } else { vec![v.as_f64().unwrap()] })
+        .collect()
+}
+
+fn close(a: f64, b: f64, tolerance: f64) -> bool {
+    (a - b).abs() <= tolerance * (1.0 + b.abs())
+}
+
+/// Solves `name` with line searches of `lanes` step lengths at a time, and compares everything.
+fn compare(name: &str, build: fn(&[f64], usize, usize) -> Problem, lanes: usize) {
+    let data: Value = serde_json::from_str(include_str!("data/crocoddyl.json")).unwrap();
+    let reference = &data["problems"][name];
+    let (x0, horizon) = (numbers(&reference["x0"]), reference["horizon"].as_u64().unwrap() as usize);
+    let mut problem = build(&x0, horizon, lanes);
+    let xs = straight(&x0, &numbers(&reference["last_guess"]), horizon);
+    let us = vec![0.0; problem.control_range(horizon).end];
+
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = reference["max_iterations"].as_u64().unwrap() as usize;
+    solver.settings.regularisation_start = reference["regularisation"].as_f64().unwrap();
+    let solution = solver.solve(&mut problem, &xs, &us).unwrap();
+
+    let trace = reference["trace"].as_array().unwrap();
+    let (mut worst, mut worst_stop) = (0.0_f64, 0.0_f64);
+    for (ours, theirs) in solution.trace.iter().zip(trace) {
+        let [cost, gap, step, regularisation, stop, d1, d2, feasible] = numbers(theirs)[..] else { panic!() };
+        worst = worst.max((ours.cost - cost).abs() / (1.0 + cost.abs()));
+        worst_stop = worst_stop.max((ours.stop - stop).abs() / (1.0 + stop.abs()));
+        let line = format!("{name}, iteration {}: {ours:?} against {theirs}", ours.iteration);
+        assert_eq!(ours.step, step, "step: {line}");
+        assert!(close(ours.regularisation, regularisation, 1e-12), "regularisation: {line}");
+        assert_eq!(ours.feasible, feasible == 1.0, "feasible: {line}");
+        assert!(close(ours.cost, cost, COST), "cost: {line}");
+        assert!(close(ours.gap, gap, COST), "gap: {line}");
+        for (ours, theirs) in [(ours.stop, stop), (ours.d1, d1), (ours.d2, d2)] {
+            assert!(close(ours, theirs, COST), "{ours:e} against {theirs:e}: {line}");
+        }
+    }
+    println!("{name}: cost differs by at most {worst:.1e}, stop by {worst_stop:.1e}");
+    assert_eq!(solution.trace.len(), trace.len(), "{name}: number of iterations");
+    assert_eq!(solution.status == Status::Converged, reference["converged"] == true, "{name}: {:?}", solution.status);
+
+    let (u0, x_last) = (numbers(&reference["u0"]), numbers(&reference["x_last"]));
+    assert!(solution.u(0).iter().zip(&u0).all(|(a, b)| close(*a, *b, DETAIL)), "{name}: {:?} {u0:?}", solution.u(0));
+    assert!(solution.x(horizon).iter().zip(&x_last).all(|(a, b)| close(*a, *b, DETAIL)), "{name}");
+    // Row after row there, column after column here, and the opposite sign.
+    let K0 = numbers(&reference["K0"]);
+    assert!(
+        solution.K[0].transpose().iter().zip(&K0).all(|(a, b)| close(*a, -b, DETAIL)),
+        "{name}: {} {K0:?}",
+        solution.K[0]
+    );
+}
+
+#[test]
+fn unicycle_20() {
+    compare("unicycle_20", unicycle, 1);
+}
+
+#[test]
+fn unicycle_200() {
+    compare("unicycle_200", unicycle, 1);
+}
+
+#[test]
+fn unicycle_with_gaps() {
+    compare("unicycle_gaps", unicycle, 1);
+}
+
+#[test]
+fn cartpole_swingup() {
+    for lanes in [1, 4, 8] {
+        compare("cartpole_swingup", cartpole, lanes);
+    }
+}
+
+#[test]
+fn cartpole_with_gaps() {
+    for lanes in [1, 4] {
+        compare("cartpole_gaps", cartpole, lanes);
+    }
+}
+
+/// Far from any solution: short steps, and a regularisation that rises and falls.
+#[test]
+fn cartpole_spinning() {
+    for lanes in [1, 8] {
+        compare("cartpole_spinning", cartpole, lanes);
+    }
+}
+
+#[test]
+fn cartpole_with_a_large_regularisation() {
+    compare("cartpole_regularised", cartpole, 4);
+}

@@ -1,0 +1,118 @@
+//! Linear-quadratic problems: the sweep solves them exactly, and FDDP in one iteration.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::{Linear, random, random_matrix, random_node};
+use condyle_optimal::{ActionModel, Fddp, LqNode, Problem, Settings, Status, Sweep, SweepError};
+use nalgebra::{DMatrix, DVector};
+
+/// Random problems with entries of size one, whose value functions grow to 1e3 or so over the horizon.
+const RESIDUAL: f64 = 1e-9;
+
+/// The solution of a random LQ problem, from gains and value functions, satisfies the Karush–Kuhn–Tucker conditions.
+#[test]
+fn kkt_residual_vanishes() {
+    let mut random = random();
+    for (ndx, nus) in
+        [(1, vec![1]), (3, vec![2; 10]), (4, vec![3, 0, 1, 6, 0, 2]), (18, vec![12; 5]), (37, vec![31; 3])]
+    {
+        let mut nodes: Vec<LqNode> = nus.iter().map(|&nu| random_node(&mut random, ndx, nu)).collect();
+        nodes.push(random_node(&mut random, ndx, 0));
+        let mut sweep = Sweep::new(&nodes);
+        sweep.run(&nodes, 0.0).unwrap();
+        let (horizon, knots) = (nus.len(), sweep.knots());
+
+        // δu = k + K δx,   δx⁺ = A δx + B δu + f,   λ = Vxx δx + Vx
+        let x0: DVector<f64> = random_matrix(&mut random, ndx, 1).column(0).into_owned();
+        let (mut xs, mut us) = (vec![x0], vec![]);
+        for (node, knot) in nodes.iter().zip(knots).take(horizon) {
+            let x = xs.last().unwrap();
+            us.push(&knot.k + &knot.K * x);
+            xs.push(&node.A * x + &node.B * us.last().unwrap() + &node.f);
+        }
+        let multiplier = |t: usize| &knots[t].Vxx * &xs[t] + &knots[t].Vx;
+        for t in 0..horizon {
+            let (node, x, u, next) = (&nodes[t], &xs[t], &us[t], multiplier(t + 1));
+            let scale = 1.0 + next.amax();
+            // Q δx + S δu + q + Aᵀλ⁺ = λ,   Sᵀδx + R δu + r + Bᵀλ⁺ = 0
+            let state = &node.Q * x + &node.S * u + &node.q + node.A.transpose() * &next - multiplier(t);
+            let control = node.S.transpose() * x + &node.R * u + &node.r + node.B.transpose() * &next;
+            assert!(state.amax() < RESIDUAL * scale, "ndx {ndx}, knot {t}: {:e}", state.amax());
+            assert!(control.iter().all(|c| c.abs() < RESIDUAL * scale), "ndx {ndx}, knot {t}: {control}");
+        }
+        let end = &nodes[horizon].Q * &xs[horizon] + &nodes[horizon].q - multiplier(horizon);
+        assert!(end.amax() < RESIDUAL);
+    }
+}
+
+/// With the regularisation ϱ: Quu = R + BᵀVB + ϱ I, K = −Quu⁻¹(Sᵀ + BᵀVA), V = Q + AᵀVA − KᵀQuu K + ϱ I.
+#[test]
+fn regularised_step_is_the_textbook_one() {
+    let (mut random, regularisation) = (random(), 0.3);
+    let nodes = [random_node(&mut random, 5, 3), random_node(&mut random, 5, 0)];
+    let mut sweep = Sweep::new(&nodes);
+    sweep.run(&nodes, regularisation).unwrap();
+    let (node, knot) = (&nodes[0], &sweep.knots()[0]);
+
+    let V = &nodes[1].Q + DMatrix::identity(5, 5) * regularisation;
+    let v = &nodes[1].q + &V * &node.f;
+    let Quu = &node.R + node.B.transpose() * &V * &node.B + DMatrix::identity(3, 3) * regularisation;
+    let Qux = node.S.transpose() + node.B.transpose() * &V * &node.A;
+    let Qu = &node.r + node.B.transpose() * &v;
+    let inverse = Quu.clone().try_inverse().unwrap();
+    let (K, k) = (-&inverse * &Qux, -&inverse * &Qu);
+    let Vx = &node.q + node.A.transpose() * &v + K.transpose() * &Qu;
+    let Qxx = &node.Q + node.A.transpose() * &V * &node.A;
+    let Vxx = Qxx + Qux.transpose() * &K + DMatrix::identity(5, 5) * regularisation;
+    for (found, expected) in [(&knot.K, &K), (&knot.Vxx, &Vxx), (&knot.Quu, &Quu)] {
+        assert!((found - expected).amax() < RESIDUAL, "{found} {expected}");
+    }
+    for (found, expected) in [(&knot.k, &k), (&knot.Vx, &Vx), (&knot.Qu, &Qu)] {
+        assert!((found - expected).amax() < RESIDUAL, "{found} {expected}");
+    }
+}
+
+#[test]
+fn sweep_names_the_knot_that_is_not_convex() {
+    let mut random = random();
+    let mut nodes: Vec<LqNode> = (0..4).map(|t| random_node(&mut random, 3, if t < 3 { 2 } else { 0 })).collect();
+    let mut sweep = Sweep::new(&nodes);
+    nodes[1].R[(1, 1)] = -1e4;
+    assert!(matches!(sweep.run(&nodes, 0.0), Err(SweepError::NotPositive { knot: 1, row: 1, .. })));
+    assert_eq!(sweep.run(&nodes, 1e5), Ok(()));
+    nodes[2].A[(0, 0)] = f64::NAN;
+    assert_eq!(sweep.run(&nodes, 1e5), Err(SweepError::NotFinite { knot: 2 }));
+    nodes[3].q[1] = f64::INFINITY;
+    assert_eq!(sweep.run(&nodes, 1e5), Err(SweepError::NotFinite { knot: 3 }));
+}
+
+/// One full step from any start, gaps or not; the second iteration finds nothing left to do.
+#[test]
+fn fddp_solves_an_lqr_in_one_iteration() {
+    let mut random = random();
+    let (ndx, horizon) = (6, 12);
+    let mut models: Vec<Box<dyn ActionModel>> = vec![];
+    for nu in [3, 0, 2] {
+        models.push(Box::new(Linear(random_node(&mut random, ndx, nu))));
+    }
+    let stages: Vec<usize> = (0..horizon).map(|t| t / 2 % 3).collect();
+    let terminal = Box::new(Linear(random_node(&mut random, ndx, 0)));
+    let x0 = random_matrix(&mut random, ndx, 1);
+    let mut problem = Problem::new(x0.as_slice().to_vec(), models, stages, terminal).unwrap();
+    let xs = random_matrix(&mut random, ndx, horizon + 1);
+    let us = random_matrix(&mut random, problem.control_range(horizon).end, 1);
+
+    let mut solver = Fddp::new(&problem);
+    // The regularisation turns the first step by about its size.
+    solver.settings =
+        Settings { tolerance: 1e-6, regularisation_start: 1e-15, regularisation_min: 1e-15, ..Settings::default() };
+    let solution = solver.solve(&mut problem, xs.as_slice(), us.as_slice()).unwrap();
+    assert_eq!(solution.status, Status::Converged);
+    assert_eq!(solution.trace.len(), 2);
+    let [first, second] = solution.trace[..] else { panic!() };
+    assert!(first.accepted && first.feasible && first.step == 1.0);
+    assert!((first.cost - second.cost).abs() < RESIDUAL * (1.0 + first.cost.abs()));
+    assert!((first.decrease - first.expected_decrease).abs() < RESIDUAL * (1.0 + first.decrease.abs()));
+    assert!(solution.gap < 1e-12 && solution.feasible);
+}

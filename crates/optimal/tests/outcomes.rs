@@ -1,0 +1,250 @@
+//! What a solve says when something is wrong, and that it does not depend on how its work is grouped.
+
+mod common;
+
+use common::{Cartpole, Circle, HANGING, Unicycle, cartpole, straight, unicycle};
+use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Settings, Status};
+
+/// The accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
+const FIRST: f64 = 1e-6;
+const SECOND: f64 = 1e-3;
+
+fn compare_with_numdiff<A: ActionModel>(mut action: A, x: &[f64], u: &[f64]) {
+    let mut ours = LqNode::zeros(action.ndx(), action.nu());
+    let mut expected = ours.clone();
+    action.calc_diff(0, x, u, &mut ours);
+    let terminal = action.nu() == 0;
+    NumDiff(action).calc_diff(0, x, u, &mut expected);
+    if !terminal {
+        assert!((&ours.A - &expected.A).amax() < FIRST, "{} {}", ours.A, expected.A);
+        assert!((&ours.B - &expected.B).amax() < FIRST, "{} {}", ours.B, expected.B);
+        assert!((&ours.r - &expected.r).amax() < FIRST, "{} {}", ours.r, expected.r);
+        assert!((&ours.S - &expected.S).amax() < SECOND, "{} {}", ours.S, expected.S);
+        assert!((&ours.R - &expected.R).amax() < SECOND, "{} {}", ours.R, expected.R);
+    }
+    assert!((&ours.q - &expected.q).amax() < FIRST, "{} {}", ours.q, expected.q);
+    assert!((&ours.Q - &expected.Q).amax() < SECOND, "{} {}", ours.Q, expected.Q);
+}
+
+#[test]
+fn written_derivatives_agree_with_finite_differences() {
+    let weights = [1.0, 0.1, 0.2, 0.3, 0.4];
+    compare_with_numdiff(Unicycle { nu: 2, lanes: 1 }, &[0.3, -0.2, 0.7], &[0.5, -1.5]);
+    compare_with_numdiff(Unicycle { nu: 0, lanes: 1 }, &[0.3, -0.2, 0.7], &[]);
+    compare_with_numdiff(Cartpole { nu: 1, lanes: 1, weights }, &[0.3, -0.2, 0.7, 1.3], &[2.0]);
+    compare_with_numdiff(Cartpole { nu: 0, lanes: 1, weights }, &[0.3, -0.2, 0.7, 1.3], &[]);
+    compare_with_numdiff(Circle { nu: 1 }, &[0.6, 0.8], &[0.4]);
+}
+
+/// On a circle the problem is linear in the angle: one full step, across the gaps of a warm start that winds around.
+#[test]
+fn a_state_may_live_on_a_manifold() {
+    let circle = |angle: f64| [angle.cos(), angle.sin()];
+    let mut problem =
+        Problem::new(circle(2.5).to_vec(), vec![Box::new(Circle { nu: 1 })], vec![0; 8], Box::new(Circle { nu: 0 }))
+            .unwrap();
+    let xs: Vec<f64> = (0..9).flat_map(|t| circle(2.0 - 0.3 * t as f64)).collect();
+    let mut solver = Fddp::new(&problem);
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 8]).unwrap();
+    assert_eq!(solution.status, Status::Converged);
+    assert!(solution.trace[0].step == 1.0 && solution.trace.len() <= 3);
+    assert!(solution.x(8)[1].abs() < 1e-3 && solution.gap < 1e-15);
+    assert_eq!((solution.K[0].shape(), solution.xs.len()), ((1, 1), 18));
+}
+
+#[test]
+fn the_pendulum_on_a_cart_stands_up() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let us = [0.0; 50];
+    let xs = problem.rollout(&us).unwrap();
+    let mut solver = Fddp::new(&problem);
+    let mut seen = 0;
+    let solution = solver.solve_with(&mut problem, &xs, &us, |_| seen += 1).unwrap();
+    assert_eq!(solution.status, Status::Converged);
+    assert_eq!(seen, solution.trace.len());
+    assert!(solution.x(50).iter().all(|x| x.abs() < 0.1), "{:?}", solution.x(50));
+    let xs = solution.xs.clone();
+    let us = solution.us.clone();
+    assert_eq!(problem.rollout(&us).unwrap(), xs);
+    // A solve from the solution does not leave it.
+    let again = solver.solve(&mut problem, &xs, &us).unwrap();
+    assert!(again.status == Status::Converged && again.trace.len() <= 2);
+}
+
+#[test]
+fn a_solve_is_the_same_with_trials_side_by_side() {
+    let solve = |lanes| {
+        let mut problem = cartpole(&HANGING, 50, lanes);
+        let xs = straight(problem.x0(), &[2.0, -6.0, 0.0, 40.0], 50);
+        let mut solver = Fddp::new(&problem);
+        solver.settings.max_iterations = 40;
+        let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+        (solution.xs.clone(), solution.us.clone(), solution.trace.clone())
+    };
+    let one = solve(1);
+    for lanes in [2, 3, 4, 8, 16] {
+        assert!(solve(lanes) == one, "{lanes} lanes");
+    }
+}
+
+#[test]
+fn an_early_stop_returns_the_iterate_it_reached() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let xs = straight(problem.x0(), problem.x0(), 50);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 12;
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone();
+    assert_eq!((solution.status, solution.trace.len()), (Status::MaxIterations, 12));
+    assert_eq!(solution.cost, solution.trace[11].cost);
+    let (mut next, mut costs) = (vec![0.0; 200], vec![0.0; 51]);
+    problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
+    assert!((costs.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * solution.cost);
+    assert_eq!(next, solution.xs[4..]);
+
+    solver.settings.max_iterations = 0;
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+    assert_eq!((solution.status, &solution.xs), (Status::MaxIterations, &xs));
+}
+
+/// x⁺ = x + u, ℓ = −½ c u²: more and more cost can be saved.
+struct Concave {
+    nu: usize,
+    curvature: f64,
+}
+
+impl ActionModel for Concave {
+    fn nx(&self) -> usize {
+        1
+    }
+    fn nu(&self) -> usize {
+        self.nu
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        next[0] = x[0] + u.iter().sum::<f64>();
+        -0.5 * self.curvature * u.iter().map(|u| u * u).sum::<f64>()
+    }
+    fn calc_diff(&mut self, _: usize, _: &[f64], u: &[f64], node: &mut LqNode) {
+        node.A[0] = 1.0;
+        node.B.fill(1.0);
+        node.R.fill(-self.curvature);
+        node.r.copy_from_slice(u);
+        node.r *= -self.curvature;
+    }
+}
+
+#[test]
+fn a_problem_without_a_minimum_ends_at_the_largest_regularisation() {
+    let models: Vec<Box<dyn ActionModel>> = vec![Box::new(Concave { nu: 1, curvature: 1e10 })];
+    let mut problem = Problem::new(vec![0.0], models, vec![0; 3], Box::new(Concave { nu: 0, curvature: 0.0 })).unwrap();
+    let mut solver = Fddp::new(&problem);
+    let solution = solver.solve(&mut problem, &[0.0; 4], &[1.0; 3]).unwrap();
+    assert_eq!((solution.status, solution.regularisation), (Status::RegularisationLimit, 1e9));
+    assert_eq!((solution.us.as_slice(), solution.trace.len()), (&[1.0; 3][..], 0));
+}
+
+/// Finite only while |x| < `limit`; its derivatives are NaN where `broken`.
+struct Bounded {
+    nu: usize,
+    lanes: usize,
+    limit: f64,
+    broken: bool,
+}
+
+impl ActionModel for Bounded {
+    fn nx(&self) -> usize {
+        1
+    }
+    fn nu(&self) -> usize {
+        self.nu
+    }
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        assert!(x[0].is_finite(), "asked for a state that is not finite");
+        next[0] = if x[0].abs() < self.limit { x[0] + u.iter().sum::<f64>() } else { f64::NAN };
+        0.5 * ((x[0] - 3.0).powi(2) + u.iter().map(|u| u * u).sum::<f64>())
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        (node.A[0], node.Q[0], node.q[0]) = (if self.broken { f64::NAN } else { 1.0 }, 1.0, x[0] - 3.0);
+        node.B.fill(1.0);
+        node.S.fill(0.0);
+        node.R.fill(1.0);
+        node.r.copy_from_slice(u);
+    }
+}
+
+#[test]
+fn what_is_not_finite_never_enters_a_solution() {
+    let solve = |limit: f64, broken: bool, lanes: usize, x: f64| {
+        let model = Bounded { nu: 1, lanes, limit, broken };
+        let mut problem = Problem::new(
+            vec![0.0],
+            vec![Box::new(model)],
+            vec![0; 6],
+            Box::new(Bounded { nu: 0, lanes, limit, broken }),
+        )
+        .unwrap();
+        let mut solver = Fddp::new(&problem);
+        let solution = solver.solve(&mut problem, &[x; 7], &[0.0; 6]).unwrap().clone();
+        assert!(solution.xs.iter().chain(&solution.us).all(|x| x.is_finite()));
+        assert!(!solution.cost.is_nan() && !solution.gap.is_nan());
+        solution
+    };
+    assert_eq!(solve(1.0, false, 1, 2.0).status, Status::NotFinite); // the warm start
+    assert_eq!(solve(9.0, true, 1, 0.0).status, Status::NotFinite); // the derivatives
+    assert_eq!(solve(9.0, false, 1, 0.0).status, Status::Converged);
+    for lanes in [1, 4] {
+        let cut = solve(2.0, false, lanes, 0.0); // a full step leaves the bounds, a shorter one does not
+        assert!(cut.trace[0].step < 1.0 && cut.trace[0].accepted, "{:?}", cut.trace);
+        assert!(cut.cost < 0.5 * 9.0 * 7.0);
+    }
+}
+
+#[test]
+fn errors_name_the_thing_and_the_numbers() {
+    let model = || -> Vec<Box<dyn ActionModel>> { vec![Box::new(Unicycle { nu: 2, lanes: 1 })] };
+    let end = || Box::new(Unicycle { nu: 0, lanes: 1 });
+    let error = |result: Result<Problem, Error>| result.unwrap_err();
+    assert_eq!(error(Problem::new(vec![0.0; 3], model(), vec![], end())), Error::EmptyHorizon);
+    let e = error(Problem::new(vec![0.0; 3], model(), vec![0, 2], end()));
+    assert_eq!(e, Error::UnknownModel { knot: 1, index: 2, models: 1 });
+    let e = error(Problem::new(vec![0.0; 2], model(), vec![0], end()));
+    assert_eq!(e, Error::Length { name: "x0", expected: 3, found: 2 });
+    let e = error(Problem::new(vec![0.0; 3], model(), vec![0, 0], Box::new(Unicycle { nu: 2, lanes: 1 })));
+    assert_eq!(e.to_string(), "node 2: expected nu = 0, found 2");
+    let e = error(Problem::new(vec![0.0; 3], vec![Box::new(Circle { nu: 1 })], vec![0], end()));
+    assert_eq!(e.to_string(), "node 0: expected nx = 3, found 2");
+
+    let mut problem = unicycle(&[0.0; 3], 5, 1);
+    let mut solver = Fddp::new(&problem);
+    let e = solver.solve(&mut problem, &[0.0; 17], &[0.0; 10]).unwrap_err();
+    assert_eq!(e.to_string(), "`xs`: expected length 18, found 17");
+    let e = solver.solve(&mut problem, &[0.0; 18], &[f64::INFINITY; 10]).unwrap_err();
+    assert_eq!(e.to_string(), "`us[0]` is inf, which is not finite");
+    let e = solver.solve(&mut unicycle(&[0.0; 3], 6, 1), &[0.0; 21], &[0.0; 12]).unwrap_err();
+    assert_eq!(e, Error::Length { name: "stages", expected: 5, found: 6 });
+    let e = solver.solve(&mut cartpole(&[0.0; 4], 5, 1), &[0.0; 24], &[0.0; 5]).unwrap_err();
+    assert_eq!(e, Error::Dimension { node: 0, name: "nx", expected: 3, found: 4 });
+    solver.settings = Settings { regularisation_factor: 1.0, ..Settings::default() };
+    let e = solver.solve(&mut problem, &[0.0; 18], &[0.0; 10]).unwrap_err();
+    assert_eq!(e.to_string(), "setting `regularisation_factor` is 1, but it must be above 1");
+}
+
+#[test]
+#[should_panic(expected = "`costs` has length 1, expected 2")]
+fn a_wrong_shape_panics_with_its_name() {
+    let mut next = [0.0; 6];
+    Unicycle { nu: 2, lanes: 1 }.calc_group(&[0, 1], &[0.0; 6], &[0.0; 4], &mut next, &mut [0.0]);
+}
+
+#[test]
+fn a_model_can_be_changed_between_solves() {
+    let mut problem = unicycle(&[1.0, 0.0, 0.0], 5, 1);
+    problem.set_x0(&[0.5, 0.0, 0.0]).unwrap();
+    assert_eq!(problem.x0(), [0.5, 0.0, 0.0]);
+    assert!(problem.set_x0(&[f64::NAN; 3]).is_err() && problem.x0()[0] == 0.5);
+    assert!(problem.model_mut::<Cartpole>(0).is_none() && problem.model_mut::<Unicycle>(1).is_none());
+    problem.model_mut::<Unicycle>(0).unwrap().lanes = 4;
+    assert_eq!(problem.terminal_mut::<Unicycle>().unwrap().nu, 0);
+}

@@ -1,0 +1,153 @@
+//! The free dynamics of robots and their costs: exact derivatives, references, limits.
+#![allow(non_snake_case)] // the names of the literature
+
+use condyle_dynamics::{Act, Data, Model, Se3, Vec3, forward_kinematics, integrate, neutral, robots};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle_optimal::{ActionModel, Error, LqNode, NumDiff};
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+use std::sync::Arc;
+
+/// Central differences of a function with values and derivatives of order one are good to about 1e-9 of them.
+const DIFFERENCES: f64 = 1e-6;
+const DT: f64 = 0.02;
+
+fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
+    (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
+}
+
+/// A state around neutral, of which no joint is near a singularity of its group.
+fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
+    let mut q = neutral(model);
+    integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
+    [q, random(model.nv(), 1.0, rng)].concat()
+}
+
+fn frame_of(model: &Model) -> usize {
+    model.frames().len() - 1
+}
+
+/// Every residual with every activation that fits it.
+fn all_costs(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Cost> {
+    let nv = model.nv();
+    let frame = frame_of(model);
+    let mut data = Data::new(model);
+    let x = random_state(model, rng);
+    let target = forward_kinematics(model, &mut data, &x[..model.nq()]).frame(frame);
+    let reference = random_state(model, rng);
+    let barrier = |n: usize| Activation::Barrier { lower: vec![-0.1; n], upper: vec![0.2; n] };
+    vec![
+        Cost::new("state", 0.3, Residual::State { reference: reference.clone() }, Activation::Quadratic),
+        Cost::new(
+            "posture",
+            0.2,
+            Residual::State { reference: reference.clone() },
+            Activation::Weighted(random(2 * nv, 1.0, rng)),
+        ),
+        Cost::new("limits", 2.0, Residual::State { reference }, barrier(2 * nv)),
+        Cost::new("effort", 0.1, Residual::Control { reference: random(nu, 1.0, rng) }, Activation::Quadratic),
+        Cost::new("effort limits", 0.7, Residual::Control { reference: vec![0.0; nu] }, barrier(nu)),
+        Cost::new("pose", 1.5, Residual::FramePlacement { frame, target }, Activation::Quadratic),
+        Cost::new(
+            "place",
+            0.9,
+            Residual::FrameTranslation { frame, target: target.translation },
+            Activation::Weighted(vec![1.0, 2.0, 3.0]),
+        ),
+    ]
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    let scale = 1.0 + b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale
+}
+
+#[test]
+fn derivatives_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(3);
+    for model in [robots::arm7(), robots::quadruped(), robots::humanoid()].map(Arc::new) {
+        let nu = model.nv() - if model.nq() == model.nv() { 0 } else { 6 };
+        let costs = all_costs(&model, nu, &mut rng);
+        let mut action = FreeDynamics::running(model.clone(), DT, costs).unwrap();
+        let mut oracle = NumDiff(action.clone());
+        let ndx = action.ndx();
+        let (mut exact, mut numeric) = (LqNode::zeros(ndx, nu), LqNode::zeros(ndx, nu));
+        for _ in 0..5 {
+            let (x, u) = (random_state(&model, &mut rng), random(nu, 5.0, &mut rng));
+            action.calc_diff(0, &x, &u, &mut exact);
+            oracle.calc_diff(0, &x, &u, &mut numeric);
+            for (name, a, b) in [
+                ("A", exact.A.as_slice(), numeric.A.as_slice()),
+                ("B", exact.B.as_slice(), numeric.B.as_slice()),
+                ("q", exact.q.as_slice(), numeric.q.as_slice()),
+                ("r", exact.r.as_slice(), numeric.r.as_slice()),
+            ] {
+                let error = largest_difference(a, b);
+                assert!(error < DIFFERENCES, "{}: {name} is off by {error:e}", model.name());
+            }
+        }
+    }
+}
+
+/// Of a residual that is linear in x and u the Gauss–Newton Hessian is the Hessian.
+#[test]
+fn hessians_of_linear_residuals_are_exact() {
+    let mut rng = StdRng::seed_from_u64(4);
+    let model = Arc::new(robots::arm7());
+    let mut costs = all_costs(&model, 7, &mut rng);
+    costs.retain(|c| !matches!(c.residual, Residual::FramePlacement { .. } | Residual::FrameTranslation { .. }));
+    let mut action = FreeDynamics::running(model.clone(), DT, costs).unwrap();
+    let mut oracle = NumDiff(action.clone());
+    let (mut exact, mut numeric) = (LqNode::zeros(14, 7), LqNode::zeros(14, 7));
+    let (x, u) = (random_state(&model, &mut rng), random(7, 1.0, &mut rng));
+    action.calc_diff(0, &x, &u, &mut exact);
+    oracle.calc_diff(0, &x, &u, &mut numeric);
+    assert!(largest_difference(exact.Q.as_slice(), numeric.Q.as_slice()) < DIFFERENCES);
+    assert!(largest_difference(exact.R.as_slice(), numeric.R.as_slice()) < DIFFERENCES);
+}
+
+#[test]
+fn a_cost_is_zero_at_its_reference() {
+    let mut rng = StdRng::seed_from_u64(5);
+    let model = Arc::new(robots::humanoid());
+    let mut data = Data::new(&model);
+    let x = random_state(&model, &mut rng);
+    let frame = frame_of(&model);
+    let target: Se3<f64> = forward_kinematics(&model, &mut data, &x[..model.nq()]).frame(frame);
+    let terms = vec![
+        Cost::new("state", 1.0, Residual::State { reference: x.clone() }, Activation::Quadratic),
+        Cost::new("pose", 1.0, Residual::FramePlacement { frame, target }, Activation::Quadratic),
+        Cost::new(
+            "place",
+            1.0,
+            Residual::FrameTranslation { frame, target: target.act(Vec3::zero()) },
+            Activation::Quadratic,
+        ),
+    ];
+    let mut action = FreeDynamics::terminal(model.clone(), terms).unwrap();
+    let mut next = x.clone();
+    assert!(action.calc(0, &x, &[], &mut next) < 1e-28);
+    assert!(action.costs_mut().set_weight("pose", 3.0) && !action.costs_mut().set_weight("rose", 3.0));
+}
+
+#[test]
+fn what_does_not_fit_is_refused_by_name() {
+    let arm = Arc::new(robots::arm7());
+    let cost = |residual, activation| {
+        FreeDynamics::running(arm.clone(), DT, vec![Cost::new("reach", 1.0, residual, activation)])
+    };
+    let message = |r: Result<FreeDynamics, Error>| r.err().expect("must be refused").to_string();
+    let control = |n| Residual::Control { reference: vec![0.0; n] };
+    assert_eq!(
+        message(cost(control(6), Activation::Quadratic)),
+        "cost `reach`: its reference has 6 numbers, expected 7"
+    );
+    assert_eq!(
+        message(cost(control(7), Activation::Weighted(vec![1.0]))),
+        "cost `reach`: its weighting has 1 numbers, expected 7"
+    );
+    let far = Residual::FrameTranslation { frame: 99, target: Vec3::zero() };
+    assert!(message(cost(far, Activation::Quadratic)).starts_with("cost `reach`: there is no frame 99"));
+    let nowhere = Residual::FrameTranslation { frame: 1, target: Vec3::new(f64::NAN, 0.0, 0.0) };
+    assert_eq!(message(cost(nowhere, Activation::Quadratic)), "cost `reach`: its target holds a NaN");
+    assert_eq!(message(FreeDynamics::running(arm.clone(), 0.0, vec![])), "a knot of 0 s: its duration must be above 0");
+}
