@@ -4,7 +4,9 @@
 mod common;
 
 use common::{HANGING, cartpole, random, random_node, straight};
-use condyle_optimal::{Fddp, Sweep};
+use condyle_dynamics::{Se3, Vec3, neutral, robots};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle_optimal::{Fddp, Problem, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -66,5 +68,42 @@ fn a_solve_allocates_nothing() {
             solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
         });
         assert_eq!((iterations, first, second), (34, 2, 0));
+    }
+}
+
+#[test]
+fn a_robots_solve_allocates_nothing() {
+    for model in [robots::arm7(), robots::quadruped()].map(std::sync::Arc::new) {
+        let x0 = [neutral(&model), vec![0.0; model.nv()]].concat();
+        let nu = model.nv() - if model.nq() == model.nv() { 0 } else { 6 };
+        let frame = model.frames().len() - 1;
+        let goal = Vec3::new(0.3, 0.2, 0.1);
+        let costs = || {
+            vec![
+                Cost::new("state", 1e-2, Residual::State { reference: x0.clone() }, Activation::Quadratic),
+                Cost::new("place", 1.0, Residual::FrameTranslation { frame, target: goal }, Activation::Quadratic),
+                Cost::new(
+                    "pose",
+                    1.0,
+                    Residual::FramePlacement { frame, target: Se3::identity() },
+                    Activation::Quadratic,
+                ),
+            ]
+        };
+        let effort = Residual::Control { reference: vec![0.0; nu] };
+        let bounds = Activation::Barrier { lower: vec![-1.0; nu], upper: vec![1.0; nu] };
+        let running = [costs(), vec![Cost::new("effort", 1e-3, effort, bounds)]].concat();
+        let mut action = FreeDynamics::running(model.clone(), 0.01, running).unwrap();
+        let us = action.quasi_static(&x0).repeat(10);
+        let end = FreeDynamics::terminal(model.clone(), costs()).unwrap();
+        let mut problem = Problem::new(x0.clone(), vec![Box::new(action)], vec![0; 10], Box::new(end)).unwrap();
+        let xs = x0.repeat(11);
+        let mut solver = Fddp::new(&problem);
+        solver.settings.max_iterations = 5;
+        solver.solve(&mut problem, &xs, &us).unwrap();
+        let second = allocations(|| {
+            solver.solve(&mut problem, &xs, &us).unwrap();
+        });
+        assert_eq!(second, 0, "{}", model.name());
     }
 }

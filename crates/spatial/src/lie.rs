@@ -12,8 +12,8 @@ use crate::vector::{Mat3, Vec3};
 /// The entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, of t = θ²:
 /// cos θ, sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, (cos θ − 1 + θ²/2)/θ⁴, (sin θ − θ + θ³/6)/θ⁵.
 ///
-/// Source: Stumpff (1959). Full relative precision for t ≥ 0: below 1 from the series of c₄ and c₅ and the recurrence
-/// cₖ = 1/k! − t cₖ₊₂ (no cancellation there), above from sine and cosine and the same recurrence upwards.
+/// Source: Stumpff (1959). Below 1 from the series of c₄ and c₅ and the recurrence cₖ = 1/k! − t cₖ₊₂, to full relative
+/// precision (no cancellation there); above from sine and cosine and the same recurrence upwards, within 1e-15.
 ///
 /// ```
 /// let c = condyle_spatial::lie::stumpff(0.0_f64);

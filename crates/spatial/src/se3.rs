@@ -1,5 +1,6 @@
 //! Poses, and how they act on motions, forces, inertias and points.
 
+use crate::lie::Quaternion;
 use crate::motion::{Force, Motion};
 use crate::scalar::{Constant, Scalar};
 use crate::vector::{Mat3, Vec3, impl_lift};
@@ -103,8 +104,10 @@ impl<S: Scalar> Act<Vec3<S>> for Se3<S> {
 impl<R: Constant<f64>> From<Se3<R>> for nalgebra::Isometry3<f64> {
     fn from(X: Se3<R>) -> Self {
         let X = X.lift::<f64>();
-        let rotation = nalgebra::Matrix3::from_columns(&X.rotation.columns().map(|c| c.to_array().into()));
-        let rotation = nalgebra::UnitQuaternion::from_matrix(&rotation);
+        // Not `UnitQuaternion::from_matrix`: it iterates, and stays where it began at half turns.
+        let q = Quaternion::from_rotation(X.rotation);
+        let q = nalgebra::Quaternion::new(q.scalar, q.vector.x, q.vector.y, q.vector.z);
+        let rotation = nalgebra::UnitQuaternion::new_normalize(q);
         Self::from_parts(nalgebra::Vector3::from(X.translation.to_array()).into(), rotation)
     }
 }

@@ -1,7 +1,7 @@
 //! Robots as optimal control problems: the state x = (q, v), costs, and the action of a robot that moves freely.
 //!
 //! ```
-//! use condyle_dynamics::{neutral, robots};
+//! use condyle_dynamics::robots;
 //! use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 //! use condyle_optimal::{Fddp, Problem, Status};
 //! use std::sync::Arc;
@@ -10,11 +10,20 @@
 //! let arm = Arc::new(robots::arm7());
 //! let tool = arm.frame("tool")?;
 //! let reach = Residual::FrameTranslation { frame: tool, target: [0.4, 0.2, 0.5].into() };
-//! let running = vec![Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic)];
-//! let terminal = vec![Cost::new("reach", 1e3, reach, Activation::Quadratic)];
+//! let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+//! let rest = Residual::State { reference: x0.clone() };
+//! let effort = Residual::Control { reference: vec![0.0; 7] };
+//! let running = vec![
+//!     Cost::new("rest", 1e-1, rest.clone(), Activation::Quadratic),
+//!     Cost::new("effort", 1e-4, effort, Activation::Quadratic),
+//! ];
+//! let stop = Activation::Weighted([[0.0; 7], [1.0; 7]].concat());
+//! let terminal = vec![
+//!     Cost::new("reach", 1e3, reach, Activation::Quadratic),
+//!     Cost::new("stop", 1e0, rest, stop),
+//! ];
 //!
 //! let mut action = FreeDynamics::running(arm.clone(), 0.05, running)?;
-//! let x0 = [neutral(&arm), vec![0.0; 7]].concat();
 //! let us = action.quasi_static(&x0).repeat(20);
 //! let end = FreeDynamics::terminal(arm.clone(), terminal)?;
 //! let mut problem = Problem::new(x0.clone(), vec![Box::new(action)], vec![0; 20], Box::new(end))?;

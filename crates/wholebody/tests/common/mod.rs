@@ -1,0 +1,123 @@
+//! A standing quadruped, and checks that share no formula with the controller.
+#![allow(dead_code, non_snake_case, unreachable_pub)] // each test file uses its part
+
+use condyle_dynamics::{Act, Data, Force, Model, Se3, Vec3, forward_kinematics, integrate, rnea};
+use condyle_wholebody::{Command, Contact, FrameTask, Gains, Settings, Tasks, WholeBodyController};
+use num_dual::Dual2_64;
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+
+pub const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
+
+/// On equalities, N and m/s²: forces are of some 100 N and the solver's tolerance is 1e-9, relative.
+pub const EQUALITY: f64 = 1e-6;
+
+/// Knees inwards, feet on the ground.
+pub fn stance() -> Vec<f64> {
+    let mut q = vec![0.0, 0.0, 0.7 * 0.7f64.cos(), 0.0, 0.0, 0.0, 1.0];
+    q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
+    q
+}
+
+pub fn feet(friction: f64) -> Vec<Contact> {
+    FEET.iter().map(|foot| Contact::new(foot, friction)).collect()
+}
+
+pub fn tasks() -> Tasks {
+    let (linear, angular) = (Vec3::zero(), Vec3::new(10.0, 10.0, 10.0));
+    let trunk = FrameTask { frame: "trunk".to_owned(), linear, angular, gains: Gains::critical(100.0) };
+    Tasks { frames: vec![trunk], ..Tasks::default() }
+}
+
+pub fn controller(model: &Model, contacts: &[Contact]) -> WholeBodyController {
+    WholeBodyController::new(model, contacts, tasks(), Settings::default()).unwrap()
+}
+
+/// A position near the stance and a velocity.
+pub fn state(model: &Model, seed: u64, distance: f64, speed: f64) -> (Vec<f64>, Vec<f64>) {
+    near(model, &stance(), seed, distance, speed)
+}
+
+/// A position near another one and a velocity.
+pub fn near(model: &Model, centre: &[f64], seed: u64, distance: f64, speed: f64) -> (Vec<f64>, Vec<f64>) {
+    let mut rng = StdRng::seed_from_u64(seed);
+    let mut draw = |scale: f64| (0..model.nv()).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect::<Vec<_>>();
+    let (offset, v) = (draw(distance), draw(speed));
+    let mut q = vec![0.0; model.nq()];
+    integrate(model, centre, &offset, &mut q);
+    (q, v)
+}
+
+/// Acceleration of each contact and of the centre of mass: ẍ along q(t) = q ⊕ (t v + ½ t² a).
+pub fn accelerations(
+    model: &Model,
+    contacts: &[Contact],
+    q: &[f64],
+    v: &[f64],
+    a: &[f64],
+) -> (Vec<Vec3<f64>>, Vec3<f64>) {
+    let lifted: Vec<_> = q.iter().map(|&q| Dual2_64::from(q)).collect();
+    let moved: Vec<_> = v.iter().zip(a).map(|(&v, &a)| Dual2_64::new(0.0, v, a)).collect();
+    let mut path = lifted.clone();
+    integrate(model, &lifted, &moved, &mut path);
+    let mut data = Data::new(model);
+    let placements = forward_kinematics(model, &mut data, &path);
+    let second = |p: Vec3<Dual2_64>| Vec3::new(p.x.v2, p.y.v2, p.z.v2);
+    let feet = contacts.iter().map(|c| second(placements.frame(model.frame(&c.frame).unwrap()).translation)).collect();
+    let mut com = Vec3::zero();
+    for (i, body) in model.bodies().iter().enumerate().skip(1) {
+        let X: Se3<Dual2_64> = placements.body(i);
+        let momentum = X.rotation * body.inertia.mass_com.lift() + X.translation.scale(body.inertia.mass.into());
+        com += second(momentum).scale(1.0 / model.total_mass());
+    }
+    (feet, com)
+}
+
+/// M q̈ + h − Jᵀ f by one pass of inverse dynamics under the contact forces.
+pub fn inverse_dynamics(model: &Model, contacts: &[Contact], q: &[f64], v: &[f64], command: &Command) -> Vec<f64> {
+    let mut data = Data::new(model);
+    let placements = forward_kinematics(model, &mut data, q);
+    let mut f_ext = vec![Force::zero(); model.bodies().len()];
+    for (contact, &f) in contacts.iter().zip(&command.forces) {
+        let frame = model.frame(&contact.frame).unwrap();
+        let body = model.frames()[frame].body;
+        let point = placements.frame(frame).translation;
+        let about_origin = Force::new(f, point.cross(f)); // the world's origin
+        f_ext[body] += placements.body(body).act_inv(about_origin);
+    }
+    rnea(model, &mut data, q, v, &command.a, &f_ext).to_vec()
+}
+
+/// μ f_n − ‖f_t‖ of a contact on level ground.
+pub fn margin(contact: &Contact, f: Vec3<f64>) -> f64 {
+    contact.friction * f.z - f.x.hypot(f.y)
+}
+
+pub fn norm(x: Vec3<f64>) -> f64 {
+    x.norm_squared().sqrt()
+}
+
+pub fn max_abs(x: impl IntoIterator<Item = f64>) -> f64 {
+    x.into_iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+/// Dynamics, held contacts, momentum: what holds of every command, to [`EQUALITY`]; and no force outside its cone.
+pub fn check(model: &Model, contacts: &[Contact], q: &[f64], v: &[f64], command: &Command) {
+    let tau = inverse_dynamics(model, contacts, q, v, command);
+    let residual = max_abs(tau.iter().zip(&command.tau).map(|(a, b)| a - b));
+    assert!(residual < EQUALITY, "M q̈ + h − Jᵀ f − τ = {residual:.1e}");
+    assert_eq!(command.tau[..6], [0.0; 6]);
+
+    let (feet, com) = accelerations(model, contacts, q, v, &command.a);
+    for (contact, a) in contacts.iter().zip(feet) {
+        assert!(norm(a) < EQUALITY, "{} accelerates with {:.1e} m/s²", contact.frame, norm(a));
+    }
+    assert!(norm(com - command.com_acceleration) < 1e-9 * (1.0 + norm(com)));
+
+    let sum = command.forces.iter().fold(Vec3::zero(), |sum, &f| sum + f);
+    let needed = (com - *model.gravity()).scale(model.total_mass());
+    assert!(norm(sum - needed) < EQUALITY, "Σ f − m (c̈ − g) = {:.1e}", norm(sum - needed));
+
+    for (contact, &f) in contacts.iter().zip(&command.forces) {
+        assert!(margin(contact, f) > -EQUALITY, "{}: {f:?} leaves the cone", contact.frame);
+    }
+}
