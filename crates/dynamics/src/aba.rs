@@ -178,7 +178,8 @@ fn by_inertia_matrix<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length.
+/// If an argument has the wrong length, `data` was made for a model of another size, or M is singular
+/// ([`Model::singular_joints`]).
 pub fn aba<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -187,6 +188,8 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
+    data.check(model);
+    model.check_regular();
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("tau", tau.len(), model.nv);

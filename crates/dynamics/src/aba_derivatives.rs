@@ -33,24 +33,24 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// C = −A B, of square matrices; four columns of A at a time, so that C is loaded and stored a quarter as often.
+/// C = −A B, of square matrices, where column j of B has zeros but in the rows `coupled[j]`; four columns of A at a time,
+/// so that C is loaded and stored a quarter as often.
 #[inline(always)]
-fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], n: usize) {
+fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>]) {
+    let n = coupled.len();
     for j in 0..n {
         let (b, c) = (&B[j * n..(j + 1) * n], &mut C[j * n..(j + 1) * n]);
         c.fill(S::zero());
-        let mut k = 0;
-        while k + 4 <= n {
-            let (b0, b1, b2, b3) = (-b[k], -b[k + 1], -b[k + 2], -b[k + 3]);
-            let (a0, rest) = A[k * n..(k + 4) * n].split_at(n);
-            let (a1, rest) = rest.split_at(n);
-            let (a2, a3) = rest.split_at(n);
+        let (fours, rest) = coupled[j].as_chunks::<4>();
+        for &[k0, k1, k2, k3] in fours {
+            let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
+            let (a2, a3) = (&A[k2 * n..(k2 + 1) * n], &A[k3 * n..(k3 + 1) * n]);
+            let (b0, b1, b2, b3) = (-b[k0], -b[k1], -b[k2], -b[k3]);
             for i in 0..n {
                 c[i] = a0[i].mul_add(b0, a1[i].mul_add(b1, a2[i].mul_add(b2, a3[i].mul_add(b3, c[i]))));
             }
-            k += 4;
         }
-        for k in k..n {
+        for &k in rest {
             let (a, b) = (&A[k * n..(k + 1) * n], -b[k]);
             for i in 0..n {
                 c[i] = a[i].mul_add(b, c[i]);
@@ -88,7 +88,8 @@ pub struct AbaDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length.
+/// If an argument has the wrong length, `data` was made for a model of another size, or M is singular
+/// ([`Model::singular_joints`]).
 pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -97,8 +98,7 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S> {
-    let a = aba(model, data, q, v, tau, f_ext);
-    let nv = a.len();
+    aba(model, data, q, v, tau, f_ext);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(data.aba.qdd());
     if model.has_mimic() {
@@ -111,7 +111,7 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     let d = &mut data.aba_derivatives;
     d.a = a_kept;
     let Minv = data.minv.matrix();
-    minus_product(Minv.as_slice(), tau_derivatives.dtau_dq.as_slice(), d.da_dq.as_mut_slice(), nv); // −M⁻¹ ∂τ/∂q
-    minus_product(Minv.as_slice(), tau_derivatives.dtau_dv.as_slice(), d.da_dv.as_mut_slice(), nv); // −M⁻¹ ∂τ/∂v
+    minus_product(Minv.as_slice(), tau_derivatives.dtau_dq.as_slice(), d.da_dq.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂q
+    minus_product(Minv.as_slice(), tau_derivatives.dtau_dv.as_slice(), d.da_dv.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂v
     AbaDerivatives { a: &d.a, da_dq: &d.da_dq, da_dv: &d.da_dv, da_dtau: Minv }
 }

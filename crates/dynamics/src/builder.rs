@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::{Body, Column, Frame, FrameKind, Limits, Mimic, Model, Node};
+use crate::soundness;
 use condyle_spatial::{Act, Inertia, Se3, Vec3};
 use std::collections::HashSet;
 
@@ -33,6 +34,8 @@ pub struct JointOptions {
 struct Draft {
     body: Body,
     options: JointOptions,
+    /// Stands between the joints of a chain, without mass on purpose.
+    between: bool,
     /// Follows this body's joint, and how.
     mimic: Option<(usize, Mimic)>,
 }
@@ -75,7 +78,7 @@ impl ModelBuilder {
         };
         Self {
             name: name.to_owned(),
-            drafts: vec![Draft { body: world, options: JointOptions::default(), mimic: None }],
+            drafts: vec![Draft { body: world, options: JointOptions::default(), between: false, mimic: None }],
             frames: Vec::new(),
             gravity: Vec3::new(0.0, 0.0, -9.81),
         }
@@ -115,7 +118,7 @@ impl ModelBuilder {
             idx_v: 0,
             mimic: None,
         };
-        self.drafts.push(Draft { body, options, mimic: None });
+        self.drafts.push(Draft { body, options, between: false, mimic: None });
         BodyId(self.drafts.len() - 1)
     }
 
@@ -131,6 +134,11 @@ impl ModelBuilder {
 
     pub(crate) fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
         self.frames.push(Frame { name: name.to_owned(), kind, body: body.0, placement });
+    }
+
+    /// Says that a body without mass stands between the joints of a chain.
+    pub(crate) fn between(&mut self, body: BodyId) {
+        self.drafts[body.0].between = true;
     }
 
     /// Lets a joint follow another one, in place of a coordinate of its own.
@@ -170,13 +178,16 @@ impl ModelBuilder {
             nodes: Vec::with_capacity(order.len()),
             columns: Vec::new(),
             support: Vec::new(),
+            coupled: Vec::new(),
+            warnings: Vec::new(),
+            singular: Vec::new(),
         };
         for frame in &mut model.frames {
             frame.body = number[frame.body];
         }
         // coordinates: of the joints that have their own, in order; then of those that follow one
         for (i, &old) in order.iter().enumerate() {
-            let Draft { body, options, mimic } = &self.drafts[old];
+            let Draft { body, options, mimic, .. } = &self.drafts[old];
             let mut body = body.clone();
             body.parent = number[body.parent];
             (body.idx_q, body.idx_v) = (model.nq, model.nv);
@@ -193,6 +204,10 @@ impl ModelBuilder {
             }
         }
         model.add_nodes();
+        for (body, &old) in model.bodies.iter().zip(&order).skip(1) {
+            soundness::of_body(body, self.drafts[old].between, &mut model.warnings);
+        }
+        model.find_singular();
         Ok(model)
     }
 
@@ -214,7 +229,7 @@ impl ModelBuilder {
         let (mut bodies, mut joints, mut frames) = (HashSet::new(), HashSet::new(), HashSet::new());
         let mimics: Vec<bool> = self.drafts.iter().map(|d| d.mimic.is_some()).collect();
         let nq: Vec<usize> = self.drafts.iter().map(|d| d.body.joint.nq()).collect();
-        for Draft { body, options, mimic } in &mut self.drafts {
+        for Draft { body, options, mimic, .. } in &mut self.drafts {
             let wrong = |what: String| Error::Body { body: body.name.clone(), what };
             if !bodies.insert(body.name.clone()) {
                 return Err(Error::Duplicate { kind: "body", name: body.name.clone() });
@@ -251,6 +266,10 @@ impl ModelBuilder {
             {
                 return Err(wrong(format!("lower limit {lower} is above upper limit {upper}")));
             }
+            let others = [options.damping, options.friction, options.armature];
+            if others.iter().chain(&options.velocity).chain(&options.effort).any(|x| x.is_nan()) {
+                return Err(wrong("a limit, damping, friction or armature is not a number".to_owned()));
+            }
             if let Some((leader, mimic)) = *mimic {
                 if !(mimic.ratio.is_finite() && mimic.offset.is_finite()) {
                     return Err(wrong(format!("mimic ratio {} or offset {} is not finite", mimic.ratio, mimic.offset)));
@@ -264,6 +283,12 @@ impl ModelBuilder {
             }
         }
         for frame in &self.frames {
+            let X = frame.placement;
+            let columns = X.rotation.columns().into_iter().chain([X.translation]);
+            if !columns.map(|c| c.norm_squared()).sum::<f64>().is_finite() {
+                let body = self.drafts[frame.body].body.name.clone();
+                return Err(Error::Body { body, what: format!("frame `{}` is not finite", frame.name) });
+            }
             if !frames.insert((frame.name.clone(), frame.kind as u8)) {
                 return Err(Error::Duplicate { kind: "frame", name: frame.name.clone() });
             }
@@ -335,5 +360,13 @@ impl Model {
                 self.columns[p].end = self.columns[p].end.max(self.columns[c].end);
             }
         }
+        let coupled = |c: usize| {
+            let mut rows: Vec<usize> = std::iter::successors(Some(c), |&c| self.columns[c].parent).collect();
+            rows.reverse();
+            rows.extend(c + 1..self.columns[c].end);
+            rows
+        };
+        let all = || (0..self.nv).collect(); // joints that follow tie branches together
+        self.coupled = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) }).collect();
     }
 }

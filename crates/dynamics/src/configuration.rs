@@ -97,6 +97,103 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
     }
 }
 
+/// q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity.
+///
+/// q0, q1, out: nq numbers; tangent: scratch of nv numbers, left at t (q₁ ⊖ q₀). Allocates nothing.
+///
+/// ```
+/// use condyle_dynamics::{interpolate, robots};
+/// let (mut q, mut tangent) = ([0.0; 7], [0.0; 7]);
+/// interpolate(&robots::arm7(), &[0.0; 7], &[1.0; 7], 0.25, &mut tangent, &mut q);
+/// assert_eq!(q, [0.25; 7]);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tangent: &mut [S], out: &mut [S]) {
+    difference(model, q0, q1, tangent);
+    for x in tangent.iter_mut() {
+        *x = *x * t;
+    }
+    integrate(model, q0, tangent, out);
+}
+
+/// ‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+///
+/// q0, q1: nq numbers; tangent: scratch of nv numbers, left at q₁ ⊖ q₀. Allocates nothing.
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mut [S]) -> S {
+    difference(model, q0, q1, tangent);
+    let mut sum = S::zero();
+    for &x in tangent.iter() {
+        sum = x.mul_add(x, sum);
+    }
+    sum.sqrt()
+}
+
+/// Brings quaternions and (cos, sin) pairs in q back to length 1, in place.
+///
+/// q: nq numbers. Allocates nothing.
+///
+/// ```
+/// use condyle_dynamics::{neutral, normalize, robots};
+/// let quadruped = robots::quadruped();
+/// let mut q = neutral(&quadruped);
+/// q[6] = 2.0;
+/// normalize(&quadruped, &mut q);
+/// assert_eq!(q, neutral(&quadruped));
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers.
+pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
+    check("q", q.len(), model.nq);
+    for (joint, iq, _) in model.coordinates() {
+        if let Some(unit) = joint.unit_part() {
+            let unit = &mut q[iq][unit];
+            let mut sum = S::zero();
+            for &x in unit.iter() {
+                sum = x.mul_add(x, sum);
+            }
+            let r = sum.sqrt().recip();
+            for x in unit {
+                *x = *x * r;
+            }
+        }
+    }
+}
+
+/// Takes the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: the inverse of ∂(q ⊕ v)/∂q, in place.
+///
+/// Along a vector space nothing changes; along a group the frame of the body is turned back by exp(v).
+/// v: nv numbers; X: nv rows. Allocates nothing.
+///
+/// # Panics
+/// If `v` has not nv numbers or `X` has not nv rows.
+pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
+    check("v", v.len(), model.nv);
+    assert!(X.nrows() == model.nv, "X: expected {} rows, found {}", model.nv, X.nrows());
+    for (joint, _, iv) in model.coordinates() {
+        let mut back = [S::zero(); 6];
+        for (back, &v) in back.iter_mut().zip(&v[iv.clone()]) {
+            *back = -v; // (Ad exp(v)⁻¹)⁻¹ = Ad exp(−v)⁻¹
+        }
+        let Some(map) = joint.jacobian(GroupJacobian::Transport, &back[..iv.len()]) else { continue };
+        for mut column in X.column_iter_mut() {
+            let mut m = [S::zero(); 6];
+            for (k, &axis) in joint.axes().iter().enumerate() {
+                m[axis] = column[iv.start + k];
+            }
+            let m = (map * condyle_spatial::Motion::from(m)).to_array();
+            for (k, &axis) in joint.axes().iter().enumerate() {
+                column[iv.start + k] = m[axis];
+            }
+        }
+    }
+}
+
 /// Which argument a Jacobian of [`integrate`] is taken with respect to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegrateArgument {
@@ -117,7 +214,7 @@ pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: Int
         IntegrateArgument::Position => GroupJacobian::Transport,
         IntegrateArgument::Velocity => GroupJacobian::Exp,
     };
-    block_diagonal(model, v, which, S::one(), J);
+    block_diagonal(model, ("v", v), which, S::one(), J);
 }
 
 /// Which argument a Jacobian of [`difference`] is taken with respect to.
@@ -140,12 +237,18 @@ pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: Di
         DifferenceArgument::From => -S::one(), // −J_log(−d)
         DifferenceArgument::To => S::one(),
     };
-    block_diagonal(model, d, GroupJacobian::Log, sign, J);
+    block_diagonal(model, ("d", d), GroupJacobian::Log, sign, J);
 }
 
-/// sign · J(sign · v), joint by joint.
-fn block_diagonal<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, sign: S, J: &mut DMatrix<S>) {
-    check("v", v.len(), model.nv);
+/// sign · J(sign · v), joint by joint, for a tangent vector v with the name that its caller gave it.
+fn block_diagonal<S: Scalar, R>(
+    model: &Model<R>,
+    (name, v): (&str, &[S]),
+    which: GroupJacobian,
+    sign: S,
+    J: &mut DMatrix<S>,
+) {
+    check(name, v.len(), model.nv);
     assert!(J.shape() == (model.nv, model.nv), "J: expected {0} × {0}, found {1:?}", model.nv, J.shape());
     J.fill(S::zero());
     for (joint, _, iv) in model.coordinates() {

@@ -75,8 +75,9 @@ fn pass<L: Layout>(l: &L, data: &mut Data<L::S>, q: &[L::S]) {
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers.
+/// If `q` has not nq numbers, or `data` was made for a model of another size.
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+    data.check(model);
     check("q", q.len(), model.nq);
     pass(&Single::new(model), data, q);
     &data.crba.M

@@ -1,8 +1,11 @@
 //! All that algorithms write: scratch and results.
 
-use crate::kinematics::World;
+use crate::kinematics::{Moving, World};
 use crate::model::Model;
-use crate::{aba, aba_derivatives, crba, minv, rnea, rnea_derivatives};
+use crate::{
+    aba, aba_derivatives, all_terms, centroidal, coriolis, crba, forward_dynamics, minv, regressor, rnea,
+    rnea_derivatives, statics,
+};
 use condyle_spatial::Scalar;
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
@@ -18,17 +21,25 @@ use condyle_spatial::Scalar;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Data<S> {
+    size: Size,
     pub(crate) world: World<S>,
+    pub(crate) moving: Moving<S>,
     pub(crate) rnea: rnea::Workspace<S>,
     pub(crate) crba: crba::Workspace<S>,
     pub(crate) aba: aba::Workspace<S>,
     pub(crate) minv: minv::Workspace<S>,
     pub(crate) rnea_derivatives: rnea_derivatives::Workspace<S>,
     pub(crate) aba_derivatives: aba_derivatives::Workspace<S>,
+    pub(crate) statics: statics::Workspace<S>,
+    pub(crate) coriolis: coriolis::Workspace<S>,
+    pub(crate) centroidal: centroidal::Workspace<S>,
+    pub(crate) all_terms: all_terms::Workspace<S>,
+    pub(crate) forward_dynamics: forward_dynamics::Workspace<S>,
+    pub(crate) regressor: regressor::Workspace<S>,
 }
 
 /// How large the arrays of a workspace are.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Size {
     /// Bodies, the world included.
     pub bodies: usize,
@@ -50,14 +61,36 @@ impl<S: Scalar> Data<S> {
             nv: model.nv,
         };
         Self {
+            size,
             world: World::new(size),
+            moving: Moving::new(size),
             rnea: rnea::Workspace::new(size),
             crba: crba::Workspace::new(size),
             aba: aba::Workspace::new(size),
             minv: minv::Workspace::new(size),
             rnea_derivatives: rnea_derivatives::Workspace::new(size),
             aba_derivatives: aba_derivatives::Workspace::new(size),
+            statics: statics::Workspace::new(size),
+            coriolis: coriolis::Workspace::new(size),
+            centroidal: centroidal::Workspace::new(size),
+            all_terms: all_terms::Workspace::new(size),
+            forward_dynamics: forward_dynamics::Workspace::new(model),
+            regressor: regressor::Workspace::new(size),
         }
+    }
+}
+
+impl<S> Data<S> {
+    /// Panics unless this was made for a model of the same size.
+    #[inline]
+    #[track_caller]
+    pub(crate) fn check<R>(&self, model: &Model<R>) {
+        let made_for = (self.size.bodies, self.size.columns, self.size.nv);
+        let given = (model.nodes.len(), model.columns.len(), model.nv);
+        assert!(
+            made_for == given,
+            "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}"
+        );
     }
 }
 

@@ -34,6 +34,18 @@ pub enum Error {
         /// What is wrong, with the numbers.
         what: String,
     },
+    /// An element of an MJCF or SDF is wrong.
+    #[error("{file}:{line}: {element}: {what}")]
+    Element {
+        /// Path, or `<string>`; of the included file, where it is in one.
+        file: String,
+        /// Where the element begins, counted from 1.
+        line: u32,
+        /// For example ``joint `elbow` ``.
+        element: String,
+        /// What is wrong, with the numbers.
+        what: String,
+    },
     /// A body given to a builder is wrong.
     #[error("body `{body}`: {what}")]
     Body {
@@ -41,6 +53,14 @@ pub enum Error {
         body: String,
         /// What is wrong, with the numbers.
         what: String,
+    },
+    /// A strict loader met what is only odd.
+    #[error("{file}: {warning}")]
+    Strict {
+        /// Path, or `<string>`.
+        file: String,
+        /// What is odd.
+        warning: crate::soundness::Warning,
     },
     /// Two bodies, joints or frames of one kind have the same name.
     #[error("two {kind}s are named `{name}`")]

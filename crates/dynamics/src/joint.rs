@@ -29,6 +29,13 @@ pub enum Joint {
         /// Unit vector in the body's frame.
         axis: Vec3<f64>,
     },
+    /// A screw: q = \[θ\], v = \[θ̇\], with `pitch` metres along the axis for each radian about it.
+    Helical {
+        /// Unit vector in the body's frame.
+        axis: Vec3<f64>,
+        /// Metres per radian.
+        pitch: f64,
+    },
     /// A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
     Spherical,
     /// Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇].
@@ -80,7 +87,7 @@ impl Joint {
     /// How many numbers the position has.
     pub fn nq(self) -> usize {
         match self {
-            Self::Revolute { .. } | Self::Prismatic { .. } => 1,
+            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } => 1,
             Self::Continuous { .. } => 2,
             Self::Translation => 3,
             Self::Spherical | Self::Planar => 4,
@@ -94,11 +101,12 @@ impl Joint {
         self.axes().len()
     }
 
-    /// Which of the unit motions of the frame (linear x, y, z, angular x, y, z) it moves along: the columns of S.
+    /// Which of the unit motions of the frame (linear x, y, z, angular x, y, z) it moves along: the columns of S. (A
+    /// screw moves along z as well, by its pitch.)
     #[inline(always)]
     pub(crate) fn axes(self) -> &'static [usize] {
         match self {
-            Self::Revolute { .. } | Self::Continuous { .. } => &[5],
+            Self::Revolute { .. } | Self::Continuous { .. } | Self::Helical { .. } => &[5],
             Self::Prismatic { .. } => &[2],
             Self::Spherical => &[3, 4, 5],
             Self::Planar => &[0, 1, 5],
@@ -110,7 +118,10 @@ impl Joint {
     /// The axis of a joint that has one, as a unit vector in the body's frame.
     pub fn axis(self) -> Option<Vec3<f64>> {
         match self {
-            Self::Revolute { axis } | Self::Continuous { axis } | Self::Prismatic { axis } => Some(axis),
+            Self::Revolute { axis }
+            | Self::Continuous { axis }
+            | Self::Prismatic { axis }
+            | Self::Helical { axis, .. } => Some(axis),
             _ => None,
         }
     }
@@ -123,6 +134,7 @@ impl Joint {
         (norm.is_normal() && norm.is_finite()).then_some(match self {
             Self::Continuous { .. } => Self::Continuous { axis },
             Self::Prismatic { .. } => Self::Prismatic { axis },
+            Self::Helical { pitch, .. } => Self::Helical { axis, pitch },
             _ => Self::Revolute { axis },
         })
     }
@@ -167,6 +179,12 @@ impl Joint {
                 let d = l.position(q, i, 0);
                 Se3::new(X_T.rotation, X_T.rotation.z.scale_add(d, X_T.translation))
             }
+            Self::Helical { pitch, .. } => {
+                let angle = l.position(q, i, 0);
+                let (sin, cos) = angle.sin_cos();
+                let X = turned(X_T, sin, cos);
+                Se3::new(X.rotation, X.rotation.z.scale_add(angle * L::S::splat(pitch), X_T.translation))
+            }
             Self::Spherical => {
                 let R = quaternion(l, i, q, 0).to_rotation();
                 Se3::new(X_T.rotation * R, X_T.translation)
@@ -187,6 +205,10 @@ impl Joint {
         match l.joint(i) {
             Self::Revolute { .. } | Self::Continuous { .. } => JointMotion::Turn(l.load(v, i, 0)),
             Self::Prismatic { .. } => JointMotion::Slide(l.load(v, i, 0)),
+            Self::Helical { pitch, .. } => {
+                let (o, x) = (L::S::zero(), l.load(v, i, 0));
+                JointMotion::Any(Motion::new(Vec3::new(o, o, x * L::S::splat(pitch)), Vec3::new(o, o, x)))
+            }
             joint => {
                 let mut m = [L::S::zero(); 6];
                 for (k, &axis) in joint.axes().iter().enumerate() {
@@ -203,6 +225,9 @@ impl Joint {
         match l.joint(i) {
             Self::Revolute { .. } | Self::Continuous { .. } => l.add(tau, i, 0, f.angular.z),
             Self::Prismatic { .. } => l.add(tau, i, 0, f.linear.z),
+            Self::Helical { pitch, .. } => {
+                l.add(tau, i, 0, f.linear.z.mul_add(L::S::splat(pitch), f.angular.z));
+            }
             joint => {
                 let f = f.to_array();
                 for (k, &axis) in joint.axes().iter().enumerate() {
@@ -216,6 +241,9 @@ impl Joint {
     #[inline(always)]
     pub(crate) fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
         let (R, p) = (oX.rotation, oX.translation);
+        if let Self::Helical { pitch, .. } = self {
+            return Motion::new(R.z.scale_add(S::splat(pitch), p.cross(R.z)), R.z);
+        }
         match self.axes()[k] {
             0 => Motion::new(R.x, Vec3::zero()),
             1 => Motion::new(R.y, Vec3::zero()),
@@ -234,7 +262,18 @@ impl Joint {
             Self::Spherical => q[3] = 1.0,
             Self::Planar => q[2] = 1.0,
             Self::FreeFlyer => q[6] = 1.0,
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Translation => {}
+            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {}
+        }
+    }
+
+    /// Which of the joint's coordinates are a vector of length 1.
+    pub(crate) fn unit_part(self) -> Option<core::ops::Range<usize>> {
+        match self {
+            Self::Continuous { .. } => Some(0..2),
+            Self::Planar => Some(2..4),
+            Self::Spherical => Some(0..4),
+            Self::FreeFlyer => Some(3..7),
+            _ => None,
         }
     }
 
@@ -256,14 +295,14 @@ impl Joint {
             Self::Planar => q[2..].copy_from_slice(&[turn.cos(), turn.sin()]),
             Self::Spherical => rotate(q),
             Self::FreeFlyer => rotate(&mut q[3..]),
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Translation => {}
+            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {}
         }
     }
 
     /// q ⊕ v: the position after moving with v for one unit of time.
     pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
         match self {
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Translation => {
+            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
                 for k in 0..q.len() {
                     out[k] = q[k] + v[k];
                 }
@@ -277,6 +316,9 @@ impl Joint {
             _ => {
                 let (R, p) = self.pose(q);
                 let (dR, dp) = lie::exp6(self.twist(v));
+                // of the quaternions r and −r, the one nearer to where it was
+                let sign = S::select(dR.scalar.lt(S::zero()), -S::one(), S::one());
+                let dR = Quaternion { vector: dR.vector.scale(sign), scalar: dR.scalar * sign };
                 self.set_pose((R * dR).normalize(), p + R.to_rotation() * dp, out);
             }
         }
@@ -285,7 +327,7 @@ impl Joint {
     /// q₁ ⊖ q₀: the v with q₀ ⊕ v = q₁.
     pub(crate) fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
         match self {
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Translation => {
+            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
                 for k in 0..q0.len() {
                     out[k] = q1[k] - q0[k];
                 }

@@ -1,11 +1,12 @@
-//! Where the bodies and frames are, and how they move with the joints.
+//! Where the bodies are and how they move: one pass from the root to the tips for all bodies. What can then be asked is
+//! in `frames.rs`.
 
 use crate::data::{Data, Size, check};
+use crate::frames::{Accelerations, Placements, Velocities};
 use crate::joint::Joint;
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use condyle_spatial::{Act, Constant, Mat3, Motion, Scalar, Se3, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
 /// What depends on the position alone, in the world's frame.
 #[derive(Clone, Debug)]
@@ -34,22 +35,59 @@ pub(crate) fn place<L: Layout>(l: &L, World { oX, S }: &mut World<L::S>, q: &[L:
     }
 }
 
-/// In which frame the velocity of a frame is expressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReferenceFrame {
-    /// In the frame itself.
-    Local,
-    /// In the world's frame: the velocity of the body's point at the world's origin.
-    World,
-    /// Of the frame's origin, along the axes of the world.
-    LocalWorldAligned,
+/// How the bodies move, in the world's frame: what depends on the velocity and the acceleration too.
+#[derive(Clone, Debug)]
+pub(crate) struct Moving<S> {
+    /// Velocity of the body; the world's stays 0. Shape: bodies. Written by: `advance`.
+    pub v: Vec<Motion<S>>,
+    /// Ṡ = v × S: how fast each column of S turns with its body. Shape: columns. Written by: `advance`.
+    pub dS: Vec<Motion<S>>,
+    /// The velocity coordinates. Shape: nv. Written by: `advance`.
+    pub qd: Vec<S>,
+    /// Spatial acceleration of the body, without gravity; the world's stays 0. Shape: bodies. Written by: `accelerate`.
+    pub a: Vec<Motion<S>>,
 }
 
-/// The placements of a robot at one position, as [`forward_kinematics`] left them.
-#[derive(Clone, Copy, Debug)]
-pub struct Placements<'d, S, R = f64> {
-    model: &'d Model<R>,
-    world: &'d World<S>,
+impl<S: Scalar> Moving<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            v: vec![Motion::zero(); size.bodies],
+            dS: vec![Motion::zero(); size.columns],
+            qd: vec![S::zero(); size.nv],
+            a: vec![Motion::zero(); size.bodies],
+        }
+    }
+}
+
+/// v_i and the columns of Ṡ, for bodies that are placed.
+#[inline(always)]
+pub(crate) fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qd: &[L::S]) {
+    let Moving { v, dS, .. } = m;
+    m.qd.copy_from_slice(qd);
+    for i in l.bodies() {
+        let mut v_i = l.parent(v, i);
+        for k in 0..l.joint(i).nv() {
+            v_i = S[l.slot(i) + k].scale_add(l.load(qd, i, k), v_i); // v_i = v_λ + S q̇
+        }
+        v[i] = v_i;
+        for k in 0..l.joint(i).nv() {
+            dS[l.slot(i) + k] = v_i.cross(S[l.slot(i) + k]); // Ṡ = v_i × S: S is fixed in the body
+        }
+    }
+}
+
+/// a_i, for bodies whose velocities are known.
+#[inline(always)]
+fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qdd: &[L::S]) {
+    let Moving { dS, qd, a, .. } = m;
+    for i in l.bodies() {
+        let mut a_i = l.parent(a, i);
+        for k in 0..l.joint(i).nv() {
+            let c = l.slot(i) + k;
+            a_i = S[c].scale_add(l.load(qdd, i, k), dS[c].scale_add(l.load(qd, i, k), a_i)); // a_i = a_λ + S q̈ + Ṡ q̇
+        }
+        a[i] = a_i;
+    }
 }
 
 /// Places all bodies: oXi = oXλ λXi(q), in O(n).
@@ -67,57 +105,82 @@ pub struct Placements<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers.
+/// If `q` has not nq numbers, or `data` was made for a model of another size.
 pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
     q: &[S],
 ) -> Placements<'d, S, R> {
+    data.check(model);
     check("q", q.len(), model.nq);
     place(&Single::new(model), &mut data.world, q);
     Placements { model, world: &data.world }
 }
 
-impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
-    /// oXb: the pose of a body in the world, in the frame that the URDF gives it.
-    ///
-    /// # Panics
-    /// If there is no such body.
-    pub fn body(&self, body: usize) -> Se3<S> {
-        let zXb = Se3::new(self.model.nodes[body].reframing.transpose(), Vec3::zero());
-        self.world.oX[body] * zXb.lift()
-    }
+/// Places all bodies and gives their velocities: v_i = v_λ + S q̇, in O(n).
+///
+/// q: nq numbers; v: nv. Allocates nothing. Source: Featherstone (2008), table 5.1; in the world's frame.
+///
+/// ```
+/// use condyle_dynamics::{Data, ReferenceFrame, forward_velocities, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let velocities = forward_velocities(&arm, &mut data, &[0.0; 7], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// let tool = velocities.frame_velocity(arm.frame("tool")?, ReferenceFrame::World);
+/// assert_eq!(tool.to_array(), [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]); // all turns about the vertical
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> Velocities<'d, S, R> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    let l = Single::new(model);
+    place(&l, &mut data.world, q);
+    advance(&l, &data.world, &mut data.moving, v);
+    Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
+}
 
-    /// oXf: the pose of a frame in the world.
-    ///
-    /// # Panics
-    /// If there is no such frame.
-    pub fn frame(&self, frame: usize) -> Se3<S> {
-        let frame = &self.model.frames[frame];
-        self.body(frame.body) * frame.placement.lift()
-    }
-
-    /// The Jacobian J of a frame, 6 × nv, linear rows first: its velocity is J v.
-    ///
-    /// # Panics
-    /// If there is no such frame, or `J` is not 6 × nv.
-    pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        assert!(J.shape() == (6, self.model.nv), "J: expected 6 × {}, found {:?}", self.model.nv, J.shape());
-        let pose = self.frame(frame);
-        // fXo of the frame whose motions the rows are
-        let oXr = match reference {
-            ReferenceFrame::Local => pose,
-            ReferenceFrame::World => Se3::identity(),
-            ReferenceFrame::LocalWorldAligned => Se3::new(Mat3::identity(), pose.translation),
-        };
-        J.fill(S::zero());
-        let l = Single::<S, R>::new(self.model);
-        for &c in l.support(self.model.frames[frame].body) {
-            let column = &self.model.columns[c];
-            let s = oXr.act_inv(self.world.S[c]).scale(S::splat(column.ratio)).to_array();
-            for (row, &s) in s.iter().enumerate() {
-                J[(row, column.coordinate)] += s;
-            }
-        }
-    }
+/// Places all bodies and gives their velocities and accelerations: a_i = a_λ + S q̈ + Ṡ q̇, in O(n).
+///
+/// q: nq numbers; v, a: nv. Gravity is not among the accelerations. Allocates nothing. Source: Featherstone (2008),
+/// table 5.1; in the world's frame.
+///
+/// ```
+/// use condyle_dynamics::{Data, ReferenceFrame, forward_accelerations, robots};
+/// let arm = robots::arm7();
+/// let (tool, mut data) = (arm.frame("tool")?, Data::new(&arm));
+/// let (q, v) = ([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// let motion = forward_accelerations(&arm, &mut data, &q, &v, &[0.0; 7]);
+/// let a = motion.frame_classical_acceleration(tool, ReferenceFrame::LocalWorldAligned);
+/// assert!(f64::abs(a.linear.x + 4.0 * motion.frame(tool).translation.x) < 1e-12); // −ω² r, towards the axis
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> Accelerations<'d, S, R> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    check("a", a.len(), model.nv);
+    let l = Single::new(model);
+    place(&l, &mut data.world, q);
+    advance(&l, &data.world, &mut data.moving, v);
+    accelerate(&l, &data.world, &mut data.moving, a);
+    let velocities = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
+    Accelerations { velocities }
 }

@@ -18,39 +18,76 @@
 
 mod aba;
 mod aba_derivatives;
+mod all_terms;
+mod assembly;
 mod builder;
+mod centroidal;
 mod cholesky;
+mod com;
 mod configuration;
+mod compose;
+mod coriolis;
 mod crba;
 mod data;
+mod divide_conquer;
+mod elementary;
+mod energy;
 mod error;
+mod forward_dynamics;
+mod frames;
+pub mod inertial_parameters;
 mod joint;
 mod kinematics;
 mod layout;
+mod ltdl;
 mod minv;
+mod mjcf;
 mod model;
+mod passive;
+mod regressor;
 mod rnea;
 mod rnea_derivatives;
 pub mod robots;
+mod sdf;
+pub mod simulation;
+mod soundness;
+mod statics;
+mod two_handles;
 mod urdf;
+mod xml;
 
 pub use aba::aba;
 pub use aba_derivatives::{AbaDerivatives, aba_derivatives};
+pub use all_terms::{AllTerms, compute_all_terms};
+pub use assembly::AssemblySize;
 pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+pub use centroidal::{CentroidalMap, CentroidalMapRate, centroidal_map, centroidal_map_rate};
 pub use condyle_spatial::{
     Act, Constant, Cross, Force, Inertia, Mat3, Motion, Quaternion, Scalar, Se3, Sym3, Vec3, lie,
 };
+pub use cholesky::Cholesky;
 pub use configuration::{
-    DifferenceArgument, IntegrateArgument, difference, difference_jacobian, integrate, integrate_jacobian, neutral,
-    random_configuration,
+    DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
+    interpolate, neutral, normalize, random_configuration, transport,
 };
+pub use coriolis::coriolis_matrix;
 pub use crba::crba;
 pub use data::Data;
+pub use divide_conquer::DivideConquer;
 pub use error::Error;
+pub use forward_dynamics::{Method, forward_dynamics};
 pub use joint::Joint;
-pub use kinematics::{Placements, ReferenceFrame, forward_kinematics};
+pub use frames::{Accelerations, Placements, ReferenceFrame, Velocities};
+pub use kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
+pub use ltdl::Ltdl;
 pub use minv::minv;
+pub use mjcf::MjcfOptions;
 pub use model::{Body, Frame, FrameKind, Limits, Mimic, Model};
+pub use passive::{passive_torque, passive_torque_derivative};
+pub use regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
 pub use rnea::{gravity, nonlinear_effects, rnea};
 pub use rnea_derivatives::{RneaDerivatives, rnea_derivatives};
+pub use sdf::SdfOptions;
+pub use soundness::Warning;
+pub use statics::static_torque;
 pub use urdf::UrdfOptions;

@@ -18,7 +18,8 @@ use nalgebra::DMatrix;
 pub(crate) struct Workspace<S> {
     /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
     P: Vec<S>,
-    /// Acceleration for each unit effort, at each depth of the tree. Shape: depth × 6 × columns. Written by: `sweep`.
+    /// Acceleration for each unit effort: of the world, zero, then at each depth of the tree. Shape: (1 + depth) × 6 ×
+    /// columns. Written by: `sweep`.
     A: Vec<S>,
     /// Shape: nv × nv. Written by: `minv`.
     Minv: DMatrix<S>,
@@ -30,7 +31,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
             P: vec![S::zero(); 6 * size.columns],
-            A: vec![S::zero(); size.depth * 6 * size.columns],
+            A: vec![S::zero(); (1 + size.depth) * 6 * size.columns],
             Minv: DMatrix::from_element(size.nv, size.nv, S::zero()),
             factor: if size.columns == size.nv { Vec::new() } else { vec![S::zero(); size.nv * size.nv] },
         }
@@ -51,6 +52,19 @@ fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
+/// y −= Σ sᵣ xᵣ, entry by entry, for six rows xᵣ of n numbers, from column `from` on.
+#[inline(always)]
+fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S]) {
+    let to = from + y.len();
+    let (x0, x1, x2) = (&x[from..to], &x[n + from..n + to], &x[2 * n + from..2 * n + to]);
+    let (x3, x4, x5) = (&x[3 * n + from..3 * n + to], &x[4 * n + from..4 * n + to], &x[5 * n + from..5 * n + to]);
+    for j in 0..y.len() {
+        let linear = x0[j].mul_add(s[0], x1[j].mul_add(s[1], x2[j] * s[2]));
+        let angular = x3[j].mul_add(s[3], x4[j].mul_add(s[4], x5[j] * s[5]));
+        y[j] -= linear + angular;
+    }
+}
+
 /// Row c of M⁻¹ for the efforts j ≥ c; the factors of the articulated bodies are those of `aba::factorize`.
 #[inline(always)]
 fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
@@ -60,36 +74,25 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
     let rows = Minv.as_mut_slice();
     P.fill(S::zero());
     for c in (0..n).rev() {
-        let (S_c, U) = (w.S[c].to_array(), f.U[c].to_array());
-        let end = columns[c].end;
+        let (U, end) = (f.U[c].to_array(), columns[c].end);
         let row = &mut rows[c * n..(c + 1) * n];
         row.fill(S::zero());
         row[c] = f.D_inv[c];
-        for r in 0..6 {
-            axpy(-(f.D_inv[c] * S_c[r]), &P[r * n + c + 1..r * n + end], &mut row[c + 1..end]); // −D⁻¹ Sᵀ P
-        }
+        subtract_six(w.S[c].scale(f.D_inv[c]).to_array(), P, n, c + 1, &mut row[c + 1..end]); // −D⁻¹ Sᵀ P
         for r in 0..6 {
             axpy(U[r], &row[c..end], &mut P[r * n + c..r * n + end]); // P += U u/D
         }
     }
     for c in 0..n {
-        let (S_c, U) = (w.S[c].to_array(), f.U[c].to_array());
-        let row = &mut rows[c * n..(c + 1) * n];
-        let depth = columns[c].depth;
-        let (above, here) = A.split_at_mut(depth * 6 * n);
-        if depth > 0 {
-            let above = &above[(depth - 1) * 6 * n..];
-            for r in 0..6 {
-                axpy(-(f.D_inv[c] * U[r]), &above[r * n + c..(r + 1) * n], &mut row[c..]); // −D⁻¹ Uᵀ A_λ
-            }
-            for r in 0..6 {
-                here[r * n + c..(r + 1) * n].copy_from_slice(&above[r * n + c..(r + 1) * n]);
-                axpy(S_c[r], &row[c..], &mut here[r * n + c..(r + 1) * n]); // A = A_λ + S q̈
-            }
-        } else {
-            for r in 0..6 {
-                here[r * n + c..(r + 1) * n].fill(S::zero());
-                axpy(S_c[r], &row[c..], &mut here[r * n + c..(r + 1) * n]);
+        let S_c = w.S[c].to_array();
+        let row = &mut rows[c * n + c..(c + 1) * n];
+        let (above, here) = A.split_at_mut((columns[c].depth + 1) * 6 * n);
+        let above = &above[columns[c].depth * 6 * n..]; // zeros for a column on the world
+        subtract_six(f.U[c].scale(f.D_inv[c]).to_array(), above, n, c, row); // −D⁻¹ Uᵀ A_λ
+        for r in 0..6 {
+            let (A_parent, A) = (&above[r * n + c..(r + 1) * n], &mut here[r * n + c..(r + 1) * n]);
+            for j in 0..row.len() {
+                A[j] = row[j].mul_add(S_c[r], A_parent[j]); // A = A_λ + S q̈
             }
         }
     }
@@ -135,8 +138,11 @@ fn by_inertia_matrix<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Dat
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers.
+/// If `q` has not nq numbers, `data` was made for a model of another size, or M is singular
+/// ([`Model::singular_joints`]).
 pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+    data.check(model);
+    model.check_regular();
     check("q", q.len(), model.nq);
     if model.has_mimic() {
         by_inertia_matrix(model, data, q);

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::joint::Joint;
+use crate::soundness::Warning;
 use condyle_spatial::{Act, Constant, Inertia, Mat3, Scalar, Se3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -65,13 +66,39 @@ pub enum FrameKind {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Least position, nq numbers (rad, m).
+    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_minus_infinity")]
     pub lower: Vec<f64>,
     /// Greatest position, nq numbers (rad, m).
+    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_infinity")]
     pub upper: Vec<f64>,
     /// Greatest speed, nv numbers (rad/s, m/s).
+    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_infinity")]
     pub velocity: Vec<f64>,
     /// Greatest effort, nv numbers (N m, N).
+    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_infinity")]
     pub effort: Vec<f64>,
+}
+
+/// Limits as files have them: JSON knows no infinity, so where there is no limit stands nothing.
+mod finite {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(limits.iter().map(|x| x.is_finite().then_some(*x)))
+    }
+
+    fn or<'de, D: Deserializer<'de>>(from: D, otherwise: f64) -> Result<Vec<f64>, D::Error> {
+        let limits = Vec::<Option<f64>>::deserialize(from)?;
+        Ok(limits.into_iter().map(|x| x.unwrap_or(otherwise)).collect())
+    }
+
+    pub(super) fn or_infinity<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        or(from, f64::INFINITY)
+    }
+
+    pub(super) fn or_minus_infinity<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        or(from, f64::NEG_INFINITY)
+    }
 }
 
 /// A body as the algorithms see it: the axis of its joint turned to z, all that a pass needs side by side.
@@ -135,6 +162,11 @@ pub struct Model<R = f64> {
     pub(crate) nodes: Vec<Node<R>>,
     pub(crate) columns: Vec<Column>,
     pub(crate) support: Vec<usize>,
+    /// For each coordinate the ones that its motion needs efforts of: before and after it in the tree, itself included.
+    pub(crate) coupled: Vec<Vec<usize>>,
+    pub(crate) warnings: Vec<Warning>,
+    /// Bodies whose joints make M singular.
+    pub(crate) singular: Vec<usize>,
 }
 
 impl<R> Model<R> {
@@ -233,6 +265,7 @@ impl Model {
     pub fn with_armature(mut self, armature: &[f64]) -> Self {
         crate::data::check("armature", armature.len(), self.nv);
         self.armature.copy_from_slice(armature);
+        self.find_singular();
         self
     }
 
@@ -283,6 +316,9 @@ impl Model {
             friction: self.friction.clone(),
             columns: self.columns.clone(),
             support: self.support.clone(),
+            coupled: self.coupled.clone(),
+            warnings: self.warnings.clone(),
+            singular: self.singular.clone(),
             nq: self.nq,
             nv: self.nv,
         }
@@ -306,6 +342,7 @@ impl<R> fmt::Display for Model<R> {
                 Joint::Revolute { .. } => "revolute",
                 Joint::Continuous { .. } => "continuous",
                 Joint::Prismatic { .. } => "prismatic",
+                Joint::Helical { .. } => "helical",
                 Joint::Spherical => "spherical",
                 Joint::Planar => "planar",
                 Joint::Translation => "translation",

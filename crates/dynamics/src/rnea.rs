@@ -85,7 +85,7 @@ fn pass<L: Layout>(l: &L, d: &mut Workspace<L::S>, q: &[L::S], qd: &[L::S], qdd:
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length.
+/// If an argument has the wrong length, or `data` was made for a model of another size.
 pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -94,6 +94,7 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
+    data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("a", a.len(), model.nv);
@@ -107,13 +108,14 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
 /// q: nq numbers; v: nv. Returns nv numbers (N m, N). Allocates nothing.
 ///
 /// # Panics
-/// If an argument has the wrong length.
+/// If an argument has the wrong length, or `data` was made for a model of another size.
 pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
     q: &[S],
     v: &[S],
 ) -> &'d [S] {
+    data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     let zero = core::mem::take(&mut data.rnea.zero);
@@ -136,8 +138,9 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers.
+/// If `q` has not nq numbers, or `data` was made for a model of another size.
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
+    data.check(model);
     check("q", q.len(), model.nq);
     let zero = core::mem::take(&mut data.rnea.zero);
     pass(&Single::new(model), &mut data.rnea, q, &zero, &zero, &[]);

@@ -30,11 +30,11 @@ use nalgebra::DMatrix;
 
 /// The matrix 2B of a body or of all that a joint carries.
 #[derive(Clone, Copy, Debug)]
-struct Coriolis<S> {
+pub(crate) struct Coriolis<S> {
     /// I v.
-    momentum: Force<S>,
+    pub momentum: Force<S>,
     /// Σ = dĪ/dt.
-    rate: Sym3<S>,
+    pub rate: Sym3<S>,
 }
 
 impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
@@ -46,9 +46,14 @@ impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
 }
 
 impl<S: Scalar> Coriolis<S> {
+    /// Of a body at rest.
+    pub(crate) fn zero() -> Self {
+        Self { momentum: Force::zero(), rate: Sym3::zero() }
+    }
+
     /// Of a body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
     #[inline(always)]
-    fn of(I: Inertia<S>, v: Motion<S>) -> Self {
+    pub(crate) fn of(I: Inertia<S>, v: Motion<S>) -> Self {
         let turning = v.angular.skew() * I.rotational.full();
         let (x, y, z) = (turning.x, turning.y, turning.z);
         let two = S::splat(2.0);
@@ -60,14 +65,14 @@ impl<S: Scalar> Coriolis<S> {
 
     /// 2B m.
     #[inline(always)]
-    fn apply(self, m: Motion<S>) -> Force<S> {
+    pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
         Force { linear: m.angular.cross(p).scale(S::splat(2.0)), angular: self.rate * m.angular + m.angular.cross(l) }
     }
 
     /// 2Bᵀ m, of which only the angular part is not zero.
     #[inline(always)]
-    fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
+    pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
         self.rate * m.angular + l.cross(m.angular) + p.cross(m.linear).scale(S::splat(2.0))
     }
@@ -102,13 +107,12 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let still = Coriolis { momentum: Force::zero(), rate: Sym3::zero() };
         let square = DMatrix::from_element(size.nv, size.nv, S::zero());
         Self {
             v: vec![Motion::zero(); size.bodies],
             a: vec![Motion::zero(); size.bodies],
             IC: vec![Inertia::zero(); size.bodies],
-            BC: vec![still; size.bodies],
+            BC: vec![Coriolis::zero(); size.bodies],
             F: vec![Force::zero(); size.bodies],
             Psid: vec![Motion::zero(); size.columns],
             Psidd: vec![Motion::zero(); size.columns],
@@ -223,7 +227,7 @@ pub struct RneaDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length.
+/// If an argument has the wrong length, or `data` was made for a model of another size.
 pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -232,6 +236,7 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
     f_ext: &[Force<S>],
 ) -> RneaDerivatives<'d, S> {
+    data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("a", a.len(), model.nv);

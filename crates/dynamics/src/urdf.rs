@@ -20,6 +20,8 @@ pub struct UrdfOptions {
     pub root_joint: Option<Joint>,
     /// Whether joints with a `<mimic>` share the coordinate of the joint they follow, instead of having their own.
     pub mimic: bool,
+    /// Whether what is only odd ([`Model::warnings`]) is an error.
+    pub strict: bool,
 }
 
 impl Model {
@@ -62,10 +64,15 @@ impl Model {
     }
 }
 
+/// How deep elements may be nested (urdf-rs is recursive); a URDF needs six levels.
+const MAX_DEPTH: usize = 32;
+
 /// A link or joint, and the line on which it begins.
 struct Element<T> {
     line: u32,
     content: T,
+    /// Whether it is a joint with a `<limit>`: to urdf-rs, none is the same as zeros.
+    limit: bool,
 }
 
 struct Reader<'a> {
@@ -98,26 +105,28 @@ impl<'a> Reader<'a> {
         };
         if robot.tag_name().name() != "robot" {
             let what = "the root element of a URDF is <robot>".to_owned();
-            return Err(reader.wrong(1, format!("<{}>", robot.tag_name().name()), what));
+            let line = document.text_pos_at(robot.range().start).row;
+            return Err(reader.wrong(line, format!("<{}>", robot.tag_name().name()), what));
         }
         let mut order = Vec::new();
         for node in robot.children().filter(|n| n.is_element()) {
             let tag = node.tag_name().name();
-            if tag != "link" && tag != "joint" {
+            if (tag != "link" && tag != "joint") || node.tag_name().namespace() != robot.tag_name().namespace() {
                 continue;
             }
             let line = document.text_pos_at(node.range().start).row;
             let Some(name) = node.attribute("name").filter(|n| !n.is_empty()) else {
                 return Err(reader.wrong(line, format!("<{tag}>"), "has no name".to_owned()));
             };
+            let limit = node.children().any(|c| c.has_tag_name("limit"));
             let parsed = reader.parse(text, node, line, name)?;
             let other = if tag == "link" {
                 let content = parsed.links.into_iter().next().expect("one element in, one out");
                 order.push(name.to_owned());
-                reader.links.insert(name.to_owned(), Element { line, content }).map(|e| e.line)
+                reader.links.insert(name.to_owned(), Element { line, content, limit }).map(|e| e.line)
             } else {
                 let content = parsed.joints.into_iter().next().expect("one element in, one out");
-                reader.joints.insert(name.to_owned(), Element { line, content }).map(|e| e.line)
+                reader.joints.insert(name.to_owned(), Element { line, content, limit }).map(|e| e.line)
             };
             if let Some(other) = other {
                 let what = format!("the name is taken by the {tag} on line {other}");
@@ -139,7 +148,15 @@ impl<'a> Reader<'a> {
     /// What urdf-rs makes of one link or joint, without its shapes.
     fn parse(&self, text: &str, node: Node, line: u32, name: &str) -> Result<urdf_rs::Robot, Error> {
         let tag = node.tag_name().name();
-        let mut element = String::from("<robot name=\"_\">");
+        let wrong = |what: String| self.wrong(line, format!("{tag} `{name}`"), what);
+        if node.descendants().any(|n| n.ancestors().nth(MAX_DEPTH).is_some()) {
+            return Err(wrong(format!("is nested more than {MAX_DEPTH} levels deep")));
+        }
+        let mut element = String::from("<robot name=\"_\"");
+        for prefix in node.namespaces().filter_map(|n| n.name()).filter(|&p| p != "xml") {
+            element.push_str(&format!(" xmlns:{prefix}=\"_\""));
+        }
+        element.push('>');
         let mut from = node.range().start;
         for shape in node.children().filter(|c| c.has_tag_name("visual") || c.has_tag_name("collision")) {
             element.push_str(&text[from..shape.range().start]);
@@ -147,16 +164,7 @@ impl<'a> Reader<'a> {
         }
         element.push_str(&text[from..node.range().end]);
         element.push_str("</robot>");
-        let wrong = |what: String| self.wrong(line, format!("{tag} `{name}`"), what);
-        let parsed = urdf_rs::read_from_string(&element).map_err(|e| wrong(e.to_string()))?;
-        if tag == "joint" {
-            let kind = node.attribute("type").unwrap_or_default();
-            let limit = node.children().any(|c| c.has_tag_name("limit"));
-            if matches!(kind, "revolute" | "prismatic") && !limit {
-                return Err(wrong(format!("is {kind} and has no <limit>")));
-            }
-        }
-        Ok(parsed)
+        urdf_rs::read_from_string(&element).map_err(|e| wrong(e.to_string().replace("custom: ", "")))
     }
 
     /// Finds root and children: every link but one is the child of one joint, and all hang together.
@@ -249,7 +257,30 @@ impl<'a> Reader<'a> {
         if options.mimic {
             self.add_mimics(&mut builder, &bodies)?;
         }
-        builder.build()
+        let model = builder.build().map_err(|e| self.locate(e))?;
+        match model.warnings().first() {
+            Some(warning) if options.strict => {
+                Err(Error::Strict { file: self.file.to_owned(), warning: warning.clone() })
+            }
+            _ => Ok(model),
+        }
+    }
+
+    /// What the builder found wrong, with the line of the link or joint.
+    fn locate(&self, error: Error) -> Error {
+        let own = || "the name belongs to the library".to_owned();
+        match &error {
+            Error::Body { body: name, what } if self.links.contains_key(name) => {
+                self.wrong(self.links[name].line, format!("link `{name}`"), what.clone())
+            }
+            Error::Duplicate { kind: "body", name } if self.links.contains_key(name) => {
+                self.wrong(self.links[name].line, format!("link `{name}`"), own())
+            }
+            Error::Duplicate { kind: "joint", name } if self.joints.contains_key(name) => {
+                self.wrong_joint(&self.joints[name], own())
+            }
+            _ => error,
+        }
     }
 }
 
@@ -257,7 +288,10 @@ impl<'a> Reader<'a> {
 impl Reader<'_> {
     /// The joint, or none if it is fixed.
     fn kind(&self, joint: &Element<urdf_rs::Joint>) -> Result<Option<Joint>, Error> {
-        let axis = Vec3::from(joint.content.axis.xyz.0);
+        let (axis, origin) = (Vec3::from(joint.content.axis.xyz.0), &joint.content.origin);
+        if origin.xyz.0.iter().chain(&origin.rpy.0).any(|x| !x.is_finite()) {
+            return Err(self.wrong_joint(joint, "its origin is not finite".to_owned()));
+        }
         let kind = match joint.content.joint_type {
             urdf_rs::JointType::Fixed => return Ok(None),
             urdf_rs::JointType::Revolute => Joint::Revolute { axis },
@@ -278,6 +312,12 @@ impl Reader<'_> {
     fn options(&self, joint: &Element<urdf_rs::Joint>) -> Result<JointOptions, Error> {
         let (limit, dynamics) = (&joint.content.limit, joint.content.dynamics.clone().unwrap_or_default());
         let limited = matches!(joint.content.joint_type, urdf_rs::JointType::Revolute | urdf_rs::JointType::Prismatic);
+        if limited && !joint.limit {
+            return Err(self.wrong_joint(joint, "is revolute or prismatic and has no <limit>".to_owned()));
+        }
+        // a continuous joint may have limits of speed and effort; what a URDF says of joints without an axis has no unit
+        let with_axis = limited || matches!(joint.content.joint_type, urdf_rs::JointType::Continuous);
+        let bounded = with_axis && joint.limit;
         let numbers = [limit.lower, limit.upper, limit.effort, limit.velocity, dynamics.damping, dynamics.friction];
         if numbers.iter().any(|x| x.is_nan()) {
             return Err(self.wrong_joint(joint, "a limit, damping or friction is not a number".to_owned()));
@@ -288,10 +328,10 @@ impl Reader<'_> {
         }
         Ok(JointOptions {
             position: limited.then_some((limit.lower, limit.upper)),
-            velocity: limited.then_some(limit.velocity),
-            effort: limited.then_some(limit.effort),
-            damping: dynamics.damping,
-            friction: dynamics.friction,
+            velocity: bounded.then_some(limit.velocity),
+            effort: bounded.then_some(limit.effort),
+            damping: if with_axis { dynamics.damping } else { 0.0 },
+            friction: if with_axis { dynamics.friction } else { 0.0 },
             armature: 0.0,
         })
     }
@@ -303,8 +343,9 @@ impl Reader<'_> {
         let (mass, I) = (inertial.mass.value, &inertial.inertia);
         let numbers = [I.ixx, I.ixy, I.ixz, I.iyy, I.iyz, I.izz, mass];
         let wrong = |what| Err(self.wrong(element.line, format!("link `{link}`"), what));
-        if numbers.iter().any(|x| !x.is_finite()) {
-            return wrong("mass or inertia is not finite".to_owned());
+        let origin = inertial.origin.xyz.0.iter().chain(&inertial.origin.rpy.0);
+        if numbers.iter().chain(origin).any(|x| !x.is_finite()) {
+            return wrong("mass, inertia or its origin is not finite".to_owned());
         }
         if mass < 0.0 {
             return wrong(format!("mass is {mass} kg"));

@@ -20,7 +20,7 @@ pub struct Inertia<S> {
 impl_linear!(Inertia { mass, mass_com, rotational });
 
 impl<S: Scalar> Inertia<S> {
-    /// From mass, centre of mass and rotational inertia about the centre of mass: Ī = I_c − m [c]ₓ[c]ₓ.
+    /// From mass, centre of mass and rotational inertia about the centre of mass: Ī = I_c − m c× c×.
     ///
     /// ```
     /// use condyle_spatial::{Inertia, Motion, Sym3, Vec3};
@@ -46,7 +46,7 @@ impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
 }
 
 impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
-    /// Rotate, then shift the origin: h' = R h + m p, Ī' = R Ī Rᵀ − [p]ₓ[Rh]ₓ − [Rh]ₓ[p]ₓ − m [p]ₓ[p]ₓ.
+    /// Rotate, then shift the origin: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× − m p× p×.
     #[inline(always)]
     fn act(&self, I: Inertia<S>) -> Inertia<S> {
         let p = self.translation;

@@ -172,14 +172,14 @@ pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     v.scale(S::select(small, near, far) * S::splat(2.0))
 }
 
-/// 1/θ² − (cot(θ/2))/(2θ) of t = θ², the coefficient of [w]ₓ² in the inverse Jacobians: (c₂ − c₃)/(4 c₁) at θ/2.
+/// 1/θ² − (cot(θ/2))/(2θ) of t = θ², the coefficient of w×² in the inverse Jacobians: (c₂ − c₃)/(4 c₁) at θ/2.
 #[inline(always)]
 fn inverse_coefficient<S: Scalar>(t: S) -> S {
     let c = stumpff(t * S::splat(0.25));
     (c[2] - c[3]) * (c[1] * S::splat(4.0)).recip()
 }
 
-/// 1 + a [w]ₓ + b [w]ₓ².
+/// 1 + a w× + b w×².
 #[inline(always)]
 fn rotation_series<S: Scalar>(w: Vec3<S>, a: S, b: S) -> Mat3<S> {
     // [w]ₓ² = w wᵀ − |w|² 1
@@ -188,14 +188,14 @@ fn rotation_series<S: Scalar>(w: Vec3<S>, a: S, b: S) -> Mat3<S> {
     (square + w.scale(a).skew()).add_diagonal(S::one() - bw.dot(w))
 }
 
-/// The right Jacobian of [`exp3`]: 1 − c₂ [w]ₓ + c₃ [w]ₓ².
+/// The right Jacobian of [`exp3`]: 1 − c₂ w× + c₃ w×².
 #[inline(always)]
 pub fn jexp3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
     let c = stumpff(w.norm_squared());
     rotation_series(w, -c[2], c[3])
 }
 
-/// Its inverse, the right Jacobian of [`log3`]: 1 + [w]ₓ/2 + (1/θ² − cot(θ/2)/(2θ)) [w]ₓ².
+/// Its inverse, the right Jacobian of [`log3`]: 1 + w×/2 + (1/θ² − cot(θ/2)/(2θ)) w×².
 #[inline(always)]
 pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
     rotation_series(w, S::splat(0.5), inverse_coefficient(w.norm_squared()))
@@ -203,7 +203,7 @@ pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
 
 /// exp of a twist: the pose after moving with it for one unit of time.
 ///
-/// Returns the rotation as a quaternion (what a configuration stores), and the translation V v, V = 1 + c₂ [w]ₓ + c₃ [w]ₓ².
+/// Returns the rotation as a quaternion (what a configuration stores), and the translation V v, V = 1 + c₂ w× + c₃ w×².
 #[inline(always)]
 pub fn exp6<S: Scalar>(m: Motion<S>) -> (Quaternion<S>, Vec3<S>) {
     let c = stumpff(m.angular.norm_squared());

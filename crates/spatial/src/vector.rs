@@ -158,7 +158,7 @@ impl<S: Scalar> Vec3<S> {
     pub fn norm_squared(self) -> S {
         self.dot(self)
     }
-    /// [a]ₓ, the matrix with [a]ₓ b = a × b.
+    /// a×, the matrix with a× b = a × b.
     #[inline(always)]
     pub fn skew(self) -> Mat3<S> {
         let o = S::zero();

@@ -1,0 +1,73 @@
+//! What the equations of motion are made of, together and one by one: `cargo bench --bench all_terms`.
+
+use condyle::{
+    Data, Model, centroidal_map, centroidal_map_rate, compute_all_terms, coriolis_matrix, crba, forward_accelerations,
+    forward_kinematics, forward_velocities, nonlinear_effects, random_configuration, robots, static_torque,
+};
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::hint::black_box;
+
+/// How many states a benchmark goes round, so that no branch learns a single one.
+const STATES: usize = 16;
+
+/// A position, a velocity, and an acceleration.
+struct State {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    a: Vec<f64>,
+}
+
+fn states(model: &Model) -> Vec<State> {
+    let mut rng = StdRng::seed_from_u64(1);
+    (0..STATES)
+        .map(|_| {
+            let q = random_configuration(model, &mut rng);
+            let [v, a] = [(); 2].map(|()| (0..model.nv()).map(|_| 2.0 * rng.random::<f64>() - 1.0).collect());
+            State { q, v, a }
+        })
+        .collect()
+}
+
+/// What `compute_all_terms` gives, from the functions that give one of the terms.
+fn apart(model: &Model, data: &mut Data<f64>, s: &State) {
+    black_box(crba(model, data, &s.q));
+    black_box(nonlinear_effects(model, data, &s.q, &s.v));
+    black_box(centroidal_map_rate(model, data, &s.q, &s.v));
+    let velocities = forward_velocities(model, data, &s.q, &s.v);
+    black_box((velocities.kinetic_energy(), velocities.potential_energy()));
+}
+
+fn terms(c: &mut Criterion) {
+    type Algorithm = fn(&Model, &mut Data<f64>, &State);
+    let algorithms: [(&str, Algorithm); 9] = [
+        ("forward_kinematics", |m, d, s| _ = black_box(forward_kinematics(m, d, &s.q))),
+        ("forward_velocities", |m, d, s| _ = black_box(forward_velocities(m, d, &s.q, &s.v))),
+        ("forward_accelerations", |m, d, s| _ = black_box(forward_accelerations(m, d, &s.q, &s.v, &s.a))),
+        ("static_torque", |m, d, s| _ = black_box(static_torque(m, d, &s.q, &[]))),
+        ("coriolis_matrix", |m, d, s| _ = black_box(coriolis_matrix(m, d, &s.q, &s.v))),
+        ("centroidal_map", |m, d, s| _ = black_box(centroidal_map(m, d, &s.q))),
+        ("centroidal_map_rate", |m, d, s| _ = black_box(centroidal_map_rate(m, d, &s.q, &s.v))),
+        ("all terms together", |m, d, s| _ = black_box(compute_all_terms(m, d, &s.q, &s.v))),
+        ("all terms apart", apart),
+    ];
+    let robots = [("arm7", robots::arm7()), ("quadruped", robots::quadruped()), ("humanoid", robots::humanoid())];
+    for (name, algorithm) in algorithms {
+        let mut group = c.benchmark_group(name);
+        for (robot, model) in &robots {
+            let (mut data, states) = (Data::new(model), states(model));
+            group.bench_function(BenchmarkId::from_parameter(robot), |b| {
+                let mut k = 0;
+                b.iter(|| {
+                    algorithm(model, &mut data, black_box(&states[k]));
+                    k = (k + 1) % STATES;
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, terms);
+criterion_main!(benches);

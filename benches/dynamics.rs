@@ -1,0 +1,58 @@
+//! The rigid-body algorithms and their derivatives, one call on one state: `cargo bench --bench dynamics`.
+
+use condyle::{Data, Model, aba, aba_derivatives, crba, minv, random_configuration, rnea, rnea_derivatives, robots};
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::hint::black_box;
+
+/// How many states a benchmark goes round, so that no branch learns a single one.
+const STATES: usize = 16;
+
+/// A position, a velocity, and an acceleration or effort.
+struct State {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    x: Vec<f64>,
+}
+
+fn states(model: &Model) -> Vec<State> {
+    let mut rng = StdRng::seed_from_u64(1);
+    (0..STATES)
+        .map(|_| {
+            let q = random_configuration(model, &mut rng);
+            let [v, x] = [(); 2].map(|()| (0..model.nv()).map(|_| 2.0 * rng.random::<f64>() - 1.0).collect());
+            State { q, v, x }
+        })
+        .collect()
+}
+
+fn algorithms(c: &mut Criterion) {
+    type Algorithm = fn(&Model, &mut Data<f64>, &State);
+    let algorithms: [(&str, Algorithm); 6] = [
+        ("rnea", |m, d, s| _ = black_box(rnea(m, d, &s.q, &s.v, &s.x, &[]))),
+        ("crba", |m, d, s| _ = black_box(crba(m, d, &s.q))),
+        ("aba", |m, d, s| _ = black_box(aba(m, d, &s.q, &s.v, &s.x, &[]))),
+        ("minv", |m, d, s| _ = black_box(minv(m, d, &s.q))),
+        ("rnea_derivatives", |m, d, s| _ = black_box(rnea_derivatives(m, d, &s.q, &s.v, &s.x, &[]))),
+        ("aba_derivatives", |m, d, s| _ = black_box(aba_derivatives(m, d, &s.q, &s.v, &s.x, &[]))),
+    ];
+    let robots = [("arm7", robots::arm7()), ("quadruped", robots::quadruped()), ("humanoid", robots::humanoid())];
+    for (name, algorithm) in algorithms {
+        let mut group = c.benchmark_group(name);
+        for (robot, model) in &robots {
+            let (mut data, states) = (Data::new(model), states(model));
+            group.bench_function(BenchmarkId::from_parameter(robot), |b| {
+                let mut k = 0;
+                b.iter(|| {
+                    algorithm(model, &mut data, black_box(&states[k]));
+                    k = (k + 1) % STATES;
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, algorithms);
+criterion_main!(benches);

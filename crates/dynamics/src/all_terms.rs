@@ -1,0 +1,157 @@
+//! All that the equations of motion are made of, from one pass to the tips and one back.
+//!
+//! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects share placements,
+//! velocities, the bodies' inertias in the world's frame and the columns Iᶜ S.
+
+use crate::centroidal::{self, CentroidalMapRate, shift_rate};
+use crate::data::{Data, Size, check};
+use crate::frames::{Placements, Velocities};
+use crate::kinematics::{Moving, World, advance, place};
+use crate::layout::{Layout, Single};
+use crate::model::Model;
+use crate::rnea_derivatives::Coriolis;
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+/// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace<S> {
+    /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `pass`.
+    a: Vec<Motion<S>>,
+    /// Force through the joint for q̈ = 0. Shape: bodies. Written by: `pass`.
+    f: Vec<Force<S>>,
+    /// Shape: nv × nv. Written by: `pass`.
+    M: DMatrix<S>,
+    /// Shape: nv. Written by: `pass`.
+    h: Vec<S>,
+    /// Twice the kinetic energy of the bodies. Written by: `pass`.
+    twice: S,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            a: vec![Motion::zero(); size.bodies],
+            f: vec![Force::zero(); size.bodies],
+            M: DMatrix::from_element(size.nv, size.nv, S::zero()),
+            h: vec![S::zero(); size.nv],
+            twice: S::zero(),
+        }
+    }
+}
+
+/// The whole algorithm, for bodies whose velocities are known.
+#[inline(always)]
+fn pass<L: Layout>(
+    l: &L,
+    World { oX, S }: &World<L::S>,
+    Moving { v, dS, qd, .. }: &Moving<L::S>,
+    centroidal::Workspace { IC, BC, F, dF, .. }: &mut centroidal::Workspace<L::S>,
+    Workspace { a, f, M, h, twice }: &mut Workspace<L::S>,
+) {
+    (IC[0], BC[0]) = (Inertia::zero(), Coriolis::zero());
+    a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
+    *twice = L::S::zero();
+    for i in l.bodies() {
+        let mut a_i = l.parent(a, i);
+        for k in 0..l.joint(i).nv() {
+            a_i = dS[l.slot(i) + k].scale_add(l.load(qd, i, k), a_i); // a_i = a_λ + Ṡ q̇
+        }
+        let I = oX[i].act(l.inertia(i));
+        a[i] = a_i;
+        IC[i] = I;
+        BC[i] = Coriolis::of(I, v[i]); // I v and İ
+        f[i] = I * a_i + v[i].cross(BC[i].momentum); // f_i = I a_i + v_i ×* I v_i
+        *twice += v[i].dot(BC[i].momentum); // 2T = Σ v_iᵀ I v_i
+    }
+    let M = M.as_mut_slice();
+    M.fill(L::S::zero());
+    h.fill(L::S::zero());
+    for i in l.bodies().rev() {
+        let dIC = BC[i].inertia_rate();
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        for k in 0..nv {
+            let (c, own) = (l.slot(i) + k, support.len() - nv + k);
+            let F_c = IC[i] * S[c]; // Iᶜ S
+            F[c] = F_c;
+            dF[c] = dIC * S[c] + IC[i] * dS[c]; // İᶜ S + Iᶜ Ṡ
+            l.add(h, i, k, S[c].dot(f[i])); // h = Sᵀ f
+            for &e in &support[..own] {
+                let x = l.at(S, e).dot(F_c); // M_ej = S_eᵀ Iᶜ S_j for every ancestor e
+                l.add_at(M, e, support[own], x);
+                l.add_at(M, support[own], e, x);
+            }
+            l.add_at(M, support[own], support[own], S[c].dot(F_c));
+        }
+        let (IC_i, BC_i, f_i) = (IC[i], BC[i], f[i]);
+        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.push(BC, i, BC_i);
+        l.push(f, i, f_i); // f_λ += f_i
+    }
+    l.add_armature(M);
+}
+
+/// What [`compute_all_terms`] gives.
+#[derive(Clone, Copy, Debug)]
+pub struct AllTerms<'d, S, R = f64> {
+    /// Placements and velocities of bodies and frames, and their Jacobians J and dJ/dt, on demand.
+    pub kinematics: Velocities<'d, S, R>,
+    /// M(q), the full symmetric nv × nv matrix, as of [`crba`](crate::crba).
+    pub M: &'d DMatrix<S>,
+    /// h(q, v), nv numbers (N m, N), as of [`nonlinear_effects`](crate::nonlinear_effects).
+    pub h: &'d [S],
+    /// Momentum, its map and the map's rate, centre of mass and its Jacobian, as of
+    /// [`centroidal_map_rate`](crate::centroidal_map_rate).
+    pub centroidal: CentroidalMapRate<'d, S>,
+    /// T = ½ vᵀ M v (J).
+    pub kinetic_energy: S,
+    /// V = −m gᵀ c (J).
+    pub potential_energy: S,
+}
+
+/// M, h, Ag, dAg, hg, centre of mass, energies, and the Jacobians of all frames: what the equations of motion are made
+/// of, from one pass to the tips and one back, in O(n · depth).
+///
+/// q: nq numbers; v: nv. The numbers are those of [`crba`](crate::crba),
+/// [`nonlinear_effects`](crate::nonlinear_effects), [`centroidal_map_rate`](crate::centroidal_map_rate) and
+/// [`forward_velocities`](crate::forward_velocities), up to rounding. Allocates nothing. Source: Featherstone, *Rigid
+/// Body Dynamics Algorithms* (2008), tables 5.1 and 6.2; Wensing and Orin (2016).
+///
+/// ```
+/// use condyle_dynamics::{Data, ReferenceFrame, compute_all_terms, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let terms = compute_all_terms(&arm, &mut data, &[0.3; 7], &[0.1; 7]);
+/// let mut J = nalgebra::DMatrix::zeros(6, 7);
+/// terms.kinematics.frame_jacobian(arm.frame("tool")?, ReferenceFrame::Local, &mut J);
+/// assert!(terms.M[(0, 0)] > 0.0 && terms.h.len() == 7 && terms.kinetic_energy > 0.0);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> AllTerms<'d, S, R> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    let l = Single::new(model);
+    place(&l, &mut data.world, q);
+    advance(&l, &data.world, &mut data.moving, v);
+    pass(&l, &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
+    let kinematics = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
+    let moment = data.centroidal.IC[0].mass_com;
+    AllTerms {
+        kinematics,
+        M: &data.all_terms.M,
+        h: &data.all_terms.h,
+        centroidal: shift_rate(model, &mut data.centroidal),
+        kinetic_energy: (data.all_terms.twice + kinematics.rotors()) * S::splat(0.5),
+        potential_energy: l.minus_gravity().dot(moment),
+    }
+}

@@ -1,0 +1,277 @@
+//! The momentum of the whole robot about its centre of mass, and the matrices that give it.
+//!
+//! About the world's origin the momentum is Σ I_i v_i = Σ Iᶜ_k S_k q̇_k, where Iᶜ_k is the inertia of all that joint k
+//! carries: column k of the map is Iᶜ S, and its rate is İᶜ S + Iᶜ Ṡ. Then all is shifted to the centre of mass.
+//!
+//! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved computation
+//! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
+
+use crate::data::{Data, Size, check};
+use crate::frames::{Accelerations, Velocities};
+use crate::kinematics::{Moving, World, advance, place};
+use crate::layout::{Layout, Single};
+use crate::model::Model;
+use crate::rnea_derivatives::Coriolis;
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Scalar, Se3, Vec3};
+use nalgebra::DMatrix;
+
+/// In the world's frame, but for what is said to be about the centre of mass.
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace<S> {
+    /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `map`, `map_rate`, all terms.
+    pub IC: Vec<Inertia<S>>,
+    /// Iᶜ v and İᶜ, likewise. Shape: bodies. Written by: `map_rate`, all terms.
+    pub BC: Vec<Coriolis<S>>,
+    /// Iᶜ S. Shape: columns. Written by: `map`, `map_rate`, all terms.
+    pub F: Vec<Force<S>>,
+    /// İᶜ S + Iᶜ Ṡ. Shape: columns. Written by: `map_rate`, all terms.
+    pub dF: Vec<Force<S>>,
+    /// About the centre of mass. Shape: 6 × nv. Written by: `shift_map`.
+    Ag: DMatrix<S>,
+    /// About the centre of mass. Shape: 6 × nv. Written by: `shift_rate`.
+    dAg: DMatrix<S>,
+    /// Shape: 3 × nv. Written by: `shift_map`.
+    Jcom: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            IC: vec![Inertia::zero(); size.bodies],
+            BC: vec![Coriolis::zero(); size.bodies],
+            F: vec![Force::zero(); size.columns],
+            dF: vec![Force::zero(); size.columns],
+            Ag: DMatrix::from_element(6, size.nv, S::zero()),
+            dAg: DMatrix::from_element(6, size.nv, S::zero()),
+            Jcom: DMatrix::from_element(3, size.nv, S::zero()),
+        }
+    }
+}
+
+impl<S: Scalar> Coriolis<S> {
+    /// The rate of the inertia, İ m = v ×* I m − I (v × m): of the mass 0, of m c the linear momentum.
+    #[inline(always)]
+    pub(crate) fn inertia_rate(self) -> Inertia<S> {
+        Inertia { mass: S::zero(), mass_com: self.momentum.linear, rotational: self.rate }
+    }
+}
+
+/// Iᶜ S of all columns, for bodies that are placed.
+#[inline(always)]
+fn map<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, F, .. } = d;
+    IC[0] = Inertia::zero();
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+    }
+    for i in l.bodies().rev() {
+        for k in 0..l.joint(i).nv() {
+            let c = l.slot(i) + k;
+            F[c] = IC[i] * S[c]; // Iᶜ S
+        }
+        let IC_i = IC[i];
+        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+    }
+}
+
+/// Iᶜ S and its rate of all columns, for bodies whose velocities are known.
+#[inline(always)]
+fn map_rate<L: Layout>(l: &L, World { oX, S }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, BC, F, dF, .. } = d;
+    (IC[0], BC[0]) = (Inertia::zero(), Coriolis::zero());
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+        BC[i] = Coriolis::of(IC[i], m.v[i]);
+    }
+    for i in l.bodies().rev() {
+        let dIC = BC[i].inertia_rate();
+        for k in 0..l.joint(i).nv() {
+            let c = l.slot(i) + k;
+            F[c] = IC[i] * S[c]; // Iᶜ S
+            dF[c] = dIC * S[c] + IC[i] * m.dS[c]; // İᶜ S + Iᶜ Ṡ
+        }
+        let (IC_i, BC_i) = (IC[i], BC[i]);
+        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.push(BC, i, BC_i);
+    }
+}
+
+/// Adds a column to the coordinate that it follows.
+#[inline(always)]
+fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: Force<S>) {
+    let column = &model.columns[c];
+    let (f, at) = (f.scale(S::splat(column.ratio)).to_array(), 6 * column.coordinate);
+    for (entry, &f) in matrix.as_mut_slice()[at..at + 6].iter_mut().zip(&f) {
+        *entry += f;
+    }
+}
+
+/// f about the point c: [f; n − c × f].
+#[inline(always)]
+fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
+    Force::new(f.linear, f.angular - c.cross(f.linear))
+}
+
+/// Shifts the map to the centre of mass, after `map` or `map_rate`.
+#[inline(always)]
+fn shift_map<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalMap<'d, S> {
+    let I = d.IC[0];
+    let per_mass = I.mass.recip();
+    let com = I.mass_com.scale(per_mass);
+    d.Ag.fill(S::zero());
+    for (c, &F) in d.F.iter().enumerate() {
+        add(model, &mut d.Ag, c, about(com, F));
+    }
+    for (J, A) in d.Jcom.as_mut_slice().chunks_exact_mut(3).zip(d.Ag.as_slice().chunks_exact(6)) {
+        for k in 0..3 {
+            J[k] = A[k] * per_mass; // m ċ is the linear momentum
+        }
+    }
+    let Ig = Se3::new(condyle_spatial::Mat3::identity(), -com).act(I);
+    let Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero but for rounding
+    CentroidalMap { Ag: &d.Ag, Ig, com, Jcom: &d.Jcom }
+}
+
+/// Shifts the map and its rate to the centre of mass, after `map_rate`.
+#[inline(always)]
+pub(crate) fn shift_rate<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalMapRate<'d, S> {
+    let (I, momentum) = (d.IC[0], d.BC[0].momentum);
+    let per_mass = I.mass.recip();
+    let (com, com_velocity) = (I.mass_com.scale(per_mass), momentum.linear.scale(per_mass));
+    d.dAg.fill(S::zero());
+    for (c, (&F, &dF)) in d.F.iter().zip(&d.dF).enumerate() {
+        let mut dA = about(com, dF); // d/dt [f; n − c × f] = [ḟ; ṅ − c × ḟ − ċ × f]
+        dA.angular -= com_velocity.cross(F.linear);
+        add(model, &mut d.dAg, c, dA);
+    }
+    let CentroidalMap { Ig, .. } = shift_map(model, d);
+    let hg = about(com, momentum);
+    CentroidalMapRate { Ag: &d.Ag, dAg: &d.dAg, hg, Ig, com, com_velocity, Jcom: &d.Jcom }
+}
+
+/// What depends on the position in hg = Ag(q) v. The axes are the world's.
+#[derive(Clone, Copy, Debug)]
+pub struct CentroidalMap<'d, S> {
+    /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
+    pub Ag: &'d DMatrix<S>,
+    /// The inertia of all moving bodies about their centre of mass, as if they were one.
+    pub Ig: Inertia<S>,
+    /// c, the centre of mass in the world's frame (m).
+    pub com: Vec3<S>,
+    /// The Jacobian of c, 3 × nv: ċ = Jcom v.
+    pub Jcom: &'d DMatrix<S>,
+}
+
+/// hg = Ag(q) v, and what its rate dhg = Ag a + dAg v depends on. The axes are the world's.
+#[derive(Clone, Copy, Debug)]
+pub struct CentroidalMapRate<'d, S> {
+    /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
+    pub Ag: &'d DMatrix<S>,
+    /// dAg/dt, 6 × nv, along the velocity v.
+    pub dAg: &'d DMatrix<S>,
+    /// The momentum about the centre of mass (kg m/s, kg m²/s).
+    pub hg: Force<S>,
+    /// The inertia of all moving bodies about their centre of mass, as if they were one.
+    pub Ig: Inertia<S>,
+    /// c, the centre of mass in the world's frame (m).
+    pub com: Vec3<S>,
+    /// ċ, its velocity (m/s).
+    pub com_velocity: Vec3<S>,
+    /// The Jacobian of c, 3 × nv: ċ = Jcom v.
+    pub Jcom: &'d DMatrix<S>,
+}
+
+/// Ag(q), the centroidal momentum matrix, with the centre of mass, its Jacobian and the inertia about it, in O(n).
+///
+/// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. Allocates
+/// nothing. Source: Orin, Goswami, Lee (2013).
+///
+/// ```
+/// use condyle_dynamics::{Data, centroidal_map, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let mut data = Data::new(&quadruped);
+/// let map = centroidal_map(&quadruped, &mut data, &neutral(&quadruped));
+/// assert!((map.Ag[(0, 0)] - quadruped.total_mass()).abs() < 1e-12); // pushed forwards, all goes forwards
+/// assert!((map.Jcom[(0, 0)] - 1.0).abs() < 1e-15);
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, or `data` was made for a model of another size.
+pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+) -> CentroidalMap<'d, S> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    let l = Single::new(model);
+    place(&l, &mut data.world, q);
+    map(&l, &data.world, &mut data.centroidal);
+    shift_map(model, &mut data.centroidal)
+}
+
+/// Ag(q), dAg/dt along v, and the centroidal momentum hg = Ag v, with what [`centroidal_map`] gives, in O(n).
+///
+/// q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass.
+/// Allocates nothing. Source: Wensing and Orin (2016).
+///
+/// ```
+/// use condyle_dynamics::{Data, centroidal_map_rate, forward_accelerations, robots};
+/// use nalgebra::DVector;
+/// let arm = robots::arm7();
+/// let (mut data, q, v) = (Data::new(&arm), [0.3; 7], [0.5; 7]);
+/// let drift = centroidal_map_rate(&arm, &mut data, &q, &v).dAg * DVector::from_row_slice(&v);
+/// let rate = forward_accelerations(&arm, &mut data, &q, &v, &[0.0; 7]).centroidal_momentum_rate();
+/// assert!((drift - DVector::from_row_slice(&rate.to_array())).amax() < 1e-13);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> CentroidalMapRate<'d, S> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    let l = Single::new(model);
+    place(&l, &mut data.world, q);
+    advance(&l, &data.world, &mut data.moving, v);
+    map_rate(&l, &data.world, &data.moving, &mut data.centroidal);
+    shift_rate(model, &mut data.centroidal)
+}
+
+impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
+    /// hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, along the world's axes (kg m/s,
+    /// kg m²/s), in O(n).
+    ///
+    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    pub fn centroidal_momentum(&self) -> Force<S> {
+        let l = Single::<S, R>::new(self.model);
+        let mut momentum = Force::zero();
+        for i in l.bodies() {
+            let oX = &self.world.oX[i];
+            momentum += oX.act(l.inertia(i) * oX.act_inv(self.moving.v[i])); // I v
+        }
+        about(self.com(), momentum)
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
+    /// dhg = Σ I_i a_i + v_i ×* I_i v_i, the rate of the centroidal momentum, along the world's axes (N, N m), in O(n):
+    /// the weight and the external forces, about the centre of mass.
+    ///
+    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    pub fn centroidal_momentum_rate(&self) -> Force<S> {
+        let l = Single::<S, R>::new(self.model);
+        let mut rate = Force::zero();
+        for i in l.bodies() {
+            let (oX, I) = (&self.world.oX[i], l.inertia(i));
+            let (v, a) = (oX.act_inv(self.moving.v[i]), oX.act_inv(self.moving.a[i]));
+            rate += oX.act(I * a + v.cross(I * v)); // I a + v ×* I v
+        }
+        about(self.com(), rate) // ċ × m ċ = 0
+    }
+}

@@ -1,0 +1,428 @@
+//! The sparse factorisation M = Lᵀ D L of the joint-space inertia matrix, without fill-in.
+//!
+//! Source: Featherstone, *Efficient factorization of the joint-space inertia matrix for branched kinematic trees* (2005).
+//! Mᵢⱼ is zero unless one of the coordinates i, j carries the other. Eliminated from the tips to the root, the matrix
+//! keeps its zeros: row k of L has entries at the coordinates between k and the root and nowhere else.
+//!
+//! Joints that share a coordinate (mimic) couple branches. A shared coordinate is then eliminated where the branches of
+//! its joints have met, and the rows follow the elimination tree of that order (Liu, *The role of elimination trees in
+//! sparse factorization*, 1990): the joints' own tree wherever no coordinate is shared, right everywhere.
+
+use crate::data::check;
+use crate::model::{Column, Model};
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+
+/// Stands for the parent of a root.
+const NONE: usize = usize::MAX;
+
+/// Where L may differ from zero: a tree on *places*, numbered depth first, parents before children.
+#[derive(Clone, Debug)]
+struct Tree {
+    /// The coordinate that each place stands for. Shape: nv.
+    order: Vec<usize>,
+    /// The exchanges that take coordinates to places, one after the other; none without shared coordinates.
+    swaps: Vec<(usize, usize)>,
+    /// The place before it on the way to the root. Shape: nv.
+    parent: Vec<usize>,
+    /// How many places are between it and the root. Shape: nv.
+    depth: Vec<usize>,
+    /// The first of the consecutive places that are all on its way to the root and end with it. Shape: nv.
+    run: Vec<usize>,
+    /// Where its row begins in `Ltdl::rows`, and at the end their length. Shape: nv + 1.
+    first: Vec<usize>,
+}
+
+/// Rows are stored in steps of this many numbers, so that the innermost loop has no remainder. What stands behind a
+/// row's end has no meaning.
+const fn step<S: Scalar>() -> usize {
+    if S::LANES == 1 { 4 } else { 1 }
+}
+
+impl Tree {
+    fn new(columns: &[Column], nv: usize, step: usize) -> Self {
+        let carried = |c: usize| std::iter::successors(columns[c].parent, |&e| columns[e].parent);
+        let hoisted = hoist(columns, nv);
+        let mut place = vec![0; nv];
+        for (k, &c) in hoisted.iter().enumerate() {
+            place[c] = k;
+        }
+        let mut coupled = vec![Vec::new(); nv]; // of each place, the later ones with which it shares an entry of M
+        for (c, column) in columns.iter().enumerate() {
+            for e in carried(c) {
+                let (i, k) = (place[columns[e].coordinate], place[column.coordinate]);
+                coupled[i.min(k)].push(i.max(k));
+            }
+        }
+        // Liu (1990), algorithm 4.1, from the last place to the first
+        let mut parent = vec![NONE; nv];
+        for i in (0..nv).rev() {
+            for &k in coupled[i].iter().filter(|&&k| k != i) {
+                let mut root = k;
+                while parent[root] != NONE && parent[root] != i {
+                    root = parent[root];
+                }
+                if root != i {
+                    parent[root] = i;
+                }
+            }
+        }
+        Self::depth_first(&hoisted, &parent, step)
+    }
+
+    /// The same tree with its places numbered depth first, which does not change the rows.
+    fn depth_first(order: &[usize], parent: &[usize], step: usize) -> Self {
+        let nv = order.len();
+        let mut children = vec![Vec::new(); nv];
+        let mut stack = Vec::new();
+        for k in (0..nv).rev() {
+            if parent[k] == NONE { stack.push((k, NONE)) } else { children[parent[k]].push(k) }
+        }
+        let mut tree = Self {
+            order: Vec::with_capacity(nv),
+            swaps: Vec::new(),
+            parent: Vec::with_capacity(nv),
+            depth: Vec::with_capacity(nv),
+            run: Vec::with_capacity(nv),
+            first: vec![0],
+        };
+        while let Some((k, parent)) = stack.pop() {
+            let place = tree.order.len();
+            tree.order.push(order[k]);
+            tree.parent.push(parent);
+            tree.depth.push(if parent == NONE { 0 } else { tree.depth[parent] + 1 });
+            tree.run.push(if parent != NONE && parent + 1 == place { tree.run[parent] } else { place });
+            tree.first.push(tree.first[place] + (tree.depth[place] + 1).next_multiple_of(step));
+            stack.extend(children[k].iter().map(|&child| (child, place))); // the first child on top
+        }
+        let mut at: Vec<usize> = (0..nv).collect(); // which coordinate stands where, as the exchanges go on
+        for place in 0..nv {
+            let other = (place..nv).find(|&k| at[k] == tree.order[place]).expect("the order is a permutation");
+            if other != place {
+                at.swap(place, other);
+                tree.swaps.push((place, other));
+            }
+        }
+        tree
+    }
+}
+
+/// The coordinates in an order in which each comes before those that it carries; one that is shared by joints on
+/// different branches comes right after the column where these branches have met.
+fn hoist(columns: &[Column], nv: usize) -> Vec<usize> {
+    let mut place: Vec<Option<usize>> = vec![None; nv];
+    for (c, column) in columns.iter().enumerate() {
+        let own = 2 * (c + 1); // even: at this column; odd: right after one, or (1) after the world
+        place[column.coordinate] = Some(match place[column.coordinate] {
+            None => own,
+            Some(other) => {
+                // the last column before both
+                let mut e = if other >= 2 { Some(other / 2 - 1) } else { None };
+                while e.is_some_and(|e| c >= columns[e].end) {
+                    e = e.and_then(|e| columns[e].parent);
+                }
+                let met = e.map_or(1, |e| 2 * (e + 1) + 1);
+                if met == other + 1 { other } else { met }
+            }
+        });
+    }
+    let mut order: Vec<usize> = (0..nv).collect();
+    order.sort_by_key(|&k| place[k]);
+    order
+}
+
+/// y += x s.
+#[inline(always)]
+pub(crate) fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
+    for (y, &x) in y.iter_mut().zip(x) {
+        *y = x.mul_add(s, *y);
+    }
+}
+
+/// y += Σ xₖ sₖ for some x, so that y is loaded and stored once; in whole steps.
+#[inline(always)]
+fn update<S: Scalar, const N: usize>(s: [S; N], x: [&[S]; N], y: &mut [S]) {
+    if step::<S>() == 1 {
+        for j in 0..y.len() {
+            for k in 0..N {
+                y[j] = x[k][j].mul_add(s[k], y[j]);
+            }
+        }
+        return;
+    }
+    let y = y.as_chunks_mut::<4>().0;
+    let x = x.map(|x| &x.as_chunks::<4>().0[..y.len()]);
+    for (i, y) in y.iter_mut().enumerate() {
+        let mut sum = *y;
+        for k in 0..N {
+            for j in 0..4 {
+                sum[j] = x[k][i][j].mul_add(s[k], sum[j]);
+            }
+        }
+        *y = sum;
+    }
+}
+
+/// Σ xₖ yₖ in four sums, which do not wait for each other.
+#[inline(always)]
+pub(crate) fn dot<S: Scalar>(x: &[S], y: &[S]) -> S {
+    let n = x.len();
+    let y = &y[..n];
+    let mut sums = [S::zero(); 4];
+    let mut k = 0;
+    while k + 4 <= n {
+        for j in 0..4 {
+            sums[j] = x[k + j].mul_add(y[k + j], sums[j]);
+        }
+        k += 4;
+    }
+    for k in k..n {
+        sums[0] = x[k].mul_add(y[k], sums[0]);
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// Eliminates N consecutive places of a run; returns N.
+#[inline(always)]
+fn eliminate<S: Scalar, const N: usize>(tree: &Tree, rows: &mut [S], D_inv: &mut [S], start: usize) -> usize {
+    let Tree { parent, depth, first, .. } = tree;
+    let (above, block) = rows.split_at_mut(first[start]);
+    let at = |k: usize| first[k] - first[start];
+    for k in (start..start + N).rev() {
+        let (before, row) = block.split_at_mut(at(k));
+        D_inv[k] = row[depth[k]].recip();
+        for e in start..k {
+            let p = depth[e];
+            update([-(row[p] * D_inv[k])], [row], &mut before[at(e)..at(e + 1)]); // H_e −= (H_ke / D_k) H_k
+        }
+    }
+    let own: [&[S]; N] = core::array::from_fn(|i| &block[at(start + i)..at(start + i + 1)]);
+    let mut e = parent[start];
+    for p in (0..depth[start]).rev() {
+        let scale = core::array::from_fn(|i| -(own[i][p] * D_inv[start + i]));
+        update(scale, own, &mut above[first[e]..first[e + 1]]);
+        e = parent[e];
+    }
+    for k in start..start + N {
+        for x in &mut block[at(k)..at(k) + depth[k]] {
+            *x = *x * D_inv[k]; // L_ke = H_ke / D_k
+        }
+    }
+    N
+}
+
+/// M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+///
+/// With depth d of the tree (columns on the way to the root) and n = nv, [`factorize`](Self::factorize) costs O(n d²),
+/// [`solve`](Self::solve) O(n d), [`inverse`](Self::inverse) O(n² d); a chain has d = n. All memory is allocated by
+/// [`new`](Self::new). Source: Featherstone (2005), sections 4 and 5. [`Cholesky`](crate::Cholesky) has the same verbs
+/// for any positive definite matrix.
+///
+/// ```
+/// use condyle_dynamics::{Data, Ltdl, crba, robots};
+/// let quadruped = robots::quadruped();
+/// let q = condyle_dynamics::neutral(&quadruped);
+/// let mut data = Data::new(&quadruped);
+/// let M = crba(&quadruped, &mut data, &q);
+/// let mut factor = Ltdl::new(&quadruped);
+/// factor.factorize(M);
+/// let mut x = [1.0; 18];
+/// factor.solve(&mut x); // M x = 1
+/// assert!((M * nalgebra::DVector::from_row_slice(&x)).iter().all(|&y: &f64| (y - 1.0).abs() < 1e-10));
+/// assert_eq!(factor.nonzeros(), 21 + 4 * (7 + 8 + 9)); // the base, and three joints of each leg: not 171
+/// ```
+#[derive(Clone, Debug)]
+pub struct Ltdl<S> {
+    tree: Tree,
+    /// Each place's row of L from the root on, then its D. Shape: nonzeros. Written by: `factorize`.
+    rows: Vec<S>,
+    /// 1/D. Shape: nv. Written by: `factorize`.
+    D_inv: Vec<S>,
+}
+
+impl<S: Scalar> Ltdl<S> {
+    /// Finds the zeros of a model's M and allocates the factor.
+    pub fn new<R>(model: &Model<R>) -> Self {
+        let tree = Tree::new(&model.columns, model.nv, step::<S>());
+        Self { rows: vec![S::zero(); tree.first[model.nv]], D_inv: vec![S::zero(); model.nv], tree }
+    }
+
+    /// How many entries of L and D may differ from zero, the ones on L's diagonal not counted.
+    pub fn nonzeros(&self) -> usize {
+        self.tree.depth.iter().map(|d| d + 1).sum()
+    }
+
+    /// The coordinates in their order from the root to the tips: they are eliminated last to first.
+    ///
+    /// It is 0, 1, 2, … unless joints share coordinates.
+    pub fn order(&self) -> &[usize] {
+        &self.tree.order
+    }
+
+    /// Row k of L in the [`order`](Self::order), entry by entry from the diagonal's left to the root: (place, value).
+    ///
+    /// # Panics
+    /// If k is not less than nv.
+    pub fn row(&self, k: usize) -> impl Iterator<Item = (usize, S)> {
+        let above = |k: usize| Some(self.tree.parent[k]).filter(|&p| p != NONE);
+        let row = &self.rows[self.tree.first[k]..][..self.tree.depth[k]];
+        std::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
+    }
+
+    /// D, in the [`order`](Self::order) of the places.
+    pub fn diagonal(&self) -> impl Iterator<Item = S> {
+        self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
+    }
+
+    /// M = Lᵀ D L, in O(n d²). Of two entries that are equal by symmetry, one is read.
+    ///
+    /// M: nv × nv, symmetric, positive definite (as [`crba`](crate::crba) gives it); if it is not, some D are not
+    /// positive. Allocates nothing. Source: Featherstone (2005), table 2.
+    ///
+    /// # Panics
+    /// If `M` is not nv × nv.
+    pub fn factorize(&mut self, M: &DMatrix<S>) {
+        let nv = self.D_inv.len();
+        assert!(M.shape() == (nv, nv), "M: expected {nv} × {nv}, found {:?}", M.shape());
+        let Self { tree, rows, D_inv } = self;
+        let Tree { order, parent, depth, run, first, .. } = &*tree;
+        let M = M.as_slice();
+        for k in 0..nv {
+            let (column, row) = (&M[order[k] * nv..(order[k] + 1) * nv], &mut rows[first[k]..first[k + 1]]);
+            let (row, rest) = row.split_at_mut(depth[k] + 1);
+            rest.fill(S::zero());
+            let mut e = k;
+            for x in row.iter_mut().rev() {
+                *x = column[order[e]];
+                e = parent[e];
+            }
+        }
+        let mut end = nv; // the rows from here on are done
+        while end > 0 {
+            // Several places of a run at a time where there are as many: rows above are loaded and stored once for all.
+            end -= match end - run[end - 1] {
+                4.. => eliminate::<S, 4>(tree, rows, D_inv, end - 4),
+                2.. => eliminate::<S, 2>(tree, rows, D_inv, end - 2),
+                _ => eliminate::<S, 1>(tree, rows, D_inv, end - 1),
+            };
+        }
+    }
+
+    /// x = M⁻¹ b in place of b, in O(n d): Lᵀ y = b, then L x = D⁻¹ y.
+    ///
+    /// b: nv numbers. Allocates nothing. Source: Featherstone (2005), table 3.
+    ///
+    /// # Panics
+    /// If `b` has not nv numbers.
+    pub fn solve(&self, b: &mut [S]) {
+        check("b", b.len(), self.D_inv.len());
+        let Tree { swaps, parent, depth, run, first, .. } = &self.tree;
+        for &(i, k) in swaps {
+            b.swap(i, k);
+        }
+        for k in (0..b.len()).rev() {
+            let row = &self.rows[first[k]..];
+            let (x, mut lo, mut hi) = (-b[k], run[k], k);
+            loop {
+                axpy(x, &row[depth[lo]..], &mut b[lo..hi]); // b_e −= L_ke b_k on all places e above
+                if parent[lo] == NONE {
+                    break;
+                }
+                hi = parent[lo] + 1;
+                lo = run[hi - 1];
+            }
+            b[k] = b[k] * self.D_inv[k];
+        }
+        for k in 0..b.len() {
+            let row = &self.rows[first[k]..];
+            let (mut x, mut lo, mut hi) = (b[k], run[k], k);
+            loop {
+                x -= dot(&b[lo..hi], &row[depth[lo]..]); // x_k = y_k − Σ L_ke x_e
+                if parent[lo] == NONE {
+                    break;
+                }
+                hi = parent[lo] + 1;
+                lo = run[hi - 1];
+            }
+            b[k] = x;
+        }
+        for &(i, k) in swaps.iter().rev() {
+            b.swap(i, k);
+        }
+    }
+
+    /// X = M⁻¹ B in place of B, column by column, each in O(n d).
+    ///
+    /// B: nv rows, any number of columns. Allocates nothing.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, Ltdl, crba, robots};
+    /// let arm = robots::arm7();
+    /// let mut data = Data::new(&arm);
+    /// let M = crba(&arm, &mut data, &[0.3; 7]);
+    /// let mut factor = Ltdl::new(&arm);
+    /// factor.factorize(M);
+    /// let mut B = M.clone();
+    /// factor.solve_matrix(&mut B);
+    /// assert!((B - nalgebra::DMatrix::<f64>::identity(7, 7)).amax() < 1e-12);
+    /// ```
+    ///
+    /// # Panics
+    /// If `B` has not nv rows.
+    pub fn solve_matrix(&self, B: &mut DMatrix<S>) {
+        check("B", B.nrows(), self.D_inv.len());
+        for column in B.as_mut_slice().chunks_exact_mut(self.D_inv.len().max(1)) {
+            self.solve(column);
+        }
+    }
+
+    /// X = M⁻¹, the full symmetric matrix, in O(n² d).
+    ///
+    /// L X = D⁻¹ L⁻ᵀ has an upper triangle on its right, so row k of X follows from the rows above:
+    /// X_kj = −Σ L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `X` is not nv × nv.
+    pub fn inverse(&self, X: &mut DMatrix<S>) {
+        let nv = self.D_inv.len();
+        assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());
+        let Tree { swaps, parent, depth, first, .. } = &self.tree;
+        let rows = X.as_mut_slice(); // row k is column k: X is symmetric
+        for k in 0..nv {
+            let L = &self.rows[first[k]..first[k] + depth[k]];
+            let (above, rest) = rows.split_at_mut(k * nv);
+            let row = &mut rest[..k];
+            row.fill(S::zero());
+            let (mut e, mut p) = (parent[k], depth[k]);
+            while p >= 4 {
+                let mut x = [&[][..]; 4];
+                for x in &mut x {
+                    *x = &above[e * nv..][..k];
+                    e = parent[e];
+                }
+                let s = [-L[p - 1], -L[p - 2], -L[p - 3], -L[p - 4]];
+                for j in 0..k {
+                    row[j] = x[0][j].mul_add(s[0], x[1][j].mul_add(s[1], x[2][j].mul_add(s[2], x[3][j].mul_add(s[3], row[j]))));
+                }
+                p -= 4;
+            }
+            while p > 0 {
+                axpy(-L[p - 1], &above[e * nv..], row);
+                (e, p) = (parent[e], p - 1);
+            }
+            let (mut diagonal, mut e) = (self.D_inv[k], parent[k]);
+            for &L in L.iter().rev() {
+                diagonal -= L * row[e];
+                e = parent[e];
+            }
+            rest[k] = diagonal;
+            for (j, &x) in rest[..k].iter().enumerate() {
+                above[j * nv + k] = x;
+            }
+        }
+        for &(i, k) in swaps.iter().rev() {
+            X.swap_rows(i, k);
+            X.swap_columns(i, k);
+        }
+    }
+}

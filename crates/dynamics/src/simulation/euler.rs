@@ -1,0 +1,39 @@
+//! The semi-implicit (symplectic) Euler method.
+
+use super::{Input, Status, acceleration};
+use crate::configuration::integrate;
+use crate::data::Data;
+use crate::model::Model;
+use condyle_spatial::{Constant, Scalar};
+
+#[derive(Clone, Debug)]
+pub(super) struct Workspace<S> {
+    /// Efforts, the passive ones included. Shape: nv. Written by: `step`.
+    effort: Vec<S>,
+    /// h v'. Shape: nv. Written by: `step`.
+    way: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(super) fn new<R>(model: &Model<R>) -> Self {
+        Self { effort: vec![S::zero(); model.nv], way: vec![S::zero(); model.nv] }
+    }
+}
+
+/// The whole method.
+pub(super) fn step<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    w: &mut Workspace<S>,
+    input: Input<S>,
+    (q, v): (&[S], &[S]),
+    (q_next, v_next): (&mut [S], &mut [S]),
+) -> Status {
+    let a = acceleration(model, data, input, (q, v), &mut w.effort);
+    for k in 0..v.len() {
+        v_next[k] = a[k].mul_add(input.h, v[k]); // v' = v + h a
+        w.way[k] = v_next[k] * input.h;
+    }
+    integrate(model, q, &w.way, q_next); // q' = q ⊕ h v'
+    Status::Done
+}

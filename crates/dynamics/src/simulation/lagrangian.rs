@@ -1,0 +1,135 @@
+//! The momentum and the slope of the Lagrangian L(q, v) = ½ vᵀ M(q) v − V(q), with their derivatives.
+//!
+//! In the world's frame, with composite quantities (sums over all that a joint carries: inertia Iᶜ, momentum hᶜ, and the
+//! force Fᶜ that holds it still), Ψ̇ = v_λ × S and Ψ̈ = −g × S. What joint j carries turns about S_e when coordinate e of
+//! the joint changes, and its bodies move faster by Ψ̇_e beside that: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see
+//! `rnea_derivatives.rs`). Turning all changes no energy, so
+//!
+//! ```text
+//! p_e = (M v)_e = S_e · hᶜ,   ∂L/∂q_e = Ψ̇_e · hᶜ − S_e · Fᶜ
+//! ∂hᶜ/∂q_d = S_d ×* hᶜ + Iᶜ Ψ̇_d,   ∂Fᶜ/∂q_d = S_d ×* Fᶜ + Iᶜ Ψ̈_d      (Iᶜ, hᶜ, Fᶜ of the joint of d)
+//! ```
+//!
+//! and for each column d and each column e on its way to the root
+//!
+//! ```text
+//! ∂p_d/∂q_e = Ψ̇_e · Iᶜ S_d                        ∂p_e/∂q_d = S_e · ∂hᶜ/∂q_d
+//! ∂²L/∂q_d∂q_e = Ψ̇_e · ∂hᶜ/∂q_d − Ψ̈_e · Iᶜ S_d     ∂²L/∂q_e∂q_d = Ψ̇_e · ∂hᶜ/∂q_d − S_e · ∂Fᶜ/∂q_d
+//! ```
+
+use crate::kinematics::World;
+use crate::layout::Layout;
+use crate::model::Model;
+use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+
+/// In the world's frame; matrices by columns.
+#[derive(Clone, Debug)]
+pub(super) struct Workspace<S> {
+    /// Velocity. Shape: bodies. Written by: `pass`.
+    v: Vec<Motion<S>>,
+    /// Iᶜ. Shape: bodies. Written by: `pass`.
+    IC: Vec<Inertia<S>>,
+    /// hᶜ. Shape: bodies. Written by: `pass`.
+    hC: Vec<Force<S>>,
+    /// Fᶜ. Shape: bodies. Written by: `pass`.
+    FC: Vec<Force<S>>,
+    /// Ψ̇. Shape: columns. Written by: `pass`.
+    Psid: Vec<Motion<S>>,
+    /// Ψ̈. Shape: columns. Written by: `pass`.
+    Psidd: Vec<Motion<S>>,
+    /// p = M v. Shape: nv. Written by: `pass`.
+    pub(super) p: Vec<S>,
+    /// ∂L/∂q. Shape: nv. Written by: `pass`.
+    pub(super) L_q: Vec<S>,
+    /// M = ∂p/∂v. Shape: nv × nv. Written by: `pass`.
+    pub(super) M: Vec<S>,
+    /// ∂p/∂q, and its transpose ∂²L/∂q∂v. Shape: nv × nv. Written by: `pass`.
+    pub(super) p_q: Vec<S>,
+    /// ∂²L/∂q∂q, row by row how ∂L/∂q changes. Shape: nv × nv. Written by: `pass`.
+    pub(super) L_qq: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(super) fn new<R>(model: &Model<R>) -> Self {
+        let (bodies, columns, nv) = (model.nodes.len(), model.columns.len(), model.nv);
+        Self {
+            v: vec![Motion::zero(); bodies],
+            IC: vec![Inertia::zero(); bodies],
+            hC: vec![Force::zero(); bodies],
+            FC: vec![Force::zero(); bodies],
+            Psid: vec![Motion::zero(); columns],
+            Psidd: vec![Motion::zero(); columns],
+            p: vec![S::zero(); nv],
+            L_q: vec![S::zero(); nv],
+            M: vec![S::zero(); nv * nv],
+            p_q: vec![S::zero(); nv * nv],
+            L_qq: vec![S::zero(); nv * nv],
+        }
+    }
+}
+
+/// All of it, for bodies that are placed, in O(n · depth). External forces take part in ∂L/∂q as if they were slopes of a
+/// potential, which they need not be: ∂²L/∂q∂q is then not symmetric.
+#[inline(always)]
+pub(super) fn pass<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
+    let (oX, S) = (&w.oX, &w.S);
+    let Workspace { v, IC, hC, FC, Psid, Psidd, p, L_q, M, p_q, L_qq } = d;
+    let minus_g = Motion::new(l.minus_gravity(), Vec3::zero());
+    for i in l.bodies() {
+        let v_parent = l.parent(v, i);
+        v[i] = v_parent;
+        for k in 0..l.joint(i).nv() {
+            let c = l.slot(i) + k;
+            v[i] = S[c].scale_add(l.load(qd, i, k), v[i]); // v_i = v_λ + S q̇
+            Psid[c] = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
+            Psidd[c] = minus_g.cross(S[c]); // Ψ̈ = −g × S
+        }
+        IC[i] = oX[i].act(l.inertia(i));
+        hC[i] = IC[i] * v[i]; // h = I v
+        FC[i] = IC[i] * minus_g; // F = −I g
+        if let Some(external) = l.force(f_ext, i) {
+            FC[i] -= oX[i].act(external);
+        }
+    }
+    p.fill(L::S::zero());
+    L_q.fill(L::S::zero());
+    M.fill(L::S::zero());
+    p_q.fill(L::S::zero());
+    L_qq.fill(L::S::zero());
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        let (before, own) = support.split_at(support.len() - nv);
+        for k in 0..nv {
+            let s = l.slot(i) + k;
+            let column = own[k];
+            l.add(p, i, k, S[s].dot(hC[i])); // p_d = S_d · hᶜ
+            l.add(L_q, i, k, Psid[s].dot(hC[i]) - S[s].dot(FC[i])); // ∂L/∂q_d = Ψ̇_d · hᶜ − S_d · Fᶜ
+            let IS = IC[i] * S[s];
+            let dh = S[s].cross(hC[i]) + IC[i] * Psid[s]; // ∂hᶜ/∂q_d
+            let dF = S[s].cross(FC[i]) + IC[i] * Psidd[s]; // ∂Fᶜ/∂q_d
+            for &e in before {
+                let (S_e, Psid_e, Psidd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e));
+                let (x, curvature) = (S_e.dot(IS), Psid_e.dot(dh));
+                l.add_at(M, column, e, x);
+                l.add_at(M, e, column, x);
+                l.add_at(p_q, column, e, Psid_e.dot(IS)); // ∂p_d/∂q_e
+                l.add_at(p_q, e, column, S_e.dot(dh)); // ∂p_e/∂q_d
+                l.add_at(L_qq, column, e, curvature - Psidd_e.dot(IS)); // ∂²L/∂q_d∂q_e
+                l.add_at(L_qq, e, column, curvature - S_e.dot(dF)); // ∂²L/∂q_e∂q_d
+            }
+            for &e in own {
+                let (Psid_e, Psidd_e) = (l.at(Psid, e), l.at(Psidd, e));
+                l.add_at(M, column, e, l.at(S, e).dot(IS));
+                l.add_at(p_q, column, e, Psid_e.dot(IS));
+                l.add_at(L_qq, column, e, Psid_e.dot(dh) - Psidd_e.dot(IS));
+            }
+        }
+        let (IC_i, hC_i, FC_i) = (IC[i], hC[i], FC[i]);
+        l.push(IC, i, IC_i);
+        l.push(hC, i, hC_i);
+        l.push(FC, i, FC_i);
+    }
+    l.add_armature(M);
+    l.add_armature_torque(qd, p);
+}

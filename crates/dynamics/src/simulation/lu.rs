@@ -1,0 +1,42 @@
+//! A dense factor A = L U on any scalar, stored by columns, without exchanges of rows.
+//!
+//! It is for matrices M + O(h) near a positive definite M: those have positive definite symmetric parts, for which
+//! elimination in the given order is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
+
+use condyle_spatial::Scalar;
+
+/// L (its diagonal of ones left out) and U in place of A.
+pub(super) fn factorize<S: Scalar>(A: &mut [S], n: usize) {
+    for j in 0..n {
+        let (left, rest) = A.split_at_mut(j * n);
+        let column = &mut rest[..n];
+        for k in 0..j {
+            let x = column[k];
+            for i in k + 1..n {
+                column[i] -= left[k * n + i] * x; // A_ij − Σ L_ik U_kj
+            }
+        }
+        let r = column[j].recip();
+        for x in &mut column[j + 1..] {
+            *x = *x * r;
+        }
+    }
+}
+
+/// x in place of b: L U x = b.
+pub(super) fn solve<S: Scalar>(LU: &[S], b: &mut [S]) {
+    let n = b.len();
+    for j in 0..n {
+        let x = b[j];
+        for i in j + 1..n {
+            b[i] -= LU[j * n + i] * x;
+        }
+    }
+    for j in (0..n).rev() {
+        b[j] = b[j] / LU[j * n + j];
+        let x = b[j];
+        for i in 0..j {
+            b[i] -= LU[j * n + i] * x;
+        }
+    }
+}

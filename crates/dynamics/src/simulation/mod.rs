@@ -1,0 +1,292 @@
+//! Robots that move by themselves: (q, v) from one instant to the next, on the joints' own groups.
+//!
+//! Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). Three
+//! [`Integrator`]s step them; a [`Simulation`] owns the state and everything they need.
+//!
+//! ```
+//! use condyle_dynamics::{neutral, robots};
+//! use condyle_dynamics::simulation::{Settings, Simulation};
+//! let quadruped = robots::quadruped();
+//! let mut simulation = Simulation::new(&quadruped, Settings::default());
+//! simulation.set_state(&neutral(&quadruped), &[0.0; 18]);
+//! let status = simulation.run(100, |now| now.tau[8] = -0.5 * now.v[8]); // a control law, once per step
+//! assert!(status.is_done());
+//! assert!((simulation.q()[2] + 0.5 * 9.81 * 0.1f64.powi(2)).abs() < 2e-3); // it has fallen ½ g t²
+//! ```
+
+mod euler;
+mod lagrangian;
+mod lu;
+mod runge_kutta;
+mod tangent;
+mod variational;
+
+use crate::aba::aba;
+use crate::data::{Data, check, check_forces};
+use crate::model::Model;
+use crate::passive::passive_torque;
+use condyle_spatial::{Constant, Force, Scalar};
+
+/// How a step is computed. τ and the external forces stay as they are during a step, forces in the body's frame;
+/// [passive torques](crate::passive_torque) follow the velocity within it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Integrator {
+    /// v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation. Where M is constant it is symplectic; elsewhere
+    /// the Coriolis forces are those of the beginning of the step, and what spins fast without damping gains energy,
+    /// light links without bound. Fit for damped robots and short horizons.
+    SemiImplicitEuler,
+    /// The classical method of Runge and Kutta for ξ̇ = J_log(ξ) v, v̇ = aba(q₀ ⊕ ξ, v, τ) (Munthe-Kaas, *Runge-Kutta
+    /// methods on Lie groups*, 1998). Order 4, four evaluations; its energy drifts by O(h⁴) per second.
+    RungeKutta4,
+    /// The variational integrator of the midpoint Lagrangian (Marsden and West, *Discrete mechanics and variational
+    /// integrators*, 2001; on groups: Bou-Rabee and Marsden, *Hamilton–Pontryagin integrators on Lie groups*, 2009),
+    /// solved by Newton's method with exact derivatives. Order 2, symmetric, symplectic: the energy sways by O(h²) and
+    /// does not drift, momentum is conserved to rounding. Its equation has no solution where a velocity changes by much
+    /// more than itself in a step ([`Status::NotConverged`]).
+    Variational,
+}
+
+/// How to simulate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The method.
+    pub integrator: Integrator,
+    /// h, the length of a step (s).
+    pub dt: f64,
+    /// The smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s), if the joints' damping and friction
+    /// are to act; `None` for none of either.
+    pub passive: Option<f64>,
+    /// Newton's method ends when the momenta balance to within this part of their size.
+    pub tolerance: f64,
+    /// Newton's method gives up after so many iterations.
+    pub max_iterations: usize,
+}
+
+impl Default for Settings {
+    /// Semi-implicit Euler at 1 kHz, no passive torques; 1e-11, which rounding lets every robot reach, and 20.
+    fn default() -> Self {
+        Self {
+            integrator: Integrator::SemiImplicitEuler,
+            dt: 1e-3,
+            passive: None,
+            tolerance: 1e-11,
+            max_iterations: 20,
+        }
+    }
+}
+
+/// How a step, or a run of steps, has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
+#[non_exhaustive]
+pub enum Status {
+    /// As it should.
+    Done,
+    /// Newton's method has not reached the tolerance: the step was not taken, the state is the one before it. A shorter
+    /// step helps.
+    NotConverged {
+        /// How many were made.
+        iterations: usize,
+    },
+    /// The velocity is no longer finite: the step was not taken, the state is the one before it.
+    NotFinite,
+}
+
+impl Status {
+    /// Whether all steps were taken.
+    pub fn is_done(self) -> bool {
+        self == Self::Done
+    }
+}
+
+/// What a control law sees before a step, and what it sets.
+#[derive(Debug)]
+pub struct Control<'a, S> {
+    /// The time at which the step begins (s).
+    pub time: f64,
+    /// The position, nq numbers.
+    pub q: &'a [S],
+    /// The velocity, nv numbers.
+    pub v: &'a [S],
+    /// The joint efforts during the step, nv numbers (N m, N); 0 when the law is called.
+    pub tau: &'a mut [S],
+    /// The force on each body during the step (N, N m), at its origin and in its frame, number 0 being the world's; 0
+    /// when the law is called.
+    pub f_ext: &'a mut [Force<S>],
+}
+
+/// What acts during a step.
+#[derive(Clone, Copy)]
+struct Input<'a, S> {
+    h: S,
+    tau: &'a [S],
+    f_ext: &'a [Force<S>],
+    passive: Option<f64>,
+}
+
+/// A robot's state, and all that is needed to move it on: nothing is allocated after [`new`](Self::new).
+///
+/// Several simulations run side by side on a scalar with lanes, and on dual numbers a simulation gives its own
+/// derivatives. Newton's method then iterates until all lanes have converged.
+#[derive(Clone, Debug)]
+pub struct Simulation<'m, S, R = f64> {
+    /// May be changed between steps.
+    pub settings: Settings,
+    model: &'m Model<R>,
+    data: Data<S>,
+    time: f64,
+    q: Vec<S>,
+    v: Vec<S>,
+    /// The state after the step that is being computed.
+    q_next: Vec<S>,
+    v_next: Vec<S>,
+    /// What the control law sets.
+    tau: Vec<S>,
+    f_ext: Vec<Force<S>>,
+    euler: euler::Workspace<S>,
+    runge_kutta: runge_kutta::Workspace<S>,
+    variational: variational::Workspace<S>,
+}
+
+impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
+    /// Allocates everything; the robot stands still at [`neutral`](crate::neutral), at time 0.
+    pub fn new(model: &'m Model<R>, settings: Settings) -> Self {
+        let q: Vec<S> = crate::neutral(model).into_iter().map(S::splat).collect();
+        let zero = vec![S::zero(); model.nv];
+        Self {
+            settings,
+            model,
+            data: Data::new(model),
+            time: 0.0,
+            q_next: q.clone(),
+            q,
+            v: zero.clone(),
+            v_next: zero.clone(),
+            tau: zero,
+            f_ext: vec![Force::zero(); model.nodes.len()],
+            euler: euler::Workspace::new(model),
+            runge_kutta: runge_kutta::Workspace::new(model),
+            variational: variational::Workspace::new(model),
+        }
+    }
+
+    /// The position, nq numbers.
+    pub fn q(&self) -> &[S] {
+        &self.q
+    }
+
+    /// The velocity, nv numbers.
+    pub fn v(&self) -> &[S] {
+        &self.v
+    }
+
+    /// The sum of the steps since the state was set (s).
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Puts the robot at position q with velocity v, and the clock to 0. Allocates nothing.
+    ///
+    /// q: nq numbers; v: nv.
+    ///
+    /// # Panics
+    /// If an argument has the wrong length.
+    pub fn set_state(&mut self, q: &[S], v: &[S]) {
+        check("q", q.len(), self.model.nq);
+        check("v", v.len(), self.model.nv);
+        self.q.copy_from_slice(q);
+        self.v.copy_from_slice(v);
+        self.time = 0.0;
+    }
+
+    /// One step of `settings.dt` under constant efforts and forces.
+    ///
+    /// tau: nv numbers (N m, N); f_ext: a force on each body as in [`aba`](crate::aba()), or empty for none. O(n) for the
+    /// explicit integrators; for the variational one O(n³) in each of some three iterations. Allocates nothing.
+    ///
+    /// ```
+    /// use condyle_dynamics::{robots, simulation::{Integrator, Settings, Simulation}};
+    /// let arm = robots::arm7();
+    /// let settings = Settings { integrator: Integrator::Variational, ..Settings::default() };
+    /// let mut simulation = Simulation::new(&arm, settings);
+    /// assert!(simulation.step(&[0.1; 7], &[]).is_done());
+    /// assert!(simulation.v().iter().any(|&v: &f64| v != 0.0));
+    /// ```
+    ///
+    /// # Panics
+    /// If an argument has the wrong length, or the smoothing of passive torques is not positive.
+    pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
+        check("tau", tau.len(), self.model.nv);
+        check_forces(f_ext.len(), self.model.nodes.len());
+        let Settings { integrator, dt, passive, .. } = self.settings;
+        let input = Input { h: S::splat(dt), tau, f_ext, passive };
+        let (model, data, state) = (self.model, &mut self.data, (&self.q[..], &self.v[..]));
+        let (q, v) = (&mut self.q_next, &mut self.v_next);
+        let status = match integrator {
+            Integrator::SemiImplicitEuler => euler::step(model, data, &mut self.euler, input, state, (q, v)),
+            Integrator::RungeKutta4 => runge_kutta::step(model, data, &mut self.runge_kutta, input, state, (q, v)),
+            Integrator::Variational => {
+                variational::step(model, data, &mut self.variational, &self.settings, input, state, (q, v))
+            }
+        };
+        if !self.v_next.iter().all(|v| everywhere::<S>(v.abs().lt(S::splat(f64::MAX)))) {
+            return if status.is_done() { Status::NotFinite } else { status };
+        }
+        if status.is_done() {
+            core::mem::swap(&mut self.q, &mut self.q_next);
+            core::mem::swap(&mut self.v, &mut self.v_next);
+            self.time += dt;
+        }
+        status
+    }
+
+    /// So many steps, with a control law that is called before each of them; ends early when one fails.
+    ///
+    /// Allocates nothing, unless the law does.
+    ///
+    /// # Panics
+    /// If the smoothing of passive torques is not positive.
+    pub fn run(&mut self, steps: usize, mut control: impl FnMut(&mut Control<S>)) -> Status {
+        let (mut tau, mut f_ext) = (core::mem::take(&mut self.tau), core::mem::take(&mut self.f_ext));
+        let mut status = Status::Done;
+        for _ in 0..steps {
+            tau.fill(S::zero());
+            f_ext.fill(Force::zero());
+            control(&mut Control { time: self.time, q: &self.q, v: &self.v, tau: &mut tau, f_ext: &mut f_ext });
+            status = self.step(&tau, &f_ext);
+            if !status.is_done() {
+                break;
+            }
+        }
+        (self.tau, self.f_ext) = (tau, f_ext);
+        status
+    }
+}
+
+/// Whether a mask holds in every lane.
+#[inline(always)]
+fn everywhere<S: Scalar>(mask: S::Mask) -> bool {
+    S::select(mask, S::one(), S::zero()) == S::one()
+}
+
+/// aba(q, v, τ + passive torque).
+#[inline(always)]
+fn acceleration<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    input: Input<S>,
+    (q, v): (&[S], &[S]),
+    effort: &mut [S],
+) -> &'d [S] {
+    match input.passive {
+        None => aba(model, data, q, v, input.tau, input.f_ext),
+        Some(smoothing) => {
+            passive_torque(model, v, smoothing, effort);
+            for (effort, &tau) in effort.iter_mut().zip(input.tau) {
+                *effort += tau;
+            }
+            aba(model, data, q, v, effort, input.f_ext)
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The classical Runge–Kutta method on the joints' groups.
+//!
+//! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀ the motion is q₀ ⊕ ξ(t), and since
+//! ∂(q₀ ⊕ ξ)/∂ξ is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹,
+//!
+//! ```text
+//! ξ̇ = J_log(ξ) v,   v̇ = aba(q₀ ⊕ ξ, v, τ),   ξ(0) = 0
+//! ```
+//!
+//! is an ordinary differential equation in a vector space: what the classical method does to it has order 4.
+
+use super::{Input, Status, acceleration, tangent};
+use crate::configuration::integrate;
+use crate::data::Data;
+use crate::joint::GroupJacobian;
+use crate::model::Model;
+use condyle_spatial::{Constant, Scalar};
+
+#[derive(Clone, Debug)]
+pub(super) struct Workspace<S> {
+    /// Efforts, the passive ones included. Shape: nv. Written by: `step`.
+    effort: Vec<S>,
+    /// Where a stage looks: ξ, v. Shape: nv. Written by: `step`.
+    xi: Vec<S>,
+    v: Vec<S>,
+    /// Its rates. Shape: nv. Written by: `step`.
+    dxi: Vec<S>,
+    dv: Vec<S>,
+    /// The weighted sums of the rates. Shape: nv. Written by: `step`.
+    sum_xi: Vec<S>,
+    sum_v: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(super) fn new<R>(model: &Model<R>) -> Self {
+        let zero = vec![S::zero(); model.nv];
+        Self {
+            effort: zero.clone(),
+            xi: zero.clone(),
+            v: zero.clone(),
+            dxi: zero.clone(),
+            dv: zero.clone(),
+            sum_xi: zero.clone(),
+            sum_v: zero,
+        }
+    }
+}
+
+/// How far from the beginning each stage looks, and the weight of what it finds there.
+const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
+
+/// The whole method.
+pub(super) fn step<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    w: &mut Workspace<S>,
+    input: Input<S>,
+    (q, v): (&[S], &[S]),
+    (q_next, v_next): (&mut [S], &mut [S]),
+) -> Status {
+    let Workspace { effort, xi, v: v_stage, dxi, dv, sum_xi, sum_v } = w;
+    sum_xi.fill(S::zero());
+    sum_v.fill(S::zero());
+    dxi.fill(S::zero());
+    dv.fill(S::zero());
+    for (part, weight) in STAGES {
+        let (ahead, weight) = (input.h * S::splat(part), input.h * S::splat(weight));
+        for k in 0..v.len() {
+            xi[k] = dxi[k] * ahead; // ξ = c h ξ̇ of the stage before
+            v_stage[k] = dv[k].mul_add(ahead, v[k]); // v = v₀ + c h v̇ of the stage before
+        }
+        integrate(model, q, xi, q_next);
+        tangent::multiply(model, GroupJacobian::Log, xi, v_stage, dxi); // ξ̇ = J_log(ξ) v
+        dv.copy_from_slice(acceleration(model, data, input, (q_next, v_stage), effort)); // v̇ = aba(q₀ ⊕ ξ, v, τ)
+        for k in 0..v.len() {
+            sum_xi[k] = dxi[k].mul_add(weight, sum_xi[k]);
+            sum_v[k] = dv[k].mul_add(weight, sum_v[k]);
+        }
+    }
+    integrate(model, q, sum_xi, q_next); // q' = q ⊕ h Σ b ξ̇
+    for k in 0..v.len() {
+        v_next[k] = v[k] + sum_v[k]; // v' = v + h Σ b v̇
+    }
+    Status::Done
+}

@@ -1,0 +1,236 @@
+//! What is odd about a model, though it loads: inertias that no body has, degrees of freedom along which M is singular.
+
+use crate::data::Data;
+use crate::kinematics::place;
+use crate::layout::{Layout, Single};
+use crate::model::{Body, Model};
+use crate::{configuration::random_configuration, crba::crba};
+use condyle_spatial::{Act, ArticulatedInertia, Inertia};
+use nalgebra::Matrix3;
+use rand::{SeedableRng, rngs::StdRng};
+use serde::{Deserialize, Serialize};
+
+/// What is odd about a model. Loaders collect these, or refuse the model when they are strict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A body that moves has neither mass nor inertia.
+    #[error("body `{body}` moves and has no mass")]
+    Massless {
+        /// The body.
+        body: String,
+    },
+    /// A body's rotational inertia about its centre of mass has a negative principal moment.
+    #[error("body `{body}`: a principal moment of inertia is {moment:e} kg m²")]
+    Negative {
+        /// The body.
+        body: String,
+        /// The least moment (kg m²).
+        moment: f64,
+    },
+    /// One principal moment is larger than the sum of the others: no distribution of mass has such an inertia.
+    #[error(
+        "body `{body}`: principal moments {} > {} + {} kg m² break the triangle inequality",
+        moments[2], moments[0], moments[1]
+    )]
+    Triangle {
+        /// The body.
+        body: String,
+        /// The principal moments (kg m²), least first.
+        moments: [f64; 3],
+    },
+    /// Nothing resists a joint: M is singular, and forward dynamics has no answer.
+    #[error("joint `{joint}` moves nothing that has inertia along it: the inertia matrix is singular")]
+    Singular {
+        /// The joint.
+        joint: String,
+    },
+    /// A loader left something out that a tree of bodies cannot have, or assumed something.
+    #[error("{element}: {what}")]
+    LeftOut {
+        /// For example ``joint `loop` ``.
+        element: String,
+        /// What was left out, and why.
+        what: String,
+    },
+}
+
+/// Rounding in a body's moments of inertia, as files have them: six digits.
+const MOMENT_ROUNDING: f64 = 1e-6;
+/// A pivot that is smaller than this share of the products it is a sum of is rounding, and none.
+const PIVOT_ROUNDING: f64 = 1e-13;
+/// Positions at which M is looked at. A joint is called singular if it is so at all of them.
+const SAMPLES: usize = 3;
+
+/// What is odd about a body on its own. The bodies between the joints of a chain have no mass on purpose.
+pub(crate) fn of_body(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
+    let (I, name) = (body.inertia, || body.name.clone());
+    if I == Inertia::zero() {
+        if !between {
+            warnings.push(Warning::Massless { body: name() });
+        }
+        return;
+    }
+    let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { I.mass_com };
+    let shift = Inertia::from_com(I.mass, com, condyle_spatial::Sym3::zero()).rotational;
+    let c = I.rotational - shift;
+    let moments = Matrix3::new(c.xx, c.xy, c.xz, c.xy, c.yy, c.yz, c.xz, c.yz, c.zz).symmetric_eigenvalues();
+    let mut moments = [moments[0], moments[1], moments[2]];
+    moments.sort_by(f64::total_cmp);
+    let rounding = MOMENT_ROUNDING * moments[2].abs();
+    if moments[0] < -rounding {
+        warnings.push(Warning::Negative { body: name(), moment: moments[0] });
+    } else if moments[2] > moments[0] + moments[1] + rounding {
+        warnings.push(Warning::Triangle { body: name(), moments });
+    }
+}
+
+impl Model {
+    /// What is odd about the robot, though it could be built.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Finds the joints along which M is singular, wherever the robot is.
+    pub(crate) fn find_singular(&mut self) {
+        let mut always = vec![true; self.bodies.len()];
+        let mut rng = StdRng::seed_from_u64(0);
+        let mut data = Data::new(self);
+        for _ in 0..SAMPLES {
+            let q = random_configuration(self, &mut rng);
+            let here = if self.has_mimic() {
+                self.singular_by_matrix(&mut data, &q)
+            } else {
+                self.singular_by_bodies(&mut data, &q)
+            };
+            always.iter_mut().zip(here).for_each(|(always, here)| *always &= here);
+        }
+        self.singular = (1..self.bodies.len()).filter(|&i| always[i]).collect();
+        self.warnings.retain(|w| !matches!(w, Warning::Singular { .. }));
+        let named = self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() });
+        self.warnings.extend(named);
+    }
+
+    /// The pivots D = Sᵀ Iᴬ S of the articulated bodies; a joint without one is passed over.
+    fn singular_by_bodies(&self, data: &mut Data<f64>, q: &[f64]) -> Vec<bool> {
+        let l = Single::<f64, f64>::new(self);
+        place(&l, &mut data.world, q);
+        let mut singular = vec![false; self.bodies.len()];
+        let mut IA = vec![ArticulatedInertia::zero(); self.bodies.len()];
+        for i in l.bodies().rev() {
+            let mut Ia = IA[i] + data.world.oX[i].act(l.inertia(i)).into();
+            for k in (0..l.joint(i).nv()).rev() {
+                let S = data.world.S[l.slot(i) + k];
+                let U = Ia * S;
+                let D = S.dot(U) + l.armature(i, k);
+                let products = S.to_array().iter().zip(U.to_array()).map(|(s, u)| (s * u).abs()).sum::<f64>();
+                if D <= PIVOT_ROUNDING * products {
+                    singular[i] = true;
+                } else {
+                    Ia = Ia.minus_outer(U, 1.0 / D);
+                }
+            }
+            l.push(&mut IA, i, Ia);
+        }
+        singular
+    }
+
+    /// The pivots of M, of robots whose joints share coordinates.
+    fn singular_by_matrix(&self, data: &mut Data<f64>, q: &[f64]) -> Vec<bool> {
+        let mut M = crba(self, data, q).clone();
+        let diagonal = M.diagonal();
+        let mut singular = vec![false; self.nv];
+        for k in (0..self.nv).rev() {
+            let D = M[(k, k)];
+            if D <= PIVOT_ROUNDING * diagonal[k] {
+                singular[k] = true;
+                continue;
+            }
+            for i in 0..k {
+                let x = M[(k, i)] / D;
+                for j in 0..=i {
+                    M[(i, j)] -= x * M[(k, j)];
+                }
+            }
+        }
+        let owns = |b: &Body| b.mimic.is_none() && (b.idx_v..b.idx_v + b.joint.nv()).any(|k| singular[k]);
+        self.bodies.iter().enumerate().map(|(i, b)| i > 0 && owns(b)).collect()
+    }
+}
+
+impl<R> Model<R> {
+    /// The bodies whose joints make M singular: nothing that they carry has inertia along them. Forward dynamics and
+    /// M⁻¹ refuse such a robot; armature on these joints cures it.
+    pub fn singular_joints(&self) -> &[usize] {
+        &self.singular
+    }
+
+    /// Panics, with the joint's name, where M has no inverse.
+    #[inline]
+    #[track_caller]
+    pub(crate) fn check_regular(&self) {
+        if let Some(&i) = self.singular.first() {
+            panic!("{}", Warning::Singular { joint: self.bodies[i].joint_name.clone() });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{ModelBuilder, WORLD};
+    use crate::joint::Joint;
+    use condyle_spatial::{Se3, Sym3, Vec3};
+
+    fn z() -> Joint {
+        Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) }
+    }
+
+    fn ball() -> Inertia<f64> {
+        Inertia::from_com(1.0, Vec3::new(0.1, 0.0, 0.0), Sym3::diagonal(0.01))
+    }
+
+    #[test]
+    fn a_massless_leaf_is_singular_and_named() {
+        let mut builder = ModelBuilder::new("leaf");
+        let arm = builder.body("arm", WORLD, z(), Se3::identity(), ball());
+        builder.body("leaf", arm, z(), Se3::new(Se3::identity().rotation, Vec3::new(1.0, 0.0, 0.0)), Inertia::zero());
+        let model = builder.build().unwrap();
+        assert_eq!(model.singular_joints(), [2]);
+        let said: Vec<String> = model.warnings().iter().map(ToString::to_string).collect();
+        assert_eq!(said[0], "body `leaf` moves and has no mass");
+        assert!(said[1].starts_with("joint `leaf` moves nothing"), "{said:?}");
+        assert!(model.with_armature(&[0.0, 0.1]).singular_joints().is_empty());
+    }
+
+    #[test]
+    fn a_mass_point_on_its_axis_is_singular_wherever_it_is() {
+        let mut builder = ModelBuilder::new("point");
+        let far = Se3::new(Se3::identity().rotation, Vec3::new(3.0, -2.0, 1.0));
+        let arm = builder.body("arm", WORLD, z(), far, ball());
+        let point = Inertia::from_com(0.7, Vec3::new(0.0, 0.0, 0.3), Sym3::zero());
+        builder.body("point", arm, z(), far, point);
+        assert_eq!(builder.build().unwrap().singular_joints(), [2]);
+    }
+
+    #[test]
+    fn a_chain_may_have_massless_bodies_inside() {
+        let mut builder = ModelBuilder::new("chain");
+        builder.spherical_zyx("ball", WORLD, Se3::identity(), ball());
+        let model = builder.build().unwrap();
+        assert!(model.singular_joints().is_empty() && model.warnings().is_empty());
+    }
+
+    #[test]
+    fn impossible_inertias_are_named() {
+        let body = |rotational| {
+            let mut builder = ModelBuilder::new("odd");
+            builder.body("odd", WORLD, z(), Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), rotational));
+            builder.build().unwrap().warnings().to_vec()
+        };
+        let flat = |xx, yy, zz| Sym3 { xx, xy: 0.0, yy, xz: 0.0, yz: 0.0, zz };
+        assert!(matches!(body(flat(0.1, 0.1, 0.3))[..], [Warning::Triangle { .. }]));
+        assert!(matches!(body(flat(0.1, -0.1, 0.1))[..], [Warning::Negative { .. }]));
+        assert!(body(flat(0.1, 0.1, 0.2)).is_empty()); // a flat plate
+    }
+}

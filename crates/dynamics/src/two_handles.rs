@@ -1,0 +1,291 @@
+//! A piece of a robot as it feels at two handles: the body on which it hangs, and its own last body.
+//!
+//! Source: Featherstone (1999), part 1, describes an articulated body with two handles by its inverse inertias, so that
+//! accelerations follow from forces. Here the handle above is given by its acceleration a (of the body on which the
+//! piece's first joint sits) and the one below by the force f that acts on it:
+//!
+//! ```text
+//! f' = K a + p − Lᵀ f      what the joint above must transmit: K and p are Iᵃ and pᵃ of the articulated-body algorithm
+//! a' = L a + b + Y f       how the body below accelerates
+//! ```
+//!
+//! which needs no inverse of an inertia, so that bodies may be without mass wherever the articulated-body algorithm
+//! allows it. (In scattering theory two such pieces are joined by Redheffer's star product.) With the second piece on
+//! the last body of the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = x − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f), x = L₁ a + b₁: the first
+//! piece is, for the second, a joint of compliance Y₁. Hence, with G = (1 + Y₁ K₂)⁻¹ Y₁, which is symmetric,
+//!
+//! ```text
+//! a₂ = x − G (K₂ x + p₂ − L₂ᵀ f)
+//! K = K₁ + L₁ᵀ K₂ N,   p = p₁ + L₁ᵀ (p₂ + K₂ e),   N = L₁ − G K₂ L₁,   e = b₁ − G (p₂ + K₂ b₁)
+//! L = L₂ N,            b = b₂ + L₂ e,               Y = Y₂ + L₂ G L₂ᵀ
+//! ```
+
+use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
+
+/// A 6 × 6 matrix by its columns, each with its linear part first.
+type Matrix<S> = [[S; 6]; 6];
+
+/// A pivot below this part of its diagonal entry is the rounding of a zero: Y has as many zero pivots as its piece lacks
+/// degrees of freedom to six. What is left out is within a hundred roundings of Y.
+const NEGLIGIBLE: f64 = 1e-14;
+
+/// A piece between two handles.
+#[derive(Clone, Debug)]
+pub(crate) struct TwoHandles<S> {
+    /// The body below in the frame of the body above.
+    pub X: Se3<S>,
+    /// The velocity of the body below relative to the body above, in that frame.
+    pub w: Motion<S>,
+    pub K: ArticulatedInertia<S>,
+    pub p: Force<S>,
+    L: Matrix<S>,
+    Y: Matrix<S>,
+    b: Motion<S>,
+    /// Of the two pieces of which it is made.
+    G: Matrix<S>,
+}
+
+impl<S: Scalar> TwoHandles<S> {
+    /// Nothing between two handles that are the same body.
+    pub(crate) fn nothing() -> Self {
+        Self {
+            X: Se3::identity(),
+            w: Motion::zero(),
+            K: ArticulatedInertia::zero(),
+            p: Force::zero(),
+            L: identity(),
+            Y: zero(),
+            b: Motion::zero(),
+            G: zero(),
+        }
+    }
+
+    /// No joint yet between the handles: Y = 0, b = 0, and L moves the origin to the handle below, at r.
+    #[inline(always)]
+    pub(crate) fn begin(&mut self, r: Vec3<S>) {
+        let skew = r.skew(); // a' = [v + ω × r; ω]
+        self.L = identity();
+        for (j, column) in skew.columns().into_iter().enumerate() {
+            self.L[3 + j][..3].copy_from_slice(&(-column).to_array());
+        }
+        self.Y = zero();
+        self.b = Motion::zero();
+    }
+
+    /// One more degree of freedom above: S, U = Iᴬ S, 1/D, and its acceleration x = u/D with the handle above at rest.
+    #[inline(always)]
+    pub(crate) fn extend(&mut self, axis: Motion<S>, U: Force<S>, D_inv: S, x: S) {
+        let s = times(&self.L, &axis.to_array()); // s = L S
+        let U = U.scale(-D_inv).to_array();
+        for j in 0..6 {
+            add(&mut self.L[j], U[j], &s); // L ← L (1 − S D⁻¹ Uᵀ)
+            add(&mut self.Y[j], D_inv * s[j], &s); // Y ← Y + s D⁻¹ sᵀ
+        }
+        self.b = Motion::from(s).scale_add(x, self.b); // b ← b + s x
+    }
+
+    /// The handle above moves on with the velocity-dependent acceleration c of its joint.
+    #[inline(always)]
+    pub(crate) fn shift(&mut self, c: Motion<S>) {
+        self.b += Motion::from(times(&self.L, &c.to_array())); // b ← b + L c
+    }
+
+    /// `upper` and, on its last body, `lower`; with what is needed below only if it is `open`.
+    #[inline(always)]
+    pub(crate) fn join(&mut self, upper: &Self, lower: &Self, open: bool) {
+        let K2 = full(lower.K);
+        let G = compliance(&upper.Y, &K2);
+        let K2L1 = product(&K2, &upper.L);
+        let mut N = upper.L; // N = L₁ − G K₂ L₁
+        for j in 0..6 {
+            let minus = times(&G, &K2L1[j]);
+            add(&mut N[j], -S::one(), &minus);
+        }
+        let push = (lower.p + lower.K * upper.b).to_array();
+        let e = upper.b - Motion::from(times(&G, &push)); // e = b₁ − G (p₂ + K₂ b₁)
+        self.K = upper.K + symmetric(&transpose_product(&K2L1, &N)); // K = K₁ + L₁ᵀ K₂ N
+        let push = (lower.p + lower.K * e).to_array();
+        self.p = upper.p + Force::from(transpose_times(&upper.L, &push)); // p = p₁ + L₁ᵀ (p₂ + K₂ e)
+        if open {
+            self.L = product(&lower.L, &N); // L = L₂ N
+            self.b = lower.b + Motion::from(times(&lower.L, &e.to_array())); // b = b₂ + L₂ e
+            self.Y = lower.Y; // Y = Y₂ + L₂ G L₂ᵀ
+            let L2G = product(&lower.L, &G);
+            for k in 0..6 {
+                for j in 0..6 {
+                    add(&mut self.Y[j], lower.L[k][j], &L2G[k]);
+                }
+            }
+        }
+        self.G = G;
+    }
+
+    /// The acceleration a₂ between `upper` and `lower`, of which this is made, and the force f₁ on `upper` there.
+    #[inline(always)]
+    pub(crate) fn between(
+        &self,
+        upper: &Self,
+        lower: &Self,
+        a: Motion<S>,
+        f: Option<Force<S>>,
+    ) -> (Motion<S>, Force<S>) {
+        let x = Motion::from(times(&upper.L, &a.to_array())) + upper.b; // x = L₁ a + b₁
+        let mut p2 = lower.p;
+        if let Some(f) = f {
+            p2 -= Force::from(transpose_times(&lower.L, &f.to_array())); // p₂ − L₂ᵀ f
+        }
+        let push = (lower.K * x + p2).to_array();
+        let a2 = x - Motion::from(times(&self.G, &push)); // a₂ = x − G (K₂ x + p₂ − L₂ᵀ f)
+        (a2, -(lower.K * a2 + p2)) // f₁ = −f'₂
+    }
+}
+
+/// G = (1 + Y K)⁻¹ Y = R (1 + Rᵀ K R)⁻¹ Rᵀ with Y = R Rᵀ.
+#[inline(always)]
+fn compliance<S: Scalar>(Y: &Matrix<S>, K: &Matrix<S>) -> Matrix<S> {
+    let R = root(Y, NEGLIGIBLE);
+    let mut H = transpose_product(&R, &product(K, &R));
+    for j in 0..6 {
+        H[j][j] += S::one();
+    }
+    let C = root(&H, 0.0); // H = C Cᵀ
+    let mut W = R; // W Cᵀ = R, so that G = W Wᵀ
+    for j in 0..6 {
+        let mut column = W[j];
+        for k in 0..j {
+            add(&mut column, -C[k][j], &W[k]);
+        }
+        let r = C[j][j].recip();
+        W[j] = column.map(|x| x * r);
+    }
+    let mut G = zero();
+    for k in 0..6 {
+        for j in 0..6 {
+            add(&mut G[j], W[k][j], &W[k]);
+        }
+    }
+    G
+}
+
+/// The lower triangular R with R Rᵀ = A, where a pivot that is a negligible part of its diagonal entry counts as zero.
+#[inline(always)]
+fn root<S: Scalar>(A: &Matrix<S>, negligible: f64) -> Matrix<S> {
+    let mut R = *A;
+    for j in 0..6 {
+        let least = A[j][j] * S::splat(negligible);
+        let keep = least.lt(R[j][j]);
+        let r = S::select(keep, R[j][j], S::one()).sqrt().recip();
+        let r = S::select(keep, r, S::zero());
+        for i in 0..6 {
+            R[j][i] = if i < j { S::zero() } else { R[j][i] * r };
+        }
+        let column = R[j];
+        for k in j + 1..6 {
+            add(&mut R[k], -column[k], &column);
+        }
+    }
+    R
+}
+
+#[inline(always)]
+fn zero<S: Scalar>() -> Matrix<S> {
+    [[S::zero(); 6]; 6]
+}
+
+#[inline(always)]
+fn identity<S: Scalar>() -> Matrix<S> {
+    let mut one = zero();
+    for j in 0..6 {
+        one[j][j] = S::one();
+    }
+    one
+}
+
+/// y += x s.
+#[inline(always)]
+fn add<S: Scalar>(y: &mut [S; 6], s: S, x: &[S; 6]) {
+    for i in 0..6 {
+        y[i] = x[i].mul_add(s, y[i]);
+    }
+}
+
+/// A x.
+#[inline(always)]
+fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
+    let mut y = [S::zero(); 6];
+    for j in 0..6 {
+        add(&mut y, x[j], &A[j]);
+    }
+    y
+}
+
+/// Aᵀ x.
+#[inline(always)]
+fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
+    let mut y = [S::zero(); 6];
+    for j in 0..6 {
+        for i in 0..6 {
+            y[j] = A[j][i].mul_add(x[i], y[j]);
+        }
+    }
+    y
+}
+
+/// A B.
+#[inline(always)]
+fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
+    let mut C = zero();
+    for j in 0..6 {
+        C[j] = times(A, &B[j]);
+    }
+    C
+}
+
+/// Aᵀ B.
+#[inline(always)]
+fn transpose_product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
+    let mut T = zero();
+    for j in 0..6 {
+        for i in 0..6 {
+            T[j][i] = A[i][j];
+        }
+    }
+    product(&T, B)
+}
+
+/// An articulated inertia as a matrix.
+#[inline(always)]
+fn full<S: Scalar>(K: ArticulatedInertia<S>) -> Matrix<S> {
+    let (linear, coupling, rotational) = (K.linear.full(), K.coupling, K.rotational.full());
+    let column = |a: Vec3<S>, b: Vec3<S>| Force::new(a, b).to_array();
+    let across = coupling.transpose();
+    [
+        column(linear.x, across.x),
+        column(linear.y, across.y),
+        column(linear.z, across.z),
+        column(coupling.x, rotational.x),
+        column(coupling.y, rotational.y),
+        column(coupling.z, rotational.z),
+    ]
+}
+
+/// The symmetric part of a matrix.
+#[inline(always)]
+fn symmetric<S: Scalar>(A: &Matrix<S>) -> ArticulatedInertia<S> {
+    let half = S::splat(0.5);
+    let at = |i: usize, j: usize| (A[j][i] + A[i][j]) * half;
+    let block = |o: usize| Sym3 {
+        xx: at(o, o),
+        xy: at(o, o + 1),
+        yy: at(o + 1, o + 1),
+        xz: at(o, o + 2),
+        yz: at(o + 1, o + 2),
+        zz: at(o + 2, o + 2),
+    };
+    let column = |j: usize| Vec3::new(at(0, j), at(1, j), at(2, j));
+    ArticulatedInertia {
+        linear: block(0),
+        coupling: Mat3 { x: column(3), y: column(4), z: column(5) },
+        rotational: block(3),
+    }
+}

@@ -1,0 +1,299 @@
+//! Random robots and states, and how the tests compare numbers.
+#![allow(dead_code)] // each test file uses a part of it
+
+pub(crate) mod table;
+
+use condyle_dynamics::{
+    Force, Inertia, Joint, JointOptions, Mat3, Mimic, Model, ModelBuilder, Quaternion, Scalar, Se3, Sym3, Vec3, WORLD,
+    integrate, lie, random_configuration, robots,
+};
+use num_dual::Dual64;
+use rand::rngs::StdRng;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+
+/// The same numbers in every run.
+pub(crate) fn rng(seed: u64) -> StdRng {
+    StdRng::seed_from_u64(seed)
+}
+
+/// n numbers, standard normal.
+pub(crate) fn normal(rng: &mut StdRng, n: usize) -> Vec<f64> {
+    let mut one = || {
+        let (u, angle) = (1.0 - rng.random::<f64>(), core::f64::consts::TAU * rng.random::<f64>());
+        (-2.0 * u.ln()).sqrt() * angle.cos()
+    };
+    (0..n).map(|_| one()).collect()
+}
+
+pub(crate) fn normal3(rng: &mut StdRng) -> Vec3<f64> {
+    let x = normal(rng, 3);
+    Vec3::new(x[0], x[1], x[2])
+}
+
+pub(crate) fn random_rotation(rng: &mut StdRng) -> Mat3<f64> {
+    let q = normal(rng, 4);
+    Quaternion::new(q[0], q[1], q[2], q[3]).normalize().to_rotation()
+}
+
+pub(crate) fn random_pose(rng: &mut StdRng) -> Se3<f64> {
+    Se3::new(random_rotation(rng), normal3(rng).scale(0.5))
+}
+
+/// Four mass points.
+pub(crate) fn random_inertia(rng: &mut StdRng) -> Inertia<f64> {
+    (0..4).fold(Inertia::zero(), |I, _| {
+        let mass = 0.2 + rng.random::<f64>();
+        I + Inertia::from_com(mass, normal3(rng).scale(0.5), Sym3::zero())
+    })
+}
+
+/// The three embedded robots, with a rotor on each joint but the free-flyer's.
+pub(crate) fn embedded() -> [Model; 3] {
+    [robots::arm7(), robots::quadruped(), robots::humanoid()].map(|model| {
+        let first = if model.bodies()[1].joint == Joint::FreeFlyer { 6 } else { 0 };
+        let armature: Vec<f64> =
+            (0..model.nv()).map(|k| if k < first { 0.0 } else { 0.01 + 1e-3 * k as f64 }).collect();
+        model.with_armature(&armature)
+    })
+}
+
+/// A body of a random tree, and the joint that carries it.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    /// 0 is the world.
+    pub(crate) parent: usize,
+    pub(crate) joint: Joint,
+    pub(crate) placement: Se3<f64>,
+    pub(crate) inertia: Inertia<f64>,
+    pub(crate) armature: f64,
+    /// Which part's joint it follows, and how.
+    pub(crate) mimic: Option<(usize, Mimic)>,
+    /// A frame on the body.
+    pub(crate) frame: Se3<f64>,
+}
+
+/// A robot that can be described more than once. Part i (counted from 1) is named `b{i}`, its frame `f{i}`.
+#[derive(Clone, Debug)]
+pub(crate) struct Tree {
+    pub(crate) parts: Vec<Part>,
+    pub(crate) gravity: Vec3<f64>,
+}
+
+impl Tree {
+    /// Every kind of joint, revolute and prismatic ones about aligned and other axes, in random order on random parents.
+    pub(crate) fn random(rng: &mut StdRng) -> Self {
+        let e = |k: usize, s: f64| Vec3::from(core::array::from_fn(|i| if i == k { s } else { 0.0 }));
+        let mut kinds = vec![
+            Joint::Revolute { axis: e(rng.random_range(0..3), 1.0) },
+            Joint::Revolute { axis: e(2, -1.0) },
+            Joint::Revolute { axis: normal3(rng) },
+            Joint::Continuous { axis: e(rng.random_range(0..2), 1.0) },
+            Joint::Continuous { axis: normal3(rng) },
+            Joint::Prismatic { axis: e(rng.random_range(0..3), -1.0) },
+            Joint::Prismatic { axis: normal3(rng) },
+            Joint::Helical { axis: e(rng.random_range(0..3), 1.0), pitch: 0.4 },
+            Joint::Helical { axis: normal3(rng), pitch: -0.2 },
+            Joint::Spherical,
+            Joint::Planar,
+            Joint::Translation,
+            Joint::FreeFlyer,
+        ];
+        kinds.shuffle(rng);
+        let mut tree = Self { parts: Vec::new(), gravity: normal3(rng).scale(5.0) };
+        for joint in kinds {
+            // half of the bodies on the last one, so that some branches are long
+            let n = tree.parts.len();
+            let parent = if rng.random::<bool>() { n } else { rng.random_range(0..=n) };
+            tree.add(rng, parent, joint);
+        }
+        tree
+    }
+
+    /// The same, and joints that follow: in the leader's branch, in others, with several followers, turned round.
+    pub(crate) fn random_with_mimics(rng: &mut StdRng) -> Self {
+        let mut tree = Self::random(rng);
+        let n = tree.parts.len();
+        let single = |tree: &Self, i: usize| tree.parts[i - 1].joint.nq() == 1;
+        let earlier = (1..=n).find(|&i| single(&tree, i)).expect("there are revolute joints");
+        let mut axis = || normal3(rng);
+        let [a, b, c, d] = [(); 4].map(|()| axis());
+        let leader = tree.add(rng, n, Joint::Revolute { axis: a });
+        let below = tree.add(rng, leader, Joint::Revolute { axis: b });
+        let between = tree.add(rng, below, Joint::Prismatic { axis: c });
+        let far_below = tree.add(rng, between, Joint::Revolute { axis: d });
+        let across = tree.add(rng, 0, Joint::Prismatic { axis: b });
+        tree.follow(below, leader, -0.7, 0.3);
+        tree.follow(far_below, leader, 1.0, 0.0);
+        tree.follow(across, leader, 0.4, -0.2);
+        tree.follow(earlier, between, 1.5, 0.1); // numbered before its leader
+        tree
+    }
+
+    pub(crate) fn add(&mut self, rng: &mut StdRng, parent: usize, joint: Joint) -> usize {
+        let armature = if rng.random::<bool>() { 0.1 + rng.random::<f64>() } else { 0.0 };
+        self.parts.push(Part {
+            parent,
+            joint,
+            placement: random_pose(rng),
+            inertia: random_inertia(rng),
+            armature,
+            mimic: None,
+            frame: random_pose(rng),
+        });
+        self.parts.len()
+    }
+
+    fn follow(&mut self, follower: usize, leader: usize, ratio: f64, offset: f64) {
+        let part = &mut self.parts[follower - 1];
+        part.mimic = Some((leader, Mimic { ratio, offset }));
+        part.armature = 0.0;
+    }
+
+    pub(crate) fn without_mimics(&self) -> Self {
+        let mut free = self.clone();
+        free.parts.iter_mut().for_each(|part| part.mimic = None);
+        free
+    }
+
+    pub(crate) fn build(&self) -> Model {
+        let mut builder = ModelBuilder::new("tree");
+        let mut ids = vec![WORLD];
+        for (i, part) in self.parts.iter().enumerate() {
+            let name = format!("b{}", i + 1);
+            let options = JointOptions { armature: part.armature, ..JointOptions::default() };
+            let id =
+                builder.body_with((&name, &name), ids[part.parent], part.joint, part.placement, part.inertia, options);
+            builder.frame(&format!("f{}", i + 1), id, part.frame);
+            ids.push(id);
+        }
+        for (i, part) in self.parts.iter().enumerate() {
+            if let Some((leader, mimic)) = part.mimic {
+                builder.mimic(ids[i + 1], ids[leader], mimic);
+            }
+        }
+        builder.gravity(self.gravity);
+        builder.build().expect("a random tree is well-formed")
+    }
+}
+
+/// The embedded robots, and random trees without and with mimic joints.
+pub(crate) fn all_models(trees: u64) -> Vec<Model> {
+    let mut models = embedded().to_vec();
+    for seed in 0..trees {
+        models.push(Tree::random(&mut rng(seed)).build());
+        models.push(Tree::random_with_mimics(&mut rng(100 + seed)).build());
+    }
+    models
+}
+
+/// A state, and what acts on it.
+#[derive(Clone, Debug)]
+pub(crate) struct State {
+    pub(crate) q: Vec<f64>,
+    pub(crate) v: Vec<f64>,
+    pub(crate) a: Vec<f64>,
+    pub(crate) tau: Vec<f64>,
+    /// On each body, and one on the world that must not matter.
+    pub(crate) f_ext: Vec<Force<f64>>,
+}
+
+impl State {
+    pub(crate) fn random(model: &Model, rng: &mut StdRng) -> Self {
+        let q = random_configuration(model, rng);
+        let mut vector = || normal(rng, model.nv());
+        let (v, a, tau) = (vector(), vector(), vector());
+        let f_ext = (0..model.bodies().len()).map(|_| Force::new(normal3(rng), normal3(rng))).collect();
+        Self { q, v, a, tau, f_ext }
+    }
+}
+
+pub(crate) fn lift<S: Scalar>(x: &[f64]) -> Vec<S> {
+    x.iter().map(|&x| S::splat(x)).collect()
+}
+
+pub(crate) fn lift_forces<S: Scalar>(f: &[Force<f64>]) -> Vec<Force<S>> {
+    f.iter().map(|f| f.lift()).collect()
+}
+
+/// x + ε d.
+pub(crate) fn dual(x: &[f64], d: &[f64]) -> Vec<Dual64> {
+    x.iter().zip(d).map(|(&x, &d)| Dual64::new(x, d)).collect()
+}
+
+pub(crate) fn real(x: &[Dual64]) -> Vec<f64> {
+    x.iter().map(|x| x.re).collect()
+}
+
+pub(crate) fn eps(x: &[Dual64]) -> Vec<f64> {
+    x.iter().map(|x| x.eps).collect()
+}
+
+pub(crate) fn unit(n: usize, k: usize) -> Vec<f64> {
+    (0..n).map(|i| if i == k { 1.0 } else { 0.0 }).collect()
+}
+
+/// q ⊕ d.
+pub(crate) fn moved<S: Scalar>(model: &Model, q: &[S], d: &[S]) -> Vec<S> {
+    let mut out = q.to_vec();
+    integrate(model, q, d, &mut out);
+    out
+}
+
+/// λ_X_i by the textbook: Rodrigues' formula about the joint's own axis.
+pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
+    let turn = |w: Vec3<f64>| lie::exp3(w).to_rotation();
+    let z = Vec3::new(0.0, 0.0, 1.0);
+    let (rotation, translation) = match joint {
+        Joint::Revolute { axis } => (turn(axis.scale(q[0])), Vec3::zero()),
+        Joint::Continuous { axis } => (turn(axis.scale(q[1].atan2(q[0]))), Vec3::zero()),
+        Joint::Prismatic { axis } => (Mat3::identity(), axis.scale(q[0])),
+        Joint::Helical { axis, pitch } => (turn(axis.scale(q[0])), axis.scale(pitch * q[0])),
+        Joint::Spherical => (Quaternion::new(q[0], q[1], q[2], q[3]).to_rotation(), Vec3::zero()),
+        Joint::Planar => (turn(z.scale(q[3].atan2(q[2]))), Vec3::new(q[0], q[1], 0.0)),
+        Joint::Translation => (Mat3::identity(), Vec3::new(q[0], q[1], q[2])),
+        Joint::FreeFlyer => (Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(q[0], q[1], q[2])),
+        _ => unreachable!("there are no other joints"),
+    };
+    Se3::new(rotation, translation)
+}
+
+/// aXb as the twelve numbers.
+pub(crate) fn flat<S: Scalar>(X: Se3<S>) -> Vec<S> {
+    X.rotation.columns().into_iter().chain([X.translation]).flat_map(Vec3::to_array).collect()
+}
+
+/// max |a − b| / (1 + max |b|); NaN anywhere gives infinity.
+pub(crate) fn relative(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let largest = |x: f64, y: f64| if y.is_nan() { f64::INFINITY } else { x.max(y) };
+    let difference = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, largest);
+    difference / (1.0 + b.iter().map(|b| b.abs()).fold(0.0, largest))
+}
+
+/// The largest error so far, with what it is allowed to be.
+pub(crate) struct Worst {
+    name: &'static str,
+    tolerance: f64,
+    error: f64,
+}
+
+impl Worst {
+    pub(crate) fn new(name: &'static str, tolerance: f64) -> Self {
+        Self { name, tolerance, error: 0.0 }
+    }
+
+    /// Fails if the relative error is too large.
+    #[track_caller]
+    pub(crate) fn see(&mut self, model: &Model, found: &[f64], expected: &[f64]) {
+        let error = relative(found, expected);
+        assert!(error <= self.tolerance, "{}: error {error:.1e} on\n{model}", self.name);
+        self.error = self.error.max(error);
+    }
+}
+
+impl Drop for Worst {
+    fn drop(&mut self) {
+        println!("{}: {:.1e} (allowed {:.0e})", self.name, self.error, self.tolerance);
+    }
+}

@@ -1,0 +1,436 @@
+//! Integrators: their order, and what they conserve.
+#![allow(unsafe_code)] // a counting allocator cannot be written without
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::{State, Tree, lift, moved, normal, relative, rng};
+use condyle_dynamics::simulation::{Integrator, Settings, Simulation, Status};
+use condyle_dynamics::{
+    Act, Data, Force, Inertia, Joint, JointOptions, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, difference,
+    forward_kinematics, forward_velocities, joint_torque_regressor, kinetic_energy_regressor, lie, neutral,
+    passive_torque, potential_energy_regressor, robots,
+};
+use num_dual::Dual64;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+const ALL: [(Integrator, f64); 3] =
+    [(Integrator::SemiImplicitEuler, 1.0), (Integrator::RungeKutta4, 4.0), (Integrator::Variational, 2.0)];
+
+/// How far an observed order may be from the method's: the next power of h is still seen at these step lengths.
+const ORDER: f64 = 0.15;
+/// Sums over all bodies and some thousand steps, relative to the largest number.
+const ROUNDING: f64 = 1e-10;
+
+fn settings(integrator: Integrator, dt: f64) -> Settings {
+    Settings { integrator, dt, ..Settings::default() }
+}
+
+/// Where the robot is after some time without efforts, with how fast it moves.
+fn simulate(model: &Model, settings: Settings, (q, v): (&[f64], &[f64]), time: f64) -> (Vec<f64>, Vec<f64>) {
+    let mut simulation = Simulation::new(model, settings);
+    simulation.set_state(q, v);
+    let steps = (time / settings.dt).round() as usize;
+    assert_eq!(simulation.run(steps, |_| {}), Status::Done);
+    assert!((simulation.time() - time).abs() < 1e-9);
+    (simulation.q().to_vec(), simulation.v().to_vec())
+}
+
+/// The distance between two states.
+fn distance(model: &Model, (q, v): (&[f64], &[f64]), (q_other, v_other): (&[f64], &[f64])) -> f64 {
+    let mut d = vec![0.0; model.nv()];
+    difference(model, q_other, q, &mut d);
+    let squares = d.iter().map(|d| d * d).chain(v.iter().zip(v_other).map(|(a, b)| (a - b) * (a - b)));
+    squares.sum::<f64>().sqrt()
+}
+
+fn energy(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> f64 {
+    forward_velocities(model, data, q, v).mechanical_energy()
+}
+
+/// Two rods of 1 m and 1 kg, hanging.
+fn double_pendulum(options: &JointOptions) -> Model {
+    let axis = Vec3::new(0.0, 1.0, 0.0);
+    let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3 { zz: 0.001, ..Sym3::diagonal(1.0 / 12.0) });
+    let mut builder = ModelBuilder::new("double pendulum");
+    let elbow = Se3 { translation: Vec3::new(0.0, 0.0, -1.0), ..Se3::identity() };
+    let joint = Joint::Revolute { axis };
+    let upper = builder.body_with(("upper", "shoulder"), WORLD, joint, Se3::identity(), rod, options.clone());
+    builder.body_with(("lower", "elbow"), upper, joint, elbow, rod, options.clone());
+    builder.build().expect("it is well-formed")
+}
+
+/// A free body in free space, of moments A = A ≠ C.
+fn top() -> Model {
+    let mut builder = ModelBuilder::new("top");
+    builder.gravity(Vec3::zero());
+    let moments = Sym3 { zz: 0.5, ..Sym3::diagonal(0.3) };
+    builder.body("top", WORLD, Joint::FreeFlyer, Se3::identity(), Inertia::from_com(2.0, Vec3::zero(), moments));
+    builder.build().expect("it is well-formed")
+}
+
+/// log₂ of how much smaller the error is with half the step.
+fn observed_order(coarse: f64, fine: f64) -> f64 {
+    (coarse / fine).log2()
+}
+
+/// The free symmetric body in closed form: with L = I ω the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
+#[test]
+fn order_on_a_free_body() {
+    let model = top();
+    let q = neutral(&model);
+    let v = [0.3, -0.2, 0.5, 1.0, 0.0, 2.0];
+    let (A, C, time) = (0.3, 0.5, 1.0);
+    let precession = lie::exp3(Vec3::new(v[3], 0.0, v[5] * C / A).scale(time));
+    let spin = lie::exp3(Vec3::new(0.0, 0.0, v[5] * (1.0 - C / A) * time));
+    let attitude = precession * spin;
+    let (R, u) = (attitude.to_rotation(), attitude.vector);
+    let linear = R.transpose_mul(Vec3::new(v[0], v[1], v[2])); // the same velocity, in the body
+    let angular = spin.to_rotation().transpose_mul(Vec3::new(v[3], 0.0, v[5]));
+    let expected_q = [v[0] * time, v[1] * time, v[2] * time, u.x, u.y, u.z, attitude.scalar];
+    let expected_v: Vec<f64> = linear.to_array().into_iter().chain(angular.to_array()).collect();
+    for (integrator, order) in ALL {
+        let error = |dt| {
+            let (q, v) = simulate(&model, settings(integrator, dt), (&q, &v), time);
+            distance(&model, (&q, &v), (&expected_q, &expected_v))
+        };
+        let dt = if integrator == Integrator::SemiImplicitEuler { 1e-3 } else { 0.02 };
+        let (coarse, fine) = (error(dt), error(dt / 2.0));
+        let observed = observed_order(coarse, fine);
+        println!("{integrator:?}: order {observed:.3} on a free body, error {fine:.1e} at h = {}", dt / 2.0);
+        assert!((observed - order).abs() < ORDER, "{integrator:?}: {observed}");
+    }
+}
+
+/// Every kind of joint, mimic joints, efforts, external forces; damping and friction: against fine steps.
+#[test]
+fn order_on_trees() {
+    let losses = JointOptions { damping: 0.2, friction: 0.3, armature: 0.1, ..JointOptions::default() };
+    let (tree, mimics) = (Tree::random(&mut rng(0)), Tree::random_with_mimics(&mut rng(1)));
+    for (seed, model) in [tree.build(), mimics.build(), double_pendulum(&losses)].into_iter().enumerate() {
+        let mut random = rng(seed as u64);
+        let State { q, v, tau, f_ext, .. } = State::random(&model, &mut random);
+        let v: Vec<f64> = v.iter().map(|v| 0.3 * v).collect();
+        let end = |integrator, dt: f64| {
+            let settings = Settings { passive: Some(0.5), ..settings(integrator, dt) };
+            let mut simulation = Simulation::new(&model, settings);
+            simulation.set_state(&q, &v);
+            for _ in 0..(0.16 / dt).round() as usize {
+                assert!(simulation.step(&tau, &f_ext).is_done());
+            }
+            (simulation.q().to_vec(), simulation.v().to_vec())
+        };
+        let (q_end, v_end) = end(Integrator::RungeKutta4, 1e-4);
+        for (integrator, order) in ALL {
+            let error = |dt| {
+                let (q, v) = end(integrator, dt);
+                distance(&model, (&q, &v), (&q_end, &v_end))
+            };
+            let dt = match integrator {
+                Integrator::SemiImplicitEuler => 2e-4,
+                Integrator::RungeKutta4 => 4e-3,
+                _ => 1e-3,
+            };
+            let (coarse, fine) = (error(dt), error(dt / 2.0));
+            let observed = observed_order(coarse, fine);
+            println!("{integrator:?}: order {observed:.3} on a tree, error {fine:.1e} at h = {}", dt / 2.0);
+            assert!((observed - order).abs() < ORDER, "{integrator:?}: {observed}");
+        }
+    }
+}
+
+/// The period of a pendulum of large swing, 4 K(sin(θ₀/2)) √(I/(m g l)), by the arithmetic-geometric mean.
+#[test]
+fn period_of_a_pendulum() {
+    let mut builder = ModelBuilder::new("pendulum");
+    let joint = Joint::Continuous { axis: Vec3::new(0.0, 1.0, 0.0) };
+    let I = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -1.0), Sym3::diagonal(0.0));
+    builder.body("bob", WORLD, joint, Se3::identity(), I);
+    let model = builder.build().expect("it is well-formed");
+    let swing = 2.5f64;
+    let (mut a, mut b) = (1.0, (swing / 2.0).cos());
+    for _ in 0..6 {
+        (a, b) = ((a + b) / 2.0, f64::sqrt(a * b));
+    }
+    let period = core::f64::consts::TAU / a / 9.81f64.sqrt();
+    let start = [swing.cos(), swing.sin()];
+    for (integrator, order) in ALL {
+        let error = |steps: f64| {
+            let (q, v) = simulate(&model, settings(integrator, period / steps), (&start, &[0.0]), period);
+            distance(&model, (&q, &v), (&start, &[0.0]))
+        };
+        let observed = observed_order(error(1000.0), error(2000.0));
+        println!("{integrator:?}: order {observed:.3} on a pendulum, error {:.1e}", error(2000.0));
+        assert!(observed > order - ORDER, "{integrator:?}: {observed}"); // Euler's errors of order 1 cancel in a period
+    }
+}
+
+/// The variational integrator's energy sways and does not drift, over two hundred swings of a chaotic pendulum.
+#[test]
+fn energy_does_not_drift() {
+    let model = double_pendulum(&JointOptions::default());
+    let mut data = Data::new(&model);
+    let (q, v) = ([1.2, -0.7], [0.0, 0.0]);
+    let start = energy(&model, &mut data, &q, &v);
+    let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 5e-3));
+    simulation.set_state(&q, &v);
+    let mut largest = [0.0; 4]; // in each quarter of 400 s
+    for largest in &mut largest {
+        for _ in 0..20_000 {
+            assert!(simulation.step(&[0.0; 2], &[]).is_done());
+            let error: f64 = energy(&model, &mut data, simulation.q(), simulation.v()) - start;
+            *largest = error.abs().max(*largest);
+        }
+    }
+    println!("energy error in each 100 s: {largest:.4?} J of {start:.1} J");
+    assert!(largest.iter().all(|&x| x < 1.2 * largest[0] && x < 2e-2), "{largest:?}");
+}
+
+/// A step back undoes a step, to rounding.
+#[test]
+fn variational_steps_are_symmetric() {
+    for seed in 0..4 {
+        let mut random = rng(seed);
+        let model = Tree::random_with_mimics(&mut random).build();
+        let State { q, v, tau, f_ext, .. } = State::random(&model, &mut random);
+        let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 1e-3));
+        simulation.set_state(&q, &v);
+        assert!(simulation.step(&tau, &f_ext).is_done());
+        simulation.settings.dt = -1e-3;
+        assert!(simulation.step(&tau, &f_ext).is_done());
+        assert!(distance(&model, (simulation.q(), simulation.v()), (&q, &v)) < 1e-9, "seed {seed}");
+    }
+}
+
+/// The momentum of a robot in the world, about the origin.
+fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 6] {
+    let velocities = forward_velocities(model, data, q, v);
+    let of = |i: usize| {
+        let oXb = velocities.body(i);
+        oXb.act(model.bodies()[i].inertia * velocities.body_velocity(i, condyle_dynamics::ReferenceFrame::Local))
+    };
+    (1..model.bodies().len()).fold(Force::zero(), |sum, i| sum + of(i)).to_array()
+}
+
+/// Without gravity nothing changes the momentum of a free robot, whatever its joints do.
+#[test]
+fn momentum_is_conserved() {
+    let model = robots::humanoid().with_gravity(Vec3::zero());
+    let mut data = Data::new(&model);
+    let (q, v) = (neutral(&model), normal(&mut rng(3), model.nv()));
+    let efforts = normal(&mut rng(4), model.nv());
+    let start = momentum(&model, &mut data, &q, &v);
+    let mut error = |integrator, dt: f64| {
+        let mut simulation = Simulation::new(&model, settings(integrator, dt));
+        simulation.set_state(&q, &v);
+        let status = simulation.run((0.5 / dt).round() as usize, |now| {
+            for k in 6..now.tau.len() {
+                now.tau[k] = 0.1 * efforts[k] - 0.05 * now.v[k];
+            }
+        });
+        assert!(status.is_done());
+        relative(&momentum(&model, &mut data, simulation.q(), simulation.v()), &start)
+    };
+    let found = error(Integrator::Variational, 1e-3);
+    println!("change of momentum by the variational integrator: {found:.1e}");
+    assert!(found < ROUNDING, "{found:.1e}");
+    let (coarse, fine) = (error(Integrator::RungeKutta4, 2e-3), error(Integrator::RungeKutta4, 1e-3));
+    assert!(fine < 1e-6 && observed_order(coarse, fine) > 3.5, "{coarse:.1e} {fine:.1e}");
+}
+
+/// A falling humanoid's centre of mass flies along a parabola, however the rest moves.
+#[test]
+fn centre_of_mass_falls_along_a_parabola() {
+    let model = robots::humanoid();
+    let mut data = Data::new(&model);
+    let (q, v) = (neutral(&model), normal(&mut rng(5), model.nv()));
+    let g = *model.gravity();
+    let com = |data: &mut Data<f64>, q: &[f64]| {
+        let placements = forward_kinematics(&model, data, q);
+        let moment = (1..model.bodies().len()).fold(Vec3::zero(), |sum: Vec3<f64>, i| {
+            let I = model.bodies()[i].inertia;
+            let X = placements.body(i);
+            sum + X.translation.scale(I.mass) + X.rotation * I.mass_com
+        });
+        moment.scale(1.0 / model.total_mass())
+    };
+    let (start, P) = (com(&mut data, &q), momentum(&model, &mut data, &q, &v));
+    let speed = Vec3::new(P[0], P[1], P[2]).scale(1.0 / model.total_mass());
+    let time = 0.5;
+    let expected = start + speed.scale(time) + g.scale(0.5 * time * time);
+    for (integrator, order) in ALL {
+        let mut error = |dt| {
+            let (q, _) = simulate(&model, settings(integrator, dt), (&q, &v), time);
+            (com(&mut data, &q) - expected).norm_squared().sqrt()
+        };
+        let (coarse, fine) = (error(2e-3), error(1e-3));
+        println!("{integrator:?}: the centre of mass is {fine:.1e} m off the parabola");
+        assert!(fine < 0.05 && observed_order(coarse, fine) > order - 0.5, "{integrator:?}: {coarse:.1e} {fine:.1e}");
+    }
+}
+
+/// Friction stops a sliding body where it should; energy only falls.
+#[test]
+fn passive_torques_act_when_asked_for() {
+    let mut builder = ModelBuilder::new("sledge");
+    let joint = Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) };
+    let losses = JointOptions { friction: 4.0, ..JointOptions::default() };
+    let I = Inertia::from_com(2.0, Vec3::zero(), Sym3::zero());
+    builder.body_with(("sledge", "rail"), WORLD, joint, Se3::identity(), I, losses);
+    let sledge = builder.build().expect("it is well-formed");
+    let losses = JointOptions { damping: 0.2, friction: 0.3, ..JointOptions::default() };
+    let pendulum = double_pendulum(&losses);
+    for (integrator, _) in ALL {
+        let (q, v) = simulate(&sledge, settings(integrator, 1e-3), (&[0.0], &[3.0]), 1.0);
+        assert!((q[0] - 3.0).abs() < 1e-9 && (v[0] - 3.0).abs() < 1e-12); // not asked for
+        let lossy = Settings { passive: Some(0.01), ..settings(integrator, 1e-3) };
+        let (q, v) = simulate(&sledge, lossy, (&[0.0], &[3.0]), 2.0); // it stops after 1.5 s
+        assert!((q[0] - 3.0 * 3.0 / 2.0 / 2.0).abs() < 5e-3, "{integrator:?}: {}", q[0]); // v²/(2 f/m)
+        assert!(v[0].abs() < 1e-3);
+        let mut data = Data::new(&pendulum);
+        let mut simulation = Simulation::new(&pendulum, lossy);
+        simulation.set_state(&[1.2, -0.7], &[0.0, 0.0]);
+        let mut last = energy(&pendulum, &mut data, simulation.q(), simulation.v());
+        for _ in 0..20 {
+            assert!(simulation.run(100, |_| {}).is_done());
+            let now = energy(&pendulum, &mut data, simulation.q(), simulation.v());
+            assert!(now < last + 1e-9, "{integrator:?}");
+            last = now;
+        }
+    }
+}
+
+/// A force on a body acts like the efforts that it is worth.
+#[test]
+fn external_forces_act() {
+    for (integrator, _) in ALL {
+        let model = top();
+        let mut simulation = Simulation::new(&model, settings(integrator, 1e-3));
+        let status = simulation.run(1000, |now| now.f_ext[1].linear.y = 4.0); // 2 m/s² for 1 s
+        assert!(status.is_done());
+        let (way, speed): (f64, f64) = (simulation.q()[1], simulation.v()[1]);
+        assert!((speed - 2.0).abs() < 1e-9 && (way - 1.0).abs() < 2e-3);
+        let by_force = simulation.q().to_vec();
+        simulation.set_state(&neutral(&model), &[0.0; 6]);
+        for _ in 0..1000 {
+            assert!(simulation.step(&[0.0, 4.0, 0.0, 0.0, 0.0, 0.0], &[]).is_done());
+        }
+        assert!(relative(simulation.q(), &by_force) < ROUNDING);
+    }
+}
+
+/// A step that fails leaves the state and says why.
+#[test]
+fn failures_are_typed() {
+    let model = robots::arm7();
+    let state = State::random(&model, &mut rng(1));
+    let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 1e-3));
+    simulation.set_state(&state.q, &state.v);
+    simulation.settings.max_iterations = 1;
+    assert_eq!(simulation.step(&state.tau, &[]), Status::NotConverged { iterations: 1 });
+    assert_eq!((simulation.q(), simulation.v(), simulation.time()), (&state.q[..], &state.v[..], 0.0));
+    simulation.settings.max_iterations = 20;
+    assert!(simulation.step(&state.tau, &[]).is_done());
+    for (integrator, _) in ALL {
+        simulation.settings.integrator = integrator;
+        simulation.set_state(&state.q, &state.v);
+        let status = simulation.run(3, |now| now.tau.fill(f64::MAX));
+        assert!(!status.is_done(), "{integrator:?}");
+        assert_eq!((simulation.q(), simulation.v(), simulation.time()), (&state.q[..], &state.v[..], 0.0));
+    }
+}
+
+/// Dual numbers through a step are its derivatives.
+#[test]
+fn a_step_can_be_differentiated() {
+    const STEP: f64 = 1e-5; // of central differences: rounding and curvature balance
+    const DIFFERENCES: f64 = 1e-7;
+    let mut random = rng(7);
+    let model = Tree::random_with_mimics(&mut random).build();
+    let State { q, v, tau, .. } = State::random(&model, &mut random);
+    let (dq, dv) = (normal(&mut random, model.nv()), normal(&mut random, model.nv()));
+    for (integrator, _) in ALL {
+        let mut simulation = Simulation::<Dual64>::new(&model, settings(integrator, 1e-2));
+        let direction: Vec<Dual64> = dq.iter().map(|&d| Dual64::new(0.0, d)).collect();
+        simulation.set_state(&moved(&model, &lift(&q), &direction), &common::dual(&v, &dv));
+        assert!(simulation.step(&lift(&tau), &[]).is_done());
+        let found = common::eps(simulation.v());
+        let end = |s: f64| {
+            let scaled = |d: &[f64]| d.iter().map(|d| d * s).collect::<Vec<_>>();
+            let mut simulation = Simulation::new(&model, settings(integrator, 1e-2));
+            let v: Vec<f64> = v.iter().zip(&dv).map(|(v, d)| v + s * d).collect();
+            simulation.set_state(&moved(&model, &q, &scaled(&dq)), &v);
+            assert!(simulation.step(&tau, &[]).is_done());
+            simulation.v().to_vec()
+        };
+        let (ahead, behind) = (end(STEP), end(-STEP));
+        let expected: Vec<f64> = ahead.iter().zip(&behind).map(|(a, b)| (a - b) / (2.0 * STEP)).collect();
+        let error = relative(&found, &expected);
+        assert!(error < DIFFERENCES, "{integrator:?}: {error:.1e}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "tau: expected 7 numbers, found 6")]
+fn wrong_shape() {
+    let arm = robots::arm7();
+    let _ = Simulation::new(&arm, Settings::default()).step(&[0.0; 6], &[]);
+}
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
+// and allocates nothing itself.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.set(COUNT.get() + 1);
+        // SAFETY: the caller's promise about `layout` is the one that is asked for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(f: impl FnOnce()) -> usize {
+    let before = COUNT.get();
+    f();
+    COUNT.get() - before
+}
+
+/// Nothing is allocated after construction: by steps and runs, by regressors, by passive torques.
+#[test]
+fn nothing_is_allocated() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(7)))), 1);
+    for (seed, model) in common::all_models(1).iter().enumerate() {
+        let State { q, v, a, tau, f_ext } = State::random(model, &mut rng(seed as u64));
+        for (integrator, _) in ALL {
+            let settings = Settings { passive: Some(0.1), ..settings(integrator, 1e-4) };
+            let mut simulation = Simulation::new(model, settings);
+            let count = allocations(|| {
+                simulation.set_state(&q, &v);
+                let _ = simulation.step(&tau, &f_ext);
+                let _ = simulation.run(3, |now| now.tau.fill(0.1));
+            });
+            assert_eq!(count, 0, "{integrator:?} on\n{model}");
+        }
+        let (mut data, mut out) = (Data::new(model), vec![0.0; model.nv()]);
+        let count = allocations(|| {
+            joint_torque_regressor(model, &mut data, &q, &v, &a);
+            kinetic_energy_regressor(model, &mut data, &q, &v);
+            potential_energy_regressor(model, &mut data, &q);
+            passive_torque(model, &v, 0.1, &mut out);
+        });
+        assert_eq!(count, 0, "on\n{model}");
+    }
+}

@@ -1,0 +1,21 @@
+"""Optimal control over a horizon: a robot's motion that costs least, by FDDP.
+
+>>> import condyle, numpy as np
+>>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem
+>>> arm = condyle.robots.arm7()
+>>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+>>> rest = Cost.state("rest", 1e-1, x0)
+>>> running = FreeDynamics(arm, 0.05, [rest, Cost.control("effort", 1e-4, np.zeros(7))])
+>>> terminal = FreeDynamics(arm, None, [rest, Cost.frame_translation("reach", 1e3, arm, "tool", [0.4, 0.2, 0.5])])
+>>> problem = Problem(x0, [running], [0] * 20, terminal)
+>>> solution = Fddp(problem).solve(np.tile(x0, (21, 1)), np.tile(running.quasi_static(x0), (20, 1)))
+>>> solution.status, solution.xs.shape
+('converged', (21, 14))
+
+The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are Crocoddyl's.
+"""
+
+from ._condyle import Activation, Cost, Fddp, FreeDynamics, Problem, ProblemError
+from ._types import Iteration, Solution
+
+__all__ = ["Activation", "Cost", "Fddp", "FreeDynamics", "Iteration", "Problem", "ProblemError", "Solution"]

@@ -1,0 +1,361 @@
+//! A robot as Python sees it.
+
+use crate::arrays::{give, give_pose, give_rows, named_tuple, output, vector, write_pose};
+use crate::exceptions::{ModelError, ParseError};
+use condyle::{Error, FrameKind, Joint, Sym3, UrdfOptions, Vec3, robots};
+use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBytes, PyType};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::PathBuf;
+
+/// A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
+///
+/// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
+/// Pinocchio numbers them. A model is made by `from_urdf`, `from_urdf_string` or one of `condyle.robots`; it can be
+/// pickled.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> arm.nq, arm.nv, arm.names[:3]
+/// (7, 7, ['universe', 'joint1', 'joint2'])
+#[pyclass(frozen, module = "condyle")]
+pub(crate) struct Model {
+    pub(crate) inner: condyle::Model,
+    /// Equal for models of the same bodies and joints, which can share a `Data`.
+    pub(crate) structure: u64,
+}
+
+impl From<condyle::Model> for Model {
+    fn from(inner: condyle::Model) -> Self {
+        let mut hasher = DefaultHasher::new();
+        for b in inner.bodies() {
+            (&b.joint_name, b.parent, kind(b.joint), b.idx_q, b.idx_v, b.mimic.is_some()).hash(&mut hasher);
+        }
+        Self { structure: hasher.finish(), inner }
+    }
+}
+
+fn kind(joint: Joint) -> &'static str {
+    match joint {
+        Joint::Revolute { .. } => "revolute",
+        Joint::Continuous { .. } => "continuous",
+        Joint::Prismatic { .. } => "prismatic",
+        Joint::Helical { .. } => "helical",
+        Joint::Spherical => "spherical",
+        Joint::Planar => "planar",
+        Joint::Translation => "translation",
+        Joint::FreeFlyer => "free_flyer",
+        _ => "other",
+    }
+}
+
+fn rows(m: Sym3<f64>) -> [Vec3<f64>; 3] {
+    m.full().columns()
+}
+
+impl Model {
+    /// The number of a frame that is given by name or by number.
+    pub(crate) fn frame_index(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
+        if let Ok(name) = frame.extract::<&str>() {
+            return self.inner.frame(name).map_err(exception);
+        }
+        let (index, count): (isize, _) = (frame.extract()?, self.inner.frames().len());
+        usize::try_from(index).ok().filter(|&i| i < count).ok_or_else(|| {
+            PyIndexError::new_err(format!("frame: expected a name or 0 to {}, found {index}", count - 1))
+        })
+    }
+
+    /// Of each joint that has coordinates of its own; 0 of the others.
+    fn of_joints(&self, get: impl Fn(&condyle::Body) -> usize) -> Vec<usize> {
+        let count = |(i, b): (usize, &condyle::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
+        self.inner.bodies().iter().enumerate().map(count).collect()
+    }
+
+    fn of_bodies<T>(&self, get: impl FnMut(&condyle::Body) -> T) -> Vec<T> {
+        self.inner.bodies().iter().map(get).collect()
+    }
+}
+
+#[pymethods]
+impl Model {
+    /// Reads a URDF file.
+    ///
+    /// Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
+    ///
+    /// path: a path, as text or `os.PathLike`.
+    /// root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
+    ///     'spherical' or 'translation'; None fixes the root link to the world.
+    /// mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
+    ///     their own.
+    ///
+    /// strict: whether what is only odd (`warnings`) is an error.
+    ///
+    /// Raises `ParseError`, with file, line and element, or `ModelError`.
+    #[staticmethod]
+    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false))]
+    fn from_urdf(path: PathBuf, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
+        let options = urdf_options(root_joint, mimic, strict)?;
+        Ok(condyle::Model::from_urdf(path, &options).map_err(exception)?.into())
+    }
+
+    /// Reads a URDF from a string; see `from_urdf`.
+    ///
+    /// >>> text = condyle.robots.QUADRUPED
+    /// >>> condyle.Model.from_urdf_string(text, root_joint="free_flyer").nv
+    /// 18
+    #[staticmethod]
+    #[pyo3(signature = (text, root_joint=None, mimic=false, strict=false))]
+    fn from_urdf_string(text: &str, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
+        let options = urdf_options(root_joint, mimic, strict)?;
+        Ok(condyle::Model::from_urdf_str(text, &options).map_err(exception)?.into())
+    }
+
+    /// What is odd about the robot, though it could be loaded.
+    ///
+    /// Inertias that no body has, joints along which the inertia matrix is singular.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.inner.warnings().iter().map(ToString::to_string).collect()
+    }
+
+    /// The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`.
+    #[getter]
+    fn singular_joints(&self) -> Vec<usize> {
+        self.inner.singular_joints().to_vec()
+    }
+
+    /// The robot's name.
+    #[getter]
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    /// How many numbers a position q has.
+    #[getter]
+    fn nq(&self) -> usize {
+        self.inner.nq()
+    }
+
+    /// How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector.
+    #[getter]
+    fn nv(&self) -> usize {
+        self.inner.nv()
+    }
+
+    /// How many bodies there are, the world included: the rows of f_ext and of what `forward_kinematics` returns.
+    #[getter]
+    fn nbodies(&self) -> usize {
+        self.inner.bodies().len()
+    }
+
+    /// The names of the joints, one for each body; 'universe' for the world.
+    #[getter]
+    fn names(&self) -> Vec<&str> {
+        self.inner.bodies().iter().map(|b| b.joint_name.as_str()).collect()
+    }
+
+    /// The names of the links that the joints carry; 'universe' for the world.
+    #[getter]
+    fn body_names(&self) -> Vec<&str> {
+        self.inner.bodies().iter().map(|b| b.name.as_str()).collect()
+    }
+
+    /// The kind of each joint: 'revolute', 'continuous', 'prismatic', 'spherical', 'planar', 'translation' or
+    /// 'free_flyer'; 'universe' for the world.
+    #[getter]
+    fn joint_types(&self) -> Vec<&str> {
+        let mut types = self.of_bodies(|b| kind(b.joint));
+        types[0] = "universe";
+        types
+    }
+
+    /// The body on which each joint sits; 0 is the world.
+    #[getter]
+    fn parents(&self) -> Vec<usize> {
+        self.of_bodies(|b| b.parent)
+    }
+
+    /// Where each joint's position begins in q; that of a joint that mimics another is the other's.
+    #[getter]
+    fn idx_qs(&self) -> Vec<usize> {
+        self.of_bodies(|b| b.idx_q)
+    }
+
+    /// Where each joint's velocity begins in v; that of a joint that mimics another is the other's.
+    #[getter]
+    fn idx_vs(&self) -> Vec<usize> {
+        self.of_bodies(|b| b.idx_v)
+    }
+
+    /// How many numbers of q each joint has of its own: none if it mimics another; 0 for the world.
+    #[getter]
+    fn nqs(&self) -> Vec<usize> {
+        self.of_joints(|b| b.joint.nq())
+    }
+
+    /// How many degrees of freedom each joint has of its own: none if it mimics another; 0 for the world.
+    #[getter]
+    fn nvs(&self) -> Vec<usize> {
+        self.of_joints(|b| b.joint.nv())
+    }
+
+    /// How each joint follows another one, as `Mimic(ratio, offset)`, or None if it does not.
+    #[getter]
+    fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
+        static MIMIC: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let class = named_tuple(py, &MIMIC, "Mimic")?;
+        let mimic = |b: &condyle::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
+        self.inner.bodies().iter().map(mimic).collect()
+    }
+
+    /// The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4).
+    #[getter]
+    fn joint_placements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let bodies = self.inner.bodies();
+        output(py, None, &[bodies.len(), 4, 4], |x| {
+            for (b, x) in bodies.iter().zip(x.chunks_exact_mut(16)) {
+                write_pose(&b.placement, x);
+            }
+        })
+    }
+
+    /// The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame.
+    #[getter]
+    fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        static INERTIA: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let class = named_tuple(py, &INERTIA, "Inertia")?;
+        let inertia = |b: &condyle::Body| {
+            let I = b.inertia;
+            let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
+            // Ī = I_c − m [c]ₓ[c]ₓ, so I_c is what is left of Ī when that is taken away
+            let point_mass = condyle::Inertia::from_com(I.mass, com, Sym3::zero());
+            let about_com = I.rotational - point_mass.rotational;
+            class.call1((
+                I.mass,
+                give(py, &com.to_array(), None)?,
+                give_rows(py, rows(about_com))?,
+                give_rows(py, rows(I.rotational))?,
+            ))
+        };
+        self.inner.bodies().iter().map(inertia).collect()
+    }
+
+    /// The limits of position, velocity and effort, as `Limits`; infinite where there are none.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        static LIMITS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let limits = self.inner.limits();
+        named_tuple(py, &LIMITS, "Limits")?.call1((
+            give(py, &limits.lower, None)?,
+            give(py, &limits.upper, None)?,
+            give(py, &limits.velocity, None)?,
+            give(py, &limits.effort, None)?,
+        ))
+    }
+
+    /// Viscous damping of each degree of freedom (N m s/rad, N s/m), nv numbers: used by no algorithm unasked.
+    #[getter]
+    fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give(py, self.inner.damping(), None)
+    }
+
+    /// Coulomb friction of each degree of freedom (N m, N), nv numbers: used by no algorithm unasked.
+    #[getter]
+    fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give(py, self.inner.friction(), None)
+    }
+
+    /// Inertia of the rotor as seen at each joint (kg m², kg), nv numbers, part of M in every algorithm.
+    #[getter]
+    fn armature<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give(py, self.inner.armature(), None)
+    }
+
+    /// The acceleration of free fall, in the world's frame (m/s²), 3 numbers.
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give(py, &self.inner.gravity().to_array(), None)
+    }
+
+    /// Mass of all bodies, of what is fixed to the world too (kg).
+    #[getter]
+    fn total_mass(&self) -> f64 {
+        self.inner.total_mass()
+    }
+
+    /// All frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the
+    /// joint's and the link's.
+    #[getter]
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        static FRAME: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let class = named_tuple(py, &FRAME, "Frame")?;
+        let frame = |f: &condyle::Frame| {
+            let kind = match f.kind {
+                FrameKind::Link => "link",
+                FrameKind::Joint => "joint",
+                FrameKind::User => "user",
+            };
+            class.call1((f.name.as_str(), kind, f.body, give_pose(py, &f.placement, None)?))
+        };
+        self.inner.frames().iter().map(frame).collect()
+    }
+
+    /// The number of the frame with this name: a link's, else the user's, else a joint's.
+    ///
+    /// Raises `ModelError`, with the nearest name.
+    fn frame(&self, name: &str) -> PyResult<usize> {
+        self.inner.frame(name).map_err(exception)
+    }
+
+    /// The number of the body that the joint with this name carries.
+    ///
+    /// Raises `ModelError`, with the nearest name.
+    fn joint(&self, name: &str) -> PyResult<usize> {
+        self.inner.joint(name).map_err(exception)
+    }
+
+    /// The same robot under another gravity (m/s², 3 numbers, in the world's frame).
+    fn with_gravity(&self, gravity: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let gravity = vector("gravity", gravity, 3)?;
+        let gravity = Vec3::new(gravity[0], gravity[1], gravity[2]);
+        Ok(Self { inner: self.inner.clone().with_gravity(gravity), structure: self.structure })
+    }
+
+    /// The same robot with another armature, nv numbers (kg m², kg).
+    fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let armature = vector("armature", armature, self.inner.nv())?;
+        Ok(Self { inner: self.inner.clone().with_armature(&armature), structure: self.structure })
+    }
+
+    /// One line: the robot's name and size.
+    fn __repr__(&self) -> String {
+        let m = &self.inner;
+        format!("<condyle.Model '{}': {} bodies, nq = {}, nv = {}>", m.name(), m.bodies().len() - 1, m.nq(), m.nv())
+    }
+
+    /// A table of the joints.
+    fn __str__(&self) -> String {
+        self.inner.to_string().trim_end().to_owned()
+    }
+
+    /// The model itself: it never changes.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    /// The model itself: it never changes.
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        let _ = memo;
+        slf
+    }
+
+    /// For pickle.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let py = slf.py();
+        let bytes = postcard::to_extend(&slf.get().inner, MAGIC.as_bytes().to_vec())
+            .map_err(|e| ModelError::new_err(format!("cannot be pickled: {e}")))?;
+        let make = py.import("condyle._condyle")?.getattr("_model_from_bytes")?;
+        Ok((make, (PyBytes::new(py, &bytes),)))
+    }
+}

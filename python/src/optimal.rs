@@ -1,0 +1,334 @@
+//! Optimal control as Python sees it: the module `condyle.optimal`.
+
+use crate::arrays::{give, matrix, named_tuple, output, vector};
+use crate::exceptions::ProblemError;
+use crate::model::Model;
+use condyle::optimal as rust;
+use condyle::{Mat3, Se3};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyType};
+use rust::robot;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+fn exception(error: rust::Error) -> PyErr {
+    ProblemError::new_err(error.to_string())
+}
+
+/// What is behind a lock that no other call may hold.
+fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
+    value.try_lock().map_err(|_| PyRuntimeError::new_err(format!("{name}: in use by another call")))
+}
+
+/// The numbers of a vector of any length.
+fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let length = value.len().map_err(|_| PyValueError::new_err(format!("{argument}: expected a list of numbers")))?;
+    Ok(vector(argument, value, length)?.to_vec())
+}
+
+/// How much a residual r costs.
+///
+/// >>> condyle.optimal.Activation.weighted([1.0, 0.0])
+/// Weighted([1.0, 0.0])
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Activation(robot::Activation);
+
+#[pymethods]
+impl Activation {
+    /// ½ Σ rᵢ².
+    #[staticmethod]
+    fn quadratic() -> Self {
+        Self(robot::Activation::Quadratic)
+    }
+
+    /// ½ Σ wᵢ rᵢ².
+    #[staticmethod]
+    fn weighted(w: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self(robot::Activation::Weighted(numbers("w", w)?)))
+    }
+
+    /// ½ Σ (excess of rᵢ over its bounds)²; infinite bounds are none.
+    #[staticmethod]
+    fn barrier(lower: &Bound<'_, PyAny>, upper: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (lower, upper) = (numbers("lower", lower)?, numbers("upper", upper)?);
+        Ok(Self(robot::Activation::Barrier { lower, upper }))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
+    }
+}
+
+/// A term of a cost: weight times an activation of a residual. The activation is quadratic unless given.
+///
+/// >>> condyle.optimal.Cost.control("effort", 1e-3, [0.0] * 7)
+/// <condyle.optimal.Cost 'effort', weight 0.001>
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Cost(robot::Cost);
+
+impl Cost {
+    fn make(name: &str, weight: f64, residual: robot::Residual, activation: Option<&Bound<'_, Activation>>) -> Self {
+        let activation = activation.map_or(robot::Activation::Quadratic, |a| a.get().0.clone());
+        Self(robot::Cost::new(name, weight, residual, activation))
+    }
+}
+
+#[pymethods]
+impl Cost {
+    /// r = x ⊖ reference, 2 nv numbers; reference = (q, v).
+    #[staticmethod]
+    #[pyo3(signature = (name, weight, reference, activation=None))]
+    fn state(
+        name: &str,
+        weight: f64,
+        reference: &Bound<'_, PyAny>,
+        activation: Option<&Bound<'_, Activation>>,
+    ) -> PyResult<Self> {
+        let reference = numbers("reference", reference)?;
+        Ok(Self::make(name, weight, robot::Residual::State { reference }, activation))
+    }
+
+    /// r = u − reference, nu numbers.
+    #[staticmethod]
+    #[pyo3(signature = (name, weight, reference, activation=None))]
+    fn control(
+        name: &str,
+        weight: f64,
+        reference: &Bound<'_, PyAny>,
+        activation: Option<&Bound<'_, Activation>>,
+    ) -> PyResult<Self> {
+        let reference = numbers("reference", reference)?;
+        Ok(Self::make(name, weight, robot::Residual::Control { reference }, activation))
+    }
+
+    /// r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix.
+    #[staticmethod]
+    #[pyo3(signature = (name, weight, model, frame, target, activation=None))]
+    fn frame_placement(
+        name: &str,
+        weight: f64,
+        model: &Bound<'_, Model>,
+        frame: &Bound<'_, PyAny>,
+        target: &Bound<'_, PyAny>,
+        activation: Option<&Bound<'_, Activation>>,
+    ) -> PyResult<Self> {
+        let m = matrix("target", target, [4, 4])?;
+        let column = |c: usize| [m[c], m[4 + c], m[8 + c]].into();
+        let target = Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3));
+        let frame = model.get().frame_index(frame)?;
+        Ok(Self::make(name, weight, robot::Residual::FramePlacement { frame, target }, activation))
+    }
+
+    /// r = p − target, 3 numbers in the world, of the origin of a frame of the model.
+    #[staticmethod]
+    #[pyo3(signature = (name, weight, model, frame, target, activation=None))]
+    fn frame_translation(
+        name: &str,
+        weight: f64,
+        model: &Bound<'_, Model>,
+        frame: &Bound<'_, PyAny>,
+        target: &Bound<'_, PyAny>,
+        activation: Option<&Bound<'_, Activation>>,
+    ) -> PyResult<Self> {
+        let p = vector("target", target, 3)?;
+        let target = [p[0], p[1], p[2]].into();
+        let frame = model.get().frame_index(frame)?;
+        Ok(Self::make(name, weight, robot::Residual::FrameTranslation { frame, target }, activation))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<condyle.optimal.Cost '{}', weight {}>", self.0.name, self.0.weight)
+    }
+}
+
+/// A knot of a robot that moves freely under its joints' efforts, by semi-implicit Euler.
+///
+/// q̈ = aba(q, v, τ), v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is x = (q, v), the
+/// controls are the efforts of all joints but a free-flyer at the root.
+///
+/// model: the robot.
+/// dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
+/// costs: a list of `Cost`.
+///
+/// Raises `ProblemError` for a cost that does not fit.
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct FreeDynamics(robot::FreeDynamics);
+
+#[pymethods]
+impl FreeDynamics {
+    #[new]
+    #[pyo3(signature = (model, dt, costs))]
+    fn new(model: &Bound<'_, Model>, dt: Option<f64>, costs: Vec<PyRef<'_, Cost>>) -> PyResult<Self> {
+        let model = Arc::new(model.get().inner.clone());
+        let costs = costs.iter().map(|c| c.0.clone()).collect();
+        let action = match dt {
+            Some(dt) => robot::FreeDynamics::running(model, dt, costs),
+            None => robot::FreeDynamics::terminal(model, costs),
+        };
+        Ok(Self(action.map_err(exception)?))
+    }
+
+    /// The efforts that hold the robot still at the state x, nu numbers.
+    fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let model = self.0.model();
+        let x = vector("x", x, model.nq() + model.nv())?;
+        give(py, &self.0.clone().quasi_static(&x), None)
+    }
+}
+
+/// An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
+///
+/// x0: the initial state, nx numbers.
+/// models: a list of `FreeDynamics`.
+/// stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
+/// terminal: the `FreeDynamics` of the end.
+///
+/// Raises `ProblemError` if they do not fit together.
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Problem(Mutex<rust::Problem>);
+
+#[pymethods]
+impl Problem {
+    #[new]
+    fn new(
+        x0: &Bound<'_, PyAny>,
+        models: Vec<PyRef<'_, FreeDynamics>>,
+        stages: Vec<usize>,
+        terminal: PyRef<'_, FreeDynamics>,
+    ) -> PyResult<Self> {
+        let models = models.iter().map(|m| Box::new(m.0.clone()) as Box<dyn rust::ActionModel>).collect();
+        let terminal = Box::new(terminal.0.clone());
+        let problem = rust::Problem::new(numbers("x0", x0)?, models, stages, terminal).map_err(exception)?;
+        Ok(Self(Mutex::new(problem)))
+    }
+
+    /// The number of knots before the terminal one, N.
+    #[getter]
+    fn horizon(&self) -> PyResult<usize> {
+        Ok(lock("problem", &self.0)?.horizon())
+    }
+
+    /// The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
+    fn rollout<'py>(&self, py: Python<'py>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let mut problem = lock("problem", &self.0)?;
+        let us = matrix("us", us, [problem.horizon(), problem.nu(0)])?;
+        let xs = problem.rollout(&us).map_err(exception)?;
+        output(py, None, &[problem.horizon() + 1, problem.nx()], |out| out.copy_from_slice(&xs))
+    }
+}
+
+/// Feasibility-driven differential dynamic programming, with Crocoddyl's rules and constants.
+///
+/// problem: what is solved; the solver allocates for its shape once.
+/// settings: any of `max_iterations`, `tolerance`, `step_lengths`, `accept`, `accept_ascent`, `flat`,
+///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
+///     `regularisation_decrease_above`, `regularisation_increase_below`.
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Fddp {
+    problem: Py<Problem>,
+    solver: Mutex<rust::Fddp>,
+}
+
+#[pymethods]
+impl Fddp {
+    #[new]
+    #[pyo3(signature = (problem, **settings))]
+    fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut solver = rust::Fddp::new(&*lock("problem", &problem.get().0)?);
+        for (name, value) in settings.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let s = &mut solver.settings;
+            let number = match name.as_str() {
+                "max_iterations" => {
+                    s.max_iterations = value.extract()?;
+                    continue;
+                }
+                "step_lengths" => {
+                    s.step_lengths = value.extract()?;
+                    continue;
+                }
+                "tolerance" => &mut s.tolerance,
+                "accept" => &mut s.accept,
+                "accept_ascent" => &mut s.accept_ascent,
+                "flat" => &mut s.flat,
+                "regularisation_start" => &mut s.regularisation_start,
+                "regularisation_min" => &mut s.regularisation_min,
+                "regularisation_max" => &mut s.regularisation_max,
+                "regularisation_factor" => &mut s.regularisation_factor,
+                "regularisation_decrease_above" => &mut s.regularisation_decrease_above,
+                "regularisation_increase_below" => &mut s.regularisation_increase_below,
+                _ => return Err(PyValueError::new_err(format!("settings: there is no setting '{name}'"))),
+            };
+            *number = value.extract()?;
+        }
+        Ok(Self { problem: problem.unbind(), solver: Mutex::new(solver) })
+    }
+
+    /// Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
+    ///
+    /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
+    /// us: controls, (N, nu).
+    ///
+    /// Raises `ProblemError` for numbers or settings that make no sense. How the solve ended is the solution's status.
+    fn solve<'py>(
+        &self,
+        py: Python<'py>,
+        xs: &Bound<'_, PyAny>,
+        us: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut problem = lock("problem", &self.problem.get().0)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let (horizon, nx, ndx, nu) = (problem.horizon(), problem.nx(), problem.ndx(), problem.nu(0));
+        let xs = matrix("xs", xs, [horizon + 1, nx])?.to_vec();
+        let us = matrix("us", us, [horizon, nu])?.to_vec();
+        let (problem, solver) = (&mut *problem, &mut *solver);
+        py.detach(|| solver.solve(problem, &xs, &us).map(|_| ())).map_err(exception)?;
+        let s = solver.solution();
+        let gains = output(py, None, &[horizon, nu, ndx], |out| {
+            for (t, K) in s.K.iter().enumerate() {
+                for r in 0..nu {
+                    for c in 0..ndx {
+                        out[(t * nu + r) * ndx + c] = K[(r, c)];
+                    }
+                }
+            }
+        })?;
+        let k: Vec<f64> = s.k.iter().flat_map(|k| k.iter().copied()).collect();
+        static ITERATION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        static SOLUTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let iteration = named_tuple(py, &ITERATION, "Iteration")?;
+        let record = |i: &rust::Iteration| {
+            iteration.call1((
+                i.iteration,
+                i.cost,
+                i.gap,
+                i.stop,
+                i.step,
+                i.regularisation,
+                i.d1,
+                i.d2,
+                i.feasible,
+                i.accepted,
+            ))
+        };
+        let trace = s.trace.iter().map(record).collect::<PyResult<Vec<_>>>()?;
+        let status = match s.status {
+            rust::Status::Converged => "converged",
+            rust::Status::MaxIterations => "max_iterations",
+            rust::Status::RegularisationLimit => "regularisation_limit",
+            _ => "not_finite",
+        };
+        named_tuple(py, &SOLUTION, "Solution")?.call1((
+            output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
+            output(py, None, &[horizon, nu], |out| out.copy_from_slice(&s.us))?,
+            gains,
+            output(py, None, &[horizon, nu], |out| out.copy_from_slice(&k))?,
+            s.cost,
+            s.gap,
+            s.feasible,
+            status,
+            trace,
+        ))
+    }
+}

@@ -1,0 +1,95 @@
+"""To whom a `Data` belongs: one robot, and one call at a time."""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from sample import Robot
+
+import condyle
+
+
+def test_data_of_another_robot(quadruped: Robot) -> None:
+    arm = condyle.robots.arm7()
+    message = r"^data: made for another model \('quadruped'\), not for this 'arm7'$"
+    with pytest.raises(ValueError, match=message):
+        condyle.gravity(arm, quadruped.data, np.zeros(7))
+    fixed = condyle.Model.from_urdf_string(condyle.robots.QUADRUPED)
+    with pytest.raises(ValueError, match="^data: made for another model"):
+        condyle.gravity(fixed, quadruped.data, np.zeros(fixed.nq))
+    with pytest.raises(TypeError):
+        condyle.gravity(quadruped.model, None, quadruped.q)  # type: ignore[arg-type]
+
+
+def test_order_of_calls_does_not_matter(robot: Robot) -> None:
+    """No function reads what another left in the scratch."""
+    model, data, q, v, a, tau, f_ext = robot
+    other = condyle.random_configuration(model, seed=9)
+    functions = [
+        lambda d, q: condyle.rnea(model, d, q, v, a, f_ext),
+        lambda d, q: condyle.rnea(model, d, q, v, a),
+        lambda d, q: condyle.aba(model, d, q, v, tau),
+        lambda d, q: condyle.crba(model, d, q),
+        lambda d, q: condyle.minv(model, d, q),
+        lambda d, q: condyle.frame_jacobian(model, d, q, 1),
+        lambda d, q: condyle.rnea_derivatives(model, d, q, v, a).dtau_dq,
+        lambda d, q: condyle.aba_derivatives(model, d, q, v, tau).da_dq,
+    ]
+    for before in functions:
+        for function in functions:
+            before(data, other)
+            assert np.array_equal(function(data, q), function(condyle.Data(model), q))
+
+
+class Interrupting:
+    """An array that does something when it is read: while a call has begun."""
+
+    def __init__(self, array: NDArray[np.float64], action: Any) -> None:
+        self.array, self.action = array, action
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> NDArray[np.float64]:
+        self.action()
+        return self.array
+
+
+def test_two_threads_at_once(quadruped: Robot) -> None:
+    """A second thread that comes while the first one's call has begun is refused; the first one's is right."""
+    model, data, q, *_ = quadruped
+    expected = condyle.gravity(model, data, q)
+    errors: list[str] = []
+
+    def second() -> None:
+        try:
+            condyle.gravity(model, data, q)
+        except RuntimeError as error:
+            errors.append(str(error))
+
+    def in_a_thread() -> None:
+        thread = threading.Thread(target=second)
+        thread.start()
+        thread.join()
+
+    assert np.array_equal(condyle.gravity(model, data, Interrupting(q, in_a_thread)), expected)  # type: ignore[arg-type]
+    assert errors == ["data: in use by another call; give each thread a Data of its own"]
+    # the same within one thread; afterwards the scratch is free again
+    with pytest.raises(RuntimeError, match="^data: in use by another call"):
+        condyle.gravity(model, data, Interrupting(q, lambda: condyle.gravity(model, data, q)))  # type: ignore[arg-type]
+    assert np.array_equal(condyle.gravity(model, data, q), expected)
+
+
+def test_many_threads_share_a_model(robot: Robot) -> None:
+    model, _, _, v, _, tau, f_ext = robot
+    qs = [condyle.random_configuration(model, seed) for seed in range(8)]
+
+    def work(q: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        data = condyle.Data(model)
+        return [condyle.aba_derivatives(model, data, q, v, tau, f_ext).da_dq for _ in range(20)]
+
+    alone = [work(q) for q in qs]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(work, qs))
+    for a, b in zip(alone, together, strict=True):
+        assert all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))

@@ -1,0 +1,78 @@
+"""Docstrings: their examples run, and the stubs have the same ones as the extension module."""
+
+import ast
+import doctest
+import inspect
+import pkgutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle import _condyle
+
+README = Path(__file__).parents[1] / "README.md"
+GLOBALS = {"condyle": condyle, "np": np}
+
+
+def members() -> Iterator[tuple[str, Any]]:
+    """The package and its modules, each function and class of the extension module, each member of its classes."""
+    yield "condyle", condyle
+    yield from (
+        (name, item) for name, item in vars(condyle).items() if name in condyle.__all__ and inspect.ismodule(item)
+    )
+    for name in _condyle.__all__:
+        item = getattr(_condyle, name)
+        if callable(item):
+            yield name, item
+        if inspect.isclass(item):
+            yield from ((f"{name}.{k}", getattr(item, k)) for k in vars(item) if not k.startswith("_"))
+
+
+@pytest.mark.parametrize(("name", "item"), list(members()))
+def test_examples(name: str, item: Any) -> None:
+    test = doctest.DocTestParser().get_doctest(inspect.getdoc(item) or "", dict(GLOBALS), name, None, None)
+    runner = doctest.DocTestRunner()
+    runner.run(test)
+    assert runner.failures == 0
+
+
+@pytest.mark.parametrize(("name", "item"), list(members()))
+def test_everything_is_documented(name: str, item: Any) -> None:
+    assert inspect.getdoc(item), name
+
+
+def test_readme() -> None:
+    results = doctest.testfile(str(README), module_relative=False, globs=dict(GLOBALS), encoding="utf-8")
+    assert results.attempted > 10
+    assert results.failed == 0
+
+
+def test_stubs_have_the_same_docstrings() -> None:
+    stub = pkgutil.get_data("condyle", "_condyle.pyi")
+    assert stub is not None
+    documented = 0
+
+    def compare(node: ast.Module | ast.ClassDef, owner: Any) -> None:
+        nonlocal documented
+        for child in node.body:
+            if not isinstance(child, ast.ClassDef | ast.FunctionDef) or child.name == "__new__":
+                continue
+            item = getattr(owner, child.name)
+            assert ast.get_docstring(child) == inspect.getdoc(item), child.name
+            documented += 1
+            if isinstance(child, ast.ClassDef):
+                compare(child, item)
+
+    compare(ast.parse(stub), _condyle)
+    assert documented > 50
+
+
+def test_version_and_names() -> None:
+    assert condyle.__version__ == _condyle.__version__
+    modules = [getattr(condyle, name) for name in condyle.__all__ if inspect.ismodule(getattr(condyle, name))]
+    public = {name for module in (condyle, *modules) for name in module.__all__}
+    assert {name for name in _condyle.__all__ if name != "_model_from_bytes"} <= public

@@ -1,0 +1,185 @@
+"""A robot as it is shown, read, copied and pickled."""
+
+import copy
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sample import Robot
+
+import condyle
+
+PENDULUM = """<robot name="pendulum">
+  <link name="base"><inertial><mass value="3"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name="rod"><inertial><origin xyz="0 0 -1"/><mass value="2"/>
+    <inertia ixx="0.3" ixy="0.01" ixz="0" iyy="0.2" iyz="0" izz="0.1"/></inertial></link>
+  <link name="ball"><inertial><mass value="1"/>
+    <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+  <link name="finger"/>
+  <joint name="pivot" type="revolute"><origin xyz="0 0 5"/><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="2" velocity="3" effort="4"/><dynamics damping="0.5" friction="0.25"/></joint>
+  <joint name="tip" type="fixed"><origin xyz="0 0 -2"/><parent link="rod"/><child link="ball"/></joint>
+  <joint name="slide" type="prismatic"><parent link="ball"/><child link="finger"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="1" velocity="1" effort="1"/><mimic joint="pivot" multiplier="0.5" offset="0.1"/></joint>
+</robot>"""
+
+
+def test_members() -> None:
+    model = condyle.Model.from_urdf_string(PENDULUM)
+    assert (model.name, model.nq, model.nv, model.nbodies) == ("pendulum", 2, 2, 3)
+    assert model.names == ["universe", "pivot", "slide"]
+    assert model.body_names == ["universe", "rod", "finger"]
+    assert model.joint_types == ["universe", "revolute", "prismatic"]
+    assert (model.parents, model.nqs, model.nvs) == ([0, 0, 1], [0, 1, 1], [0, 1, 1])
+    assert (model.idx_qs, model.idx_vs) == ([0, 0, 1], [0, 0, 1])
+    assert model.mimics == [None, None, None]
+    assert np.array_equal(model.limits.lower, [-1, 0])
+    assert np.array_equal(model.limits.upper, [2, 1])
+    assert np.array_equal(model.limits.velocity, [3, 1])
+    assert np.array_equal(model.limits.effort, [4, 1])
+    assert np.array_equal(model.damping, [0.5, 0])
+    assert np.array_equal(model.friction, [0.25, 0])
+    assert np.array_equal(model.armature, [0, 0])
+    assert np.array_equal(model.gravity, [0, 0, -9.81])
+    assert model.total_mass == 6.0
+    assert np.array_equal(model.joint_placements[:, :3, 3], [[0, 0, 0], [0, 0, 5], [0, 0, -2]])
+    assert [(f.name, f.kind, f.body) for f in model.frames] == [
+        ("base", "link", 0),
+        ("pivot", "joint", 1),
+        ("rod", "link", 1),
+        ("tip", "joint", 1),
+        ("ball", "link", 1),
+        ("slide", "joint", 2),
+        ("finger", "link", 2),
+    ]
+    assert np.array_equal(model.frames[4].placement[:3, 3], [0, 0, -2])
+    assert (model.frame("ball"), model.joint("slide")) == (4, 2)
+    with pytest.raises(condyle.ModelError, match="^unknown joint `slid`; nearest is `slide`$"):
+        model.joint("slid")
+
+
+def test_inertias() -> None:
+    world, rod, finger = condyle.Model.from_urdf_string(PENDULUM).inertias
+    assert (world.mass, rod.mass, finger.mass) == (3.0, 3.0, 0.0)
+    np.testing.assert_allclose(rod.com, [0, 0, -4 / 3], atol=1e-15)
+    # 2 kg at −1, 1 kg at −2: both turn about the axis; about their common centre 2/3 kg m² are left
+    np.testing.assert_allclose(rod.rotational, [[6.3, 0.01, 0], [0.01, 6.2, 0], [0, 0, 0.1]], atol=1e-14)
+    np.testing.assert_allclose(rod.about_com, [[0.3 + 2 / 3, 0.01, 0], [0.01, 0.2 + 2 / 3, 0], [0, 0, 0.1]], atol=1e-14)
+    assert np.array_equal(finger.com, [0, 0, 0])
+
+
+def test_mimic() -> None:
+    model = condyle.Model.from_urdf_string(PENDULUM, mimic=True)
+    assert (model.nq, model.nv) == (1, 1)
+    assert model.mimics == [None, None, condyle.Mimic(ratio=0.5, offset=0.1)]
+    assert (model.nqs, model.idx_qs, model.idx_vs) == ([0, 1, 0], [0, 0, 0], [0, 0, 0])
+    finger = condyle.frame_placement(model, condyle.Data(model), [0.0], "finger")
+    np.testing.assert_allclose(finger[:3, 3], [0.1, 0, 3])
+
+
+@pytest.mark.parametrize(
+    ("root_joint", "nq", "nv"),
+    [(None, 2, 2), ("free_flyer", 9, 8), ("planar", 6, 5), ("spherical", 6, 5), ("translation", 5, 5)],
+)
+def test_root_joints(root_joint: str | None, nq: int, nv: int) -> None:
+    model = condyle.Model.from_urdf_string(PENDULUM, root_joint)  # type: ignore[arg-type]
+    assert (model.nq, model.nv) == (nq, nv)
+    assert model.joint_types[1] == (root_joint or "revolute")
+
+
+def test_files(tmp_path: Path) -> None:
+    path = tmp_path / "pendulum.urdf"
+    path.write_text(PENDULUM, encoding="utf-8")
+    assert condyle.Model.from_urdf(path).names == condyle.Model.from_urdf(str(path)).names
+    with pytest.raises(condyle.ParseError, match=r"missing\.urdf: "):
+        condyle.Model.from_urdf(tmp_path / "missing.urdf")
+
+
+def test_errors() -> None:
+    read = condyle.Model.from_urdf_string
+    assert issubclass(condyle.ParseError, condyle.Error)
+    assert issubclass(condyle.ModelError, condyle.Error)
+    with pytest.raises(condyle.ParseError, match="^<string>:1: not well-formed XML"):
+        read("<robot")
+    with pytest.raises(condyle.ParseError, match="^<string>:12: joint `slide`: no link is named `bal`; nearest"):
+        read(PENDULUM.replace('<parent link="ball"/>', '<parent link="bal"/>'))
+    with pytest.raises(condyle.ParseError, match="^<string>:9: joint `pivot`: its axis .* is no direction"):
+        read(PENDULUM.replace('xyz="0 1 0"', 'xyz="0 0 0"'))
+    with pytest.raises(condyle.Error):
+        read(PENDULUM.replace('joint="pivot"', 'joint="slide"'), mimic=True)
+    with pytest.raises(ValueError, match="^root_joint: expected None, 'free_flyer', .*, found 'free'"):
+        read(PENDULUM, "free")  # type: ignore[arg-type]
+
+
+def test_continuous_joints_have_limits_of_speed_and_effort_only() -> None:
+    limits = condyle.Model.from_urdf_string(PENDULUM.replace('"revolute"', '"continuous"')).limits
+    assert np.array_equal(limits.upper, [np.inf, np.inf, 1])
+    assert np.array_equal(limits.velocity, [3, 1])
+    assert np.array_equal(limits.effort, [4, 1])
+
+
+def test_gravity_and_armature(robot: Robot) -> None:
+    model, data, q, v, a, *_ = robot
+    weightless = model.with_gravity([0, 0, 0])
+    assert np.array_equal(condyle.gravity(weightless, data, q), np.zeros(model.nv))
+    assert np.array_equal(model.gravity, [0, 0, -9.81])  # the model itself does not change
+    armature = np.arange(model.nv) / 10
+    geared = model.with_armature(armature)
+    assert np.array_equal(geared.armature, armature)
+    difference = condyle.rnea(geared, data, q, v, a) - condyle.rnea(model, data, q, v, a)
+    np.testing.assert_allclose(difference, armature * a, atol=1e-12)
+    with pytest.raises(ValueError, match=r"^gravity: expected shape \(3,\)"):
+        model.with_gravity([0, 0])
+    with pytest.raises(ValueError, match="^armature: expected shape "):
+        model.with_armature([0.0])
+
+
+def test_words(quadruped: Robot) -> None:
+    assert repr(quadruped.model) == "<condyle.Model 'quadruped': 13 bodies, nq = 19, nv = 18>"
+    assert repr(quadruped.data) == "<condyle.Data of 'quadruped'>"
+    lines = str(quadruped.model).split("\n")
+    assert lines[0].startswith("quadruped: 13 bodies, nq = 19, nv = 18, ")
+    assert len(lines) == quadruped.model.nbodies
+    assert "free-flyer" in lines[1]
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_pickle(robot: Robot, protocol: int) -> None:
+    """All numbers to the last bit, infinite limits too; and the copy can use the original's scratch."""
+    model, data, q, v, a, *_ = robot
+    model = model.with_gravity([0.1, 0.2, 0.3]).with_armature(np.full(model.nv, 1 / 3))
+    again = pickle.loads(pickle.dumps(model, protocol))
+    assert str(again) == str(model)
+    assert np.array_equal(again.limits.lower, model.limits.lower)
+    assert np.array_equal(condyle.rnea(again, data, q, v, a), condyle.rnea(model, data, q, v, a))
+
+
+def test_pickle_of_results(quadruped: Robot) -> None:
+    model, data, q, v, a, *_ = quadruped
+    d = condyle.rnea_derivatives(model, data, q, v, a)
+    again = pickle.loads(pickle.dumps(d))
+    assert type(again) is condyle.RneaDerivatives
+    assert np.array_equal(again.dtau_dq, d.dtau_dq)
+
+
+def test_damaged_pickles(quadruped: Robot) -> None:
+    make, (state,) = quadruped.model.__reduce__()
+    with pytest.raises(condyle.ModelError, match="^the pickle is not of condyle "):
+        make(b"x" + state)
+    with pytest.raises(condyle.ModelError, match="^the pickle is damaged: "):
+        make(state[:100])
+
+
+def test_copies_are_the_model_itself(quadruped: Robot) -> None:
+    assert copy.copy(quadruped.model) is quadruped.model
+    assert copy.deepcopy(quadruped.model) is quadruped.model
+    assert copy.deepcopy([quadruped.model])[0] is quadruped.model
+
+
+def test_models_and_data_take_no_attributes(quadruped: Robot) -> None:
+    with pytest.raises(AttributeError):
+        quadruped.model.name = "dog"  # type: ignore[misc]
+    with pytest.raises(AttributeError):
+        quadruped.data.q = quadruped.q  # type: ignore[attr-defined]

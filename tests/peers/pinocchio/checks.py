@@ -1,0 +1,176 @@
+"""The comparisons, for any pair of models."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from comparison import Pair, State, ours_of, theirs_of
+
+import condyle
+
+FRAMES = {
+    "local": pin.ReferenceFrame.LOCAL,
+    "world": pin.ReferenceFrame.WORLD,
+    "local_world_aligned": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+}
+KINDS = {
+    pin.FrameType.BODY: "link",
+    pin.FrameType.JOINT: "joint",
+    pin.FrameType.FIXED_JOINT: "joint",
+}
+
+
+def check_model(pair: Pair) -> None:
+    """Sizes, names, order, placements, inertias, limits, frames."""
+    ours, theirs = pair.ours, pair.theirs
+    assert ours.name == theirs.name
+    assert (ours.nq, ours.nv, ours.nbodies) == (theirs.nq, theirs.nv, theirs.njoints)
+    assert ours.names == list(theirs.names)
+    assert ours.parents == list(theirs.parents)
+    moving = slice(1, None)
+    assert ours.nqs == list(theirs.nqs)
+    assert ours.nvs == list(theirs.nvs)
+    assert ours.idx_qs[moving] == list(theirs.idx_qs)[moving]
+    assert ours.idx_vs[moving] == list(theirs.idx_vs)[moving]
+    pair.expect("joint placements", ours.joint_placements[moving], poses(theirs.jointPlacements)[moving])
+    pair.expect("masses", [i.mass for i in ours.inertias], [i.mass for i in theirs.inertias])
+    first_moments = np.array([i.mass * i.lever for i in theirs.inertias])
+    pair.expect("centres of mass", [i.mass * i.com for i in ours.inertias], first_moments)
+    pair.expect("rotational inertias", [i.about_com for i in ours.inertias], [i.inertia for i in theirs.inertias])
+    pair.expect("total mass", ours.total_mass, pin.computeTotalMass(theirs) + theirs.inertias[0].mass)
+    pair.expect("damping", ours.damping, theirs.damping)
+    pair.expect("friction", ours.friction, theirs.upperDryFrictionLimit)
+    check_limits(pair)
+    check_frames(pair)
+
+
+def check_limits(pair: Pair) -> None:
+    """Limits are equal, and infinite where Pinocchio has none (or ±1.01 for the numbers of a rotation)."""
+    ours, theirs = pair.ours.limits, pair.theirs
+    finite = np.zeros(theirs.nq, bool)
+    for joint in theirs.joints[1:]:
+        if joint.nq == joint.nv == 1:
+            finite[joint.idx_q] = True
+    for our, their in ((ours.lower, theirs.lowerPositionLimit), (ours.upper, theirs.upperPositionLimit)):
+        finite_here = finite & np.isfinite(their)
+        assert np.array_equal(our[finite_here], their[finite_here])
+        assert np.isinf(our[~finite_here]).all()
+    for our, their in ((ours.velocity, theirs.upperVelocityLimit), (ours.effort, theirs.upperEffortLimit)):
+        assert np.array_equal(our, np.where(their == np.finfo(float).max, np.inf, their))
+
+
+def check_frames(pair: Pair) -> None:
+    """The same frames but for Pinocchio's `universe`, with the same body and placement."""
+    ours = {(f.name, f.kind): f for f in pair.ours.frames}
+    theirs = {(f.name, KINDS[f.type]): f for f in list(pair.theirs.frames)[1:]}
+    assert len(theirs) == pair.theirs.nframes - 1
+    assert ours.keys() == theirs.keys()
+    for key, frame in theirs.items():
+        assert ours[key].body == frame.parentJoint, key
+        pair.expect("frames in their bodies", ours[key].placement, frame.placement.homogeneous)
+
+
+def check_kinematics(state: State) -> None:
+    """Placements of bodies and frames, and the Jacobians of all frames in all three frames of reference."""
+    pair, ours, q = state.pair, ours_of(state), state.q
+    model, data = pair.theirs, pair.their_data
+    pin.framesForwardKinematics(model, data, q)
+    pair.expect("forward_kinematics", ours(condyle.forward_kinematics, q), poses(data.oMi))
+    pin.computeJointJacobians(model, data, q)
+    kinds = {frame.type for frame in model.frames}
+    assert kinds <= KINDS.keys()
+    ids = {(f.name, KINDS[f.type]): i for i, f in enumerate(model.frames) if i > 0}
+    for i, frame in enumerate(pair.ours.frames):
+        j = ids[frame.name, frame.kind]
+        pair.expect("frame_placement", ours(condyle.frame_placement, q, i), data.oMf[j].homogeneous)
+        for name, reference in FRAMES.items():
+            J = ours(condyle.frame_jacobian, q, i, name)
+            pair.expect(f"frame_jacobian, {name}", J, pin.getFrameJacobian(model, data, j, reference))
+
+
+def check_inverse_dynamics(state: State) -> None:
+    """rnea and nonlinear_effects, which both libraries offer for mimic joints too."""
+    pair, ours, theirs = state.pair, ours_of(state), theirs_of(state)
+    q, v, a = state.q, state.v, state.a
+    pair.expect("rnea", ours(condyle.rnea, q, v, a), theirs(pin.rnea, q, v, a))
+    tau = theirs(pin.rnea, q, v, a, state.their_forces)
+    pair.expect("rnea, f_ext", ours(condyle.rnea, q, v, a, state.f_ext), tau)
+    pair.expect("nonlinear_effects", ours(condyle.nonlinear_effects, q, v), theirs(pin.nonLinearEffects, q, v))
+
+
+def check_crba(state: State) -> None:
+    """M, both triangles."""
+    state.pair.expect("crba", ours_of(state)(condyle.crba, state.q), theirs_of(state)(pin.crba, state.q))
+
+
+def check_gravity(state: State) -> None:
+    """The efforts of gravity."""
+    ours, theirs = ours_of(state), theirs_of(state)
+    state.pair.expect("gravity", ours(condyle.gravity, state.q), theirs(pin.computeGeneralizedGravity, state.q))
+
+
+def check_rnea_derivatives(state: State) -> None:
+    """∂τ/∂q, ∂τ/∂v, ∂τ/∂a, with and without external forces."""
+    for label, ours_extra, theirs_extra in (("", (), ()), (", f_ext", (state.f_ext,), (state.their_forces,))):
+        ours = ours_of(state)(condyle.rnea_derivatives, state.q, state.v, state.a, *ours_extra)
+        theirs = theirs_of(state)(pin.computeRNEADerivatives, state.q, state.v, state.a, *theirs_extra)
+        for field, our, their in zip(ours._fields, ours, theirs, strict=True):
+            state.pair.expect(f"rnea_derivatives{label}: {field}", our, their)
+
+
+def check_forward_dynamics(state: State) -> bool:
+    """q̈, M⁻¹ and the derivatives of q̈, with and without external forces; false if M has no inverse.
+
+    A body without mass at the end of a limb makes M singular. Pinocchio's q̈ is then not finite; ours is refused, with
+    the joint's name.
+    """
+    pair, q, v, tau = state.pair, state.q, state.v, state.tau
+    ours, theirs, distance = ours_of(state), theirs_of(state), pair.self_distance
+    if not np.isfinite(distance):
+        assert np.linalg.matrix_rank(theirs(pin.crba, q)) < pair.theirs.nv
+        singular = pair.ours.names[pair.ours.singular_joints[0]]
+        for function, arguments in ((condyle.aba, (q, v, tau)), (condyle.minv, (q,))):
+            with pytest.raises(condyle.ModelError, match=singular):
+                ours(function, *arguments)
+        return False
+    for label, ours_extra, theirs_extra in (("", (), ()), (", f_ext", (state.f_ext,), (state.their_forces,))):
+        a = theirs(pin.aba, q, v, tau, *theirs_extra, pin.Convention.WORLD).copy()
+        pair.expect(f"aba{label}", ours(condyle.aba, q, v, tau, *ours_extra), a, distance)
+        d = ours(condyle.aba_derivatives, q, v, tau, *ours_extra)
+        pair.expect(f"aba_derivatives{label}: a", d.a, a, distance)
+        da_dq, da_dv, da_dtau = theirs(pin.computeABADerivatives, q, v, tau, *theirs_extra)
+        pair.expect(f"aba_derivatives{label}: da_dq", d.da_dq, da_dq, distance)
+        pair.expect(f"aba_derivatives{label}: da_dv", d.da_dv, da_dv, distance)
+        pair.expect(f"aba_derivatives{label}: da_dtau", d.da_dtau, da_dtau, distance)
+    pair.expect("minv", ours(condyle.minv, q), theirs(pin.computeMinverse, q), distance)
+    return True
+
+
+def check_configuration(state: State) -> None:
+    """Neutral, integrate, difference, and their Jacobians."""
+    pair, q, q1, v = state.pair, state.q, state.q1, state.v
+    ours, theirs = pair.ours, pair.theirs
+    pair.expect("neutral", condyle.neutral(ours), pin.neutral(theirs))
+    moved = pin.integrate(theirs, q, v)
+    pair.expect("integrate", condyle.integrate(ours, q, v), with_nearer_quaternions(theirs, q, moved))
+    d = condyle.difference(ours, q, q1)
+    pair.expect("difference", d, pin.difference(theirs, q, q1))
+    for argument, J in zip(("position", "velocity"), pin.dIntegrate(theirs, q, v), strict=True):
+        pair.expect(f"integrate_jacobian, {argument}", condyle.integrate_jacobian(ours, v, argument), J)
+    for argument, J in zip(("from", "to"), pin.dDifference(theirs, q, q1), strict=True):
+        pair.expect(f"difference_jacobian, {argument}", condyle.difference_jacobian(ours, d, argument), J)
+
+
+def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Of the two quaternions of a rotation the one nearer to q's: ours is, and Pinocchio's of a free-flyer, but not
+    Pinocchio's of a spherical joint that turns by more than half a turn.
+    """
+    for joint in model.joints:
+        if joint.shortname() == "JointModelSpherical":
+            part = slice(joint.idx_q, joint.idx_q + joint.nq)
+            moved[part] *= np.copysign(1.0, q[part] @ moved[part])
+    return moved
+
+
+def poses(placements: "pin.StdVec_SE3") -> np.ndarray:
+    """Poses as homogeneous matrices."""
+    return np.array([X.homogeneous for X in placements])

@@ -1,0 +1,109 @@
+"""One robot read by both libraries, states to compare them at, and what counts as equal."""
+
+from collections import defaultdict
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+import condyle
+
+TOLERANCE = 1e-10
+"""Relative to 1 + max |theirs|: some thousand roundings of double precision, with room for ill-conditioned poses."""
+SELF_DISTANCE = 10.0
+"""What contains M⁻¹ may be this many times as far from Pinocchio as Pinocchio is from itself."""
+UNLIMITED = 3.0
+"""Where a coordinate has no limits, it is drawn from ± this (rad, m)."""
+
+ROOT_JOINTS = {
+    "free_flyer": pin.JointModelFreeFlyer,
+    "planar": pin.JointModelPlanar,
+    "spherical": pin.JointModelSpherical,
+    "translation": pin.JointModelTranslation,
+}
+
+SELF_STATES = 20
+"""At how many states Pinocchio is compared with itself."""
+
+worst: dict[str, tuple[float, float, str]] = defaultdict(lambda: (0.0, 0.0, ""))
+"""For each quantity the greatest (share of the bound, relative difference, where), for the summary."""
+
+
+class Pair:
+    """A robot as Pinocchio and as we read it from the same URDF."""
+
+    def __init__(self, name: str, path: str, root_joint: str | None, mimic: bool = False) -> None:
+        self.name, self.path, self.root_joint = name, path, root_joint
+        root = (ROOT_JOINTS[root_joint](),) if root_joint else ()
+        self.theirs = pin.buildModelFromUrdf(path, *root, mimic=mimic)
+        self.ours = condyle.Model.from_urdf(path, root_joint=root_joint, mimic=mimic)
+        self.their_data, self.data = self.theirs.createData(), condyle.Data(self.ours)
+
+    def with_armature(self, armature: np.ndarray) -> "Pair":
+        """The same robot, with armature for both."""
+        other = Pair(self.name, self.path, self.root_joint)
+        other.theirs.armature = armature
+        other.ours = other.ours.with_armature(armature)
+        return other
+
+    def states(self, count: int, seed: int = 0) -> "list[State]":
+        """Random states: q inside its limits, the rest standard normal."""
+        return [State(self, seed + i) for i in range(count)]
+
+    @cached_property
+    def self_distance(self) -> float:
+        """How far Pinocchio's forward dynamics is from itself, relative; not a number if M has no inverse."""
+        return float(np.max([state.self_distance() for state in self.states(SELF_STATES, seed=100)]))
+
+    def expect(self, what: str, ours: np.ndarray, theirs: np.ndarray, self_distance: float = 0.0) -> None:
+        """Checks that two results are equal; `self_distance` is Pinocchio's from itself, relative."""
+        ours, theirs = np.asarray(ours), np.asarray(theirs)
+        assert ours.shape == theirs.shape, f"{what} of {self.name}: shape {ours.shape}, expected {theirs.shape}"
+        if not theirs.size:
+            return
+        assert np.isfinite(theirs).all(), f"{what} of {self.name}: Pinocchio's is not finite"
+        difference = np.abs(ours - theirs).max() / (1.0 + np.abs(theirs).max())
+        bound = max(TOLERANCE, SELF_DISTANCE * self_distance)
+        if not difference / bound <= worst[what][0]:
+            worst[what] = (difference / bound, difference, self.name)
+        assert difference <= bound, f"{what} of {self.name}: differs by {difference:.1e}, allowed are {bound:.1e}"
+
+
+class State:
+    """A position, velocity, acceleration, efforts and external forces."""
+
+    def __init__(self, pair: Pair, seed: int) -> None:
+        model, rng = pair.theirs, np.random.default_rng(seed)
+        lower, upper = model.lowerPositionLimit.copy(), model.upperPositionLimit.copy()
+        lower[~(np.abs(lower) < 1e6)] = -UNLIMITED
+        upper[~(np.abs(upper) < 1e6)] = UNLIMITED
+        pin.seed(seed)
+        self.q = pin.randomConfiguration(model, lower, upper)
+        self.q1 = pin.randomConfiguration(model, lower, upper)
+        self.v, self.a, self.tau = rng.standard_normal((3, model.nv))
+        self.f_ext = rng.standard_normal((model.njoints, 6))
+        self.pair = pair
+
+    @cached_property
+    def their_forces(self) -> "pin.StdVec_Force":
+        forces = pin.StdVec_Force()
+        for row in self.f_ext:
+            forces.append(pin.Force(row))
+        return forces
+
+    def self_distance(self) -> float:
+        """How far Pinocchio's forward dynamics in the world's frame is from that in the bodies' frames, relative."""
+        args = (self.pair.theirs, self.pair.their_data, self.q, self.v, self.tau)
+        local, world = pin.aba(*args, pin.Convention.LOCAL).copy(), pin.aba(*args, pin.Convention.WORLD).copy()
+        return float(np.abs(local - world).max() / (1.0 + np.abs(world).max()))
+
+
+def ours_of(state: State) -> Callable[..., np.ndarray]:
+    """Our functions, with model and data filled in."""
+    return lambda function, *args: function(state.pair.ours, state.pair.data, *args)
+
+
+def theirs_of(state: State) -> Callable[..., np.ndarray]:
+    """Pinocchio's functions, with model and data filled in."""
+    return lambda function, *args: function(state.pair.theirs, state.pair.their_data, *args)

@@ -1,0 +1,60 @@
+"""URDFs of random robots: every kind of joint, odd axes, odd names, links without inertia, fixed joints between."""
+
+import numpy as np
+
+AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 -1", "-1 0 0", "0 0 2", "1e-9 0 1", "0 3 4")
+"""Aligned, against the axis, not normalised, nearly aligned; beside random ones and none at all."""
+NAMES = ("J3", "_0", "j1", "j10", "j2", "J", "hip.left", "hip-left", "Über", "a b")
+"""Their order in bytes is neither that of the alphabet nor of the numbers."""
+KINDS = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
+
+
+class RandomUrdf:
+    """A random robot of some links; `mimics` lets some joints follow others."""
+
+    def __init__(self, seed: int, links: int = 12, mimics: bool = False) -> None:
+        self.rng = np.random.default_rng(seed)
+        parents = [int(self.rng.integers(0, i)) for i in range(1, links)]
+        suffixes = self.rng.permutation(links)
+        names = [f"{self.rng.choice(NAMES)}{suffixes[i]}" for i in range(1, links)]
+        kinds = [str(self.rng.choice(KINDS)) for _ in names]
+        lines = [f'<robot name="random{seed}">']
+        # a body that moves has mass, or M would have no inverse
+        lines += [self._link(i, moves=i == 0 or kinds[i - 1] != "fixed") for i in range(links)]
+        leaders: list[str] = []
+        for i, (name, kind, parent) in enumerate(zip(names, kinds, parents, strict=True), start=1):
+            one = kind in ("revolute", "prismatic")
+            follows = str(self.rng.choice(leaders)) if mimics and one and leaders and self.rng.random() < 0.4 else None
+            lines.append(self._joint(name, kind, parent, i, follows))
+            if one and not follows:
+                leaders.append(name)
+        order = self.rng.permutation(len(lines) - 1) + 1
+        self.text = "\n".join([lines[0], *(lines[i] for i in order), "</robot>\n"])
+
+    def _numbers(self, count: int, scale: float) -> str:
+        return " ".join(repr(float(x)) for x in self.rng.uniform(-scale, scale, count))
+
+    def _origin(self) -> str:
+        return f'<origin xyz="{self._numbers(3, 0.5)}" rpy="{self._numbers(3, np.pi)}"/>'
+
+    def _link(self, i: int, moves: bool) -> str:
+        if not moves and self.rng.random() < 0.3:
+            return f'<link name="link{i}"/>'
+        mass, (a, b, c) = self.rng.uniform(0.5, 2.0), self.rng.uniform(0.1, 0.3, 3) ** 2
+        ixx, iyy, izz = mass * (b + c), mass * (a + c), mass * (a + b)
+        inertia = f'<inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}"/>'
+        return f'<link name="link{i}"><inertial>{self._origin()}<mass value="{mass}"/>{inertia}</inertial></link>'
+
+    def _joint(self, name: str, kind: str, parent: int, child: int, follows: str | None) -> str:
+        axes = (f'<axis xyz="{self._numbers(3, 1.0)}"/>', "", *(f'<axis xyz="{axis}"/>' for axis in AXES))
+        axis = axes[self.rng.integers(len(axes))] if kind in ("revolute", "continuous", "prismatic") else ""
+        lower, upper, velocity, effort = self.rng.uniform((-3, 0, 0, 0), (0, 3, 10, 100))
+        limited = kind in ("revolute", "prismatic") or (kind == "continuous" and self.rng.random() < 0.5)
+        limit = f'<limit lower="{lower}" upper="{upper}" velocity="{velocity}" effort="{effort}"/>' if limited else ""
+        damping, friction = self.rng.uniform(0, 1, 2)
+        dynamics = f'<dynamics damping="{damping}" friction="{friction}"/>' if self.rng.random() < 0.5 else ""
+        ratio, offset = self.rng.uniform(-2, 2, 2)
+        mimic = f'<mimic joint="{follows}" multiplier="{ratio}" offset="{offset}"/>' if follows else ""
+        ends = f'<parent link="link{parent}"/><child link="link{child}"/>'
+        content = self._origin() + ends + axis + limit + dynamics + mimic
+        return f'<joint name="{name}" type="{kind}">{content}</joint>'

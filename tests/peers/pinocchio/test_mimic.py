@@ -1,0 +1,140 @@
+"""Mimic joints that share a coordinate: rnea, crba and nle as Pinocchio has them, and all else by projection.
+
+A robot whose joints follow others moves as the same robot with free joints does along q_free = G q + offset, so its
+efforts are Gᵀ τ_free, its inertia Gᵀ M_free G, and its derivatives Gᵀ (∂τ_free/∂·) G; Pinocchio computes those of the
+free robot. What forward dynamics returns is put back into these.
+"""
+
+from pathlib import Path
+
+import checks
+import numpy as np
+import pinocchio as pin
+import pytest
+import test_robots
+from comparison import ROOT_JOINTS, Pair, State
+from random_urdf import RandomUrdf
+
+import condyle
+
+STATES = 3
+RANDOM = 20
+ROBOTS = [n for n in test_robots.ROBOTS if n not in test_robots.NO_URDF and "<mimic" in test_robots.text(n)]
+BROKEN = {"alex_psyonic_hands"}
+"""Robots with a joint that follows one that is not there; neither library reads them with mimic=True."""
+REFUSED = {"romeo", "talos_full", "talos_full_box"}
+"""Robots with a joint that follows one of a higher number, which Pinocchio does not read with mimic=True."""
+
+
+class Projection:
+    """The robot with mimic joints (ours) as part of the one without (Pinocchio's)."""
+
+    def __init__(self, name: str, path: str, root_joint: str | None) -> None:
+        self.free = Pair(name, path, root_joint)
+        self.ours = condyle.Model.from_urdf(path, root_joint, mimic=True)
+        self.data = condyle.Data(self.ours)
+        free, ours = self.free.ours, self.ours
+        assert ours.names == free.names
+        self.G = np.zeros((free.nv, ours.nv))
+        for i, mimic in enumerate(ours.mimics):
+            for k in range(free.nvs[i]):
+                self.G[free.idx_vs[i] + k, ours.idx_vs[i] + k] = mimic.ratio if mimic else 1.0
+
+    def position(self, q: np.ndarray) -> np.ndarray:
+        """The position of the free robot."""
+        free, ours, q_free = self.free.ours, self.ours, np.empty(self.free.ours.nq)
+        for i, mimic in enumerate(ours.mimics):
+            own = q[ours.idx_qs[i] : ours.idx_qs[i] + free.nqs[i]]
+            q_free[free.idx_qs[i] : free.idx_qs[i] + free.nqs[i]] = mimic.ratio * own + mimic.offset if mimic else own
+        return q_free
+
+    def check(self, seed: int) -> None:
+        """Everything at one random state."""
+        rng, pair, G, ours = np.random.default_rng(seed), self.free, self.G, (self.ours, self.data)
+        q = condyle.random_configuration(self.ours, seed)
+        v, a, tau = rng.standard_normal((3, self.ours.nv))
+        state = State(pair, seed)
+        q_free, v_free, theirs = self.position(q), G @ v, (pair.theirs, pair.their_data)
+
+        def rnea(a: np.ndarray) -> np.ndarray:
+            return G.T @ pin.rnea(*theirs, q_free, v_free, G @ a, state.their_forces)
+
+        def derivatives(a: np.ndarray) -> list[np.ndarray]:
+            d = pin.computeRNEADerivatives(*theirs, q_free, v_free, G @ a, state.their_forces)
+            return [G.T @ x @ G for x in d]
+
+        pin.forwardKinematics(*theirs, q_free)
+        placements = checks.poses(pair.their_data.oMi)
+        pair.expect("mimic: forward_kinematics", condyle.forward_kinematics(*ours, q), placements)
+        f_ext = state.f_ext
+        pair.expect("mimic: rnea, f_ext", condyle.rnea(*ours, q, v, a, f_ext), rnea(a))
+        M = G.T @ pin.crba(*theirs, q_free) @ G
+        pair.expect("mimic: crba", condyle.crba(*ours, q), M)
+        ours_derivatives = condyle.rnea_derivatives(*ours, q, v, a, f_ext)
+        for field, our, their in zip(ours_derivatives._fields, ours_derivatives, derivatives(a), strict=True):
+            pair.expect(f"mimic: rnea_derivatives: {field}", our, their)
+        if np.linalg.matrix_rank(M) < self.ours.nv:
+            return
+        d = condyle.aba_derivatives(*ours, q, v, tau, f_ext)
+        assert np.array_equal(d.a, condyle.aba(*ours, q, v, tau, f_ext))
+        assert np.array_equal(d.da_dtau, condyle.minv(*ours, q))
+        # M q̈ + h = τ and what follows from it, M ∂q̈/∂· = −∂τ/∂·, M M⁻¹ = 1
+        dtau_dq, dtau_dv, _ = derivatives(d.a)
+        pair.expect("mimic: rnea of aba", rnea(d.a), tau)
+        pair.expect("mimic: M times da_dq", M @ d.da_dq, -dtau_dq)
+        pair.expect("mimic: M times da_dv", M @ d.da_dv, -dtau_dv)
+        pair.expect("mimic: M times minv", M @ d.da_dtau, np.eye(self.ours.nv))
+
+
+@pytest.mark.parametrize("name", [n for n in ROBOTS if n not in BROKEN])
+def test_projection(name: str) -> None:
+    projection = Projection(name, test_robots.urdf_path(name), test_robots.root_joint(name))
+    for seed in range(STATES):
+        projection.check(seed)
+
+
+@pytest.mark.parametrize("name", [n for n in ROBOTS if n not in BROKEN | REFUSED])
+def test_directly(name: str) -> None:
+    pair = test_robots.load(name, mimic=True)
+    checks.check_model(pair)
+    for state in pair.states(STATES):
+        checks.check_inverse_dynamics(state)
+        checks.check_crba(state)
+
+
+@pytest.mark.parametrize("name", sorted(BROKEN))
+def test_broken(name: str) -> None:
+    path = test_robots.urdf_path(name)
+    with pytest.raises(ValueError, match="not in the kinematic tree"):
+        pin.buildModelFromUrdf(path, mimic=True)
+    with pytest.raises(condyle.ParseError, match="which is no moving joint"):
+        condyle.Model.from_urdf(path, mimic=True)
+
+
+@pytest.mark.parametrize("name", sorted(REFUSED))
+def test_refused(name: str) -> None:
+    """Once Pinocchio reads these, they belong to the direct comparison."""
+    with pytest.raises(ValueError, match="not in the kinematic tree"):
+        pin.buildModelFromUrdf(test_robots.urdf_path(name), mimic=True)
+
+
+@pytest.mark.parametrize("seed", range(RANDOM))
+def test_random_robot(seed: int, tmp_path: Path) -> None:
+    """Without a direct comparison of M: with joints of several degrees of freedom below one that follows another,
+    Pinocchio's crba contradicts its own rnea, and ours agrees with the latter.
+    """
+    path = tmp_path / "robot.urdf"
+    path.write_text(RandomUrdf(1000 + seed, mimics=True).text, encoding="utf-8")
+    arguments = f"robot {seed}", str(path), (None, *ROOT_JOINTS)[seed % (1 + len(ROOT_JOINTS))]
+    projection = Projection(*arguments)
+    for i in range(STATES):
+        projection.check(seed + i)
+    try:
+        pair = Pair(*arguments, mimic=True)
+    except ValueError as error:
+        if "not in the kinematic tree" not in str(error):
+            raise
+        return  # a joint follows one of a higher number
+    checks.check_model(pair)
+    for state in pair.states(STATES, seed):
+        checks.check_inverse_dynamics(state)
