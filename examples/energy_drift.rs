@@ -103,7 +103,7 @@ struct Figure {
 const PANEL: (f64, f64) = (400.0, 300.0); // its size, without what stands around it
 const LEFT: f64 = 70.0;
 const TOP: f64 = 64.0;
-const DECADES: (i32, i32) = (-12, 6); // J
+const DECADES: (i32, i32) = (-12, 15); // J
 
 impl Figure {
     fn new(panels: usize) -> Self {
@@ -190,7 +190,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 match drift(system, integrator, dt) {
                     Ok(Drift { start, kinetic, errors, end }) => {
                         let greatest = errors.iter().copied().fold(0.0, f64::max);
-                        println!(" {start:.1} | {kinetic:.1} | {greatest:.1e} | {end:.1e} |");
+                        println!(" {start:.1} | {kinetic:.2e} | {greatest:.1e} | {end:.1e} |");
                         curves.push(Some(errors));
                     }
                     Err(status) => {

@@ -7,7 +7,18 @@ from typing import Any, Literal, TypeAlias, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._types import AbaDerivatives, Frame, Inertia, Limits, Mimic, RneaDerivatives, Solution
+from ._types import (
+    AbaDerivatives,
+    AllTerms,
+    CentroidalMap,
+    CentroidalMapRate,
+    Frame,
+    Inertia,
+    Limits,
+    Mimic,
+    RneaDerivatives,
+    Solution,
+)
 
 __all__ = [
     "ARM7",
@@ -29,29 +40,59 @@ __all__ = [
     "aba",
     "aba_derivatives",
     "arm7",
+    "centroidal_map",
+    "centroidal_map_rate",
+    "centroidal_momentum",
+    "centroidal_momentum_rate",
+    "com",
+    "com_acceleration",
+    "com_jacobian",
+    "com_velocity",
+    "compute_all_terms",
+    "coriolis_matrix",
     "crba",
     "difference",
     "difference_jacobian",
+    "distance",
     "forward_kinematics",
+    "frame_acceleration",
+    "frame_classical_acceleration",
     "frame_jacobian",
+    "frame_jacobian_rate",
     "frame_placement",
+    "frame_velocity",
     "gravity",
     "humanoid",
     "integrate",
     "integrate_jacobian",
+    "interpolate",
+    "joint_torque_regressor",
+    "kinetic_energy",
+    "kinetic_energy_regressor",
+    "mechanical_energy",
     "minv",
     "neutral",
     "nonlinear_effects",
+    "normalize",
+    "passive_torque",
+    "passive_torque_derivative",
+    "potential_energy",
+    "potential_energy_regressor",
     "quadruped",
     "random_configuration",
     "rnea",
     "rnea_derivatives",
+    "static_torque",
+    "transport",
 ]
 
 _Array: TypeAlias = NDArray[np.float64]
 _RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translation"]
+_Reference: TypeAlias = Literal["local", "world", "local_world_aligned"]
 _RneaOut: TypeAlias = RneaDerivatives | tuple[_Array, _Array, _Array]
 _AbaOut: TypeAlias = AbaDerivatives | tuple[_Array, _Array, _Array, _Array]
+_MapOut: TypeAlias = CentroidalMap | tuple[_Array, _Array, _Array, _Array]
+_MapRateOut: TypeAlias = CentroidalMapRate | tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array]
 
 __version__: str
 ARM7: str
@@ -99,7 +140,6 @@ class Model:
             'spherical' or 'translation'; None fixes the root link to the world.
         mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
             their own.
-
         strict: whether what is only odd (`warnings`) is an error.
 
         Raises `ParseError`, with file, line and element, or `ModelError`.
@@ -173,6 +213,12 @@ class Model:
     def inertias(self) -> list[Inertia]:
         """The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame."""
     @property
+    def inertial_parameters(self) -> _Array:
+        """π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
+        xy, yy, xz, yz, zz of the rotational inertia about the origin of the body's frame; what regressors are
+        multiplied with.
+        """
+    @property
     def limits(self) -> Limits:
         """The limits of position, velocity and effort, as `Limits`; infinite where there are none."""
     @property
@@ -209,6 +255,20 @@ class Model:
         """The same robot under another gravity (m/s², 3 numbers, in the world's frame)."""
     def with_armature(self, armature: ArrayLike) -> Model:
         """The same robot with another armature, nv numbers (kg m², kg)."""
+    def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
+        """The same robot with some joints locked where they are at q.
+
+        Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
+        locked with it.
+
+        joints: a list of names or numbers of bodies.
+        q: nq numbers.
+
+        >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
+        ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
+
+        Raises `ModelError`.
+        """
     def __copy__(self) -> Model:
         """The model itself: it never changes."""
     def __deepcopy__(self, memo: object) -> Model:
@@ -285,7 +345,7 @@ def frame_jacobian(
     data: Data,
     q: ArrayLike,
     frame: str | int,
-    reference: Literal["local", "world", "local_world_aligned"] = "local",
+    reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
     """The Jacobian J of a frame, (6, nv), linear rows first: the frame's velocity is J v.
@@ -297,6 +357,190 @@ def frame_jacobian(
     >>> arm = condyle.robots.arm7()
     >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
     (6, 7)
+    """
+
+def frame_velocity(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The velocity of a frame, 6 numbers: of its body's point at the origin of the reference (m/s), then of its
+    rotation (rad/s); O(n).
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "tool")
+    >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
+    True
+    """
+
+def frame_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
+    velocity, seen from the world, expressed in the reference; O(n).
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_classical_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of its body's point at the origin of the reference
+    (m/s²), then of its rotation (rad/s²); in 'local_world_aligned' p̈ of the frame's origin; O(n).
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "tool", "local_world_aligned")
+    >>> dJ = condyle.frame_jacobian_rate(arm, data, q, v, "tool", "local_world_aligned")
+    >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
+    >>> np.allclose(acceleration, J @ a + dJ @ v)
+    True
+    """
+
+def frame_jacobian_rate(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """dJ/dt, the rate of a frame's Jacobian along v, (6, nv), linear rows first.
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
+    acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
+    frame.
+    """
+
+def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """c, the centre of mass of the moving bodies, 3 numbers, in the world's frame (m); O(n).
+
+    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(com[1]) < 1e-12)  # left and right weigh the same
+    True
+    """
+
+def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """ċ, the velocity of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s); O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def com_acceleration(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """c̈, the acceleration of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s²), without
+    gravity; O(n).
+
+    q: nq numbers; v, a: nv.
+    """
+
+def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """Jcom(q), the Jacobian of the centre of mass: (3, nv), ċ = Jcom v; O(n).
+
+    q: nq numbers. It is a part of `centroidal_map`.
+    """
+
+def centroidal_map(model: Model, data: Data, q: ArrayLike, out: _MapOut | None = None) -> CentroidalMap:
+    """The centroidal momentum matrix Ag(q), hg = Ag v, and what it needs, in O(n), as `CentroidalMap(Ag, Ig, com,
+    Jcom)`.
+
+    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
+    arrays, such as an earlier result.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(map.Ag[0, 0] - quadruped.total_mass) < 1e-9)  # pushed forwards, all goes forwards
+    True
+    """
+
+def centroidal_map_rate(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _MapRateOut | None = None
+) -> CentroidalMapRate:
+    """Ag(q), its rate along v, and the centroidal momentum hg = Ag v, in O(n), as
+    `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`; the rate of hg is Ag a + dAg v.
+
+    q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
+    seven arrays, such as an earlier result.
+    """
+
+def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """hg, the momentum of the moving bodies about their centre of mass, along the world's axes: 6 numbers (kg m/s, then
+    kg m²/s); O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def centroidal_momentum_rate(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The rate of hg, along the world's axes: 6 numbers (N, then N m), the weight and the external forces about the
+    centre of mass; O(n).
+
+    q: nq numbers; v, a: nv.
+    """
+
+def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
+    """T = ½ vᵀ M(q) v, the kinetic energy of the moving bodies and the rotors (J); O(n).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, np.full(7, 0.5)
+    >>> np.isclose(condyle.kinetic_energy(arm, data, q, v), 0.5 * v @ condyle.crba(arm, data, q) @ v).item()
+    True
+    """
+
+def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
+    """V = −m gᵀ c(q), the potential energy of the moving bodies under gravity (J), 0 at the world's origin; O(n).
+
+    q: nq numbers.
+    """
+
+def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
+    """E = T + V, the mechanical energy (J); O(n).
+
+    q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
+    """
+
+def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
+    """What the equations of motion are made of, from one pass to the tips and one back, in O(n depth), as
+    `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
+
+    q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
+    `kinetic_energy` and `potential_energy`, up to rounding.
+
+    >>> arm = condyle.robots.arm7()
+    >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)
+    >>> terms.M.shape, terms.h.shape, terms.centroidal.Ag.shape
+    ((7, 7), (7,), (6, 7))
     """
 
 def rnea(
@@ -379,6 +623,26 @@ def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -
     True
     """
 
+def static_torque(
+    model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
+) -> _Array:
+    """τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, nv numbers (N m, N); O(n).
+
+    q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
+    """
+
+def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """C(q, v), the Coriolis matrix by Christoffel symbols: (nv, nv), C v = h − g, Ṁ = C + Cᵀ; O(n depth).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
+    >>> h, g = condyle.nonlinear_effects(arm, data, q, v), condyle.gravity(arm, data, q)
+    >>> np.allclose(condyle.coriolis_matrix(arm, data, q, v) @ v, h - g)
+    True
+    """
+
 def rnea_derivatives(
     model: Model,
     data: Data,
@@ -422,6 +686,55 @@ def aba_derivatives(
     True
     """
 
+def joint_torque_regressor(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """Y(q, v, a) with τ = Y π: (nv, 10 (nbodies − 1)), `rnea` as a linear function of `Model.inertial_parameters`; O(n
+    depth).
+
+    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
+    >>> Y = condyle.joint_torque_regressor(arm, data, q, v, a)
+    >>> np.allclose(Y @ arm.inertial_parameters, condyle.rnea(arm, data, q, v, a))
+    True
+    """
+
+def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """y(q, v) with T = y · π: 10 (nbodies − 1) numbers, `kinetic_energy` as a linear function of
+    `Model.inertial_parameters`, without the rotors; O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """y(q) with V = y · π: 10 (nbodies − 1) numbers, `potential_energy` as a linear function of
+    `Model.inertial_parameters`; O(n).
+
+    q: nq numbers.
+    """
+
+def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
+    """τ = −d v − f tanh(v/ε): the efforts of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
+    O(n).
+
+    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
+    them: whoever wants them adds them to τ.
+
+    >>> arm = condyle.robots.arm7()
+    >>> v = np.ones(7)
+    >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
+    True
+    """
+
+def passive_torque_derivative(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
+    """∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`: nv numbers, the diagonal of a matrix without other
+    entries; O(n).
+
+    v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
+    """
+
 def neutral(model: Model) -> _Array:
     """The position in which every body is at its joint's frame, nq numbers: zeros, and rotations by nothing.
 
@@ -452,6 +765,47 @@ def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = 
     """q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one; nv numbers.
 
     q0, q1: nq numbers.
+    """
+
+def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Array | None = None) -> _Array:
+    """q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity, nq numbers.
+
+    q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
+
+    >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
+    array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
+    """
+
+def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
+    """‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+
+    q0, q1: nq numbers.
+    """
+
+def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
+    `out`.
+
+    q: nq numbers.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> q = condyle.neutral(quadruped)
+    >>> q[6] = 2.0
+    >>> np.array_equal(condyle.normalize(quadruped, q), condyle.neutral(quadruped))
+    True
+    """
+
+def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
+    """The columns of X, tangent vectors at q ⊕ v, taken to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+
+    v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
+    `transport` with −v.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> v = np.full(18, 0.1)
+    >>> J = condyle.integrate_jacobian(quadruped, v, "position")
+    >>> np.allclose(condyle.transport(quadruped, v, J), np.eye(18))
+    True
     """
 
 def integrate_jacobian(

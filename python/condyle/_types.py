@@ -30,6 +30,53 @@ class AbaDerivatives(NamedTuple):
     """∂q̈/∂τ = M(q)⁻¹."""
 
 
+class CentroidalMap(NamedTuple):
+    """What depends on the position in hg = Ag(q) v; the axes are the world's."""
+
+    Ag: NDArray[np.float64]
+    """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
+    Ig: NDArray[np.float64]
+    """The inertia of all moving bodies about their centre of mass, as if they were one, (6, 6): [m 1, 0; 0, Ī]."""
+    com: NDArray[np.float64]
+    """c, the centre of mass in the world's frame (m), 3 numbers."""
+    Jcom: NDArray[np.float64]
+    """The Jacobian of c, (3, nv): ċ = Jcom v."""
+
+
+class CentroidalMapRate(NamedTuple):
+    """hg = Ag(q) v, and what its rate Ag a + dAg v depends on; the axes are the world's."""
+
+    Ag: NDArray[np.float64]
+    """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
+    dAg: NDArray[np.float64]  # noqa: N815
+    """dAg/dt along the velocity, (6, nv)."""
+    hg: NDArray[np.float64]
+    """The momentum about the centre of mass, along the axes of the world (kg m/s, kg m²/s), 6 numbers."""
+    Ig: NDArray[np.float64]
+    """The inertia of all moving bodies about their centre of mass, as if they were one, (6, 6): [m 1, 0; 0, Ī]."""
+    com: NDArray[np.float64]
+    """c, the centre of mass in the world's frame (m), 3 numbers."""
+    com_velocity: NDArray[np.float64]
+    """ċ, its velocity (m/s), 3 numbers."""
+    Jcom: NDArray[np.float64]
+    """The Jacobian of c, (3, nv): ċ = Jcom v."""
+
+
+class AllTerms(NamedTuple):
+    """What the equations of motion M a + h = τ are made of, momentum and energies."""
+
+    M: NDArray[np.float64]
+    """M(q), (nv, nv), as of `crba`."""
+    h: NDArray[np.float64]
+    """h(q, v), nv numbers, as of `nonlinear_effects`."""
+    centroidal: CentroidalMapRate
+    """Momentum, its map and the map's rate, centre of mass, as of `centroidal_map_rate`."""
+    kinetic_energy: float
+    """T = ½ vᵀ M v (J)."""
+    potential_energy: float
+    """V = −m gᵀ c (J)."""
+
+
 class Frame(NamedTuple):
     """A frame fixed to a body."""
 
@@ -79,7 +126,17 @@ class Mimic(NamedTuple):
 
 
 # to users they are members of `condyle`, and are pickled as such
-for _class in (RneaDerivatives, AbaDerivatives, Frame, Inertia, Limits, Mimic):
+for _class in (
+    RneaDerivatives,
+    AbaDerivatives,
+    CentroidalMap,
+    CentroidalMapRate,
+    AllTerms,
+    Frame,
+    Inertia,
+    Limits,
+    Mimic,
+):
     _class.__module__ = "condyle"
 
 

@@ -165,6 +165,53 @@ pub(crate) fn gravity<'py>(
     give(py, g, out)
 }
 
+/// τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, nv numbers (N m, N); O(n).
+///
+/// q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
+#[pyfunction]
+#[pyo3(signature = (model, data, q, f_ext=None, out=None))]
+pub(crate) fn static_torque<'py>(
+    model: &Bound<'py, Model>,
+    data: &Bound<'py, Data>,
+    q: &Bound<'py, PyAny>,
+    f_ext: Option<&Bound<'py, PyAny>>,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), model.get());
+    let mut data = scratch(model, data)?;
+    let Data { inner, forces, .. } = &mut *data;
+    let q = vector("q", q, model.inner.nq())?;
+    let tau = condyle::static_torque(&model.inner, inner, &q, external(forces, f_ext)?);
+    drop(q);
+    give(py, tau, out)
+}
+
+/// C(q, v), the Coriolis matrix by Christoffel symbols: (nv, nv), C v = h − g, Ṁ = C + Cᵀ; O(n depth).
+///
+/// q: nq numbers; v: nv.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
+/// >>> h, g = condyle.nonlinear_effects(arm, data, q, v), condyle.gravity(arm, data, q)
+/// >>> np.allclose(condyle.coriolis_matrix(arm, data, q, v) @ v, h - g)
+/// True
+#[pyfunction]
+#[pyo3(signature = (model, data, q, v, out=None))]
+pub(crate) fn coriolis_matrix<'py>(
+    model: &Bound<'py, Model>,
+    data: &Bound<'py, Data>,
+    q: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), model.get());
+    let mut data = scratch(model, data)?;
+    let (q, v) = (vector("q", q, model.inner.nq())?, vector("v", v, model.inner.nv())?);
+    let C = condyle::coriolis_matrix(&model.inner, &mut data.inner, &q, &v);
+    drop((q, v));
+    give_matrix(py, C, out)
+}
+
 /// The derivatives of `rnea` with respect to q, v and a, exact, in O(n depth), as
 /// `RneaDerivatives(dtau_dq, dtau_dv, dtau_da)`, each (nv, nv).
 ///

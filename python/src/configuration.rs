@@ -1,9 +1,10 @@
 //! The space of positions, and its tangent vectors.
 
-use crate::arrays::{give, give_matrix, vector};
+use crate::arrays::{give, give_matrix, matrix, vector};
 use crate::model::Model;
 use condyle::{DifferenceArgument, IntegrateArgument};
 use nalgebra::DMatrix;
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rand::SeedableRng;
@@ -71,6 +72,90 @@ pub(crate) fn difference<'py>(
     condyle::difference(model, &q0, &q1, &mut v);
     drop((q0, q1));
     give(py, &v, out)
+}
+
+/// q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity, nq numbers.
+///
+/// q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
+///
+/// >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
+/// array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
+#[pyfunction]
+#[pyo3(signature = (model, q0, q1, t, out=None))]
+pub(crate) fn interpolate<'py>(
+    model: &Bound<'py, Model>,
+    q0: &Bound<'py, PyAny>,
+    q1: &Bound<'py, PyAny>,
+    t: f64,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), &model.get().inner);
+    let (q0, q1) = (vector("q0", q0, model.nq())?, vector("q1", q1, model.nq())?);
+    let (mut tangent, mut q) = (vec![0.0; model.nv()], vec![0.0; model.nq()]);
+    condyle::interpolate(model, &q0, &q1, t, &mut tangent, &mut q);
+    drop((q0, q1));
+    give(py, &q, out)
+}
+
+/// ‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+///
+/// q0, q1: nq numbers.
+#[pyfunction]
+pub(crate) fn distance(model: &Bound<'_, Model>, q0: &Bound<'_, PyAny>, q1: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let model = &model.get().inner;
+    let (q0, q1) = (vector("q0", q0, model.nq())?, vector("q1", q1, model.nq())?);
+    Ok(condyle::distance(model, &q0, &q1, &mut vec![0.0; model.nv()]))
+}
+
+/// q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
+/// `out`.
+///
+/// q: nq numbers.
+///
+/// >>> quadruped = condyle.robots.quadruped()
+/// >>> q = condyle.neutral(quadruped)
+/// >>> q[6] = 2.0
+/// >>> np.array_equal(condyle.normalize(quadruped, q), condyle.neutral(quadruped))
+/// True
+#[pyfunction]
+#[pyo3(signature = (model, q, out=None))]
+pub(crate) fn normalize<'py>(
+    model: &Bound<'py, Model>,
+    q: &Bound<'py, PyAny>,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), &model.get().inner);
+    let mut q = vector("q", q, model.nq())?.to_vec();
+    condyle::normalize(model, &mut q);
+    give(py, &q, out)
+}
+
+/// The columns of X, tangent vectors at q ⊕ v, taken to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+///
+/// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
+/// `transport` with −v.
+///
+/// >>> quadruped = condyle.robots.quadruped()
+/// >>> v = np.full(18, 0.1)
+/// >>> J = condyle.integrate_jacobian(quadruped, v, "position")
+/// >>> np.allclose(condyle.transport(quadruped, v, J), np.eye(18))
+/// True
+#[pyfunction]
+#[pyo3(signature = (model, v, X, out=None))]
+pub(crate) fn transport<'py>(
+    model: &Bound<'py, Model>,
+    v: &Bound<'py, PyAny>,
+    X: &Bound<'py, PyAny>,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), &model.get().inner);
+    let v = vector("v", v, model.nv())?;
+    let X = py.import("numpy")?.call_method1("asarray", (X,)).unwrap_or_else(|_| X.clone()); // `matrix` says why not
+    let columns = X.cast::<PyUntypedArray>().ok().and_then(|x| x.shape().get(1).copied()).unwrap_or(1);
+    let mut moved = DMatrix::from_row_slice(model.nv(), columns, &matrix("X", &X, [model.nv(), columns])?);
+    condyle::transport(model, &v, &mut moved);
+    drop(v);
+    give_matrix(py, &moved, out)
 }
 
 /// ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v: (nv, nv), block-diagonal, between tangent spaces; it does not depend on q.

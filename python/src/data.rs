@@ -68,7 +68,10 @@ pub(crate) fn regular(model: &Model) -> PyResult<()> {
 }
 
 /// The external forces of a call: one row for each body, or none at all.
-pub(crate) fn external<'a>(forces: &'a mut [Force<f64>], f_ext: Option<&Bound<'_, PyAny>>) -> PyResult<&'a [Force<f64>]> {
+pub(crate) fn external<'a>(
+    forces: &'a mut [Force<f64>],
+    f_ext: Option<&Bound<'_, PyAny>>,
+) -> PyResult<&'a [Force<f64>]> {
     let Some(f_ext) = f_ext else { return Ok(&[]) };
     let rows: Input<'_, Ix2> = matrix("f_ext", f_ext, [forces.len(), 6])?;
     for (force, &row) in forces.iter_mut().zip(rows.as_chunks::<6>().0) {

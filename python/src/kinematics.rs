@@ -105,3 +105,121 @@ pub(crate) fn frame_jacobian<'py>(
     drop(q);
     give_matrix(py, jacobian, out)
 }
+
+/// The velocity of a frame, 6 numbers: of its body's point at the origin of the reference (m/s), then of its
+/// rotation (rad/s); O(n).
+///
+/// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
+/// >>> J = condyle.frame_jacobian(arm, data, q, "tool")
+/// >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
+/// True
+#[pyfunction]
+#[pyo3(signature = (model, data, q, v, frame, reference="local", out=None))]
+pub(crate) fn frame_velocity<'py>(
+    model: &Bound<'py, Model>,
+    data: &Bound<'py, Data>,
+    q: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+    frame: &Bound<'py, PyAny>,
+    reference: &str,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), model.get());
+    let mut data = scratch(model, data)?;
+    let (frame, reference) = (model.frame_index(frame)?, reference_frame(reference)?);
+    let (q, v) = (vector("q", q, model.inner.nq())?, vector("v", v, model.inner.nv())?);
+    let motion = condyle::forward_velocities(&model.inner, &mut data.inner, &q, &v).frame_velocity(frame, reference);
+    drop((q, v));
+    give(py, &motion.to_array(), out)
+}
+
+/// The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
+/// velocity, seen from the world, expressed in the reference; O(n).
+///
+/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+#[pyfunction]
+#[pyo3(signature = (model, data, q, v, a, frame, reference="local", out=None))]
+pub(crate) fn frame_acceleration<'py>(
+    model: &Bound<'py, Model>,
+    data: &Bound<'py, Data>,
+    q: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+    a: &Bound<'py, PyAny>,
+    frame: &Bound<'py, PyAny>,
+    reference: &str,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), model.get());
+    let mut data = scratch(model, data)?;
+    let (frame, reference) = (model.frame_index(frame)?, reference_frame(reference)?);
+    let (nq, nv) = (model.inner.nq(), model.inner.nv());
+    let (q, v, a) = (vector("q", q, nq)?, vector("v", v, nv)?, vector("a", a, nv)?);
+    let motion =
+        condyle::forward_accelerations(&model.inner, &mut data.inner, &q, &v, &a).frame_acceleration(frame, reference);
+    drop((q, v, a));
+    give(py, &motion.to_array(), out)
+}
+
+/// The classical acceleration of a frame, 6 numbers: v̇ + ω × v of its body's point at the origin of the reference
+/// (m/s²), then of its rotation (rad/s²); in 'local_world_aligned' p̈ of the frame's origin; O(n).
+///
+/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
+/// >>> J = condyle.frame_jacobian(arm, data, q, "tool", "local_world_aligned")
+/// >>> dJ = condyle.frame_jacobian_rate(arm, data, q, v, "tool", "local_world_aligned")
+/// >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
+/// >>> np.allclose(acceleration, J @ a + dJ @ v)
+/// True
+#[pyfunction]
+#[pyo3(signature = (model, data, q, v, a, frame, reference="local", out=None))]
+pub(crate) fn frame_classical_acceleration<'py>(
+    model: &Bound<'py, Model>,
+    data: &Bound<'py, Data>,
+    q: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+    a: &Bound<'py, PyAny>,
+    frame: &Bound<'py, PyAny>,
+    reference: &str,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), model.get());
+    let mut data = scratch(model, data)?;
+    let (frame, reference) = (model.frame_index(frame)?, reference_frame(reference)?);
+    let (nq, nv) = (model.inner.nq(), model.inner.nv());
+    let (q, v, a) = (vector("q", q, nq)?, vector("v", v, nv)?, vector("a", a, nv)?);
+    let motion = condyle::forward_accelerations(&model.inner, &mut data.inner, &q, &v, &a)
+        .frame_classical_acceleration(frame, reference);
+    drop((q, v, a));
+    give(py, &motion.to_array(), out)
+}
+
+/// dJ/dt, the rate of a frame's Jacobian along v, (6, nv), linear rows first.
+///
+/// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
+/// acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
+/// frame.
+#[pyfunction]
+#[pyo3(signature = (model, data, q, v, frame, reference="local", out=None))]
+pub(crate) fn frame_jacobian_rate<'py>(
+    model: &Bound<'py, Model>,
+    data: &Bound<'py, Data>,
+    q: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+    frame: &Bound<'py, PyAny>,
+    reference: &str,
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, model) = (model.py(), model.get());
+    let mut data = scratch(model, data)?;
+    let (frame, reference) = (model.frame_index(frame)?, reference_frame(reference)?);
+    let (q, v) = (vector("q", q, model.inner.nq())?, vector("v", v, model.inner.nv())?);
+    let Data { inner, jacobian, .. } = &mut *data;
+    condyle::forward_velocities(&model.inner, inner, &q, &v).frame_jacobian_rate(frame, reference, jacobian);
+    drop((q, v));
+    give_matrix(py, jacobian, out)
+}

@@ -1,9 +1,10 @@
 //! A robot as Python sees it.
 
 use crate::arrays::{give, give_pose, give_rows, named_tuple, output, vector, write_pose};
-use crate::exceptions::{ModelError, ParseError};
-use condyle::{Error, FrameKind, Joint, Sym3, UrdfOptions, Vec3, robots};
-use pyo3::exceptions::{PyIndexError, PyValueError};
+use crate::exceptions::{ModelError, exception};
+use crate::robots::{MAGIC, urdf_options};
+use condyle::{FrameKind, Joint, Sym3, Vec3, inertial_parameters};
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyType};
@@ -66,6 +67,17 @@ impl Model {
         })
     }
 
+    /// The number of a moving body that is given by its joint's name or by number.
+    fn joint_index(&self, joint: &Bound<'_, PyAny>) -> PyResult<usize> {
+        if let Ok(name) = joint.extract::<&str>() {
+            return self.inner.joint(name).map_err(exception);
+        }
+        let (index, count): (isize, _) = (joint.extract()?, self.inner.bodies().len());
+        usize::try_from(index).ok().filter(|i| (1..count).contains(i)).ok_or_else(|| {
+            PyIndexError::new_err(format!("joints: expected names or 1 to {}, found {index}", count - 1))
+        })
+    }
+
     /// Of each joint that has coordinates of its own; 0 of the others.
     fn of_joints(&self, get: impl Fn(&condyle::Body) -> usize) -> Vec<usize> {
         let count = |(i, b): (usize, &condyle::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
@@ -88,7 +100,6 @@ impl Model {
     ///     'spherical' or 'translation'; None fixes the root link to the world.
     /// mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
     ///     their own.
-    ///
     /// strict: whether what is only odd (`warnings`) is an error.
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`.
@@ -241,6 +252,16 @@ impl Model {
         self.inner.bodies().iter().map(inertia).collect()
     }
 
+    /// π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
+    /// xy, yy, xz, yz, zz of the rotational inertia about the origin of the body's frame; what regressors are
+    /// multiplied with.
+    #[getter]
+    fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let bodies = self.inner.bodies()[1..].iter();
+        let pi: Vec<f64> = bodies.flat_map(|b| inertial_parameters::from_inertia(b.inertia)).collect();
+        give(py, &pi, None)
+    }
+
     /// The limits of position, velocity and effort, as `Limits`; infinite where there are none.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -326,6 +347,24 @@ impl Model {
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
         let armature = vector("armature", armature, self.inner.nv())?;
         Ok(Self { inner: self.inner.clone().with_armature(&armature), structure: self.structure })
+    }
+
+    /// The same robot with some joints locked where they are at q.
+    ///
+    /// Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
+    /// locked with it.
+    ///
+    /// joints: a list of names or numbers of bodies.
+    /// q: nq numbers.
+    ///
+    /// >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
+    /// ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
+    ///
+    /// Raises `ModelError`.
+    fn lock(&self, joints: Vec<Bound<'_, PyAny>>, q: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let joints = joints.iter().map(|joint| self.joint_index(joint)).collect::<PyResult<Vec<_>>>()?;
+        let q = vector("q", q, self.inner.nq())?;
+        Ok(self.inner.lock(&joints, &q).map_err(exception)?.into())
     }
 
     /// One line: the robot's name and size.

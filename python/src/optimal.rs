@@ -271,12 +271,7 @@ impl Fddp {
     /// us: controls, (N, nu).
     ///
     /// Raises `ProblemError` for numbers or settings that make no sense. How the solve ended is the solution's status.
-    fn solve<'py>(
-        &self,
-        py: Python<'py>,
-        xs: &Bound<'_, PyAny>,
-        us: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut problem = lock("problem", &self.problem.get().0)?;
         let mut solver = lock("solver", &self.solver)?;
         let (horizon, nx, ndx, nu) = (problem.horizon(), problem.nx(), problem.ndx(), problem.nu(0));

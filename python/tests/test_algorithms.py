@@ -1,8 +1,10 @@
 """What must hold between the functions, whatever the robot; that the numbers are right is for tests/peers to say."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from sample import Robot
 
@@ -80,6 +82,104 @@ def test_kinematics(robot: Robot) -> None:
         np.testing.assert_allclose(world[:3] + np.cross(J[3:].T, translation).T, J[:3], **CLOSE)
 
 
+@pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
+def test_motion_of_frames(robot: Robot, reference: Any) -> None:
+    """V = J v, A = J a + dJ v, and dJ by differences along the motion."""
+    model, data, q, v, a, *_ = robot
+    for frame in range(0, len(model.frames), 5):
+
+        def jacobian(t: NDArray[np.float64], frame: int = frame) -> NDArray[np.float64]:
+            return condyle.frame_jacobian(model, data, condyle.integrate(model, q, t[0] * v), frame, reference).ravel()
+
+        J = condyle.frame_jacobian(model, data, q, frame, reference)
+        dJ = condyle.frame_jacobian_rate(model, data, q, v, frame, reference)
+        np.testing.assert_allclose(dJ.ravel(), central(jacobian, 1)[:, 0], **DIFFERENCES)
+        velocity = condyle.frame_velocity(model, data, q, v, frame, reference)
+        np.testing.assert_allclose(velocity, J @ v, **CLOSE)
+        spatial = condyle.frame_acceleration(model, data, q, v, a, frame, reference)
+        classical = condyle.frame_classical_acceleration(model, data, q, v, a, frame, reference)
+        acceleration = classical if reference == "local_world_aligned" else spatial
+        np.testing.assert_allclose(acceleration, J @ a + dJ @ v, **CLOSE)
+        np.testing.assert_allclose(classical[:3], spatial[:3] + np.cross(velocity[3:], velocity[:3]), **CLOSE)
+        assert np.array_equal(classical[3:], spatial[3:])
+
+
+def test_centre_of_mass_and_momentum(robot: Robot) -> None:
+    model, data, q, v, a, *_ = robot
+    rate, still = condyle.centroidal_map_rate(model, data, q, v), condyle.centroidal_map(model, data, q)
+    for field in still._fields:
+        np.testing.assert_allclose(getattr(rate, field), getattr(still, field), **CLOSE)
+    assert np.array_equal(condyle.com_jacobian(model, data, q), still.Jcom)
+    np.testing.assert_allclose(condyle.com(model, data, q), still.com, **CLOSE)
+    along = central(lambda e: condyle.com(model, data, condyle.integrate(model, q, e)), model.nv)
+    np.testing.assert_allclose(still.Jcom, along, **DIFFERENCES)
+    np.testing.assert_allclose(condyle.com_velocity(model, data, q, v), still.Jcom @ v, **CLOSE)
+    np.testing.assert_allclose(rate.com_velocity, still.Jcom @ v, **CLOSE)
+    hg, dhg = condyle.centroidal_momentum(model, data, q, v), condyle.centroidal_momentum_rate(model, data, q, v, a)
+    np.testing.assert_allclose(hg, still.Ag @ v, **CLOSE)
+    np.testing.assert_allclose(rate.hg, hg, **CLOSE)
+    np.testing.assert_allclose(dhg, still.Ag @ a + rate.dAg @ v, **CLOSE)
+    mass = sum(inertia.mass for inertia in model.inertias[1:])
+    np.testing.assert_allclose(condyle.com_acceleration(model, data, q, v, a), dhg[:3] / mass, **CLOSE)
+    np.testing.assert_allclose(still.Ig[:3], mass * np.eye(3, 6), **CLOSE)
+    assert np.array_equal(still.Ig, still.Ig.T)
+    if model.joint_types[1] == "free_flyer":  # if all turns as one, hg = Ig times its velocity at the centre of mass
+        turn = np.r_[0.0, 0, 0, 1, 2, 3, np.zeros(model.nv - 6)]
+        omega = condyle.frame_velocity(model, data, q, turn, "root_joint", "local_world_aligned")[3:]
+        np.testing.assert_allclose((still.Ag @ turn)[3:], still.Ig[3:, 3:] @ omega, **CLOSE)
+
+
+def test_energies(robot: Robot) -> None:
+    model, data, q, v, *_ = robot
+    T, V = condyle.kinetic_energy(model, data, q, v), condyle.potential_energy(model, data, q)
+    assert np.isclose(T, 0.5 * v @ condyle.crba(model, data, q) @ v, **CLOSE)
+    assert np.isclose(condyle.mechanical_energy(model, data, q, v), T + V, **CLOSE)
+    slope = central(
+        lambda e: np.array([condyle.potential_energy(model, data, condyle.integrate(model, q, e))]), model.nv
+    )
+    np.testing.assert_allclose(condyle.gravity(model, data, q), slope[0], **DIFFERENCES)
+
+
+def test_equations_of_motion(robot: Robot) -> None:
+    model, data, q, v, a, _, f_ext = robot
+    M, h = condyle.crba(model, data, q), condyle.nonlinear_effects(model, data, q, v)
+    C = condyle.coriolis_matrix(model, data, q, v)
+    np.testing.assert_allclose(C @ v, h - condyle.gravity(model, data, q), **CLOSE)
+    np.testing.assert_allclose(
+        condyle.static_torque(model, data, q, f_ext), condyle.rnea(model, data, q, 0 * v, 0 * a, f_ext), **CLOSE
+    )
+    terms = condyle.compute_all_terms(model, data, q, v)
+    np.testing.assert_allclose(terms.M, M, **CLOSE)
+    np.testing.assert_allclose(terms.h, h, **CLOSE)
+    for ours, alone in zip(terms.centroidal, condyle.centroidal_map_rate(model, data, q, v), strict=True):
+        np.testing.assert_allclose(ours, alone, **CLOSE)
+    assert np.isclose(terms.kinetic_energy, condyle.kinetic_energy(model, data, q, v), **CLOSE)
+    assert np.isclose(terms.potential_energy, condyle.potential_energy(model, data, q), **CLOSE)
+
+
+def test_regressors(robot: Robot) -> None:
+    model, data, q, v, a, *_ = robot
+    model = model.with_armature(np.full(model.nv, 0.1))
+    pi = model.inertial_parameters
+    Y = condyle.joint_torque_regressor(model, data, q, v, a)
+    np.testing.assert_allclose(Y @ pi + 0.1 * a, condyle.rnea(model, data, q, v, a), **CLOSE)
+    T = condyle.kinetic_energy_regressor(model, data, q, v) @ pi + 0.05 * v @ v
+    assert np.isclose(T, condyle.kinetic_energy(model, data, q, v), **CLOSE)
+    V = condyle.potential_energy_regressor(model, data, q) @ pi
+    assert np.isclose(V, condyle.potential_energy(model, data, q), **CLOSE)
+
+
+def test_passive_torque() -> None:
+    joint = '<dynamics damping="0.5" friction="2"/>'
+    text = condyle.robots.ARM7.replace("<dynamics", "<ignored").replace("</joint>", joint + "</joint>")
+    model = condyle.Model.from_urdf_string(text)
+    assert np.array_equal(model.friction, np.full(7, 2.0))
+    v = np.linspace(-0.1, 0.2, 7)
+    np.testing.assert_allclose(condyle.passive_torque(model, v, 0.1), -0.5 * v - 2 * np.tanh(v / 0.1), **CLOSE)
+    slope = central(lambda e: condyle.passive_torque(model, v + e, 0.1), 7)
+    np.testing.assert_allclose(np.diag(condyle.passive_torque_derivative(model, v, 0.1)), slope, **DIFFERENCES)
+
+
 def test_frames_by_name_and_number(quadruped: Robot) -> None:
     model, data, q, *_ = quadruped
     by_name = condyle.frame_placement(model, data, q, "LF_foot")
@@ -102,6 +202,20 @@ def test_positions(robot: Robot) -> None:
     np.testing.assert_allclose(condyle.difference_jacobian(model, 0.3 * v, "to"), to, **DIFFERENCES)
     origin = central(lambda e: condyle.difference(model, condyle.integrate(model, q, e), q1), model.nv)
     np.testing.assert_allclose(condyle.difference_jacobian(model, 0.3 * v, "from"), origin, **DIFFERENCES)
+
+
+def test_between_positions(robot: Robot) -> None:
+    model, _, q, v, *_ = robot
+    v = 0.3 * v
+    q1 = condyle.integrate(model, q, v)
+    np.testing.assert_allclose(condyle.interpolate(model, q, q1, 0.25), condyle.integrate(model, q, v / 4), **CLOSE)
+    assert np.isclose(condyle.distance(model, q, q1), np.linalg.norm(v), **CLOSE)
+    stretched = q.copy()
+    stretched[3:7] *= 2.0 if model.joint_types[1] == "free_flyer" else 1.0
+    np.testing.assert_allclose(condyle.normalize(model, stretched), q, **CLOSE)
+    X = np.random.default_rng(2).standard_normal((model.nv, 3))
+    J = condyle.integrate_jacobian(model, v, "position")
+    np.testing.assert_allclose(J @ condyle.transport(model, v, X), X, **CLOSE)
 
 
 def test_random_configuration(robot: Robot) -> None:

@@ -25,6 +25,26 @@ def calls(robot: Robot) -> dict[str, Call]:
         "forward_kinematics": lambda **k: condyle.forward_kinematics(model, data, q, **k),
         "frame_placement": lambda **k: condyle.frame_placement(model, data, q, 1, **k),
         "frame_jacobian": lambda **k: condyle.frame_jacobian(model, data, q, 1, **k),
+        "static_torque": lambda **k: condyle.static_torque(model, data, q, f_ext, **k),
+        "coriolis_matrix": lambda **k: condyle.coriolis_matrix(model, data, q, v, **k),
+        "frame_velocity": lambda **k: condyle.frame_velocity(model, data, q, v, 1, **k),
+        "frame_acceleration": lambda **k: condyle.frame_acceleration(model, data, q, v, a, 1, **k),
+        "frame_classical_acceleration": lambda **k: condyle.frame_classical_acceleration(model, data, q, v, a, 1, **k),
+        "frame_jacobian_rate": lambda **k: condyle.frame_jacobian_rate(model, data, q, v, 1, **k),
+        "com": lambda **k: condyle.com(model, data, q, **k),
+        "com_velocity": lambda **k: condyle.com_velocity(model, data, q, v, **k),
+        "com_acceleration": lambda **k: condyle.com_acceleration(model, data, q, v, a, **k),
+        "com_jacobian": lambda **k: condyle.com_jacobian(model, data, q, **k),
+        "centroidal_momentum": lambda **k: condyle.centroidal_momentum(model, data, q, v, **k),
+        "centroidal_momentum_rate": lambda **k: condyle.centroidal_momentum_rate(model, data, q, v, a, **k),
+        "joint_torque_regressor": lambda **k: condyle.joint_torque_regressor(model, data, q, v, a, **k),
+        "kinetic_energy_regressor": lambda **k: condyle.kinetic_energy_regressor(model, data, q, v, **k),
+        "potential_energy_regressor": lambda **k: condyle.potential_energy_regressor(model, data, q, **k),
+        "passive_torque": lambda **k: condyle.passive_torque(model, v, 0.01, **k),
+        "passive_torque_derivative": lambda **k: condyle.passive_torque_derivative(model, v, 0.01, **k),
+        "interpolate": lambda **k: condyle.interpolate(model, q, q, 0.5, **k),
+        "normalize": lambda **k: condyle.normalize(model, q, **k),
+        "transport": lambda **k: condyle.transport(model, v, np.outer(v, [1.0, 2.0]), **k),
         "integrate": lambda **k: condyle.integrate(model, q, v, **k),
         "difference": lambda **k: condyle.difference(model, q, q, **k),
         "integrate_jacobian": lambda **k: condyle.integrate_jacobian(model, v, "velocity", **k),
@@ -38,6 +58,8 @@ def several(robot: Robot) -> dict[str, Call]:
     return {
         "rnea_derivatives": lambda **k: condyle.rnea_derivatives(model, data, q, v, a, f_ext, **k),
         "aba_derivatives": lambda **k: condyle.aba_derivatives(model, data, q, v, tau, f_ext, **k),
+        "centroidal_map": lambda **k: condyle.centroidal_map(model, data, q, **k),
+        "centroidal_map_rate": lambda **k: condyle.centroidal_map_rate(model, data, q, v, **k),
     }
 
 
@@ -53,6 +75,26 @@ def test_shapes(robot: Robot) -> None:
         "forward_kinematics": (nb, 4, 4),
         "frame_placement": (4, 4),
         "frame_jacobian": (6, nv),
+        "static_torque": (nv,),
+        "coriolis_matrix": (nv, nv),
+        "frame_velocity": (6,),
+        "frame_acceleration": (6,),
+        "frame_classical_acceleration": (6,),
+        "frame_jacobian_rate": (6, nv),
+        "com": (3,),
+        "com_velocity": (3,),
+        "com_acceleration": (3,),
+        "com_jacobian": (3, nv),
+        "centroidal_momentum": (6,),
+        "centroidal_momentum_rate": (6,),
+        "joint_torque_regressor": (nv, 10 * (nb - 1)),
+        "kinetic_energy_regressor": (10 * (nb - 1),),
+        "potential_energy_regressor": (10 * (nb - 1),),
+        "passive_torque": (nv,),
+        "passive_torque_derivative": (nv,),
+        "interpolate": (nq,),
+        "normalize": (nq,),
+        "transport": (nv, 2),
         "integrate": (nq,),
         "difference": (nv,),
         "integrate_jacobian": (nv, nv),
@@ -67,6 +109,10 @@ def test_shapes(robot: Robot) -> None:
         assert array.flags.writeable, name
     assert [x.shape for x in several(robot)["rnea_derivatives"]()] == [(nv, nv)] * 3
     assert [x.shape for x in several(robot)["aba_derivatives"]()] == [(nv,)] + [(nv, nv)] * 3
+    map_shapes = {"Ag": (6, nv), "dAg": (6, nv), "hg": (6,), "Ig": (6, 6), "com": (3,), "Jcom": (3, nv)}
+    for name in ("centroidal_map", "centroidal_map_rate"):
+        for field, x in several(robot)[name]()._asdict().items():
+            assert x.shape == map_shapes.get(field, (3,)), field
 
 
 def test_results_belong_to_the_caller(robot: Robot) -> None:
@@ -190,6 +236,14 @@ def test_wrong_words(quadruped: Robot) -> None:
         condyle.integrate_jacobian(model, v, "q")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="^argument: expected 'from' or 'to', found 'q'"):
         condyle.difference_jacobian(model, v, "q")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="^smoothing: expected a positive speed, found 0$"):
+        condyle.passive_torque(model, v, 0.0)
+    with pytest.raises(ValueError, match=r"^X: expected shape \(18, 2\), found \(17, 2\)$"):
+        condyle.transport(model, v, np.zeros((17, 2)))
+    with pytest.raises(ValueError, match=r"^X: expected shape \(18, 1\), found \(18,\)$"):
+        condyle.transport(model, v, v)
+    with pytest.raises(ValueError, match="^X: "):
+        condyle.transport(model, v, [[1.0], [1.0, 2.0]])
 
 
 def test_an_array_that_fails_to_convert_tells_so(quadruped: Robot) -> None:

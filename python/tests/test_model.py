@@ -120,6 +120,81 @@ def test_continuous_joints_have_limits_of_speed_and_effort_only() -> None:
     assert np.array_equal(limits.effort, [4, 1])
 
 
+ODD = PENDULUM.replace('ixx="0.3"', 'ixx="0.25"')
+"""Without mass at its tip, but otherwise a body that can be."""
+
+
+def test_warnings() -> None:
+    assert condyle.Model.from_urdf_string(PENDULUM).warnings[0].startswith("body `rod`: principal moments 0.96")
+    model = condyle.Model.from_urdf_string(ODD)
+    assert model.warnings == [
+        "body `finger` moves and has no mass",
+        "joint `slide` moves nothing that has inertia along it: the inertia matrix is singular",
+    ]
+    assert model.singular_joints == [model.joint("slide")]
+    sound = condyle.Model.from_urdf_string(ODD.replace("prismatic", "fixed"), strict=True)
+    assert (sound.warnings, sound.singular_joints) == ([], [])
+
+
+def test_strict(tmp_path: Path) -> None:
+    with pytest.raises(condyle.ParseError, match="^<string>: body `finger` moves and has no mass$"):
+        condyle.Model.from_urdf_string(ODD, strict=True)
+    path = tmp_path / "pendulum.urdf"
+    path.write_text(ODD, encoding="utf-8")
+    with pytest.raises(condyle.ParseError, match=r"pendulum\.urdf: body `finger` moves and has no mass$"):
+        condyle.Model.from_urdf(path, strict=True)
+
+
+def test_singular() -> None:
+    """What needs M⁻¹ is refused, the rest is not; a rotor makes M regular."""
+    model = condyle.Model.from_urdf_string(PENDULUM)
+    data, zero = condyle.Data(model), np.zeros(2)
+    message = "^joint `slide` moves nothing that has inertia along it: the inertia matrix is singular$"
+    for function in (condyle.aba, condyle.aba_derivatives):
+        with pytest.raises(condyle.ModelError, match=message):
+            function(model, data, zero, zero, zero)
+    with pytest.raises(condyle.ModelError, match=message):
+        condyle.minv(model, data, zero)
+    assert condyle.crba(model, data, zero)[1, 1] == 0.0
+    geared = model.with_armature([0.0, 0.1])
+    assert geared.singular_joints == []
+    assert np.isfinite(condyle.aba(geared, data, zero, zero, zero)).all()
+
+
+def test_lock(robot: Robot) -> None:
+    model, data, q, v, a, *_ = robot
+    last = model.nbodies - 1
+    stiff = model.lock([model.names[last - 1], last], q)
+    assert stiff.names == model.names[: last - 1]
+    assert np.isclose(stiff.total_mass, model.total_mass)
+    n = stiff.nv
+    v[n:] = a[n:] = 0.0
+    expected = condyle.rnea(model, data, q, v, a)[:n]
+    own = condyle.Data(stiff)
+    np.testing.assert_allclose(condyle.rnea(stiff, own, q[: stiff.nq], v[:n], a[:n]), expected, atol=1e-9)
+    tip = model.frames[-1].name
+    np.testing.assert_allclose(
+        condyle.frame_placement(stiff, own, q[: stiff.nq], tip),
+        condyle.frame_placement(model, data, q, tip),
+        atol=1e-12,
+    )
+    with pytest.raises(ValueError, match="^data: made for another model"):
+        condyle.rnea(stiff, data, q[: stiff.nq], v[:n], a[:n])
+    for wrong in (0, -1, model.nbodies):
+        with pytest.raises(IndexError, match=rf"^joints: expected names or 1 to {last}, found {wrong}$"):
+            model.lock([wrong], q)
+    with pytest.raises(condyle.ModelError, match="^unknown joint `nothing`; nearest is "):
+        model.lock(["nothing"], q)
+    with pytest.raises(ValueError, match="^q: expected shape "):
+        model.lock([1], [])
+
+
+def test_inertial_parameters() -> None:
+    rod, finger = condyle.Model.from_urdf_string(PENDULUM).inertial_parameters.reshape(2, 10)
+    np.testing.assert_allclose(rod, [3, 0, 0, -4, 6.3, 0.01, 6.2, 0, 0, 0.1], atol=1e-14)
+    assert np.array_equal(finger, np.zeros(10))
+
+
 def test_gravity_and_armature(robot: Robot) -> None:
     model, data, q, v, a, *_ = robot
     weightless = model.with_gravity([0, 0, 0])

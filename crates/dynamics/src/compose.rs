@@ -101,14 +101,7 @@ impl ModelBuilder {
                 armature: model.armature[iv],
             };
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
-            let id = self.body_with(
-                (&names.0, &names.1),
-                on,
-                body.joint,
-                pXp * body.placement,
-                body.inertia,
-                options,
-            );
+            let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
             place.push((id, Se3::identity()));
         }
         for (i, body) in model.bodies.iter().enumerate().skip(1) {

@@ -129,14 +129,7 @@ impl<S: Scalar> DivideConquer<S> {
     /// # Panics
     /// If an argument has the wrong length, `model` is not of the size of the one that was planned for, or M is singular
     /// ([`Model::singular_joints`]).
-    pub fn aba<R: Constant<S>>(
-        &mut self,
-        model: &Model<R>,
-        q: &[S],
-        v: &[S],
-        tau: &[S],
-        f_ext: &[Force<S>],
-    ) -> &[S] {
+    pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes.len(), self.bodies.len() + 1);
         assert!(bodies == planned && model.nv == self.qdd.len(), "model: planned for {planned} bodies, found {bodies}");
         model.check_regular();

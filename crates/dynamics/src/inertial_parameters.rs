@@ -98,21 +98,33 @@ pub fn pseudo_inertia<S: Scalar>(I: Inertia<S>) -> SMatrix<S, 4, 4> {
     )
 }
 
-/// U with J = U Uᵀ, as (U₄₄, diagonal, (s₁₂, s₂₃, s₁₃) times U₄₄, centre of mass); its pivots are the check.
-fn factor(I: Inertia<f64>) -> Result<(f64, Vec3<f64>, Vec3<f64>, Vec3<f64>), NotPhysical> {
+/// U with J = U Uᵀ.
+struct Factor {
+    /// eᵅ.
+    scale: f64,
+    /// eᵅ (e^d₁, e^d₂, e^d₃).
+    diagonal: Vec3<f64>,
+    /// eᵅ (s₁₂, s₂₃, s₁₃).
+    above: Vec3<f64>,
+    /// The centre of mass.
+    t: Vec3<f64>,
+}
+
+/// The factor from the last column to the first; its pivots are the check.
+fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
     let positive = |moment: f64| if moment > 0.0 { Ok(moment.sqrt()) } else { Err(NotPhysical::Spread { moment }) };
     let mass = I.mass;
     if !(mass > 0.0 && mass.is_finite()) {
         return Err(NotPhysical::Mass { mass });
     }
-    let com = I.mass_com.scale(1.0 / mass);
-    let s = second_moments(I.rotational) - Sym3::outer(com).scale(mass); // about the centre of mass
+    let t = I.mass_com.scale(1.0 / mass);
+    let s = second_moments(I.rotational) - Sym3::outer(t).scale(mass); // about the centre of mass
     let z = positive(s.zz)?;
     let (yz, xz) = (s.yz / z, s.xz / z);
     let y = positive(s.yy - yz * yz)?;
     let xy = (s.xy - xz * yz) / y;
     let x = positive(s.xx - xy * xy - xz * xz)?;
-    Ok((mass.sqrt(), Vec3::new(x, y, z), Vec3::new(xy, yz, xz), com))
+    Ok(Factor { scale: mass.sqrt(), diagonal: Vec3::new(x, y, z), above: Vec3::new(xy, yz, xz), t })
 }
 
 /// Whether a body of positive density can have this inertia: J ≻ 0, by the pivots of its Cholesky factor.
@@ -148,7 +160,7 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
 /// # Errors
 /// [`NotPhysical`]: what [`check`] refuses has no logarithm.
 pub fn log_cholesky(I: Inertia<f64>) -> Result<[f64; 10], NotPhysical> {
-    let (scale, diagonal, above, t) = factor(I)?;
+    let Factor { scale, diagonal, above, t } = factor(I)?;
     let d = diagonal.to_array().map(|x| (x / scale).ln());
     let s = above.scale(1.0 / scale);
     Ok([scale.ln(), d[0], d[1], d[2], s.x, s.y, s.z, t.x, t.y, t.z])

@@ -24,8 +24,8 @@ mod builder;
 mod centroidal;
 mod cholesky;
 mod com;
-mod configuration;
 mod compose;
+mod configuration;
 mod coriolis;
 mod crba;
 mod data;
@@ -62,10 +62,10 @@ pub use all_terms::{AllTerms, compute_all_terms};
 pub use assembly::AssemblySize;
 pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 pub use centroidal::{CentroidalMap, CentroidalMapRate, centroidal_map, centroidal_map_rate};
+pub use cholesky::Cholesky;
 pub use condyle_spatial::{
     Act, Constant, Cross, Force, Inertia, Mat3, Motion, Quaternion, Scalar, Se3, Sym3, Vec3, lie,
 };
-pub use cholesky::Cholesky;
 pub use configuration::{
     DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
     interpolate, neutral, normalize, random_configuration, transport,
@@ -76,8 +76,8 @@ pub use data::Data;
 pub use divide_conquer::DivideConquer;
 pub use error::Error;
 pub use forward_dynamics::{Method, forward_dynamics};
-pub use joint::Joint;
 pub use frames::{Accelerations, Placements, ReferenceFrame, Velocities};
+pub use joint::Joint;
 pub use kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
 pub use ltdl::Ltdl;
 pub use minv::minv;

@@ -4,14 +4,15 @@
 //! Mᵢⱼ is zero unless one of the coordinates i, j carries the other. Eliminated from the tips to the root, the matrix
 //! keeps its zeros: row k of L has entries at the coordinates between k and the root and nowhere else.
 //!
-//! Joints that share a coordinate (mimic) couple branches. A shared coordinate is then eliminated where the branches of
-//! its joints have met, and the rows follow the elimination tree of that order (Liu, *The role of elimination trees in
-//! sparse factorization*, 1990): the joints' own tree wherever no coordinate is shared, right everywhere.
+//! Joints that share a coordinate (mimic) couple branches. The coordinates are then eliminated in the order of least
+//! coupling, and the rows follow the elimination tree of that order (Liu, *The role of elimination trees in sparse
+//! factorization*, 1990): the joints' own tree wherever no coordinate is shared, right everywhere.
 
 use crate::data::check;
 use crate::model::{Column, Model};
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
+use std::collections::BTreeSet;
 
 /// Stands for the parent of a root.
 const NONE: usize = usize::MAX;
@@ -41,23 +42,31 @@ const fn step<S: Scalar>() -> usize {
 
 impl Tree {
     fn new(columns: &[Column], nv: usize, step: usize) -> Self {
-        let carried = |c: usize| std::iter::successors(columns[c].parent, |&e| columns[e].parent);
-        let hoisted = hoist(columns, nv);
-        let mut place = vec![0; nv];
-        for (k, &c) in hoisted.iter().enumerate() {
-            place[c] = k;
+        if columns.len() == nv {
+            let (order, parent): (Vec<_>, Vec<_>) = columns.iter().map(|c| (c.coordinate, c.parent.unwrap_or(NONE))).unzip();
+            return Self::depth_first(&order, &parent, step);
         }
-        let mut coupled = vec![Vec::new(); nv]; // of each place, the later ones with which it shares an entry of M
-        for (c, column) in columns.iter().enumerate() {
-            for e in carried(c) {
-                let (i, k) = (place[columns[e].coordinate], place[column.coordinate]);
-                coupled[i.min(k)].push(i.max(k));
+        let mut coupled = vec![BTreeSet::new(); nv]; // of each coordinate, those with which it shares an entry of M
+        for column in columns {
+            let (mut e, k) = (column.parent, column.coordinate);
+            while let Some(ancestor) = e {
+                let i = columns[ancestor].coordinate;
+                if i != k {
+                    coupled[i].insert(k);
+                    coupled[k].insert(i);
+                }
+                e = columns[ancestor].parent;
             }
+        }
+        let order = minimum_degree(coupled.clone());
+        let mut place = vec![0; nv];
+        for (k, &coordinate) in order.iter().enumerate() {
+            place[coordinate] = k;
         }
         // Liu (1990), algorithm 4.1, from the last place to the first
         let mut parent = vec![NONE; nv];
         for i in (0..nv).rev() {
-            for &k in coupled[i].iter().filter(|&&k| k != i) {
+            for k in coupled[order[i]].iter().map(|&k| place[k]).filter(|&k| k > i) {
                 let mut root = k;
                 while parent[root] != NONE && parent[root] != i {
                     root = parent[root];
@@ -67,7 +76,7 @@ impl Tree {
                 }
             }
         }
-        Self::depth_first(&hoisted, &parent, step)
+        Self::depth_first(&order, &parent, step)
     }
 
     /// The same tree with its places numbered depth first, which does not change the rows.
@@ -107,27 +116,25 @@ impl Tree {
     }
 }
 
-/// The coordinates in an order in which each comes before those that it carries; one that is shared by joints on
-/// different branches comes right after the column where these branches have met.
-fn hoist(columns: &[Column], nv: usize) -> Vec<usize> {
-    let mut place: Vec<Option<usize>> = vec![None; nv];
-    for (c, column) in columns.iter().enumerate() {
-        let own = 2 * (c + 1); // even: at this column; odd: right after one, or (1) after the world
-        place[column.coordinate] = Some(match place[column.coordinate] {
-            None => own,
-            Some(other) => {
-                // the last column before both
-                let mut e = if other >= 2 { Some(other / 2 - 1) } else { None };
-                while e.is_some_and(|e| c >= columns[e].end) {
-                    e = e.and_then(|e| columns[e].parent);
-                }
-                let met = e.map_or(1, |e| 2 * (e + 1) + 1);
-                if met == other + 1 { other } else { met }
-            }
-        });
+/// The coordinates, last the one that is coupled with the fewest others, before it the one that then is, and so on (Tinney
+/// and Walker, *Direct solutions of sparse network equations by optimally ordered triangular factorization*, 1967). Of
+/// equals, the one that was coupled with the fewest at first is later, so that a shared coordinate comes before those of
+/// one branch.
+fn minimum_degree(mut coupled: Vec<BTreeSet<usize>>) -> Vec<usize> {
+    let at_first: Vec<usize> = coupled.iter().map(BTreeSet::len).collect();
+    let mut left: BTreeSet<usize> = (0..coupled.len()).collect();
+    let mut order = Vec::new();
+    while let Some(&k) = left.iter().rev().min_by_key(|&&k| (coupled[k].len(), at_first[k])) {
+        left.remove(&k);
+        order.push(k);
+        let others = core::mem::take(&mut coupled[k]);
+        for &i in &others {
+            coupled[i].extend(&others);
+            coupled[i].remove(&i);
+            coupled[i].remove(&k);
+        }
     }
-    let mut order: Vec<usize> = (0..nv).collect();
-    order.sort_by_key(|&k| place[k]);
+    order.reverse();
     order
 }
 
@@ -402,7 +409,8 @@ impl<S: Scalar> Ltdl<S> {
                 }
                 let s = [-L[p - 1], -L[p - 2], -L[p - 3], -L[p - 4]];
                 for j in 0..k {
-                    row[j] = x[0][j].mul_add(s[0], x[1][j].mul_add(s[1], x[2][j].mul_add(s[2], x[3][j].mul_add(s[3], row[j]))));
+                    row[j] = x[0][j]
+                        .mul_add(s[0], x[1][j].mul_add(s[1], x[2][j].mul_add(s[2], x[3][j].mul_add(s[3], row[j]))));
                 }
                 p -= 4;
             }

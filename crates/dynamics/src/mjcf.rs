@@ -92,20 +92,13 @@ fn model(
     let reader = Reader { compiler: Compiler::read(&root)?, defaults: &defaults, bodies: 0, names: HashMap::new() };
     let model = reader.model(&root)?;
     match model.warnings().first() {
-        Some(warning) if options.strict => {
-            Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() })
-        }
+        Some(warning) if options.strict => Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() }),
         _ => Ok(model),
     }
 }
 
 /// Puts what is in included files in place of the `<include>`s.
-fn include(
-    element: &mut Element,
-    folder: Option<&Path>,
-    seen: &mut Vec<PathBuf>,
-    depth: usize,
-) -> Result<(), Error> {
+fn include(element: &mut Element, folder: Option<&Path>, seen: &mut Vec<PathBuf>, depth: usize) -> Result<(), Error> {
     if depth == MAX_DEPTH {
         return Err(element.wrong(format!("is nested more than {MAX_DEPTH} levels deep")));
     }

@@ -33,9 +33,9 @@ impl Model {
     /// **Joints.** `revolute` has one number, limits or not ([`Joint::Revolute`]); `continuous` has q = [cos, sin], as
     /// in a URDF; `ball` is [`Joint::Spherical`]; `universal` and `revolute2` become two revolute joints, the first
     /// called `name#1`, with a body `child#1` between them. `prismatic` and `fixed` are what they say; others
-    /// (`screw`, `gearbox`) are errors unless they close a loop. The body of the model sits at the joint's frame: the
-    /// child link is a frame ([`FrameKind::Link`]) apart from it by the joint's `<pose>`. Siblings are numbered in the
-    /// order of the file.
+    /// (`screw`, `gearbox`) are never part of the tree, and errors where they close no loop. The body of the model
+    /// sits at the joint's frame: the child link is a frame ([`FrameKind::Link`]) apart from it by the joint's
+    /// `<pose>`. Siblings are numbered in the order of the file.
     ///
     /// **Poses** may be `relative_to` links, joints and frames; `<frame>`s become [`FrameKind::User`]. An axis is
     /// `expressed_in` the joint's frame unless it says otherwise; `use_parent_model_frame` of SDF 1.6 means the
@@ -65,7 +65,8 @@ impl Model {
     /// let pendulum = Model::from_sdf_str(sdf, &SdfOptions::default())?;
     /// assert_eq!((pendulum.nq(), pendulum.nv()), (1, 1));
     /// let error = Model::from_sdf_str(&sdf.replace(">rod<", ">bar<"), &SdfOptions::default()).unwrap_err();
-    /// assert_eq!(error.to_string(), "<string>:5: joint `pivot`: no link is named `bar`; nearest is `base`");
+    /// let expected = "<string>:5: joint `pivot`: no link, joint or frame is named `bar`; nearest is `base`";
+    /// assert_eq!(error.to_string(), expected);
     /// # Ok::<(), condyle_dynamics::Error>(())
     /// ```
     ///
@@ -94,15 +95,16 @@ fn model(root: &Element, options: &SdfOptions) -> Result<Model, Error> {
     let mut model = reader.build(gravity, options)?;
     model.warnings.append(&mut reader.warnings);
     match model.warnings.first() {
-        Some(warning) if options.strict => {
-            Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() })
-        }
+        Some(warning) if options.strict => Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() }),
         _ => Ok(model),
     }
 }
 
 /// The name under which joints know the world.
 const WORLD_LINK: &str = "world";
+
+/// The types of joints that a tree can have.
+const KINDS: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "ball", "universal", "revolute2"];
 
 /// A joint, and the links that it connects.
 struct Edge<'a> {
@@ -170,9 +172,10 @@ impl<'a> Reader<'a> {
         let mut loops = Vec::new();
         while let Some(link) = line.pop_front() {
             for &i in joints_on.get(link).into_iter().flatten() {
-                let child = self.edges[i].child;
-                if let Some(first) = reached.get(child) {
-                    loops.push((i, *first));
+                let Edge { element, child, .. } = self.edges[i];
+                let kind = element.attribute("type").unwrap_or_default();
+                if reached.contains_key(child) || !KINDS.contains(&kind) {
+                    loops.push(i);
                     continue;
                 }
                 reached.insert(child, Some(i));
@@ -180,9 +183,13 @@ impl<'a> Reader<'a> {
                 tree.entry(link).or_insert_with(Vec::new).push(i);
             }
         }
-        for (i, first) in loops {
+        for i in loops {
             let (joint, child) = (self.edges[i].element, self.edges[i].child);
-            let first = first.map_or(String::new(), |j: usize| format!(", after {}", self.edges[j].element.label()));
+            let Some(first) = reached.get(child) else {
+                let kind = joint.attribute("type").unwrap_or_default();
+                return Err(joint.wrong(format!("joints of type `{kind}` are not supported")));
+            };
+            let first = first.map_or(String::new(), |j: usize| format!(" beside {}", self.edges[j].element.label()));
             self.warn(joint, format!("would give link `{child}` a second parent{first}: it closes a loop, left out"));
         }
         match self.model.all("link").find(|l| l.attribute("name").is_some_and(|n| !reached.contains_key(n))) {
@@ -267,11 +274,10 @@ impl<'a> Reader<'a> {
             "continuous" => vec![(Joint::Continuous { axis: axis("axis")? }, "axis")],
             "prismatic" => vec![(Joint::Prismatic { axis: axis("axis")? }, "axis")],
             "ball" => vec![(Joint::Spherical, "")],
-            "universal" | "revolute2" => vec![
+            _ => vec![
                 (Joint::Revolute { axis: axis("axis")? }, "axis"),
                 (Joint::Revolute { axis: axis("axis2")? }, "axis2"),
             ],
-            other => return Err(element.wrong(format!("joints of type `{other}` are not supported"))),
         };
         let (mut body, mut at) = (parent, bXj);
         let count = joints.len();
@@ -348,7 +354,7 @@ fn limits(joint: &Element, axis: &Element, kind: Joint) -> Result<JointOptions, 
     if lower > upper {
         return Err(joint.wrong(format!("lower limit {lower} is above upper limit {upper}")));
     }
-    let bound = |x: f64| (x >= 0.0 && x < f64::INFINITY).then_some(x);
+    let bound = |x: f64| (0.0..f64::INFINITY).contains(&x).then_some(x);
     Ok(JointOptions {
         position: (kind.nq() == 1).then_some((lower, upper)),
         velocity: bound(number(limit, "velocity", -1.0)?),

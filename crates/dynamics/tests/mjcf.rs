@@ -1,7 +1,9 @@
 //! From MJCF to a model, against MuJoCo's numbers (data/make_mujoco.py), and whatever else a file can contain.
 #![allow(non_snake_case)]
 
-use condyle_dynamics::{Data, Error, FrameKind, Joint, MjcfOptions, Model, Vec3, Warning, crba, forward_kinematics, rnea};
+use condyle_dynamics::{
+    Data, Error, FrameKind, Joint, MjcfOptions, Model, Vec3, Warning, crba, forward_kinematics, rnea,
+};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use serde_json::Value;
@@ -48,7 +50,10 @@ fn flat(X: &condyle_dynamics::Se3<f64>) -> Vec<f64> {
 fn against_mujoco(name: &str) {
     let model = Model::from_mjcf(data(&format!("{name}.xml")), &MjcfOptions::default()).unwrap();
     let reference: Value = serde_json::from_str(&text(&format!("{name}_mujoco.json"))).unwrap();
-    assert_eq!((model.nq() as u64, model.nv() as u64), (reference["nq"].as_u64().unwrap(), reference["nv"].as_u64().unwrap()));
+    assert_eq!(
+        (model.nq() as u64, model.nv() as u64),
+        (reference["nq"].as_u64().unwrap(), reference["nv"].as_u64().unwrap())
+    );
     close("armature", model.armature(), &floats(&reference["armature"]));
     close("damping", model.damping(), &floats(&reference["damping"]));
     for (body, range) in model.bodies().iter().skip(1).zip(reference["range"].as_array().unwrap()) {
@@ -87,7 +92,7 @@ fn against_mujoco(name: &str) {
             let w = linear(&v[3..6]);
             let body = R.transpose_mul(linear(&v));
             v[..3].copy_from_slice(&body.to_array());
-            a[..3].copy_from_slice(&(-w.cross_with(body)).to_array());
+            a[..3].copy_from_slice(&(-w.cross(body)).to_array());
         }
         let to_mujoco = |x: &mut [f64]| {
             if free {
@@ -109,16 +114,6 @@ fn against_mujoco(name: &str) {
     let masses: f64 = reference["bodies"].as_object().unwrap().values().filter_map(Value::as_f64).sum();
     if free {
         close("mass", &[model.total_mass()], &[masses]);
-    }
-}
-
-trait CrossWith {
-    fn cross_with(self, o: Self) -> Self;
-}
-
-impl CrossWith for Vec3<f64> {
-    fn cross_with(self, o: Self) -> Self {
-        Vec3::new(self.y * o.z - self.z * o.y, self.z * o.x - self.x * o.z, self.x * o.y - self.y * o.x)
     }
 }
 
@@ -212,8 +207,20 @@ fn what_is_left_out_is_said() {
 }
 
 const PIECES: [&str; 14] = [
-    "<", ">", "\"", "/", "nan", "-1", "1e999", "<body>", "</body>", "<freejoint/>", "<joint type=\"ball\"/>", "<geom/>",
-    "<default class=\"dog\"/>", "é",
+    "<",
+    ">",
+    "\"",
+    "/",
+    "nan",
+    "-1",
+    "1e999",
+    "<body>",
+    "</body>",
+    "<freejoint/>",
+    "<joint type=\"ball\"/>",
+    "<geom/>",
+    "<default class=\"dog\"/>",
+    "é",
 ];
 
 proptest! {

@@ -4,9 +4,10 @@
 mod common;
 
 use common::{State, embedded, normal, rng};
+use condyle_dynamics::simulation::{Integrator, Settings, Simulation};
 use condyle_dynamics::{
-    Data, Inertia, Joint, JointOptions, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, aba, passive_torque,
-    passive_torque_derivative, rnea,
+    Data, Inertia, Joint, JointOptions, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, aba, forward_velocities,
+    passive_torque, passive_torque_derivative, rnea,
 };
 use num_dual::Dual64;
 
@@ -87,6 +88,45 @@ fn acts_only_where_asked_for() {
     let (mut data, mut other) = (Data::new(&with), Data::new(&without));
     assert_eq!(rnea(&with, &mut data, &q, &v, &a, &[]), rnea(&without, &mut other, &q, &v, &a, &[]));
     assert_eq!(aba(&with, &mut data, &q, &v, &tau, &[]), aba(&without, &mut other, &q, &v, &tau, &[]));
+}
+
+/// In a simulation that is asked to, friction stops a sliding body where it should, and energy only falls.
+#[test]
+fn simulations_lose_energy() {
+    const DT: f64 = 1e-3;
+    let mut builder = ModelBuilder::new("sledge");
+    let joint = Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) };
+    let losses = JointOptions { friction: 4.0, ..JointOptions::default() };
+    let I = Inertia::from_com(2.0, Vec3::zero(), Sym3::zero());
+    builder.body_with(("sledge", "rail"), WORLD, joint, Se3::identity(), I, losses);
+    let sledge = builder.build().expect("it is well-formed");
+    for integrator in [Integrator::SemiImplicitEuler, Integrator::RungeKutta4, Integrator::Variational] {
+        let lossless = Settings { integrator, dt: DT, ..Settings::default() };
+        let lossy = Settings { passive: Some(SMOOTHING), ..lossless };
+        let slide = |settings| {
+            let mut simulation = Simulation::new(&sledge, settings);
+            simulation.set_state(&[0.0], &[3.0]);
+            assert!(simulation.run(2000, |_| {}).is_done());
+            (simulation.q()[0], simulation.v()[0])
+        };
+        let (way, speed): (f64, f64) = slide(lossless);
+        assert!((way - 6.0).abs() < 1e-9 && (speed - 3.0).abs() < 1e-9); // not asked for
+        let (way, speed): (f64, f64) = slide(lossy);
+        assert!((way - 3.0 * 3.0 / (2.0 * 4.0 / 2.0)).abs() < 5e-3); // v²/(2 f/m), after 1.5 s
+        assert!(speed.abs() < 1e-3);
+        let model = chain(true);
+        let State { q, v, .. } = State::random(&model, &mut rng(2));
+        let mut data = Data::new(&model);
+        let mut simulation = Simulation::new(&model, lossy);
+        simulation.set_state(&q, &v);
+        let mut last = f64::INFINITY;
+        for _ in 0..20 {
+            let now = forward_velocities(&model, &mut data, simulation.q(), simulation.v()).mechanical_energy();
+            assert!(now < last, "{integrator:?}");
+            last = now;
+            assert!(simulation.run(50, |_| {}).is_done());
+        }
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -26,8 +27,32 @@ ROOT_JOINTS = {
 SELF_STATES = 20
 """At how many states Pinocchio is compared with itself."""
 
-worst: dict[str, tuple[float, float, str]] = defaultdict(lambda: (0.0, 0.0, ""))
-"""For each quantity the greatest (share of the bound, relative difference, where), for the summary."""
+
+@dataclass
+class Record:
+    """How far one quantity was from Pinocchio's, over all robots and states."""
+
+    share: float = 0.0
+    """The greatest difference as a share of what is allowed there."""
+    difference: float = 0.0
+    """The same, relative to 1 + max |theirs|."""
+    bound: float = TOLERANCE
+    """What is allowed there."""
+    where: str = ""
+    """The robot."""
+    robots: set[str] = field(default_factory=set)
+    """All robots that it was compared for."""
+
+    def add(self, difference: float, bound: float, robot: str) -> None:
+        self.robots.add(robot)
+        if not self.where or not difference / bound <= self.share:
+            self.share, self.difference, self.bound, self.where = difference / bound, difference, bound, robot
+
+
+records: dict[str, Record] = defaultdict(Record)
+"""For each quantity what was found, for the summary."""
+sizes: dict[str, tuple[str, int, int, int]] = {}
+"""For each robot that was read its root joint, moving bodies, nq and nv, for the summary."""
 
 
 class Pair:
@@ -39,6 +64,8 @@ class Pair:
         self.theirs = pin.buildModelFromUrdf(path, *root, mimic=mimic)
         self.ours = condyle.Model.from_urdf(path, root_joint=root_joint, mimic=mimic)
         self.their_data, self.data = self.theirs.createData(), condyle.Data(self.ours)
+        if not mimic:
+            sizes[name] = (root_joint or "none", self.ours.nbodies - 1, self.ours.nq, self.ours.nv)
 
     def with_armature(self, armature: np.ndarray) -> "Pair":
         """The same robot, with armature for both."""
@@ -65,8 +92,7 @@ class Pair:
         assert np.isfinite(theirs).all(), f"{what} of {self.name}: Pinocchio's is not finite"
         difference = np.abs(ours - theirs).max() / (1.0 + np.abs(theirs).max())
         bound = max(TOLERANCE, SELF_DISTANCE * self_distance)
-        if not difference / bound <= worst[what][0]:
-            worst[what] = (difference / bound, difference, self.name)
+        records[what].add(float(difference), bound, self.name)
         assert difference <= bound, f"{what} of {self.name}: differs by {difference:.1e}, allowed are {bound:.1e}"
 
 

@@ -20,8 +20,14 @@ def test_random_robot(seed: int, tmp_path: Path) -> None:
     pair = Pair(f"robot {seed}", str(path), root_joint)
     checks.check_model(pair)
     armature = np.random.default_rng(seed).random(pair.ours.nv)
+    for state in pair.states(STATES, seed):
+        checks.check_energy(state)
+        checks.check_lock(state)
     for state in pair.states(STATES, seed) + pair.with_armature(armature).states(STATES, seed):
         checks.check_kinematics(state)
+        checks.check_motion(state)
+        checks.check_centroidal(state)
+        checks.check_equations_of_motion(state)
         checks.check_inverse_dynamics(state)
         checks.check_crba(state)
         checks.check_gravity(state)

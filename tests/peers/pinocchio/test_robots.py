@@ -45,6 +45,7 @@ def test_model(pair: Pair) -> None:
 def test_kinematics(pair: Pair) -> None:
     for state in pair.states(STATES):
         checks.check_kinematics(state)
+        checks.check_motion(state)
 
 
 def test_inverse_dynamics(pair: Pair) -> None:
@@ -53,6 +54,18 @@ def test_inverse_dynamics(pair: Pair) -> None:
         checks.check_crba(state)
         checks.check_gravity(state)
         checks.check_rnea_derivatives(state)
+
+
+def test_centroidal(pair: Pair) -> None:
+    for state in pair.states(STATES):
+        checks.check_centroidal(state)
+        checks.check_energy(state)
+
+
+def test_equations_of_motion(pair: Pair) -> None:
+    for state in pair.states(STATES):
+        checks.check_equations_of_motion(state)
+        checks.check_lock(state)
 
 
 def test_forward_dynamics(pair: Pair) -> None:
@@ -72,4 +85,5 @@ def test_armature(pair: Pair) -> None:
         checks.check_inverse_dynamics(state)
         checks.check_crba(state)
         checks.check_rnea_derivatives(state)
+        checks.check_equations_of_motion(state)
         assert checks.check_forward_dynamics(state)

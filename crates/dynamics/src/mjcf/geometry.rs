@@ -105,8 +105,7 @@ fn shape(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
             let h = 2.0 * size[1];
             let (tube, ball) = (PI * a * a * h, 4.0 / 3.0 * PI * a * a * a);
             let (t, b) = (tube / (tube + ball), ball / (tube + ball));
-            let across =
-                t * (a * a / 4.0 + h * h / 12.0) + b * (0.4 * a * a + h * h / 4.0 + 3.0 / 8.0 * a * h);
+            let across = t * (a * a / 4.0 + h * h / 12.0) + b * (0.4 * a * a + h * h / 4.0 + 3.0 / 8.0 * a * h);
             (tube + ball, [across, across, t * a * a / 2.0 + b * 0.4 * a * a])
         }
     }

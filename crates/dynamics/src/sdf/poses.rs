@@ -21,7 +21,8 @@ impl<'a> Poses<'a> {
         let mut poses = Self { elements: HashMap::new(), mXe: HashMap::new() };
         let named = |e: &&Element| matches!(&*e.tag, "link" | "joint" | "frame");
         for element in model.children.iter().filter(named) {
-            let name = element.attribute("name").filter(|n| !n.is_empty()).ok_or_else(|| element.wrong("has no name"))?;
+            let name =
+                element.attribute("name").filter(|n| !n.is_empty()).ok_or_else(|| element.wrong("has no name"))?;
             if [WORLD_LINK, MODEL].contains(&name) {
                 return Err(element.wrong("the name belongs to SDF"));
             }
@@ -84,7 +85,9 @@ impl<'a> Poses<'a> {
     /// The pose of the model in the world.
     pub(super) fn of_model(&self, model: &Element) -> Result<Se3<f64>, Error> {
         match model.child("pose").and_then(relative_to) {
-            Some(name) if name != WORLD_LINK => Err(model.wrong(format!("a pose relative to `{name}` is not supported"))),
+            Some(name) if name != WORLD_LINK => {
+                Err(model.wrong(format!("a pose relative to `{name}` is not supported")))
+            }
             _ => pose(model, model),
         }
     }
@@ -100,7 +103,8 @@ impl<'a> Poses<'a> {
 
     /// The link that a joint's parent or child names, perhaps through frames.
     pub(super) fn link(&self, joint: &Element, name: &'a str) -> Result<&'a str, Error> {
-        let unknown = |name| joint.wrong(format!("no link is named `{name}`; nearest is `{}`", self.near(name, "link")));
+        let unknown =
+            |name| joint.wrong(format!("no link is named `{name}`; nearest is `{}`", self.near(name, "link")));
         match self.elements.get(name) {
             Some(e) if e.tag == "link" => Ok(name),
             Some(e) if e.tag == "frame" => self.attached(e, name)?.ok_or_else(|| unknown(name)),
@@ -176,8 +180,7 @@ pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
     }
     let [x, y, z, roll, pitch, yaw] = xml::array(&pose.text).map_err(wrong)?;
     let degrees = pose.attribute("degrees").is_some_and(|d| matches!(d, "true" | "1"));
-    let [(sr, cr), (sp, cp), (sy, cy)] =
-        [roll, pitch, yaw].map(|a| if degrees { a.to_radians() } else { a }.sin_cos());
+    let [(sr, cr), (sp, cp), (sy, cy)] = [roll, pitch, yaw].map(|a| if degrees { a.to_radians() } else { a }.sin_cos());
     let rotation = Mat3 {
         x: Vec3::new(cy * cp, sy * cp, -sp),
         y: Vec3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),

@@ -57,22 +57,17 @@ pub struct Settings {
     /// The smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s), if the joints' damping and friction
     /// are to act; `None` for none of either.
     pub passive: Option<f64>,
-    /// Newton's method ends when the momenta balance to within this part of their size.
+    /// Newton's method makes its last iteration, which squares the error, once the momenta balance to within this part of
+    /// their sum.
     pub tolerance: f64,
     /// Newton's method gives up after so many iterations.
     pub max_iterations: usize,
 }
 
 impl Default for Settings {
-    /// Semi-implicit Euler at 1 kHz, no passive torques; 1e-11, which rounding lets every robot reach, and 20.
+    /// Semi-implicit Euler at 1 kHz, no passive torques; 1e-9 and 20.
     fn default() -> Self {
-        Self {
-            integrator: Integrator::SemiImplicitEuler,
-            dt: 1e-3,
-            passive: None,
-            tolerance: 1e-11,
-            max_iterations: 20,
-        }
+        Self { integrator: Integrator::SemiImplicitEuler, dt: 1e-3, passive: None, tolerance: 1e-9, max_iterations: 20 }
     }
 }
 

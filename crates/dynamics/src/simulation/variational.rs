@@ -150,12 +150,6 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
 /// The momentum (kg m²/s, kg m/s) below which nothing counts as moving.
 const STILL: f64 = 1e-30;
 
-/// The greater of two numbers, and NaN if one is.
-#[inline(always)]
-fn greater<S: Scalar>(a: S, b: S) -> S {
-    S::select(b.lt(a), a, b + (a - a))
-}
-
 /// The whole method.
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -191,8 +185,8 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
         for k in 0..model.nv {
             let (inside, outside) = (d.lagrangian.p[k], d.pushed[k].mul_add(half, d.carried[k]));
             d.residual[k] = inside - outside; // M w − J(−y)ᵀ p − h/2 J(−y/2)ᵀ f
-            error = greater(error, d.residual[k].abs());
-            size = greater(size, inside.abs() + d.carried[k].abs() + (d.pushed[k] * half).abs());
+            error += d.residual[k].abs();
+            size += inside.abs() + d.carried[k].abs() + (d.pushed[k] * half).abs();
         }
         // The step that follows squares the error, and completes the derivatives of dual numbers.
         converged = everywhere::<S>(error.lt(size * S::splat(settings.tolerance)));

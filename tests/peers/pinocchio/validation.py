@@ -1,0 +1,100 @@
+"""The table of all differences from Pinocchio, as Markdown, from what the tests of one run have recorded."""
+
+import platform
+
+import comparison
+import numpy as np
+import pinocchio as pin
+import test_mimic
+import test_robots
+
+import condyle
+
+COMMAND = ".venv/pinocchio/bin/pytest tests/peers/pinocchio --validation VALIDATION.md"
+
+HEAD = """# How far from Pinocchio
+
+Every function that both libraries have, called with the same numbers. This file is written by
+
+```
+{command}
+```
+
+with condyle {ours}, Pinocchio {theirs}, NumPy {numpy} and Python {python}; `./test` makes the environment, installs
+condyle into it and runs the same comparisons. Nothing here is edited by hand.
+
+The relative difference is max |ours − theirs| / (1 + max |theirs|), over all entries of a result. It must stay below
+the bound, {tolerance:.0e}; what contains M⁻¹ may instead be {factor:.0f} times as far from Pinocchio as Pinocchio's
+own forward dynamics in the world's frame is from that in the bodies' frames, where that is more. The states are
+random: positions within their limits, the rest standard normal. The robots are those of example-robot-data, and
+random ones (`robot 0`, `robot 1`, …: every kind of joint and of root joint, odd axes, names and orders).
+
+Where the libraries mean different things, the comparison says so in `tests/peers/pinocchio/checks.py`. In short:
+Pinocchio's kinetic energy leaves armature out for revolute joints about axes that are not aligned, so energies are
+compared without armature; its `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q, our `transport` with the inverse, so
+ours is compared as what undoes it; its `dJ` in LOCAL_WORLD_ALIGNED belongs, like ours, to the classical acceleration.
+
+## Differences
+
+Of each quantity the state that comes nearest to its bound.
+
+| Quantity | Bound | Relative difference | Robot | Robots |
+| --- | ---: | ---: | --- | ---: |
+"""
+
+
+def report() -> str:
+    """The whole file."""
+    head = HEAD.format(
+        command=COMMAND,
+        ours=condyle.__version__,
+        theirs=pin.__version__,
+        numpy=np.__version__,
+        python=platform.python_version(),
+        tolerance=comparison.TOLERANCE,
+        factor=comparison.SELF_DISTANCE,
+    )
+    rows = [
+        f"| {what} | {r.bound:.1e} | {r.difference:.1e} | {r.where} | {len(r.robots)} |"
+        for what, r in sorted(comparison.records.items())
+    ]
+    return head + "\n".join([*rows, "", *robots(), ""])
+
+
+def robots() -> list[str]:
+    """All robots of example-robot-data, with what is special about them."""
+    lines = [
+        "## Robots",
+        "",
+        "| Robot | Root joint | Moving bodies | nq | nv | |",
+        "| --- | --- | ---: | ---: | ---: | --- |",
+    ]
+    for name in test_robots.ROBOTS:
+        if name in test_robots.NO_URDF:
+            lines.append(f"| {name} | | | | | refused: {test_robots.NO_URDF[name]} |")
+        elif name in comparison.sizes:
+            root, bodies, nq, nv = comparison.sizes[name]
+            lines.append(f"| {name} | {root} | {bodies} | {nq} | {nv} | {'; '.join(remarks(name))} |")
+    random = [name for name in comparison.sizes if name not in test_robots.ROBOTS]
+    lines += ["", f"And {len(random)} random robots, of {sizes(random)} degrees of freedom."]
+    return lines
+
+
+def sizes(names: list[str]) -> str:
+    """From the least to the greatest number of degrees of freedom."""
+    nvs = [comparison.sizes[name][3] for name in names] or [0]
+    return f"{min(nvs)} to {max(nvs)}"
+
+
+def remarks(name: str) -> list[str]:
+    """What is special about a robot."""
+    found = []
+    if name in test_robots.SINGULAR:
+        found.append("M has no inverse (bodies without mass): forward dynamics only with armature")
+    if name in test_mimic.BROKEN:
+        found.append("with mimic joints refused by both: one follows a joint that is not there")
+    elif name in test_mimic.REFUSED:
+        found.append("with mimic joints refused by Pinocchio, so compared by projection")
+    elif name in test_mimic.ROBOTS:
+        found.append("with mimic joints too")
+    return found
