@@ -51,10 +51,6 @@ fn kind(joint: Joint) -> &'static str {
     }
 }
 
-fn rows(m: Sym3<f64>) -> [Vec3<f64>; 3] {
-    m.full().columns()
-}
-
 impl Model {
     /// The number of a frame that is given by name or by number.
     pub(crate) fn frame_index(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
@@ -245,8 +241,8 @@ impl Model {
             class.call1((
                 I.mass,
                 give(py, &com.to_array(), None)?,
-                give_rows(py, rows(about_com))?,
-                give_rows(py, rows(I.rotational))?,
+                give_rows(py, about_com.full().columns())?,
+                give_rows(py, I.rotational.full().columns())?,
             ))
         };
         self.inner.bodies().iter().map(inertia).collect()

@@ -5,9 +5,14 @@
 //! a tree falls into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983): from each body the
 //! path goes on to the child that carries most. A path is cut in two where both halves, with all that hangs on them,
 //! weigh most nearly the same, and so on; the subtrees that hang on a body are paths of their own. A chain of n bodies
-//! thus has ⌈log₂ n⌉ levels of joins, and any tree O(log n).
+//! thus has ⌈log₂ n⌉ levels of joins, and any tree O(log n). No cut is made below a body that without its load would not
+//! resist its own joint (one without mass, say): the piece above the cut could not be solved on its own.
 
-use crate::model::Model;
+use crate::model::{Body, Model};
+use condyle_spatial::{Act, ArticulatedInertia, Se3, Vec3};
+
+/// A joint whose inertia is a smaller part of its body's mass (kg) and rotational inertia (kg m²) counts as without any.
+const FREE: f64 = 1e-9;
 
 /// Stands for the handle above a piece in place of a parent among its links.
 pub(crate) const HANDLE: usize = usize::MAX;
@@ -85,7 +90,7 @@ pub(crate) struct Assembly {
 }
 
 impl Assembly {
-    /// Runs have at most `grain` bodies.
+    /// Runs have at most `grain` bodies, or more where no cut can be made.
     pub(crate) fn new<R>(model: &Model<R>, grain: usize) -> Self {
         let bodies = model.bodies.len();
         let mut children = vec![Vec::new(); bodies];
@@ -99,7 +104,8 @@ impl Assembly {
             children.sort_by_key(|&i| (usize::MAX - weight[i], i)); // the heaviest first
         }
         let nv = model.bodies.iter().map(|b| b.joint.nv()).collect();
-        let mut plan = Planner { children, weight, nv, grain, pieces: Vec::new(), links: Vec::new() };
+        let firm = model.bodies.iter().map(firm).collect();
+        let mut plan = Planner { children, weight, nv, firm, grain, pieces: Vec::new(), links: Vec::new() };
         if bodies > 1 {
             let roots = plan.children[0].clone();
             plan.gather(&roots);
@@ -126,6 +132,8 @@ struct Planner {
     /// How many bodies each one carries, itself included.
     weight: Vec<usize>,
     nv: Vec<usize>,
+    /// Its own inertia resists each degree of freedom of its joint.
+    firm: Vec<bool>,
     grain: usize,
     pieces: Vec<Piece>,
     links: Vec<Link>,
@@ -152,7 +160,7 @@ impl Planner {
             let path: Vec<usize> = std::iter::successors(Some(root), |&i| self.children[i].first().copied()).collect();
             self.path(&path, false);
         } else {
-            let (left, right) = roots.split_at(halfway(&weights));
+            let (left, right) = roots.split_at(halfway(&weights, |_| true).expect("there are two at least"));
             self.piece(Kind::Gather, false, |plan| {
                 plan.gather(left);
                 plan.gather(right);
@@ -172,12 +180,14 @@ impl Planner {
                 plan.links.push(Link { body, dof: 0, parent: HANDLE, spine: open });
                 plan.gather(&light);
             });
-        } else {
-            let (upper, lower) = path.split_at(halfway(&weights));
+        } else if let Some(cut) = halfway(&weights, |cut| self.firm[path[cut - 1]]) {
+            let (upper, lower) = path.split_at(cut);
             self.piece(Kind::Join, open, |plan| {
                 plan.path(upper, true);
                 plan.path(lower, open);
             });
+        } else {
+            self.piece(Kind::Run, open, |plan| plan.run(&path[..1], if open { path } else { &[] }));
         }
     }
 
@@ -196,13 +206,31 @@ impl Planner {
     }
 }
 
-/// Where to cut a row of weights so that the heavier part is lightest; both parts have at least one.
-fn halfway(weights: &[usize]) -> usize {
+/// Where to cut a row of weights so that the heavier part is lightest, if it may be cut; both parts have at least one.
+fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> {
     let total: usize = weights.iter().sum();
-    let mut left = 0;
-    let heavier = |cut: usize| {
+    let (mut left, mut best) = (0, None);
+    for cut in 1..weights.len() {
         left += weights[cut - 1];
-        (cut, left.max(total - left))
-    };
-    (1..weights.len()).map(heavier).min_by_key(|&(_, heavier)| heavier).expect("there are two at least").0
+        let heavier = left.max(total - left);
+        if may_cut(cut) && best.is_none_or(|(least, _)| heavier < least) {
+            best = Some((heavier, cut));
+        }
+    }
+    best.map(|(_, cut)| cut)
+}
+
+/// Whether each D of the body's joint is positive with nothing hanging on it; in its own frame, where S is constant.
+fn firm(body: &Body) -> bool {
+    let inertia = Se3::new(body.joint.reframing(), Vec3::zero()).act_inv(body.inertia);
+    let rotational = inertia.rotational;
+    let least = FREE * (inertia.mass + rotational.xx + rotational.yy + rotational.zz);
+    let mut Ia = ArticulatedInertia::from(inertia);
+    (0..body.joint.nv()).rev().all(|k| {
+        let S = body.joint.column(&Se3::identity(), k);
+        let U = Ia * S;
+        let D = S.dot(U);
+        Ia = Ia.minus_outer(U, D.recip()); // Iᵃ = I − U D⁻¹ Uᵀ
+        D > least
+    })
 }

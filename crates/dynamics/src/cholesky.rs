@@ -60,8 +60,8 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
 /// use condyle_dynamics::Cholesky;
 /// use nalgebra::dmatrix;
 /// let mut factor = Cholesky::new(2);
-/// factor.factorize(&dmatrix![4.0, 2.0; 2.0, 3.0]);
-/// let mut x = [8.0, 8.0];
+/// factor.factorize(&dmatrix![4.0, 2.0; 2.0, 5.0]);
+/// let mut x = [8.0, 12.0];
 /// factor.solve(&mut x);
 /// assert_eq!(x, [1.0, 2.0]);
 /// ```

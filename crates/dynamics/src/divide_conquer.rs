@@ -1,4 +1,4 @@
-//! Forward dynamics by the divide-and-conquer articulated-body algorithm, in O(log n) steps on as many processors.
+//! Forward dynamics by the divide-and-conquer articulated-body algorithm, in O(log n) steps on O(n) processors.
 //!
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
 //! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999). The robot is cut in two
@@ -7,55 +7,22 @@
 //! and velocities are found the same way, so no pass waits for a chain of bodies. All joints may have armature and any
 //! number of degrees of freedom.
 
-use crate::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link, Piece};
+use crate::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::data::{check, check_forces};
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::layout::{Layout, Single};
 use crate::model::Model;
+use crate::parts::{Body, Dof, Part};
 use crate::two_handles::TwoHandles;
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Motion, Scalar, Se3, Vec3};
-
-/// What is computed of a body; in the world's frame.
-#[derive(Clone, Debug)]
-struct Body<S> {
-    /// λXi. Written by: `relate`.
-    X: Se3<S>,
-    /// oXi. Written by: `place`.
-    oX: Se3<S>,
-    /// Velocity. Written by: `place`.
-    v: Motion<S>,
-    /// v × v_J. Written by: `place`.
-    c: Motion<S>,
-    /// Iᴬ. Written by: `place` and its children.
-    IA: ArticulatedInertia<S>,
-    /// pᴬ. Written by: `place` and its children.
-    pA: Force<S>,
-    /// Acceleration. Written by: `accelerate`.
-    a: Motion<S>,
-}
-
-/// What is computed of a degree of freedom; in the world's frame.
-#[derive(Clone, Debug)]
-struct Dof<S> {
-    /// Written by: `place`.
-    S: Motion<S>,
-    /// U = Iᴬ S. Written by: `eliminate`.
-    U: Force<S>,
-    /// 1/D, D = Sᵀ U + armature. Written by: `eliminate`.
-    D_inv: S,
-    /// τ − Sᵀ pᴬ. Written by: `eliminate`.
-    u: S,
-    /// Joint acceleration. Written by: `accelerate`.
-    qdd: S,
-}
 
 /// Forward dynamics by divide and conquer: the plan for one model, and its scratch.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps: a
-/// chain of n bodies ⌈log₂ n⌉ + 1 levels. A join of two pieces costs some six times as much as the elimination of a body,
-/// a body of a run with two handles some two to three times as much. So on few processors the runs must be long, and
-/// on one, [`aba`](crate::aba()) is faster; `benches/divide_conquer.rs` shows from where on this is.
+/// chain of n bodies ⌈log₂ n⌉ + 1 levels. A join of two pieces costs some ten times as much as the elimination of a body,
+/// a body of a run between two handles half as much again as one in [`aba`](crate::aba()). So on few processors the runs
+/// must be long (n over the number of threads), and on one, `aba` is faster; `benches/divide_conquer.rs` shows when.
 ///
 /// Runs in the pool of rayon in which it is called, else in the global one, with the same bits for any number of
 /// threads. All memory is allocated by [`new`](Self::new), but for what rayon allocates by itself.
@@ -166,62 +133,6 @@ impl<S: Scalar> DivideConquer<S> {
         job.assemble(all.again(), Se3::identity(), Motion::zero());
         job.accelerate(all, world, None);
     }
-}
-
-/// A piece with all of which it is made.
-struct Part<'d, S> {
-    pieces: &'d [Piece],
-    links: &'d [Link],
-    bodies: &'d mut [Body<S>],
-    dofs: &'d mut [Dof<S>],
-    handles: &'d mut [TwoHandles<S>],
-}
-
-impl<'d, S> Part<'d, S> {
-    /// The same once more.
-    #[inline(always)]
-    fn again(&mut self) -> Part<'_, S> {
-        let Self { pieces, links, bodies, dofs, handles } = self;
-        Part { pieces, links, bodies, dofs, handles }
-    }
-
-    /// The piece itself, and all of which it is made.
-    #[inline(always)]
-    fn open(self) -> (Own<'d, S>, Self) {
-        let Piece { kind, open, .. } = self.pieces[0];
-        let (n, dofs) = match kind {
-            Kind::Run => (self.links.len(), self.dofs.len()),
-            Kind::Hub => (1, self.dofs.len() - self.pieces[1].dofs),
-            Kind::Join | Kind::Gather => (0, 0),
-        };
-        let (bodies, dofs) = (self.bodies.split_at_mut(n), self.dofs.split_at_mut(dofs));
-        let (handle, handles) = self.handles.split_first_mut().expect("a part has a piece");
-        let own = Own { kind, open, links: &self.links[..n], bodies: bodies.0, dofs: dofs.0, handle };
-        (own, Self { pieces: &self.pieces[1..], links: &self.links[n..], bodies: bodies.1, dofs: dofs.1, handles })
-    }
-
-    /// The first of some pieces with all of which it is made, and the others.
-    #[inline(always)]
-    fn split(self) -> (Self, Self) {
-        let Piece { links: n, dofs, pieces, .. } = self.pieces[0];
-        let (bodies, dofs, handles) =
-            (self.bodies.split_at_mut(n), self.dofs.split_at_mut(dofs), self.handles.split_at_mut(pieces));
-        let (pieces, links) = (self.pieces.split_at(pieces), self.links.split_at(n));
-        (
-            Self { pieces: pieces.0, links: links.0, bodies: bodies.0, dofs: dofs.0, handles: handles.0 },
-            Self { pieces: pieces.1, links: links.1, bodies: bodies.1, dofs: dofs.1, handles: handles.1 },
-        )
-    }
-}
-
-/// A piece, without those of which it is made.
-struct Own<'d, S> {
-    kind: Kind,
-    open: bool,
-    links: &'d [Link],
-    bodies: &'d mut [Body<S>],
-    dofs: &'d mut [Dof<S>],
-    handle: &'d mut TwoHandles<S>,
 }
 
 /// The arguments of a call.
@@ -415,7 +326,7 @@ impl<L: Layout + Sync> Job<'_, L> {
             }
             Kind::Join => {
                 let (upper, lower) = rest.split();
-                let (a2, f1) = piece.handle.between(&upper.handles[0], &lower.handles[0], a, f);
+                let (a2, f1) = piece.handle.between(&lower.handles[0], a, f);
                 self.both(|| self.accelerate(upper, a, Some(f1)), || self.accelerate(lower, a2, f));
             }
             Kind::Gather => {

@@ -9,16 +9,18 @@
 //! a' = L a + b + Y f       how the body below accelerates
 //! ```
 //!
-//! which needs no inverse of an inertia, so that bodies may be without mass wherever the articulated-body algorithm
-//! allows it. (In scattering theory two such pieces are joined by Redheffer's star product.) With the second piece on
-//! the last body of the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = x − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f), x = L₁ a + b₁: the first
-//! piece is, for the second, a joint of compliance Y₁. Hence, with G = (1 + Y₁ K₂)⁻¹ Y₁, which is symmetric,
+//! which needs no inverse of an inertia, only those of the articulated-body algorithm: bodies may be without mass. (In
+//! scattering theory two such pieces are joined by Redheffer's star product.) With the second piece on the last body of the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f): the first piece is,
+//! for the second, a joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric G = E Y₁,
 //!
 //! ```text
-//! a₂ = x − G (K₂ x + p₂ − L₂ᵀ f)
-//! K = K₁ + L₁ᵀ K₂ N,   p = p₁ + L₁ᵀ (p₂ + K₂ e),   N = L₁ − G K₂ L₁,   e = b₁ − G (p₂ + K₂ b₁)
-//! L = L₂ N,            b = b₂ + L₂ e,               Y = Y₂ + L₂ G L₂ᵀ
+//! a₂ = N a + e + G L₂ᵀ f,      N = E L₁,              e = E (b₁ − Y₁ p₂)
+//! K = K₁ + L₁ᵀ K₂ N,           p = p₁ + L₁ᵀ (p₂ + K₂ e)
+//! L = L₂ N,                    b = b₂ + L₂ e,         Y = Y₂ + L₂ G L₂ᵀ
 //! ```
+//!
+//! Each handle is described in a frame along the world's axes, at its own origin: Y has rotations and translations of
+//! a body of this size in it, not of its distance from the world's origin.
 
 use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
@@ -36,13 +38,22 @@ pub(crate) struct TwoHandles<S> {
     pub X: Se3<S>,
     /// The velocity of the body below relative to the body above, in that frame.
     pub w: Motion<S>,
+    /// Force above per acceleration above.
     pub K: ArticulatedInertia<S>,
+    /// Force above with the handle above at rest.
     pub p: Force<S>,
+    /// Acceleration below per acceleration above.
     L: Matrix<S>,
+    /// Acceleration below per force below.
     Y: Matrix<S>,
+    /// Acceleration below with the handle above at rest.
     b: Motion<S>,
-    /// Of the two pieces of which it is made.
+    /// Acceleration between the two pieces of which it is made, per acceleration above.
+    N: Matrix<S>,
+    /// The same per force between them.
     G: Matrix<S>,
+    /// The same with the handle above at rest.
+    e: Motion<S>,
 }
 
 impl<S: Scalar> TwoHandles<S> {
@@ -56,7 +67,9 @@ impl<S: Scalar> TwoHandles<S> {
             L: identity(),
             Y: zero(),
             b: Motion::zero(),
+            N: zero(),
             G: zero(),
+            e: Motion::zero(),
         }
     }
 
@@ -93,22 +106,19 @@ impl<S: Scalar> TwoHandles<S> {
     /// `upper` and, on its last body, `lower`; with what is needed below only if it is `open`.
     #[inline(always)]
     pub(crate) fn join(&mut self, upper: &Self, lower: &Self, open: bool) {
-        let K2 = full(lower.K);
-        let G = compliance(&upper.Y, &K2);
-        let K2L1 = product(&K2, &upper.L);
-        let mut N = upper.L; // N = L₁ − G K₂ L₁
+        let (L1, Y1, K2, p2) = (&upper.L, &upper.Y, full(lower.K), lower.p);
+        let G = compliance(Y1, &K2);
         for j in 0..6 {
-            let minus = times(&G, &K2L1[j]);
-            add(&mut N[j], -S::one(), &minus);
+            self.N[j] = divide(&L1[j], Y1, &K2, &G); // N = E L₁
         }
-        let push = (lower.p + lower.K * upper.b).to_array();
-        let e = upper.b - Motion::from(times(&G, &push)); // e = b₁ − G (p₂ + K₂ b₁)
-        self.K = upper.K + symmetric(&transpose_product(&K2L1, &N)); // K = K₁ + L₁ᵀ K₂ N
-        let push = (lower.p + lower.K * e).to_array();
-        self.p = upper.p + Force::from(transpose_times(&upper.L, &push)); // p = p₁ + L₁ᵀ (p₂ + K₂ e)
+        let x = upper.b - Motion::from(times(Y1, &p2.to_array()));
+        self.e = divide(&x.to_array(), Y1, &K2, &G).into(); // e = E (b₁ − Y₁ p₂)
+        self.K = upper.K + symmetric(&transpose_product(L1, &product(&K2, &self.N))); // K = K₁ + L₁ᵀ K₂ N
+        let push = (p2 + lower.K * self.e).to_array();
+        self.p = upper.p + Force::from(transpose_times(L1, &push)); // p = p₁ + L₁ᵀ (p₂ + K₂ e)
         if open {
-            self.L = product(&lower.L, &N); // L = L₂ N
-            self.b = lower.b + Motion::from(times(&lower.L, &e.to_array())); // b = b₂ + L₂ e
+            self.L = product(&lower.L, &self.N); // L = L₂ N
+            self.b = lower.b + Motion::from(times(&lower.L, &self.e.to_array())); // b = b₂ + L₂ e
             self.Y = lower.Y; // Y = Y₂ + L₂ G L₂ᵀ
             let L2G = product(&lower.L, &G);
             for k in 0..6 {
@@ -120,24 +130,38 @@ impl<S: Scalar> TwoHandles<S> {
         self.G = G;
     }
 
-    /// The acceleration a₂ between `upper` and `lower`, of which this is made, and the force f₁ on `upper` there.
+    /// The acceleration a₂ between the two pieces of which this is made, and the force f₁ on the upper one there.
     #[inline(always)]
-    pub(crate) fn between(
-        &self,
-        upper: &Self,
-        lower: &Self,
-        a: Motion<S>,
-        f: Option<Force<S>>,
-    ) -> (Motion<S>, Force<S>) {
-        let x = Motion::from(times(&upper.L, &a.to_array())) + upper.b; // x = L₁ a + b₁
+    pub(crate) fn between(&self, lower: &Self, a: Motion<S>, f: Option<Force<S>>) -> (Motion<S>, Force<S>) {
+        let mut a2 = self.e + Motion::from(times(&self.N, &a.to_array()));
         let mut p2 = lower.p;
         if let Some(f) = f {
-            p2 -= Force::from(transpose_times(&lower.L, &f.to_array())); // p₂ − L₂ᵀ f
+            let push = transpose_times(&lower.L, &f.to_array());
+            a2 += times(&self.G, &push).into(); // a₂ = N a + e + G L₂ᵀ f
+            p2 -= push.into();
         }
-        let push = (lower.K * x + p2).to_array();
-        let a2 = x - Motion::from(times(&self.G, &push)); // a₂ = x − G (K₂ x + p₂ − L₂ᵀ f)
-        (a2, -(lower.K * a2 + p2)) // f₁ = −f'₂
+        (a2, -(lower.K * a2 + p2)) // f₁ = −(K₂ a₂ + p₂ − L₂ᵀ f)
     }
+}
+
+/// E x = (1 + Y K)⁻¹ x = x − G K x, and the same once more for what remains: a light body on which much hangs has a large Y,
+/// and the difference loses as many digits as Y K is large.
+#[inline(always)]
+fn divide<S: Scalar>(x: &[S; 6], Y: &Matrix<S>, K: &Matrix<S>, G: &Matrix<S>) -> [S; 6] {
+    let (mut y, mut r) = (*x, *x);
+    let GKx = times(G, &times(K, x));
+    for i in 0..6 {
+        y[i] -= GKx[i]; // y = x − G K x
+    }
+    let YKy = times(Y, &times(K, &y));
+    for i in 0..6 {
+        r[i] = x[i] - YKy[i] - y[i]; // r = x − (1 + Y K) y
+    }
+    let GKr = times(G, &times(K, &r));
+    for i in 0..6 {
+        y[i] += r[i] - GKr[i]; // y ← y + r − G K r
+    }
+    y
 }
 
 /// G = (1 + Y K)⁻¹ Y = R (1 + Rᵀ K R)⁻¹ Rᵀ with Y = R Rᵀ.

@@ -1,11 +1,15 @@
 //! All ways of forward dynamics are one.
+#![allow(unsafe_code)] // a counting allocator cannot be written without
 #![allow(non_snake_case)]
 
 mod common;
 
 use common::{State, Worst, all_models, lift, lift_forces, rng};
-use condyle_dynamics::{Data, Method, aba, forward_dynamics};
+use condyle_dynamics::{Cholesky, Data, DivideConquer, Ltdl, Method, aba, crba, forward_dynamics};
+use nalgebra::DMatrix;
 use num_dual::Dual64;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 
 /// Some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in these robots.
 const INVERTED: f64 = 1e-10;
@@ -57,6 +61,67 @@ fn what_is_fastest() {
         let shared = model.bodies().iter().any(|b| b.mimic.is_some());
         let expected = if shared { Method::Sparse } else { Method::ArticulatedBody };
         assert_eq!(Method::fastest(&model), expected, "{model}");
+    }
+}
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
+// and allocates nothing itself.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.set(COUNT.get() + 1);
+        // SAFETY: the caller's promise about `layout` is the one that is asked for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[track_caller]
+fn allocates_nothing(f: impl FnOnce()) {
+    let before = COUNT.get();
+    f();
+    assert_eq!(COUNT.get(), before);
+}
+
+/// Every method, both factors, and divide and conquer (on one thread: what rayon allocates to share work is its own).
+#[test]
+fn nothing_is_allocated() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
+    for (seed, model) in all_models(2).iter().enumerate() {
+        let State { q, v, tau, f_ext, .. } = State::random(model, &mut rng(seed as u64));
+        let mut data = Data::new(model);
+        for method in METHODS {
+            allocates_nothing(|| _ = forward_dynamics(model, &mut data, &q, &v, &tau, &f_ext, Some(method)));
+        }
+        let M = crba(model, &mut data, &q).clone();
+        let (mut sparse, mut dense) = (Ltdl::new(model), Cholesky::new(model.nv()));
+        let (mut x, mut X) = (tau.clone(), DMatrix::identity(model.nv(), 3));
+        let mut inverse = M.clone();
+        allocates_nothing(|| {
+            sparse.factorize(&M);
+            sparse.solve(&mut x);
+            sparse.solve_matrix(&mut X);
+            sparse.inverse(&mut inverse);
+            dense.factorize(&M);
+            dense.solve(&mut x);
+            dense.solve_matrix(&mut X);
+            dense.inverse(&mut inverse);
+        });
+        if let Ok(mut divided) = DivideConquer::new(model, 1) {
+            pool.install(|| allocates_nothing(|| _ = divided.aba(model, &q, &v, &tau, &f_ext)));
+        }
     }
 }
 

@@ -180,10 +180,16 @@ def check_equations_of_motion(state: State) -> None:
 
 
 def check_lock(state: State) -> None:
-    """Every third joint locked."""
+    """Every third joint locked, unless Pinocchio refuses: it finds no frame where a joint and a link have one name."""
     pair, rng = state.pair, np.random.default_rng(0)
     locked = list(range(1, pair.ours.nbodies, 3))
-    ours, theirs = pair.ours.lock(locked, state.q), pin.buildReducedModel(pair.theirs, locked, state.q)
+    ours = pair.ours.lock(locked, state.q)
+    try:
+        theirs = pin.buildReducedModel(pair.theirs, locked, state.q)
+    except ValueError as error:
+        if "Several frames match the filter" not in str(error):
+            raise
+        return
     assert ours.names == list(theirs.names)
     assert (ours.nq, ours.nv) == (theirs.nq, theirs.nv)
     if not ours.nv:
@@ -278,6 +284,7 @@ def check_configuration(state: State) -> None:
     X = np.random.default_rng(0).standard_normal((theirs.nv, 3))
     there = pin.dIntegrateTransport(theirs, q, v, X, pin.ArgumentPosition.ARG0)
     pair.expect("transport", condyle.transport(ours, v, there), X)
+    pair.expect("transport", condyle.transport(ours, -v, X), there)
 
 
 def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) -> np.ndarray:

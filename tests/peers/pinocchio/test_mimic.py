@@ -73,6 +73,7 @@ class Projection:
         ours_derivatives = condyle.rnea_derivatives(*ours, q, v, a, f_ext)
         for field, our, their in zip(ours_derivatives._fields, ours_derivatives, derivatives(a), strict=True):
             pair.expect(f"mimic: rnea_derivatives: {field}", our, their)
+        self.check_terms(q, v, a, state)
         if np.linalg.matrix_rank(M) < self.ours.nv:
             return
         d = condyle.aba_derivatives(*ours, q, v, tau, f_ext)
@@ -84,6 +85,28 @@ class Projection:
         pair.expect("mimic: M times da_dq", M @ d.da_dq, -dtau_dq)
         pair.expect("mimic: M times da_dv", M @ d.da_dv, -dtau_dv)
         pair.expect("mimic: M times minv", M @ d.da_dtau, np.eye(self.ours.nv))
+
+    def check_terms(self, q: np.ndarray, v: np.ndarray, a: np.ndarray, state: State) -> None:
+        """The Coriolis matrix, the regressor, centre of mass, momentum and energies."""
+        pair, G, ours, theirs = self.free, self.G, (self.ours, self.data), (self.free.theirs, self.free.their_data)
+        q_free, v_free, a_free = self.position(q), G @ v, G @ a
+        C = pin.computeCoriolisMatrix(*theirs, q_free, v_free)
+        pair.expect("mimic: coriolis_matrix", condyle.coriolis_matrix(*ours, q, v), G.T @ C @ G)
+        Y = pin.computeJointTorqueRegressor(*theirs, q_free, v_free, a_free)
+        pair.expect("mimic: joint_torque_regressor", condyle.joint_torque_regressor(*ours, q, v, a), G.T @ Y)
+        tau = pin.computeStaticTorque(*theirs, q_free, state.their_forces)
+        pair.expect("mimic: static_torque, f_ext", condyle.static_torque(*ours, q, state.f_ext), G.T @ tau)
+        T = pin.computeKineticEnergy(*theirs, q_free, v_free)
+        pair.expect("mimic: kinetic_energy", condyle.kinetic_energy(*ours, q, v), T)
+        pin.centerOfMass(*theirs, q_free, v_free, a_free)
+        acceleration = condyle.com_acceleration(*ours, q, v, a)
+        pair.expect("mimic: com_acceleration", acceleration, pair.their_data.acom[0])
+        pin.dccrba(*theirs, q_free, v_free)
+        terms, data = condyle.compute_all_terms(*ours, q, v), pair.their_data
+        pair.expect("mimic: compute_all_terms: centroidal: Ag", terms.centroidal.Ag, data.Ag @ G)
+        pair.expect("mimic: compute_all_terms: centroidal: dAg", terms.centroidal.dAg, data.dAg @ G)
+        pair.expect("mimic: compute_all_terms: centroidal: hg", terms.centroidal.hg, data.hg.vector)
+        pair.expect("mimic: compute_all_terms: h", terms.h, G.T @ pin.nonLinearEffects(*theirs, q_free, v_free))
 
 
 @pytest.mark.parametrize("name", [n for n in ROBOTS if n not in BROKEN])
@@ -125,7 +148,7 @@ def test_random_robot(seed: int, tmp_path: Path) -> None:
     """
     path = tmp_path / "robot.urdf"
     path.write_text(RandomUrdf(1000 + seed, mimics=True).text, encoding="utf-8")
-    arguments = f"robot {seed}", str(path), (None, *ROOT_JOINTS)[seed % (1 + len(ROOT_JOINTS))]
+    arguments = f"mimic robot {seed}", str(path), (None, *ROOT_JOINTS)[seed % (1 + len(ROOT_JOINTS))]
     projection = Projection(*arguments)
     for i in range(STATES):
         projection.check(seed + i)

@@ -27,12 +27,15 @@ The relative difference is max |ours − theirs| / (1 + max |theirs|), over all 
 the bound, {tolerance:.0e}; what contains M⁻¹ may instead be {factor:.0f} times as far from Pinocchio as Pinocchio's
 own forward dynamics in the world's frame is from that in the bodies' frames, where that is more. The states are
 random: positions within their limits, the rest standard normal. The robots are those of example-robot-data, and
-random ones (`robot 0`, `robot 1`, …: every kind of joint and of root joint, odd axes, names and orders).
+random ones (`robot 0`, …, `mimic robot 0`, …: every kind of joint and of root joint, odd axes, names and orders).
 
 Where the libraries mean different things, the comparison says so in `tests/peers/pinocchio/checks.py`. In short:
 Pinocchio's kinetic energy leaves armature out for revolute joints about axes that are not aligned, so energies are
 compared without armature; its `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q, our `transport` with the inverse, so
 ours is compared as what undoes it; its `dJ` in LOCAL_WORLD_ALIGNED belongs, like ours, to the classical acceleration.
+Its `buildReducedModel` refuses robots in which a joint to be locked has the name of a link, so fewer robots are locked.
+Rows that begin with `mimic` are of robots whose joints follow others: Pinocchio computes the same robot with free
+joints, and the result is projected (`test_mimic.py`), as few of its functions know such joints.
 
 ## Differences
 
@@ -76,11 +79,12 @@ def robots() -> list[str]:
             root, bodies, nq, nv = comparison.sizes[name]
             lines.append(f"| {name} | {root} | {bodies} | {nq} | {nv} | {'; '.join(remarks(name))} |")
     random = [name for name in comparison.sizes if name not in test_robots.ROBOTS]
-    lines += ["", f"And {len(random)} random robots, of {sizes(random)} degrees of freedom."]
-    return lines
+    read = len(comparison.sizes) - len(random)
+    lines += ["", f"{read} robots are read by both, {len(test_robots.NO_URDF)} by none."]
+    return [*lines, f"To them come {len(random)} random ones, of {degrees(random)} degrees of freedom."]
 
 
-def sizes(names: list[str]) -> str:
+def degrees(names: list[str]) -> str:
     """From the least to the greatest number of degrees of freedom."""
     nvs = [comparison.sizes[name][3] for name in names] or [0]
     return f"{min(nvs)} to {max(nvs)}"

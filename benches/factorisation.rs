@@ -1,0 +1,114 @@
+//! Which way of forward dynamics and of M⁻¹ is fastest, for which size and shape of a tree:
+//! `cargo bench --bench factorisation`. The rules in `Method::fastest` rest on its figures.
+#![allow(non_snake_case)]
+
+use condyle::{
+    BodyId, Cholesky, Data, Inertia, Joint, Ltdl, Mat3, Method, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, crba,
+    forward_dynamics, minv, random_configuration, robots,
+};
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use nalgebra::DMatrix;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::hint::black_box;
+use std::time::Duration;
+
+const SIZES: [usize; 6] = [6, 12, 25, 50, 100, 200];
+
+/// n hinges, each body on the one that `parent` names.
+fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
+    let mut rng = StdRng::seed_from_u64(7);
+    let mut builder = ModelBuilder::new("tree");
+    let mut ids: Vec<BodyId> = vec![WORLD];
+    for i in 1..=n {
+        let mut r = || 0.2 * rng.random::<f64>() - 0.1;
+        let inertia = Inertia::from_com(1.0, Vec3::new(r(), r(), r()), Sym3::diagonal(0.01));
+        let placement = Se3::new(Mat3::identity(), Vec3::new(r(), r(), 0.2));
+        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
+        ids.push(builder.body(&format!("b{i}"), ids[parent(i)], Joint::Revolute { axis }, placement, inertia));
+    }
+    builder.build().expect("a tree is well-formed")
+}
+
+fn models() -> Vec<(String, Model)> {
+    let mut models = vec![
+        ("arm7".to_owned(), robots::arm7()),
+        ("quadruped".to_owned(), robots::quadruped()),
+        ("humanoid".to_owned(), robots::humanoid()),
+    ];
+    for n in SIZES {
+        models.push((format!("chain of {n}"), tree(n, |i| i - 1)));
+        models.push((format!("binary tree of {n}"), tree(n, |i| i / 2)));
+        models.push((format!("star of {n}"), tree(n, |i| usize::from(i > 1))));
+    }
+    models
+}
+
+fn factorisation(c: &mut Criterion) {
+    for (name, model) in models() {
+        let mut rng = StdRng::seed_from_u64(1);
+        let q = random_configuration(&model, &mut rng);
+        let [v, tau] = [(); 2].map(|()| (0..model.nv()).map(|_| 2.0 * rng.random::<f64>() - 1.0).collect::<Vec<f64>>());
+        let mut data = Data::new(&model);
+
+        let mut group = c.benchmark_group(format!("forward dynamics/{name}"));
+        for method in [Method::ArticulatedBody, Method::Dense, Method::Sparse] {
+            group.bench_function(BenchmarkId::from_parameter(format!("{method:?}")), |b| {
+                b.iter(|| {
+                    _ = black_box(forward_dynamics(&model, &mut data, black_box(&q), &v, &tau, &[], Some(method)))
+                });
+            });
+        }
+        group.finish();
+
+        let M = crba(&model, &mut data, &q).clone();
+        let (mut sparse, mut dense) = (Ltdl::new(&model), Cholesky::new(model.nv()));
+        let mut group = c.benchmark_group(format!("factorise/{name}"));
+        group.bench_function("Dense", |b| b.iter(|| dense.factorize(black_box(&M))));
+        group.bench_function("Sparse", |b| b.iter(|| sparse.factorize(black_box(&M))));
+        group.finish();
+
+        let mut x = tau.clone();
+        let mut group = c.benchmark_group(format!("solve/{name}"));
+        group.bench_function("Dense", |b| {
+            b.iter(|| {
+                x.copy_from_slice(black_box(&tau));
+                dense.solve(&mut x);
+            });
+        });
+        group.bench_function("Sparse", |b| {
+            b.iter(|| {
+                x.copy_from_slice(black_box(&tau));
+                sparse.solve(&mut x);
+            });
+        });
+        group.finish();
+
+        let mut X = DMatrix::zeros(model.nv(), model.nv());
+        let mut group = c.benchmark_group(format!("inverse of M/{name}"));
+        group.bench_function("minv", |b| b.iter(|| _ = black_box(minv(&model, &mut data, black_box(&q)))));
+        group.bench_function("Dense", |b| {
+            b.iter(|| {
+                dense.factorize(crba(&model, &mut data, black_box(&q)));
+                dense.inverse(&mut X);
+            });
+        });
+        group.bench_function("Sparse", |b| {
+            b.iter(|| {
+                sparse.factorize(crba(&model, &mut data, black_box(&q)));
+                sparse.inverse(&mut X);
+            });
+        });
+        group.finish();
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_millis(400))
+        .sample_size(20);
+    targets = factorisation
+}
+criterion_main!(benches);
