@@ -28,13 +28,13 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     knots: u32,
     /// Seconds from knot to knot
-    #[arg(long, default_value_t = 0.01, value_name = "SECONDS")]
+    #[arg(long, default_value_t = 0.01, value_name = "SECONDS", allow_negative_numbers = true)]
     dt: f64,
     /// The time that one solver iteration may take (ms); going over is said, and no error
-    #[arg(long, default_value_t = 10.0, value_name = "MS")]
+    #[arg(long, default_value_t = 10.0, value_name = "MS", allow_negative_numbers = true)]
     budget_ms: f64,
     /// How far from the target is still there (m)
-    #[arg(long, default_value_t = 0.01, value_name = "METRES")]
+    #[arg(long, default_value_t = 0.01, value_name = "METRES", allow_negative_numbers = true)]
     tolerance: f64,
     /// Iterations after which the solver stops
     #[arg(long, default_value_t = 200)]

@@ -163,7 +163,8 @@ impl<S: Scalar> Ltdl<S> {
         self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
     }
 
-    /// M = Lᵀ D L, in O(n d²). Of two entries that are equal by symmetry, one is read.
+    /// M = Lᵀ D L, in O(n d²). Of two entries that are equal by symmetry, one is read: that of the lower triangle in the
+    /// [`order`](Self::order).
     ///
     /// M: nv × nv, symmetric, positive definite (as [`crba`](crate::crba) gives it); if it is not, some D are not
     /// positive. Allocates nothing. Source: Featherstone (2005).
@@ -177,12 +178,11 @@ impl<S: Scalar> Ltdl<S> {
         let Tree { order, parent, depth, run, first, .. } = &*tree;
         let M = M.as_slice();
         for k in 0..nv {
-            let (column, row) = (&M[order[k] * nv..(order[k] + 1) * nv], &mut rows[first[k]..first[k + 1]]);
-            let (row, rest) = row.split_at_mut(depth[k] + 1);
+            let (row, rest) = rows[first[k]..first[k + 1]].split_at_mut(depth[k] + 1);
             rest.fill(S::zero());
             let mut e = k;
             for x in row.iter_mut().rev() {
-                *x = column[order[e]];
+                *x = M[order[e] * nv + order[k]];
                 e = parent[e];
             }
         }

@@ -56,7 +56,7 @@ pub struct Frame {
 pub enum FrameKind {
     /// A link of the URDF.
     Link,
-    /// A joint of the URDF, at position zero of nothing: the joint's frame on the child's side.
+    /// A joint of the URDF: its frame on the child's side.
     Joint,
     /// Added by the user.
     User,
