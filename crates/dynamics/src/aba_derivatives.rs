@@ -10,7 +10,7 @@
 use crate::aba::aba;
 use crate::data::{Data, Size};
 use crate::layout::Single;
-use crate::minv::{self, minv};
+use crate::minv;
 use crate::model::Model;
 use crate::rnea_derivatives;
 use condyle_spatial::{Constant, Force, Scalar};
@@ -101,12 +101,12 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     aba(model, data, q, v, tau, f_ext);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(data.aba.qdd());
-    if model.has_mimic() {
-        minv(model, data, q);
+    rnea_derivatives::pass(&Single::new(model), &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext);
+    if data.minv.by_factor() {
+        minv::from_matrix(&mut data.minv, data.rnea_derivatives.view().dtau_da); // M = ∂τ/∂a
     } else {
         minv::from_factors(model, data); // the factors are those of `aba`
     }
-    rnea_derivatives::pass(&Single::new(model), &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext);
     let tau_derivatives = data.rnea_derivatives.view();
     let d = &mut data.aba_derivatives;
     d.a = a_kept;

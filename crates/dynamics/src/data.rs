@@ -67,7 +67,7 @@ impl<S: Scalar> Data<S> {
             rnea: rnea::Workspace::new(size),
             crba: crba::Workspace::new(size),
             aba: aba::Workspace::new(size),
-            minv: minv::Workspace::new(size),
+            minv: minv::Workspace::new(size, model),
             rnea_derivatives: rnea_derivatives::Workspace::new(size),
             aba_derivatives: aba_derivatives::Workspace::new(size),
             statics: statics::Workspace::new(size),

@@ -1,18 +1,23 @@
-//! The inverse of the joint-space inertia matrix, without the matrix.
+//! The inverse of the joint-space inertia matrix, in one of two ways.
 //!
-//! Source: Carpentier, *Analytical inverse of the joint space inertia matrix* (2018): the articulated-body algorithm
-//! for all unit efforts at once, of which only those in the subtree of a joint reach it. In the world's frame one
-//! array of bias forces serves all bodies.
+//! From M by its sparse factor ([`Ltdl`]), in O(n d) operations a column, where the rows of the factor are short; else,
+//! and without M, by Carpentier, *Analytical inverse of the joint space inertia matrix* (2018): the articulated-body
+//! algorithm for all unit efforts at once, of which only those in the subtree of a joint reach it, in O(n) a column. In
+//! the world's frame one array of bias forces serves all bodies.
 
 use crate::aba;
-use crate::cholesky;
 use crate::crba::crba;
 use crate::data::{Data, Size, check};
 use crate::kinematics::World;
 use crate::layout::Single;
+use crate::ltdl::Ltdl;
 use crate::model::{Column, Model};
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
+
+/// How long the factor's rows may be, in the mean, for the factor to be the faster way: measured by
+/// `benches/factorisation.rs`, equal at 12.5 on a chain of 24; the humanoid has 9.7, the arm 4.
+const SHORT_ROWS: usize = 12;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace<S> {
@@ -23,22 +28,31 @@ pub(crate) struct Workspace<S> {
     A: Vec<S>,
     /// Shape: nv × nv. Written by: `minv`.
     Minv: DMatrix<S>,
-    /// A factor of M, of robots whose joints share coordinates. Shape: nv × nv. Written by: `minv`.
-    factor: Vec<S>,
+    /// A factor of M. Written by: `from_matrix`.
+    factor: Ltdl<S>,
+    /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
+    by_factor: bool,
 }
 
 impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
+    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
+        let factor = Ltdl::new(model);
         Self {
+            by_factor: model.has_mimic() || factor.nonzeros() <= SHORT_ROWS * size.nv,
+            factor,
             P: vec![S::zero(); 6 * size.columns],
             A: vec![S::zero(); (1 + size.depth) * 6 * size.columns],
             Minv: DMatrix::from_element(size.nv, size.nv, S::zero()),
-            factor: if size.columns == size.nv { Vec::new() } else { vec![S::zero(); size.nv * size.nv] },
         }
     }
 }
 
 impl<S> Workspace<S> {
+    /// Whether M⁻¹ is best had from M.
+    pub(crate) fn by_factor(&self) -> bool {
+        self.by_factor
+    }
+
     pub(crate) fn matrix(&self) -> &DMatrix<S> {
         &self.Minv
     }
@@ -110,23 +124,16 @@ pub(crate) fn from_factors<'d, S: Scalar, R>(model: &Model<R>, data: &'d mut Dat
     &data.minv.Minv
 }
 
-/// M⁻¹ from a dense factor of M: the way for joints that share a coordinate.
-fn by_inertia_matrix<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) {
-    crba(model, data, q);
-    data.minv.factor.copy_from_slice(data.crba.matrix().as_slice());
-    let Workspace { Minv, factor, .. } = &mut data.minv;
-    cholesky::factorize(factor, model.nv);
-    Minv.fill(S::zero());
-    for (j, mut column) in Minv.column_iter_mut().enumerate() {
-        column[j] = S::one();
-        cholesky::solve(factor, column.as_mut_slice());
-    }
+/// M⁻¹ from M.
+pub(crate) fn from_matrix<S: Scalar>(d: &mut Workspace<S>, M: &DMatrix<S>) {
+    d.factor.factorize(M);
+    d.factor.inverse(&mut d.Minv);
 }
 
 /// M(q)⁻¹, the accelerations for unit efforts, in O(n²).
 ///
-/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018). Robots
-/// whose joints share a coordinate (mimic) take the way over a factor of M, O(n³).
+/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018); on trees with
+/// short branches, and where joints share a coordinate (mimic), by the factor of Featherstone (2005) ([`Ltdl`]).
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, minv, robots};
@@ -144,8 +151,9 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     data.check(model);
     model.check_regular();
     check("q", q.len(), model.nq);
-    if model.has_mimic() {
-        by_inertia_matrix(model, data, q);
+    if data.minv.by_factor {
+        crba(model, data, q);
+        from_matrix(&mut data.minv, data.crba.matrix());
         return &data.minv.Minv;
     }
     aba::factorize(&Single::new(model), &mut data.world, &mut data.aba, q);

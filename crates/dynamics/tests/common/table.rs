@@ -2,10 +2,11 @@
 
 use super::{State, lift, lift_forces};
 use condyle_dynamics::{
-    Data, DifferenceArgument, Force, IntegrateArgument, Model, ReferenceFrame, Scalar, Se3, aba, aba_derivatives,
-    centroidal_map, centroidal_map_rate, compute_all_terms, coriolis_matrix, crba, difference, difference_jacobian,
-    forward_accelerations, forward_kinematics, forward_velocities, gravity, integrate, integrate_jacobian, minv,
-    nonlinear_effects, random_configuration, rnea, rnea_derivatives, static_torque,
+    Data, DifferenceArgument, Force, IntegrateArgument, Method, Model, ReferenceFrame, Scalar, Se3, aba,
+    aba_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, coriolis_matrix, crba, difference,
+    difference_jacobian, forward_accelerations, forward_dynamics, forward_kinematics, forward_velocities, gravity,
+    integrate, integrate_jacobian, minv, nonlinear_effects, random_configuration, rnea, rnea_derivatives,
+    static_torque,
 };
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
@@ -72,7 +73,7 @@ impl<S: Scalar> Output<S> {
 pub(crate) type Function<S> = fn(&Model, &mut Data<S>, &Input<S>, &mut Output<S>);
 
 /// Name and call of each function. A call allocates only if the function does.
-pub(crate) fn functions<S: Scalar>() -> [(&'static str, Function<S>); 24] {
+pub(crate) fn functions<S: Scalar>() -> [(&'static str, Function<S>); 26] {
     [
         ("rnea", |m, d, i, o| o.numbers.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &i.f_ext))),
         ("rnea without forces", |m, d, i, o| o.numbers.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &[]))),
@@ -80,6 +81,14 @@ pub(crate) fn functions<S: Scalar>() -> [(&'static str, Function<S>); 24] {
         ("gravity", |m, d, i, o| o.numbers.extend_from_slice(gravity(m, d, &i.q))),
         ("crba", |m, d, i, o| o.numbers.extend_from_slice(crba(m, d, &i.q).as_slice())),
         ("aba", |m, d, i, o| o.numbers.extend_from_slice(aba(m, d, &i.q, &i.v, &i.x, &i.f_ext))),
+        ("forward_dynamics, dense", |m, d, i, o| {
+            let method = Some(Method::Dense);
+            o.numbers.extend_from_slice(forward_dynamics(m, d, &i.q, &i.v, &i.x, &i.f_ext, method));
+        }),
+        ("forward_dynamics, sparse", |m, d, i, o| {
+            let method = Some(Method::Sparse);
+            o.numbers.extend_from_slice(forward_dynamics(m, d, &i.q, &i.v, &i.x, &i.f_ext, method));
+        }),
         ("aba without forces", |m, d, i, o| o.numbers.extend_from_slice(aba(m, d, &i.q, &i.v, &i.x, &[]))),
         ("minv", |m, d, i, o| o.numbers.extend_from_slice(minv(m, d, &i.q).as_slice())),
         ("rnea_derivatives", |m, d, i, o| {
