@@ -5,12 +5,11 @@
 //! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
 //! matrix is inverted.
 
-use crate::cholesky;
 use crate::data::{Data, Size, check, check_forces};
+use crate::forward_dynamics::{Method, forward_dynamics};
 use crate::kinematics::{World, place};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use crate::{crba::crba, rnea::rnea};
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
 /// In the world's frame.
@@ -36,8 +35,6 @@ pub(crate) struct Workspace<S> {
     u: Vec<S>,
     /// Joint accelerations. Shape: nv. Written by: `pass`.
     qdd: Vec<S>,
-    /// A factor of M, of robots whose joints share coordinates. Shape: nv × nv. Written by: `by_inertia_matrix`.
-    factor: Vec<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -53,14 +50,7 @@ impl<S: Scalar> Workspace<S> {
             pA: vec![Force::zero(); size.bodies],
             u: vec![S::zero(); size.columns],
             qdd: vec![S::zero(); size.nv],
-            factor: if size.columns == size.nv { Vec::new() } else { vec![S::zero(); size.nv * size.nv] },
         }
-    }
-}
-
-impl<S> Workspace<S> {
-    pub(crate) fn qdd(&self) -> &[S] {
-        &self.qdd
     }
 }
 
@@ -137,35 +127,12 @@ fn pass<L: Layout>(
     }
 }
 
-/// M q̈ = τ − h solved with a dense factor of M: the way for joints that share a coordinate.
-fn by_inertia_matrix<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &mut Data<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
-) {
-    crba(model, data, q);
-    data.aba.factor.copy_from_slice(data.crba.matrix().as_slice());
-    data.aba.qdd.fill(S::zero());
-    let zero = core::mem::take(&mut data.aba.qdd);
-    rnea(model, data, q, v, &zero, f_ext);
-    data.aba.qdd = zero;
-    let d = &mut data.aba;
-    for (k, h) in data.rnea.tau().iter().enumerate() {
-        d.qdd[k] = tau[k] - *h;
-    }
-    cholesky::factorize(&mut d.factor, model.nv);
-    cholesky::solve(&d.factor, &mut d.qdd);
-}
-
 /// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, in O(n).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
 /// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
-/// Source: Featherstone (2008), table 7.1. Robots whose joints share a coordinate (mimic) take the way over a factor
-/// of M, O(n³).
+/// Source: Featherstone (2008), table 7.1. Robots whose joints share a coordinate (mimic) go over a sparse factor
+/// of M, as [`forward_dynamics`] does with [`Method::Sparse`].
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba, robots, rnea};
@@ -195,9 +162,8 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     check("tau", tau.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
     if model.has_mimic() {
-        by_inertia_matrix(model, data, q, v, tau, f_ext);
-    } else {
-        pass(&Single::new(model), &mut data.world, &mut data.aba, q, v, tau, f_ext);
+        return forward_dynamics(model, data, q, v, tau, f_ext, Some(Method::Sparse));
     }
+    pass(&Single::new(model), &mut data.world, &mut data.aba, q, v, tau, f_ext);
     &data.aba.qdd
 }

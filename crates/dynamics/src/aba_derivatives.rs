@@ -98,9 +98,8 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S> {
-    aba(model, data, q, v, tau, f_ext);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
-    a_kept.copy_from_slice(data.aba.qdd());
+    a_kept.copy_from_slice(aba(model, data, q, v, tau, f_ext));
     rnea_derivatives::pass(&Single::new(model), &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext);
     if data.minv.by_factor() {
         minv::from_matrix(&mut data.minv, data.rnea_derivatives.view().dtau_da); // M = ∂τ/∂a

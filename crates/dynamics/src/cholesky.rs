@@ -8,7 +8,7 @@ use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
 /// L in place of the lower triangle of M.
-pub(crate) fn factorize<S: Scalar>(M: &mut [S], n: usize) {
+fn factorize<S: Scalar>(M: &mut [S], n: usize) {
     for j in 0..n {
         let (left, rest) = M.split_at_mut(j * n);
         let column = &mut rest[j..n];
@@ -24,7 +24,7 @@ pub(crate) fn factorize<S: Scalar>(M: &mut [S], n: usize) {
 }
 
 /// x in place of b: L Lᵀ x = b.
-pub(crate) fn solve<S: Scalar>(L: &[S], b: &mut [S]) {
+fn solve<S: Scalar>(L: &[S], b: &mut [S]) {
     forward(L, b, 0);
     backward(L, b, 0);
 }
