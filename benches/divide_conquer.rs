@@ -1,10 +1,11 @@
 //! From which size on divide and conquer pays, on one thread and on two: `cargo bench --bench divide_conquer`.
 //!
-//! µs on two cores of a Xeon at 2.6 GHz, smallest of many, `aba` / runs of n/2 on one thread / on two / runs of one body on
-//! one / on two: chain of 100 8.7 / 11.2 / 10.6 / 103 / 60; of 200 16.8 / 23.4 / 15.6 / 208 / 117; of 300 25.9 / 33.0 / 22.8 /
-//! 330 / 173; of 500 45 / 53 / 35 / 567 / 303 · star of 500 39 / 43 / 30 / 89 / 73; of 1000 76 / 92 / 57 / 239 / 141. Two
-//! threads win from some 200 bodies on, by 1.1 to 1.3; one thread never does; and runs of one body, with all their
-//! parallelism, would need some 12 processors for a chain.
+//! µs on two cores of a Xeon at 2.6 GHz, smallest of many, `aba` / runs of n/2 on one thread / on two: chain of 100
+//! 8.7 / 11.2 / 10.6; of 200 16.8 / 23.4 / 15.6; of 300 25.9 / 33.0 / 22.8; of 500 45 / 53 / 35 · star of 500 39 / 43 /
+//! 30; of 1000 76 / 92 / 57. Two threads win from some 200 bodies on, by 1.1 to 1.3; one thread never does. Runs of one
+//! body, beside other work on both cores, `aba` / on one thread / on two: chain of 100 10.3 / 81 / 74; of 300 31.9 /
+//! 253 / 272; of 1000 106 / 1015 / 548 · star of 1000 90 / 295 / 352: with all their parallelism they would need more
+//! than eight processors for a chain.
 
 use condyle::{
     BodyId, Data, DivideConquer, Inertia, Joint, Mat3, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, aba,

@@ -1,6 +1,9 @@
 //! The rigid-body algorithms and their derivatives, one call on one state: `cargo bench --bench dynamics`.
 
-use condyle::{Data, Model, aba, aba_derivatives, crba, minv, random_configuration, rnea, rnea_derivatives, robots};
+use condyle::{
+    Data, Model, aba, aba_derivatives, crba, joint_torque_regressor, kinetic_energy_regressor, minv,
+    potential_energy_regressor, random_configuration, rnea, rnea_derivatives, robots,
+};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -29,13 +32,18 @@ fn states(model: &Model) -> Vec<State> {
 
 fn algorithms(c: &mut Criterion) {
     type Algorithm = fn(&Model, &mut Data<f64>, &State);
-    let algorithms: [(&str, Algorithm); 6] = [
+    let algorithms: [(&str, Algorithm); 8] = [
         ("rnea", |m, d, s| _ = black_box(rnea(m, d, &s.q, &s.v, &s.x, &[]))),
         ("crba", |m, d, s| _ = black_box(crba(m, d, &s.q))),
         ("aba", |m, d, s| _ = black_box(aba(m, d, &s.q, &s.v, &s.x, &[]))),
         ("minv", |m, d, s| _ = black_box(minv(m, d, &s.q))),
         ("rnea_derivatives", |m, d, s| _ = black_box(rnea_derivatives(m, d, &s.q, &s.v, &s.x, &[]))),
         ("aba_derivatives", |m, d, s| _ = black_box(aba_derivatives(m, d, &s.q, &s.v, &s.x, &[]))),
+        ("joint_torque_regressor", |m, d, s| _ = black_box(joint_torque_regressor(m, d, &s.q, &s.v, &s.x))),
+        ("energy_regressors", |m, d, s| {
+            black_box(kinetic_energy_regressor(m, d, &s.q, &s.v));
+            black_box(potential_energy_regressor(m, d, &s.q));
+        }),
     ];
     let robots = [("arm7", robots::arm7()), ("quadruped", robots::quadruped()), ("humanoid", robots::humanoid())];
     for (name, algorithm) in algorithms {

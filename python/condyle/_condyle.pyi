@@ -1,7 +1,7 @@
 """Rigid-body dynamics with exact derivatives: the compiled part of `condyle`."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
@@ -9,14 +9,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._types import (
     AbaDerivatives,
+    AbaHessian,
     AllTerms,
+    AssemblySize,
+    CentroidalDerivatives,
     CentroidalMap,
     CentroidalMapRate,
+    Constrained,
+    ConstrainedDerivatives,
+    Constraint,
+    Control,
+    CoriolisDerivatives,
+    EnergyDerivatives,
     Frame,
+    Impulse,
+    ImpulseDerivatives,
     Inertia,
     Limits,
     Mimic,
     RneaDerivatives,
+    RneaHessian,
+    RneaSecondDerivatives,
     Solution,
 )
 
@@ -24,51 +37,86 @@ __all__ = [
     "ARM7",
     "HUMANOID",
     "QUADRUPED",
+    "WORLD",
     "Activation",
+    "BodyId",
+    "Cholesky",
+    "ConstraintSet",
     "Cost",
     "Data",
+    "DivideConquer",
     "Error",
     "Fddp",
     "FreeDynamics",
+    "Joint",
+    "Ltdl",
     "Model",
+    "ModelBuilder",
     "ModelError",
+    "NotPhysicalError",
     "ParseError",
     "Problem",
     "ProblemError",
+    "Simulation",
     "__version__",
     "_model_from_bytes",
     "aba",
     "aba_derivatives",
+    "aba_hessian",
+    "aba_input_derivative",
     "arm7",
+    "body_acceleration",
+    "body_acceleration_derivatives",
+    "body_classical_acceleration",
+    "body_jacobian",
+    "body_jacobian_rate",
+    "body_velocity",
+    "body_velocity_derivative",
+    "centroidal_derivatives",
     "centroidal_map",
     "centroidal_map_rate",
     "centroidal_momentum",
     "centroidal_momentum_rate",
+    "check",
     "com",
     "com_acceleration",
     "com_jacobian",
     "com_velocity",
     "compute_all_terms",
+    "constrained_dynamics",
+    "constrained_dynamics_derivatives",
+    "coriolis_derivatives",
     "coriolis_matrix",
     "crba",
     "difference",
     "difference_jacobian",
     "distance",
+    "energy_derivatives",
+    "forward_dynamics",
     "forward_kinematics",
     "frame_acceleration",
+    "frame_acceleration_derivatives",
     "frame_classical_acceleration",
+    "frame_classical_acceleration_derivatives",
     "frame_jacobian",
     "frame_jacobian_rate",
     "frame_placement",
     "frame_velocity",
+    "frame_velocity_derivative",
+    "from_inertia",
+    "from_log_cholesky",
     "gravity",
     "humanoid",
+    "impulse_dynamics",
+    "impulse_dynamics_derivatives",
     "integrate",
     "integrate_jacobian",
     "interpolate",
     "joint_torque_regressor",
     "kinetic_energy",
     "kinetic_energy_regressor",
+    "log_cholesky",
+    "log_cholesky_jacobian",
     "mechanical_energy",
     "minv",
     "neutral",
@@ -78,17 +126,32 @@ __all__ = [
     "passive_torque_derivative",
     "potential_energy",
     "potential_energy_regressor",
+    "pseudo_inertia",
     "quadruped",
     "random_configuration",
     "rnea",
     "rnea_derivatives",
+    "rnea_hessian",
+    "rnea_input_derivative",
+    "rnea_second_derivatives",
     "static_torque",
+    "static_torque_derivative",
+    "to_inertia",
     "transport",
 ]
 
 _Array: TypeAlias = NDArray[np.float64]
 _RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translation"]
+_Joints: TypeAlias = Sequence[tuple[Joint, ArrayLike | None]]
+_Method: TypeAlias = Literal["aba", "dense", "sparse"]
+_Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
+_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
 _Reference: TypeAlias = Literal["local", "world", "local_world_aligned"]
+_Input: TypeAlias = (
+    Literal["gravity", "armature", "damping"]
+    | tuple[Literal["force", "inertia"], str | int]
+    | tuple[Literal["friction"], float]
+)
 _RneaOut: TypeAlias = RneaDerivatives | tuple[_Array, _Array, _Array]
 _AbaOut: TypeAlias = AbaDerivatives | tuple[_Array, _Array, _Array, _Array]
 _MapOut: TypeAlias = CentroidalMap | tuple[_Array, _Array, _Array, _Array]
@@ -98,12 +161,13 @@ __version__: str
 ARM7: str
 QUADRUPED: str
 HUMANOID: str
+WORLD: BodyId
 
 class Error(Exception):
     """What is wrong with a robot's description or with a name in it."""
 
 class ParseError(Error):
-    """A file cannot be read, is no XML, or is no URDF of a robot."""
+    """A file cannot be read, is no XML, or does not describe a robot."""
 
 class ProblemError(Error):
     """An optimal control problem, a warm start or a setting makes no sense."""
@@ -111,12 +175,15 @@ class ProblemError(Error):
 class ModelError(Error):
     """A model cannot be built, or has no frame or joint of that name."""
 
+class NotPhysicalError(Error):
+    """No body of positive density has this inertia."""
+
 @final
 class Model:
     """A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
 
     Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
-    Pinocchio numbers them. A model is made by `from_urdf`, `from_urdf_string` or one of `condyle.robots`; it can be
+    Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
     pickled.
 
     >>> arm = condyle.robots.arm7()
@@ -130,35 +197,93 @@ class Model:
         root_joint: _RootJoint | None = None,
         mimic: bool = False,
         strict: bool = False,
+        packages: Sequence[str | os.PathLike[str]] | None = None,
     ) -> Model:
         """Reads a URDF file.
 
         Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
 
-        path: a path, as text or `os.PathLike`.
+        path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
         root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
             'spherical' or 'translation'; None fixes the root link to the world.
         mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
             their own.
         strict: whether what is only odd (`warnings`) is an error.
+        packages: folders that have packages in them, or are packages; before those that the environment names in
+            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
 
         Raises `ParseError`, with file, line and element, or `ModelError`.
         """
     @staticmethod
-    def from_urdf_string(
+    def from_urdf_str(
         text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
     ) -> Model:
         """Reads a URDF from a string; see `from_urdf`.
 
         >>> text = condyle.robots.QUADRUPED
-        >>> condyle.Model.from_urdf_string(text, root_joint="free_flyer").nv
+        >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
         18
+        """
+    @staticmethod
+    def from_mjcf(
+        path: str | os.PathLike[str], mimic: bool = False, strict: bool = False, weightless_meshes: bool = False
+    ) -> Model:
+        """Reads an MJCF file (MuJoCo), and the files that it includes.
+
+        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
+        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
+        bodies without mass, `name#1`, `name#2`, …, between them. What a tree of bodies cannot have is left out and
+        stands in `warnings`.
+
+        path: a path, as text or `os.PathLike`.
+        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being left out; its `polycoef`
+            must be linear.
+        strict: whether what is only odd, or left out (`warnings`), is an error.
+        weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and stands in
+            `warnings`, instead of being an error.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+    @staticmethod
+    def from_mjcf_str(text: str, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
+        """Reads an MJCF from a string, which may not include files; see `from_mjcf`.
+
+        >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
+        >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
+        2.0
+        """
+    @staticmethod
+    def from_sdf(
+        path: str | os.PathLike[str], root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
+    ) -> Model:
+        """Reads an SDF file (Gazebo) with one model in it.
+
+        Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
+        parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
+
+        path: a path, as text or `os.PathLike`.
+        root_joint: as for `from_urdf`.
+        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
+        strict: whether what is only odd, or left out (`warnings`), is an error.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+    @staticmethod
+    def from_sdf_str(
+        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
+    ) -> Model:
+        """Reads an SDF from a string; see `from_sdf`.
+
+        >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
+        >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
+        >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
+        6
         """
     @property
     def warnings(self) -> list[str]:
         """What is odd about the robot, though it could be loaded.
 
-        Inertias that no body has, joints along which the inertia matrix is singular.
+        Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
         """
 
     @property
@@ -185,9 +310,12 @@ class Model:
         """The names of the links that the joints carry; 'universe' for the world."""
     @property
     def joint_types(self) -> list[str]:
-        """The kind of each joint: 'revolute', 'continuous', 'prismatic', 'spherical', 'planar', 'translation' or
-        'free_flyer'; 'universe' for the world.
+        """The kind of each joint: 'revolute', 'continuous', 'prismatic', 'helical', 'spherical', 'planar',
+        'translation' or 'free_flyer'; 'universe' for the world.
         """
+    @property
+    def joints(self) -> list[Joint | None]:
+        """Each joint, as `Joint`; None for the world."""
     @property
     def parents(self) -> list[int]:
         """The body on which each joint sits; 0 is the world."""
@@ -255,6 +383,15 @@ class Model:
         """The same robot under another gravity (m/s², 3 numbers, in the world's frame)."""
     def with_armature(self, armature: ArrayLike) -> Model:
         """The same robot with another armature, nv numbers (kg m², kg)."""
+    def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
+        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
+
+        >>> arm = condyle.robots.arm7()
+        >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
+        >>> heavier = arm.with_inertias(twice)
+        >>> heavier.total_mass == 2.0 * arm.total_mass
+        True
+        """
     def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
         """The same robot with some joints locked where they are at q.
 
@@ -337,6 +474,261 @@ def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, ou
     >>> arm = condyle.robots.arm7()
     >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
     >>> bool(tool[2, 3] > 0.5)  # stretched upwards
+    True
+    """
+
+def rnea_input_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    wrt: _Input,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at most O(n) a
+    column.
+
+    q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
+    (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
+    frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
+    `passive_torque`; f_ext: as for `rnea`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
+    >>> dtau_dg = condyle.rnea_input_derivative(arm, data, q, zero, zero, "gravity")
+    >>> np.allclose(dtau_dg @ [0.0, 0.0, -9.81], condyle.gravity(arm, data, q))  # τ is linear in g
+    True
+    """
+
+def aba_input_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    wrt: _Input,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at most O(n²) a
+    column.
+
+    q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+    >>> da_df = condyle.aba_input_derivative(quadruped, data, q, zero, zero, ("force", "root_joint"))
+    >>> np.allclose(da_df, condyle.minv(quadruped, data, q)[:, :6])  # a force on the trunk is an effort of its joint
+    True
+    """
+
+def rnea_hessian(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    lambda_: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: Sequence[_Array] | None = None,
+) -> RneaHessian:
+    """The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
+    (nv, nv); the other blocks are zero.
+
+    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+    derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
+    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, np.ones(7))
+    >>> np.allclose(hessian.dqdq, hessian.dqdq.T)
+    True
+    """
+
+def aba_hessian(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    lambda_: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: Sequence[_Array] | None = None,
+) -> AbaHessian:
+    """The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
+    other blocks are zero.
+
+    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+    derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+    """
+
+def rnea_second_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: Sequence[_Array] | None = None,
+) -> RneaSecondDerivatives:
+    """The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
+    `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
+
+    q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
+    contracted with a vector, many times faster.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
+    >>> tensors = condyle.rnea_second_derivatives(arm, data, q, v, a)
+    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, weights)
+    >>> np.allclose(np.einsum("i,ijk->jk", weights, tensors.dqdq), hessian.dqdq)
+    True
+    """
+
+def frame_velocity_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """∂v/∂q of a frame's velocity, (6, nv), linear rows first; ∂v/∂(velocity) is its Jacobian.
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
+    >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
+    True
+    """
+
+def frame_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: Sequence[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
+    Jacobian.
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_classical_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: Sequence[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
+    Jacobian.
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def body_velocity_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: Sequence[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+    `frame_acceleration_derivatives` of its own frame.
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def centroidal_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    out: Sequence[_Array] | None = None,
+) -> CentroidalDerivatives:
+    """The derivatives of the centroidal momentum, its rate and the centre of mass by q, v and a, exact, in O(n), as
+    `CentroidalDerivatives`.
+
+    q: nq numbers; v, a: nv. Gravity is not among the accelerations.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+    >>> d = condyle.centroidal_derivatives(quadruped, data, q, zero, zero)
+    >>> np.allclose(d.drate_da, condyle.centroidal_map(quadruped, data, q).Ag)
+    True
+    """
+
+def energy_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    out: Sequence[_Array] | None = None,
+) -> EnergyDerivatives:
+    """The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
+    `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
+
+    q: nq numbers; v: nv.
+    """
+
+def static_torque_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """∂τ/∂q of `static_torque`, and without forces of `gravity`, (nv, nv); exact, in O(n depth).
+
+    q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
+    """
+
+def coriolis_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    out: Sequence[_Array] | None = None,
+) -> CoriolisDerivatives:
+    """The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
+    `CoriolisDerivatives(dq, dv)`, each (nv, nv).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
+    >>> d = condyle.coriolis_derivatives(arm, data, q, v)
+    >>> np.allclose(d.dv, 2.0 * condyle.coriolis_matrix(arm, data, q, v))  # C v is quadratic in v
     True
     """
 
@@ -434,6 +826,86 @@ def frame_jacobian_rate(
     q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
     acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
     frame.
+    """
+
+def body_jacobian(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The Jacobian J of a body, (6, nv), linear rows first: the body's velocity is J v.
+
+    q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
+    body's own frame.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q = condyle.Data(arm), [0.3] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "link7")
+    >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
+    True
+    """
+
+def body_velocity(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
+    own frame; O(n).
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_classical_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
+    frame; O(n).
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_jacobian_rate(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """dJ/dt, the rate of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
 def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
@@ -584,6 +1056,29 @@ def aba(
     True
     """
 
+def forward_dynamics(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    method: _Method | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, nv numbers (rad/s², m/s²).
+
+    q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', by a
+    dense factor of M, O(n³); 'sparse', by one with the zeros of the tree, O(n d²) for depth d; None, the fastest:
+    'aba', or 'sparse' for a robot with mimic joints. All give the same numbers, up to rounding.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
+    >>> a = condyle.forward_dynamics(arm, data, q, v, tau, method="sparse")
+    >>> np.allclose(a, condyle.aba(arm, data, q, v, tau))
+    True
+    """
+
 def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """M(q), the joint-space inertia matrix: (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
 
@@ -629,6 +1124,99 @@ def static_torque(
     """τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, nv numbers (N m, N); O(n).
 
     q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
+    """
+
+def constrained_dynamics(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: Constrained | Sequence[_Array] | None = None,
+) -> Constrained:
+    """q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that make J q̈ + γ = 0: forward dynamics under
+    constraints, as `Constrained(a, lambda_, residual, redundant)`.
+
+    constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
+    other, or themselves at a singular posture, give finite numbers and a residual.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
+    >>> feet = [condyle.Constraint(foot, "point", kd=10.0) for foot in ("LF_foot", "RH_foot")]
+    >>> stance = condyle.ConstraintSet(quadruped, feet)
+    >>> a, forces, residual, redundant = condyle.constrained_dynamics(quadruped, data, stance, q, zero, zero)
+    >>> bool(residual < 1e-9), redundant, np.allclose(stance.jacobian() @ a, 0.0)
+    (True, 0.0, True)
+    """
+
+def constrained_dynamics_derivatives(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: ConstrainedDerivatives | Sequence[_Array] | None = None,
+) -> ConstrainedDerivatives:
+    """`constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as `ConstrainedDerivatives`.
+
+    constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving
+    with the bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier
+    result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> touch = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> d = condyle.constrained_dynamics_derivatives(arm, condyle.Data(arm), touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
+    >>> np.allclose(touch.jacobian() @ d.da_dtau, 0.0)  # no effort moves the point
+    True
+    """
+
+def impulse_dynamics(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    restitution: float = 0.0,
+    out: Impulse | Sequence[_Array] | None = None,
+) -> Impulse:
+    """v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact, as
+    `Impulse(v, lambda_, residual, redundant)`.
+
+    constraints: a `ConstraintSet`, of which gains, velocities and accelerations do not count; q: nq numbers; v: nv;
+    restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.Constraint("LF_foot", "point")])
+    >>> q, falling = condyle.neutral(quadruped), np.eye(18)[2] * -1.0
+    >>> after = condyle.impulse_dynamics(quadruped, condyle.Data(quadruped), touchdown, q, falling)
+    >>> bool(after.lambda_[2] > 0.0)  # the ground pushes upwards
+    True
+    """
+
+def impulse_dynamics_derivatives(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    restitution: float = 0.0,
+    out: ImpulseDerivatives | Sequence[_Array] | None = None,
+) -> ImpulseDerivatives:
+    """`impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
+    `ImpulseDerivatives`.
+
+    constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: as many arrays
+    as there are members, such as an earlier result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> hit = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> d = condyle.impulse_dynamics_derivatives(arm, condyle.Data(arm), hit, [0.3] * 7, [0.1] * 7)
+    >>> np.allclose(d.dv_dv @ d.dv_dv, d.dv_dv)  # an impact that sticks is a projection
+    True
     """
 
 def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
@@ -823,6 +1411,475 @@ def difference_jacobian(
     their difference only.
 
     d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
+    """
+
+@final
+class ConstraintSet:
+    """Constraints of one model: contacts and loops, and the scratch of `constrained_dynamics` and its like.
+
+    Make one set for each combination of contacts; the `Data` can be the same for all sets. As a `Data`, a set serves
+    one thread at a time.
+
+    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found, so
+    that redundant constraints share the smallest forces; μ is small beside J M⁻¹ Jᵀ, as 1e-8. With μ = 0 one iteration
+    is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
+    sparse resolution of constrained dynamic equations (2021).
+
+    model: the robot; constraints: a list of `Constraint`s; mu: μ (1/kg); iterations: how many there are, always.
+
+    Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
+    'world', a gain is negative or not finite, or two constraints are the same.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> trot = condyle.ConstraintSet(quadruped, [condyle.Constraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
+    >>> len(trot), trot.rows, trot.range(1)
+    (2, 6, slice(3, 6, 1))
+    """
+
+    def __new__(
+        cls, model: Model, constraints: Sequence[Constraint], mu: float = 0.0, iterations: int = 1
+    ) -> ConstraintSet: ...
+    def __len__(self) -> int: ...
+    @property
+    def rows(self) -> int:
+        """How many rows J has, and λ numbers."""
+    def range(self, k: int) -> slice:
+        """The rows of constraint k, as a slice."""
+    def set_target(
+        self,
+        k: int,
+        placement: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+    ) -> None:
+        """Changes where constraint k wants its frame to be, and how it should move there: what is given, as in
+        `Constraint`.
+        """
+    def jacobian(self, out: _Array | None = None) -> _Array:
+        """J, (rows, nv), as the last call left it."""
+
+@final
+class Ltdl:
+    """M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+
+    With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
+    `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
+    matrix for branched kinematic trees (2005).
+
+    model: the robot whose zeros M has.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> factor = condyle.Ltdl(quadruped)
+    >>> factor.factorize(M)
+    >>> np.allclose(M @ factor.solve(np.ones(18)), 1.0)
+    True
+    >>> factor.nonzeros  # the base, and three joints of each leg: not 171
+    117
+    """
+
+    def __new__(cls, model: Model) -> Ltdl: ...
+    def factorize(self, M: ArrayLike) -> None:
+        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+
+        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+        """
+    def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
+        """x with M x = b, as many numbers as M has rows.
+
+        b: as many numbers.
+        """
+    def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
+        """X with M X = B, column by column.
+
+        B: a matrix of as many rows as M has.
+        """
+    def inverse(self, out: _Array | None = None) -> _Array:
+        """M⁻¹, both triangles filled."""
+    @property
+    def nonzeros(self) -> int:
+        """How many entries of L and D may differ from zero, the ones on L's diagonal not counted."""
+    @property
+    def order(self) -> list[int]:
+        """The coordinates in their order from the root to the tips: they are eliminated last to first.
+
+        It is 0, 1, 2, … unless joints share coordinates.
+        """
+    def row(self, k: int) -> list[tuple[int, float]]:
+        """Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value)."""
+    @property
+    def diagonal(self) -> _Array:
+        """D, in the `order` of the places."""
+
+@final
+class Cholesky:
+    """M = L Lᵀ of any symmetric positive definite matrix.
+
+    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
+    and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
+
+    n: the rows of M.
+
+    >>> factor = condyle.Cholesky(2)
+    >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
+    >>> factor.solve([8.0, 12.0])
+    array([1., 2.])
+    """
+
+    def __new__(cls, n: int) -> Cholesky: ...
+    def factorize(self, M: ArrayLike) -> None:
+        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+
+        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+        """
+    def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
+        """x with M x = b, as many numbers as M has rows.
+
+        b: as many numbers.
+        """
+    def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
+        """X with M X = B, column by column.
+
+        B: a matrix of as many rows as M has.
+        """
+    def inverse(self, out: _Array | None = None) -> _Array:
+        """M⁻¹, both triangles filled."""
+    @property
+    def lower(self) -> _Array:
+        """L, lower triangular."""
+
+@final
+class DivideConquer:
+    """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its scratch.
+
+    The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
+    a join of two pieces costs some ten times as much as the elimination of a body. On two threads this is faster than
+    `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. The bits are the same
+    for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for parallel
+    O(log(n)) calculation of rigid-body dynamics (1999).
+
+    model: the robot; grain: how many bodies a run has at most.
+
+    Raises `ModelError` if a joint follows another one (mimic).
+
+    >>> arm = condyle.robots.arm7()
+    >>> divided = condyle.DivideConquer(arm, grain=1)
+    >>> q, v, tau = [0.3] * 7, [0.1] * 7, [1.0] * 7
+    >>> np.allclose(divided.aba(arm, q, v, tau), condyle.aba(arm, condyle.Data(arm), q, v, tau))
+    True
+    >>> divided.size
+    AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, levels=4)
+    """
+
+    def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
+    @property
+    def size(self) -> AssemblySize:
+        """How much work the assembly is, and how many levels wait for one another, as `AssemblySize`."""
+    def aba(
+        self,
+        model: Model,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        f_ext: ArrayLike | None = None,
+        out: _Array | None = None,
+    ) -> _Array:
+        """q̈, nv numbers: those of `aba`, up to rounding, in O(n) work and O(log n + grain) steps.
+
+        model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
+        f_ext: as for `rnea`.
+        """
+
+@final
+class Simulation:
+    """A robot's state, and all that is needed to move it on.
+
+    Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
+    external forces stay as they are during a step.
+
+    model: the robot; it stands still at `neutral`, at time 0.
+    integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
+        whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
+        is conserved to rounding.
+    dt: h, the length of a step (s).
+    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
+        none of either.
+    tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
+    max_iterations: it gives up after so many iterations.
+
+    Raises `ModelError` if M is singular.
+
+    >>> from condyle.simulation import Simulation
+    >>> quadruped = condyle.robots.quadruped()
+    >>> simulation = Simulation(quadruped, dt=1e-3)
+    >>> def damper(now):
+    ...     now.tau[8] = -0.5 * now.v[8]
+    >>> simulation.run(100, damper)
+    'done'
+    >>> bool(abs(simulation.q[2] + 0.5 * 9.81 * 0.1**2) < 2e-3)  # it has fallen ½ g t²
+    True
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        integrator: _Integrator = "semi_implicit_euler",
+        dt: float = 1e-3,
+        passive: float | None = None,
+        tolerance: float = 1e-9,
+        max_iterations: int = 20,
+    ) -> Simulation: ...
+    @property
+    def q(self) -> _Array:
+        """The position, nq numbers."""
+    @property
+    def v(self) -> _Array:
+        """The velocity, nv numbers."""
+    @property
+    def time(self) -> float:
+        """The sum of the steps since the state was set (s)."""
+    def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
+        """Puts the robot at position q (nq numbers) with velocity v (nv), and the clock to 0."""
+    def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
+        """One step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach
+        the tolerance (a shorter step helps); or 'not_finite': then the step was not taken.
+
+        tau: nv numbers (N m, N); f_ext: as for `rnea`.
+        """
+    def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
+        """So many steps, with a control law that is called before each of them; ends early when one fails, with its
+        status.
+
+        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
+            efforts, then other threads run meanwhile.
+        """
+
+@final
+class Joint:
+    """The kind of a joint, with what it needs to know.
+
+    | | q | v |
+    | --- | --- | --- |
+    | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
+    | `continuous` | 2: cos θ, sin θ | 1 |
+    | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
+    | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
+    | `translation` | 3 | 3 |
+    | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
+
+    An axis is a vector in the body's frame, of any length but 0.
+
+    >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
+    1
+    """
+
+    @staticmethod
+    def revolute(axis: ArrayLike) -> Joint:
+        """One angle about an axis: q = [θ], v = [θ̇]."""
+    @staticmethod
+    def continuous(axis: ArrayLike) -> Joint:
+        """One angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
+    @staticmethod
+    def prismatic(axis: ArrayLike) -> Joint:
+        """One length along an axis: q = [d], v = [ḋ]."""
+    @staticmethod
+    def helical(axis: ArrayLike, pitch: float) -> Joint:
+        """A screw: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
+    @staticmethod
+    def spherical() -> Joint:
+        """A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
+    @staticmethod
+    def planar() -> Joint:
+        """Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
+    @staticmethod
+    def translation() -> Joint:
+        """Three lengths: q = [x, y, z], v = q̇."""
+    @staticmethod
+    def free_flyer() -> Joint:
+        """A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame."""
+    @property
+    def nq(self) -> int:
+        """How many numbers the position has."""
+    @property
+    def nv(self) -> int:
+        """How many degrees of freedom it has: the numbers of its velocity."""
+    @property
+    def axis(self) -> _Array | None:
+        """The axis, 3 numbers in the body's frame, a unit vector in a model; None if the joint has none."""
+
+@final
+class BodyId:
+    """Names a body of a builder: what `ModelBuilder.body` and others return. `WORLD` is always there."""
+
+@final
+class ModelBuilder:
+    """Makes a `Model`, body by body, parents first.
+
+    Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
+    joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
+    and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
+    the rows of f_ext count them.
+
+    name: the robot's.
+
+    >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
+    >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
+    >>> elbow = np.eye(4)
+    >>> elbow[2, 3] = -1.0
+    >>> robot = ModelBuilder("double pendulum")
+    >>> upper = robot.body("upper", WORLD, Joint.revolute([0.0, 1.0, 0.0]), inertia=rod)
+    >>> lower = robot.body("lower", upper, Joint.revolute([0.0, 1.0, 0.0]), elbow, rod, damping=0.1)
+    >>> robot.frame("tip", lower, elbow)
+    >>> robot.build()
+    <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
+    """
+
+    def __new__(cls, name: str) -> ModelBuilder: ...
+    def body(
+        self,
+        name: str,
+        parent: BodyId,
+        joint: Joint,
+        placement: ArrayLike | None = None,
+        inertia: Inertia | None = None,
+        *,
+        joint_name: str | None = None,
+        position: tuple[float, float] | None = None,
+        velocity: float | None = None,
+        effort: float | None = None,
+        damping: float = 0.0,
+        friction: float = 0.0,
+        armature: float = 0.0,
+    ) -> BodyId:
+        """Adds a body and its joint.
+
+        name: the body's, and the joint's unless it has a `joint_name` of its own.
+        parent: the body on which the joint sits.
+        placement: the joint's frame at position zero in the parent's frame.
+        inertia: in the body's frame, which is the joint's at position zero.
+        position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
+        velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
+        damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
+        armature: inertia of the rotor as seen at the joint (kg m², kg).
+        """
+    def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
+        """Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+
+        Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
+        `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
+        `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+
+        joints: a list of (joint, placement).
+        """
+    def spherical_zyx(
+        self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
+    ) -> BodyId:
+        """Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+
+        M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
+        """
+    def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
+        """Fixes more inertia to a body, given in a frame that is at `placement` in the body's."""
+    def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
+        """Adds a frame at `placement` in the body's frame."""
+    def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
+        """Lets a joint follow another one, in place of a coordinate of its own: its position is ratio q + offset.
+
+        follower, leader: the bodies that the joints carry.
+        """
+    def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
+        """Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before
+        them.
+
+        >>> from condyle import ModelBuilder, WORLD
+        >>> two = ModelBuilder("two arms")
+        >>> for side, y in ("left_", 0.4), ("right_", -0.4):
+        ...     at = np.eye(4)
+        ...     at[1, 3] = y
+        ...     two.append(WORLD, at, condyle.robots.arm7(), side)
+        >>> two.build().nv
+        14
+        """
+    def gravity(self, gravity: ArrayLike) -> None:
+        """Sets the acceleration of free fall (m/s², 3 numbers, in the world's frame); (0, 0, −9.81) otherwise."""
+    def build(self) -> Model:
+        """Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and
+        freezes the model. The builder cannot be used any more.
+
+        Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
+        """
+
+def from_inertia(inertia: Inertia) -> _Array:
+    """π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational inertia about
+    the origin, 10 numbers.
+
+    >>> from condyle import inertial_parameters
+    >>> I = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
+    >>> inertial_parameters.from_inertia(I)
+    array([2. , 0. , 0. , 1. , 0.6, 0. , 0.6, 0. , 0. , 0.1])
+    """
+
+def to_inertia(pi: ArrayLike) -> Inertia:
+    """The `Inertia` with the ten parameters π; the inverse of `from_inertia`.
+
+    pi: 10 numbers.
+    """
+
+def pseudo_inertia(inertia: Inertia) -> _Array:
+    """J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and kg.
+
+    Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
+    Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
+    (2018).
+
+    >>> from condyle import inertial_parameters
+    >>> J = inertial_parameters.pseudo_inertia(condyle.robots.arm7().inertias[3])
+    >>> bool(np.linalg.eigvalsh(J).min() > 0.0)
+    True
+    """
+
+def check(inertia: Inertia) -> None:
+    """Raises `NotPhysicalError` unless a body of positive density can have this inertia: J ≻ 0.
+
+    Point masses, rods and plates are at the border, without volume, and are refused.
+
+    >>> from condyle import inertial_parameters
+    >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
+    Traceback (most recent call last):
+        ...
+    condyle.NotPhysicalError: mass is 0 kg
+    """
+
+def log_cholesky(inertia: Inertia) -> _Array:
+    """θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃), the log-Cholesky parameters of a physical inertia: any ten
+    numbers, of which each tuple is another body.
+
+    α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). With them an identification needs no
+    constraints. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
+
+    Raises `NotPhysicalError`.
+
+    >>> from condyle import inertial_parameters
+    >>> pi = condyle.robots.arm7().inertial_parameters[:10]
+    >>> theta = inertial_parameters.log_cholesky(inertial_parameters.to_inertia(pi))
+    >>> np.allclose(inertial_parameters.from_inertia(inertial_parameters.from_log_cholesky(theta)), pi)
+    True
+    """
+
+def from_log_cholesky(theta: ArrayLike) -> Inertia:
+    """The `Inertia` with the log-Cholesky parameters θ, physical whatever they are; the inverse of `log_cholesky`.
+
+    theta: 10 numbers; α within ±32 and dᵢ within ±64.
+    """
+
+def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
+    """∂π/∂θ, (10, 10) and never singular: how the ten parameters change with the log-Cholesky parameters.
+
+    theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the slope of the efforts in θ.
+
+    >>> from condyle import inertial_parameters
+    >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ
+    2.0
     """
 
 @final

@@ -3,14 +3,14 @@
 //! In: a float64 C-contiguous array is read where it lies; other dtypes and strides are converted; a wrong shape is a
 //! `ValueError`. Out: a new array, or the caller's. Matrices are column-major in nalgebra and row-major here.
 
-use condyle::{Mat3, Se3, Vec3};
-use nalgebra::DMatrix;
+use condyle::{Force, Inertia, Mat3, Motion, Se3, Vec3};
+use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
 use numpy::ndarray::Dimension;
 use numpy::{Element, Ix1, Ix2, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyType;
+use pyo3::types::{PyFloat, PyType};
 use std::fmt::Write;
 use std::ops::Deref;
 
@@ -21,6 +21,14 @@ impl<D: Dimension> Deref for Input<'_, D> {
     type Target = [f64];
     fn deref(&self) -> &[f64] {
         self.0.as_slice().expect("was made contiguous and aligned")
+    }
+}
+
+impl Input<'_, Ix2> {
+    /// The matrix, column by column.
+    pub(crate) fn to_matrix(&self) -> DMatrix<f64> {
+        let &[rows, columns] = self.0.shape() else { unreachable!("has two dimensions") };
+        DMatrix::from_row_slice(rows, columns, self)
     }
 }
 
@@ -124,50 +132,156 @@ fn type_name(value: &Bound<'_, PyAny>) -> String {
     value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string())
 }
 
-/// Gives a vector out.
-pub(crate) fn give<'py>(
-    py: Python<'py>,
-    numbers: &[f64],
-    out: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    output(py, out, &[numbers.len()], |x| x.copy_from_slice(numbers))
+/// An array, as Python will see it.
+pub(crate) trait Array {
+    /// Its shape.
+    fn shape(&self) -> impl AsRef<[usize]>;
+    /// Writes its numbers in C order.
+    fn write(&self, x: &mut [f64]);
 }
 
-/// Gives a matrix out.
-pub(crate) fn give_matrix<'py>(
-    py: Python<'py>,
-    matrix: &DMatrix<f64>,
-    out: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let (rows, columns) = matrix.shape();
-    output(py, out, &[rows, columns], |x| {
-        for (c, column) in matrix.as_slice().chunks_exact(rows.max(1)).enumerate() {
+impl Array for [f64] {
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [self.len()]
+    }
+    fn write(&self, x: &mut [f64]) {
+        x.copy_from_slice(self);
+    }
+}
+
+/// Column-major in Rust, row-major in Python.
+impl<R: Dim, C: Dim, S: RawStorage<f64, R, C>> Array for Matrix<f64, R, C, S> {
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [self.nrows(), self.ncols()]
+    }
+    fn write(&self, x: &mut [f64]) {
+        let columns = self.ncols();
+        for (c, column) in self.column_iter().enumerate() {
             for (r, &number) in column.iter().enumerate() {
                 x[r * columns + c] = number;
             }
         }
-    })
+    }
 }
 
-/// Writes a pose as a homogeneous 4 × 4 matrix, row by row.
-pub(crate) fn write_pose(X: &Se3<f64>, out: &mut [f64]) {
-    let Mat3 { x, y, z } = X.rotation;
-    let p = X.translation;
-    out.copy_from_slice(&[
-        x.x, y.x, z.x, p.x, //
-        x.y, y.y, z.y, p.y, //
-        x.z, y.z, z.z, p.z, //
-        0.0, 0.0, 0.0, 1.0,
-    ]);
+/// A homogeneous matrix.
+impl Array for Se3<f64> {
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [4, 4]
+    }
+    fn write(&self, out: &mut [f64]) {
+        let Mat3 { x, y, z } = self.rotation;
+        let p = self.translation;
+        out.copy_from_slice(&[
+            x.x, y.x, z.x, p.x, //
+            x.y, y.y, z.y, p.y, //
+            x.z, y.z, z.z, p.z, //
+            0.0, 0.0, 0.0, 1.0,
+        ]);
+    }
 }
 
-/// Gives a pose out.
-pub(crate) fn give_pose<'py>(
-    py: Python<'py>,
-    X: &Se3<f64>,
+/// Homogeneous matrices, one for each body.
+impl Array for [Se3<f64>] {
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [self.len(), 4, 4]
+    }
+    fn write(&self, x: &mut [f64]) {
+        for (X, x) in self.iter().zip(x.chunks_exact_mut(16)) {
+            X.write(x);
+        }
+    }
+}
+
+/// [m 1, 0; 0, Ī]: of a whole robot about its centre of mass.
+impl Array for Inertia<f64> {
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [6, 6]
+    }
+    fn write(&self, x: &mut [f64]) {
+        x.fill(0.0);
+        for (k, column) in self.rotational.full().columns().into_iter().enumerate() {
+            x[7 * k] = self.mass;
+            x[6 * (3 + k) + 3..6 * (4 + k)].copy_from_slice(&column.to_array()); // symmetric: a column is a row
+        }
+    }
+}
+
+/// Those that are a row of numbers.
+macro_rules! rows {
+    ($($type:ident: $n:literal),*) => {$(
+        impl Array for $type<f64> {
+            fn shape(&self) -> impl AsRef<[usize]> {
+                [$n]
+            }
+            fn write(&self, x: &mut [f64]) {
+                x.copy_from_slice(&self.to_array());
+            }
+        }
+    )*};
+}
+rows!(Vec3: 3, Motion: 6, Force: 6);
+
+/// What a function can return: an array, a number, or a tuple of them.
+pub(crate) trait Give {
+    /// Gives it to Python, in the caller's `out` if there is one.
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>>;
+}
+
+impl<T: Array + ?Sized> Give for T {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        output(py, out, self.shape().as_ref(), |x| self.write(x))
+    }
+}
+
+impl Give for f64 {
+    fn give<'py>(&self, py: Python<'py>, _: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(PyFloat::new(py, *self).into_any())
+    }
+}
+
+/// A struct of the library as the named tuple of `condyle._types` with the same name and members.
+macro_rules! named_tuples {
+    ($($type:ident { $($member:ident),* })*) => {$(
+        impl $crate::arrays::Give for condyle::$type<'_, f64> {
+            fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+                static CLASS: pyo3::sync::PyOnceLock<Py<pyo3::types::PyType>> = pyo3::sync::PyOnceLock::new();
+                let names = [$(stringify!($member)),*];
+                let mut out = $crate::arrays::members(out, &names)?.into_iter();
+                let members = [$(self.$member.give(py, out.next().flatten().as_ref())?),*];
+                let members = pyo3::types::PyTuple::new(py, members)?;
+                $crate::arrays::named_tuple(py, &CLASS, stringify!($type))?.call1(members)
+            }
+        }
+    )*};
+}
+pub(crate) use named_tuples;
+
+/// The members of `out` of a function that returns several arrays, or none of them.
+pub(crate) fn members<'py>(
     out: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    output(py, out, &[4, 4], |x| write_pose(X, x))
+    names: &[&str],
+) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
+    let Some(out) = out else { return Ok(Vec::new()) };
+    let members = out.try_iter()?.map(|x| x.map(Some)).collect::<PyResult<Vec<_>>>()?;
+    if members.len() == names.len() {
+        return Ok(members);
+    }
+    let (expected, names, found) = (names.len(), names.join(", "), members.len());
+    Err(PyValueError::new_err(format!("out: expected {expected} arrays ({names}), found {found}")))
+}
+
+/// A pose that is given as a homogeneous 4 × 4 matrix.
+pub(crate) fn pose(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Se3<f64>> {
+    let m = matrix(argument, value, [4, 4])?;
+    let column = |c: usize| [m[c], m[4 + c], m[8 + c]].into();
+    Ok(Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3)))
+}
+
+/// Three numbers.
+pub(crate) fn three(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3<f64>> {
+    let x = vector(argument, value, 3)?;
+    Ok(Vec3::new(x[0], x[1], x[2]))
 }
 
 /// Gives the rows of a small matrix out.

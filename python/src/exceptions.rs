@@ -6,7 +6,7 @@ use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 create_exception!(condyle, Error, PyException, "What is wrong with a robot's description or with a name in it.");
-create_exception!(condyle, ParseError, Error, "A file cannot be read, is no XML, or is no URDF of a robot.");
+create_exception!(condyle, ParseError, Error, "A file cannot be read, is no XML, or does not describe a robot.");
 create_exception!(
     condyle,
     ProblemError,
@@ -14,13 +14,17 @@ create_exception!(
     "An optimal control problem, a warm start or a setting makes no sense."
 );
 create_exception!(condyle, ModelError, Error, "A model cannot be built, or has no frame or joint of that name.");
+create_exception!(condyle, NotPhysicalError, Error, "No body of positive density has this inertia.");
 
 /// A library error as one of our exceptions.
 pub(crate) fn exception(error: Cause) -> PyErr {
     match error {
-        Cause::File { .. } | Cause::Xml { .. } | Cause::Urdf { .. } | Cause::Strict { .. } => {
-            ParseError::new_err(error.to_string())
-        }
+        Cause::File { .. }
+        | Cause::Package { .. }
+        | Cause::Xml { .. }
+        | Cause::Urdf { .. }
+        | Cause::Element { .. }
+        | Cause::Strict { .. } => ParseError::new_err(error.to_string()),
         _ => ModelError::new_err(error.to_string()),
     }
 }

@@ -1,23 +1,31 @@
 //! The Python package `condyle`: its extension module `condyle._condyle`.
 //!
-//! `arrays` takes NumPy arrays in and gives them out, `model` shows a robot, `data` is the algorithms' scratch;
-//! `algorithms`, `centroidal`, `configuration`, `kinematics` and `regressors` are the functions of the library, one to
-//! one, and `optimal` is what `condyle.optimal` shows. The doc comments here are the docstrings that Python sees;
-//! `condyle/_condyle.pyi` repeats them for editors, and a test holds the two together.
+//! `arrays` takes NumPy arrays in and gives them out, `functions` is what all calls have in common, `model` shows a robot
+//! and `builder` makes one, `data` is the algorithms' scratch; `algorithms`, `centroidal`, `configuration`, `constrained`,
+//! `derivatives`, `factorisation`, `kinematics` and `regressors` are what the library has, one to one, and
+//! `inertial_parameters`, `optimal` and `simulation` are what the modules of these names show. The doc comments here are
+//! the docstrings that Python sees; `condyle/_condyle.pyi` repeats them for editors, and a test holds the two together.
 #![allow(non_snake_case)]
 #![allow(clippy::too_many_arguments)] // a function in Python has as many as it needs
 
 mod algorithms;
 mod arrays;
+mod builder;
 mod centroidal;
 mod configuration;
+mod constrained;
 mod data;
+mod derivatives;
 mod exceptions;
+mod factorisation;
+mod functions;
+mod inertial_parameters;
 mod kinematics;
 mod model;
 mod optimal;
 mod regressors;
 mod robots;
+mod simulation;
 
 use pyo3::prelude::*;
 
@@ -28,9 +36,11 @@ mod _condyle {
 
     #[pymodule_export]
     use algorithms::{
-        aba, aba_derivatives, coriolis_matrix, crba, gravity, minv, nonlinear_effects, rnea, rnea_derivatives,
-        static_torque,
+        aba, aba_derivatives, coriolis_matrix, crba, forward_dynamics, gravity, minv, nonlinear_effects, rnea,
+        rnea_derivatives, static_torque,
     };
+    #[pymodule_export]
+    use builder::{BodyId, Joint, ModelBuilder};
     #[pymodule_export]
     use centroidal::{
         centroidal_map, centroidal_map_rate, centroidal_momentum, centroidal_momentum_rate, com, com_acceleration,
@@ -42,11 +52,30 @@ mod _condyle {
         random_configuration, transport,
     };
     #[pymodule_export]
+    use constrained::{
+        ConstraintSet, constrained_dynamics, constrained_dynamics_derivatives, impulse_dynamics,
+        impulse_dynamics_derivatives,
+    };
+    #[pymodule_export]
     use data::Data;
     #[pymodule_export]
-    use exceptions::{Error, ModelError, ParseError, ProblemError};
+    use derivatives::{
+        aba_hessian, aba_input_derivative, body_acceleration_derivatives, body_velocity_derivative,
+        centroidal_derivatives, coriolis_derivatives, energy_derivatives, frame_acceleration_derivatives,
+        frame_classical_acceleration_derivatives, frame_velocity_derivative, rnea_hessian, rnea_input_derivative,
+        rnea_second_derivatives, static_torque_derivative,
+    };
+    #[pymodule_export]
+    use exceptions::{Error, ModelError, NotPhysicalError, ParseError, ProblemError};
+    #[pymodule_export]
+    use factorisation::{Cholesky, DivideConquer, Ltdl};
+    #[pymodule_export]
+    use inertial_parameters::{
+        check, from_inertia, from_log_cholesky, log_cholesky, log_cholesky_jacobian, pseudo_inertia, to_inertia,
+    };
     #[pymodule_export]
     use kinematics::{
+        body_acceleration, body_classical_acceleration, body_jacobian, body_jacobian_rate, body_velocity,
         forward_kinematics, frame_acceleration, frame_classical_acceleration, frame_jacobian, frame_jacobian_rate,
         frame_placement, frame_velocity,
     };
@@ -61,10 +90,13 @@ mod _condyle {
     };
     #[pymodule_export]
     use robots::{arm7, humanoid, model_from_bytes, quadruped};
+    #[pymodule_export]
+    use simulation::Simulation;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("WORLD", builder::world(module.py())?)?;
         module.add("ARM7", condyle::robots::ARM7)?;
         module.add("QUADRUPED", condyle::robots::QUADRUPED)?;
         module.add("HUMANOID", condyle::robots::HUMANOID)

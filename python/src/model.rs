@@ -1,10 +1,12 @@
 //! A robot as Python sees it.
 
-use crate::arrays::{give, give_pose, give_rows, named_tuple, output, vector, write_pose};
+use crate::arrays::{Give, named_tuple, three, vector};
+use crate::builder;
 use crate::exceptions::{ModelError, exception};
-use crate::robots::{MAGIC, urdf_options};
-use condyle::{FrameKind, Joint, Sym3, Vec3, inertial_parameters};
-use pyo3::exceptions::PyIndexError;
+use crate::inertial_parameters::{give_inertia, read_inertia};
+use crate::robots::{MAGIC, root};
+use condyle::{FrameKind, Joint, MjcfOptions, SdfOptions, UrdfOptions, inertial_parameters};
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBytes, PyType};
@@ -14,7 +16,7 @@ use std::path::PathBuf;
 /// A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
 ///
 /// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
-/// Pinocchio numbers them. A model is made by `from_urdf`, `from_urdf_string` or one of `condyle.robots`; it can be
+/// Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
 /// pickled.
 ///
 /// >>> arm = condyle.robots.arm7()
@@ -37,7 +39,7 @@ impl From<condyle::Model> for Model {
     }
 }
 
-fn kind(joint: Joint) -> &'static str {
+pub(crate) fn kind(joint: Joint) -> &'static str {
     match joint {
         Joint::Revolute { .. } => "revolute",
         Joint::Continuous { .. } => "continuous",
@@ -51,29 +53,37 @@ fn kind(joint: Joint) -> &'static str {
     }
 }
 
+/// The number of a frame that is given by name or by number.
+pub(crate) fn frame_index(model: &condyle::Model, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
+    if let Ok(name) = frame.extract::<&str>() {
+        return model.frame(name).map_err(exception);
+    }
+    numbered("frame: expected a name", frame, 0, model.frames().len())
+}
+
+/// The number, from `least` on, of a body that is given by its joint's name or by number.
+pub(crate) fn body_index(
+    expected: &str,
+    model: &condyle::Model,
+    body: &Bound<'_, PyAny>,
+    least: usize,
+) -> PyResult<usize> {
+    if let Ok(name) = body.extract::<&str>() {
+        return model.joint(name).map_err(exception);
+    }
+    numbered(expected, body, least, model.bodies().len())
+}
+
+/// A number from `least` to below `count`.
+fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
+    let index: isize = given.extract()?;
+    usize::try_from(index)
+        .ok()
+        .filter(|i| (least..count).contains(i))
+        .ok_or_else(|| PyIndexError::new_err(format!("{expected} or {least} to {}, found {index}", count - 1)))
+}
+
 impl Model {
-    /// The number of a frame that is given by name or by number.
-    pub(crate) fn frame_index(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
-        if let Ok(name) = frame.extract::<&str>() {
-            return self.inner.frame(name).map_err(exception);
-        }
-        let (index, count): (isize, _) = (frame.extract()?, self.inner.frames().len());
-        usize::try_from(index).ok().filter(|&i| i < count).ok_or_else(|| {
-            PyIndexError::new_err(format!("frame: expected a name or 0 to {}, found {index}", count - 1))
-        })
-    }
-
-    /// The number of a moving body that is given by its joint's name or by number.
-    fn joint_index(&self, joint: &Bound<'_, PyAny>) -> PyResult<usize> {
-        if let Ok(name) = joint.extract::<&str>() {
-            return self.inner.joint(name).map_err(exception);
-        }
-        let (index, count): (isize, _) = (joint.extract()?, self.inner.bodies().len());
-        usize::try_from(index).ok().filter(|i| (1..count).contains(i)).ok_or_else(|| {
-            PyIndexError::new_err(format!("joints: expected names or 1 to {}, found {index}", count - 1))
-        })
-    }
-
     /// Of each joint that has coordinates of its own; 0 of the others.
     fn of_joints(&self, get: impl Fn(&condyle::Body) -> usize) -> Vec<usize> {
         let count = |(i, b): (usize, &condyle::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
@@ -91,36 +101,110 @@ impl Model {
     ///
     /// Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
     ///
-    /// path: a path, as text or `os.PathLike`.
+    /// path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
     /// root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
     ///     'spherical' or 'translation'; None fixes the root link to the world.
     /// mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
     ///     their own.
     /// strict: whether what is only odd (`warnings`) is an error.
+    /// packages: folders that have packages in them, or are packages; before those that the environment names in
+    ///     `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`.
     #[staticmethod]
-    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false))]
-    fn from_urdf(path: PathBuf, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
-        let options = urdf_options(root_joint, mimic, strict)?;
+    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false, packages=None))]
+    fn from_urdf(
+        path: PathBuf,
+        root_joint: Option<&str>,
+        mimic: bool,
+        strict: bool,
+        packages: Option<Vec<PathBuf>>,
+    ) -> PyResult<Self> {
+        let packages = packages.unwrap_or_default();
+        let options = UrdfOptions { root_joint: root(root_joint)?, mimic, strict, packages };
         Ok(condyle::Model::from_urdf(path, &options).map_err(exception)?.into())
     }
 
     /// Reads a URDF from a string; see `from_urdf`.
     ///
     /// >>> text = condyle.robots.QUADRUPED
-    /// >>> condyle.Model.from_urdf_string(text, root_joint="free_flyer").nv
+    /// >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
     /// 18
     #[staticmethod]
     #[pyo3(signature = (text, root_joint=None, mimic=false, strict=false))]
-    fn from_urdf_string(text: &str, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
-        let options = urdf_options(root_joint, mimic, strict)?;
+    fn from_urdf_str(text: &str, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
+        let options = UrdfOptions { root_joint: root(root_joint)?, mimic, strict, packages: Vec::new() };
         Ok(condyle::Model::from_urdf_str(text, &options).map_err(exception)?.into())
+    }
+
+    /// Reads an MJCF file (MuJoCo), and the files that it includes.
+    ///
+    /// q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
+    /// in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
+    /// bodies without mass, `name#1`, `name#2`, …, between them. What a tree of bodies cannot have is left out and
+    /// stands in `warnings`.
+    ///
+    /// path: a path, as text or `os.PathLike`.
+    /// mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being left out; its `polycoef`
+    ///     must be linear.
+    /// strict: whether what is only odd, or left out (`warnings`), is an error.
+    /// weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and stands in
+    ///     `warnings`, instead of being an error.
+    ///
+    /// Raises `ParseError`, with file, line and element, or `ModelError`.
+    #[staticmethod]
+    #[pyo3(signature = (path, mimic=false, strict=false, weightless_meshes=false))]
+    fn from_mjcf(path: PathBuf, mimic: bool, strict: bool, weightless_meshes: bool) -> PyResult<Self> {
+        let options = MjcfOptions { strict, mimic, weightless_meshes };
+        Ok(condyle::Model::from_mjcf(path, &options).map_err(exception)?.into())
+    }
+
+    /// Reads an MJCF from a string, which may not include files; see `from_mjcf`.
+    ///
+    /// >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
+    /// >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
+    /// 2.0
+    #[staticmethod]
+    #[pyo3(signature = (text, mimic=false, strict=false, weightless_meshes=false))]
+    fn from_mjcf_str(text: &str, mimic: bool, strict: bool, weightless_meshes: bool) -> PyResult<Self> {
+        let options = MjcfOptions { strict, mimic, weightless_meshes };
+        Ok(condyle::Model::from_mjcf_str(text, &options).map_err(exception)?.into())
+    }
+
+    /// Reads an SDF file (Gazebo) with one model in it.
+    ///
+    /// Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
+    /// parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
+    ///
+    /// path: a path, as text or `os.PathLike`.
+    /// root_joint: as for `from_urdf`.
+    /// mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
+    /// strict: whether what is only odd, or left out (`warnings`), is an error.
+    ///
+    /// Raises `ParseError`, with file, line and element, or `ModelError`.
+    #[staticmethod]
+    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false))]
+    fn from_sdf(path: PathBuf, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
+        let options = SdfOptions { root_joint: root(root_joint)?, mimic, strict };
+        Ok(condyle::Model::from_sdf(path, &options).map_err(exception)?.into())
+    }
+
+    /// Reads an SDF from a string; see `from_sdf`.
+    ///
+    /// >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
+    /// >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
+    /// >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
+    /// 6
+    #[staticmethod]
+    #[pyo3(signature = (text, root_joint=None, mimic=false, strict=false))]
+    fn from_sdf_str(text: &str, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
+        let options = SdfOptions { root_joint: root(root_joint)?, mimic, strict };
+        Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
     }
 
     /// What is odd about the robot, though it could be loaded.
     ///
-    /// Inertias that no body has, joints along which the inertia matrix is singular.
+    /// Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.inner.warnings().iter().map(ToString::to_string).collect()
@@ -168,13 +252,20 @@ impl Model {
         self.inner.bodies().iter().map(|b| b.name.as_str()).collect()
     }
 
-    /// The kind of each joint: 'revolute', 'continuous', 'prismatic', 'spherical', 'planar', 'translation' or
-    /// 'free_flyer'; 'universe' for the world.
+    /// The kind of each joint: 'revolute', 'continuous', 'prismatic', 'helical', 'spherical', 'planar',
+    /// 'translation' or 'free_flyer'; 'universe' for the world.
     #[getter]
     fn joint_types(&self) -> Vec<&str> {
         let mut types = self.of_bodies(|b| kind(b.joint));
         types[0] = "universe";
         types
+    }
+
+    /// Each joint, as `Joint`; None for the world.
+    #[getter]
+    fn joints(&self) -> Vec<Option<builder::Joint>> {
+        let bodies = self.inner.bodies().iter().enumerate();
+        bodies.map(|(i, b)| (i > 0).then_some(builder::Joint(b.joint))).collect()
     }
 
     /// The body on which each joint sits; 0 is the world.
@@ -219,33 +310,13 @@ impl Model {
     /// The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4).
     #[getter]
     fn joint_placements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let bodies = self.inner.bodies();
-        output(py, None, &[bodies.len(), 4, 4], |x| {
-            for (b, x) in bodies.iter().zip(x.chunks_exact_mut(16)) {
-                write_pose(&b.placement, x);
-            }
-        })
+        self.of_bodies(|b| b.placement).give(py, None)
     }
 
     /// The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame.
     #[getter]
     fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        static INERTIA: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let class = named_tuple(py, &INERTIA, "Inertia")?;
-        let inertia = |b: &condyle::Body| {
-            let I = b.inertia;
-            let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
-            // Ī = I_c − m [c]ₓ[c]ₓ, so I_c is what is left of Ī when that is taken away
-            let point_mass = condyle::Inertia::from_com(I.mass, com, Sym3::zero());
-            let about_com = I.rotational - point_mass.rotational;
-            class.call1((
-                I.mass,
-                give(py, &com.to_array(), None)?,
-                give_rows(py, about_com.full().columns())?,
-                give_rows(py, I.rotational.full().columns())?,
-            ))
-        };
-        self.inner.bodies().iter().map(inertia).collect()
+        self.inner.bodies().iter().map(|b| give_inertia(py, b.inertia)).collect()
     }
 
     /// π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
@@ -255,7 +326,7 @@ impl Model {
     fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let bodies = self.inner.bodies()[1..].iter();
         let pi: Vec<f64> = bodies.flat_map(|b| inertial_parameters::from_inertia(b.inertia)).collect();
-        give(py, &pi, None)
+        pi.give(py, None)
     }
 
     /// The limits of position, velocity and effort, as `Limits`; infinite where there are none.
@@ -264,35 +335,35 @@ impl Model {
         static LIMITS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let limits = self.inner.limits();
         named_tuple(py, &LIMITS, "Limits")?.call1((
-            give(py, &limits.lower, None)?,
-            give(py, &limits.upper, None)?,
-            give(py, &limits.velocity, None)?,
-            give(py, &limits.effort, None)?,
+            limits.lower.give(py, None)?,
+            limits.upper.give(py, None)?,
+            limits.velocity.give(py, None)?,
+            limits.effort.give(py, None)?,
         ))
     }
 
     /// Viscous damping of each degree of freedom (N m s/rad, N s/m), nv numbers: used by no algorithm unasked.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give(py, self.inner.damping(), None)
+        self.inner.damping().give(py, None)
     }
 
     /// Coulomb friction of each degree of freedom (N m, N), nv numbers: used by no algorithm unasked.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give(py, self.inner.friction(), None)
+        self.inner.friction().give(py, None)
     }
 
     /// Inertia of the rotor as seen at each joint (kg m², kg), nv numbers, part of M in every algorithm.
     #[getter]
     fn armature<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give(py, self.inner.armature(), None)
+        self.inner.armature().give(py, None)
     }
 
     /// The acceleration of free fall, in the world's frame (m/s²), 3 numbers.
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give(py, &self.inner.gravity().to_array(), None)
+        self.inner.gravity().give(py, None)
     }
 
     /// Mass of all bodies, of what is fixed to the world too (kg).
@@ -313,7 +384,7 @@ impl Model {
                 FrameKind::Joint => "joint",
                 FrameKind::User => "user",
             };
-            class.call1((f.name.as_str(), kind, f.body, give_pose(py, &f.placement, None)?))
+            class.call1((f.name.as_str(), kind, f.body, f.placement.give(py, None)?))
         };
         self.inner.frames().iter().map(frame).collect()
     }
@@ -334,8 +405,7 @@ impl Model {
 
     /// The same robot under another gravity (m/s², 3 numbers, in the world's frame).
     fn with_gravity(&self, gravity: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let gravity = vector("gravity", gravity, 3)?;
-        let gravity = Vec3::new(gravity[0], gravity[1], gravity[2]);
+        let gravity = three("gravity", gravity)?;
         Ok(Self { inner: self.inner.clone().with_gravity(gravity), structure: self.structure })
     }
 
@@ -343,6 +413,22 @@ impl Model {
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
         let armature = vector("armature", armature, self.inner.nv())?;
         Ok(Self { inner: self.inner.clone().with_armature(&armature), structure: self.structure })
+    }
+
+    /// The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
+    ///
+    /// >>> arm = condyle.robots.arm7()
+    /// >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
+    /// >>> heavier = arm.with_inertias(twice)
+    /// >>> heavier.total_mass == 2.0 * arm.total_mass
+    /// True
+    fn with_inertias(&self, inertias: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
+        let (expected, found) = (self.inner.bodies().len(), inertias.len());
+        if found != expected {
+            return Err(PyValueError::new_err(format!("inertias: expected {expected}, found {found}")));
+        }
+        let inertias = inertias.iter().map(|I| read_inertia("inertias", I)).collect::<PyResult<Vec<_>>>()?;
+        Ok(Self { inner: self.inner.with_inertias(|body, _| inertias[body]), structure: self.structure })
     }
 
     /// The same robot with some joints locked where they are at q.
@@ -358,7 +444,10 @@ impl Model {
     ///
     /// Raises `ModelError`.
     fn lock(&self, joints: Vec<Bound<'_, PyAny>>, q: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let joints = joints.iter().map(|joint| self.joint_index(joint)).collect::<PyResult<Vec<_>>>()?;
+        let joints = joints
+            .iter()
+            .map(|joint| body_index("joints: expected names", &self.inner, joint, 1))
+            .collect::<PyResult<Vec<_>>>()?;
         let q = vector("q", q, self.inner.nq())?;
         Ok(self.inner.lock(&joints, &q).map_err(exception)?.into())
     }

@@ -1,10 +1,9 @@
 //! Optimal control as Python sees it: the module `condyle.optimal`.
 
-use crate::arrays::{give, matrix, named_tuple, output, vector};
+use crate::arrays::{Give, matrix, named_tuple, output, pose, three, vector};
 use crate::exceptions::ProblemError;
-use crate::model::Model;
+use crate::model::{Model, frame_index};
 use condyle::optimal as rust;
-use condyle::{Mat3, Se3};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -113,10 +112,8 @@ impl Cost {
         target: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let m = matrix("target", target, [4, 4])?;
-        let column = |c: usize| [m[c], m[4 + c], m[8 + c]].into();
-        let target = Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3));
-        let frame = model.get().frame_index(frame)?;
+        let target = pose("target", target)?;
+        let frame = frame_index(&model.get().inner, frame)?;
         Ok(Self::make(name, weight, robot::Residual::FramePlacement { frame, target }, activation))
     }
 
@@ -131,9 +128,8 @@ impl Cost {
         target: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let p = vector("target", target, 3)?;
-        let target = [p[0], p[1], p[2]].into();
-        let frame = model.get().frame_index(frame)?;
+        let target = three("target", target)?;
+        let frame = frame_index(&model.get().inner, frame)?;
         Ok(Self::make(name, weight, robot::Residual::FrameTranslation { frame, target }, activation))
     }
 
@@ -173,7 +169,7 @@ impl FreeDynamics {
     fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let model = self.0.model();
         let x = vector("x", x, model.nq() + model.nv())?;
-        give(py, &self.0.clone().quasi_static(&x), None)
+        self.0.clone().quasi_static(&x).give(py, None)
     }
 }
 

@@ -1,25 +1,23 @@
 //! Where models come from, apart from files: the robots of our own, and pickles.
 
 use crate::exceptions::ModelError;
+use crate::functions::wrong_word;
 use crate::model::Model;
-use condyle::{Joint, UrdfOptions, robots};
-use pyo3::exceptions::PyValueError;
+use condyle::{Joint, robots};
 use pyo3::prelude::*;
 
-/// The options of reading a URDF.
-pub(crate) fn urdf_options(root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<UrdfOptions> {
-    let root_joint = match root_joint {
-        None => None,
-        Some("free_flyer") => Some(Joint::FreeFlyer),
-        Some("planar") => Some(Joint::Planar),
-        Some("spherical") => Some(Joint::Spherical),
-        Some("translation") => Some(Joint::Translation),
+/// The joint between the world and a root link.
+pub(crate) fn root(root_joint: Option<&str>) -> PyResult<Option<Joint>> {
+    match root_joint {
+        None => Ok(None),
+        Some("free_flyer") => Ok(Some(Joint::FreeFlyer)),
+        Some("planar") => Ok(Some(Joint::Planar)),
+        Some("spherical") => Ok(Some(Joint::Spherical)),
+        Some("translation") => Ok(Some(Joint::Translation)),
         Some(other) => {
-            let expected = "expected None, 'free_flyer', 'planar', 'spherical' or 'translation'";
-            return Err(PyValueError::new_err(format!("root_joint: {expected}, found '{other}'")));
+            Err(wrong_word("root_joint", "None, 'free_flyer', 'planar', 'spherical' or 'translation'", other))
         }
-    };
-    Ok(UrdfOptions { root_joint, mimic, strict })
+    }
 }
 
 /// What a pickled model begins with: the library's version, since the form may change from one to the next.

@@ -104,6 +104,27 @@ def test_motion_of_frames(robot: Robot, reference: Any) -> None:
         assert np.array_equal(classical[3:], spatial[3:])
 
 
+@pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
+def test_motion_of_bodies(robot: Robot, reference: Any) -> None:
+    """That of the frames that joints have at the bodies' origins; the world stands still."""
+    model, data, q, v, a, *_ = robot
+    for body in range(1, model.nbodies):
+        name = model.names[body]
+        frame = next(i for i, f in enumerate(model.frames) if f.body == body and f.name == name)
+        for of_body, of_frame, arguments in (
+            (condyle.body_jacobian, condyle.frame_jacobian, (q,)),
+            (condyle.body_velocity, condyle.frame_velocity, (q, v)),
+            (condyle.body_acceleration, condyle.frame_acceleration, (q, v, a)),
+            (condyle.body_classical_acceleration, condyle.frame_classical_acceleration, (q, v, a)),
+            (condyle.body_jacobian_rate, condyle.frame_jacobian_rate, (q, v)),
+        ):
+            expected = of_frame(model, data, *arguments, frame, reference)  # type: ignore[operator]
+            np.testing.assert_allclose(of_body(model, data, *arguments, body, reference), expected, **CLOSE)  # type: ignore[operator]
+            by_name = of_body(model, data, *arguments, name, reference)  # type: ignore[operator]
+            assert np.array_equal(by_name, of_body(model, data, *arguments, body, reference))  # type: ignore[operator]
+    assert not condyle.body_velocity(model, data, q, v, 0, reference).any()
+
+
 def test_centre_of_mass_and_momentum(robot: Robot) -> None:
     model, data, q, v, a, *_ = robot
     rate, still = condyle.centroidal_map_rate(model, data, q, v), condyle.centroidal_map(model, data, q)
@@ -172,7 +193,7 @@ def test_regressors(robot: Robot) -> None:
 def test_passive_torque() -> None:
     joint = '<dynamics damping="0.5" friction="2"/>'
     text = condyle.robots.ARM7.replace("<dynamics", "<ignored").replace("</joint>", joint + "</joint>")
-    model = condyle.Model.from_urdf_string(text)
+    model = condyle.Model.from_urdf_str(text)
     assert np.array_equal(model.friction, np.full(7, 2.0))
     v = np.linspace(-0.1, 0.2, 7)
     np.testing.assert_allclose(condyle.passive_torque(model, v, 0.1), -0.5 * v - 2 * np.tanh(v / 0.1), **CLOSE)

@@ -18,6 +18,7 @@ def calls(robot: Robot) -> dict[str, Call]:
     return {
         "rnea": lambda **k: condyle.rnea(model, data, q, v, a, f_ext, **k),
         "aba": lambda **k: condyle.aba(model, data, q, v, tau, f_ext, **k),
+        "forward_dynamics": lambda **k: condyle.forward_dynamics(model, data, q, v, tau, f_ext, "sparse", **k),
         "crba": lambda **k: condyle.crba(model, data, q, **k),
         "minv": lambda **k: condyle.minv(model, data, q, **k),
         "nonlinear_effects": lambda **k: condyle.nonlinear_effects(model, data, q, v, **k),
@@ -31,6 +32,11 @@ def calls(robot: Robot) -> dict[str, Call]:
         "frame_acceleration": lambda **k: condyle.frame_acceleration(model, data, q, v, a, 1, **k),
         "frame_classical_acceleration": lambda **k: condyle.frame_classical_acceleration(model, data, q, v, a, 1, **k),
         "frame_jacobian_rate": lambda **k: condyle.frame_jacobian_rate(model, data, q, v, 1, **k),
+        "body_jacobian": lambda **k: condyle.body_jacobian(model, data, q, 1, **k),
+        "body_velocity": lambda **k: condyle.body_velocity(model, data, q, v, 1, **k),
+        "body_acceleration": lambda **k: condyle.body_acceleration(model, data, q, v, a, 1, **k),
+        "body_classical_acceleration": lambda **k: condyle.body_classical_acceleration(model, data, q, v, a, 1, **k),
+        "body_jacobian_rate": lambda **k: condyle.body_jacobian_rate(model, data, q, v, 1, **k),
         "com": lambda **k: condyle.com(model, data, q, **k),
         "com_velocity": lambda **k: condyle.com_velocity(model, data, q, v, **k),
         "com_acceleration": lambda **k: condyle.com_acceleration(model, data, q, v, a, **k),
@@ -68,6 +74,7 @@ def test_shapes(robot: Robot) -> None:
     shapes = {
         "rnea": (nv,),
         "aba": (nv,),
+        "forward_dynamics": (nv,),
         "crba": (nv, nv),
         "minv": (nv, nv),
         "nonlinear_effects": (nv,),
@@ -81,6 +88,11 @@ def test_shapes(robot: Robot) -> None:
         "frame_acceleration": (6,),
         "frame_classical_acceleration": (6,),
         "frame_jacobian_rate": (6, nv),
+        "body_jacobian": (6, nv),
+        "body_velocity": (6,),
+        "body_acceleration": (6,),
+        "body_classical_acceleration": (6,),
+        "body_jacobian_rate": (6, nv),
         "com": (3,),
         "com_velocity": (3,),
         "com_acceleration": (3,),
@@ -228,6 +240,11 @@ def test_wrong_words(quadruped: Robot) -> None:
     for index in (-1, len(model.frames)):
         with pytest.raises(IndexError, match=rf"^frame: expected a name or 0 to \d+, found {index}$"):
             condyle.frame_placement(model, data, q, index)
+    with pytest.raises(condyle.ModelError, match="^unknown joint `LF_kne`; nearest is `"):
+        condyle.body_jacobian(model, data, q, "LF_kne")
+    for index in (-1, model.nbodies):
+        with pytest.raises(IndexError, match=rf"^body: expected a joint's name or 0 to 13, found {index}$"):
+            condyle.body_jacobian(model, data, q, index)
     with pytest.raises(TypeError):
         condyle.frame_placement(model, data, q, 1.5)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="^reference: expected 'local', 'world' .*, found 'body'"):

@@ -17,7 +17,7 @@ def test_data_of_another_robot(quadruped: Robot) -> None:
     message = r"^data: made for another model \('quadruped'\), not for this 'arm7'$"
     with pytest.raises(ValueError, match=message):
         condyle.gravity(arm, quadruped.data, np.zeros(7))
-    fixed = condyle.Model.from_urdf_string(condyle.robots.QUADRUPED)
+    fixed = condyle.Model.from_urdf_str(condyle.robots.QUADRUPED)
     with pytest.raises(ValueError, match="^data: made for another model"):
         condyle.gravity(fixed, quadruped.data, np.zeros(fixed.nq))
     with pytest.raises(TypeError):
@@ -32,6 +32,8 @@ def test_order_of_calls_does_not_matter(robot: Robot) -> None:
         lambda d, q: condyle.rnea(model, d, q, v, a, f_ext),
         lambda d, q: condyle.rnea(model, d, q, v, a),
         lambda d, q: condyle.aba(model, d, q, v, tau),
+        lambda d, q: condyle.forward_dynamics(model, d, q, v, tau, None, "dense"),
+        lambda d, q: condyle.forward_dynamics(model, d, q, v, tau, None, "sparse"),
         lambda d, q: condyle.crba(model, d, q),
         lambda d, q: condyle.minv(model, d, q),
         lambda d, q: condyle.frame_jacobian(model, d, q, 1),

@@ -27,7 +27,7 @@ PENDULUM = """<robot name="pendulum">
 
 
 def test_members() -> None:
-    model = condyle.Model.from_urdf_string(PENDULUM)
+    model = condyle.Model.from_urdf_str(PENDULUM)
     assert (model.name, model.nq, model.nv, model.nbodies) == ("pendulum", 2, 2, 3)
     assert model.names == ["universe", "pivot", "slide"]
     assert model.body_names == ["universe", "rod", "finger"]
@@ -61,7 +61,7 @@ def test_members() -> None:
 
 
 def test_inertias() -> None:
-    world, rod, finger = condyle.Model.from_urdf_string(PENDULUM).inertias
+    world, rod, finger = condyle.Model.from_urdf_str(PENDULUM).inertias
     assert (world.mass, rod.mass, finger.mass) == (3.0, 3.0, 0.0)
     np.testing.assert_allclose(rod.com, [0, 0, -4 / 3], atol=1e-15)
     # 2 kg at −1, 1 kg at −2: both turn about the axis; about their common centre 2/3 kg m² are left
@@ -71,7 +71,7 @@ def test_inertias() -> None:
 
 
 def test_mimic() -> None:
-    model = condyle.Model.from_urdf_string(PENDULUM, mimic=True)
+    model = condyle.Model.from_urdf_str(PENDULUM, mimic=True)
     assert (model.nq, model.nv) == (1, 1)
     assert model.mimics == [None, None, condyle.Mimic(ratio=0.5, offset=0.1)]
     assert (model.nqs, model.idx_qs, model.idx_vs) == ([0, 1, 0], [0, 0, 0], [0, 0, 0])
@@ -84,7 +84,7 @@ def test_mimic() -> None:
     [(None, 2, 2), ("free_flyer", 9, 8), ("planar", 6, 5), ("spherical", 6, 5), ("translation", 5, 5)],
 )
 def test_root_joints(root_joint: str | None, nq: int, nv: int) -> None:
-    model = condyle.Model.from_urdf_string(PENDULUM, root_joint)  # type: ignore[arg-type]
+    model = condyle.Model.from_urdf_str(PENDULUM, root_joint)  # type: ignore[arg-type]
     assert (model.nq, model.nv) == (nq, nv)
     assert model.joint_types[1] == (root_joint or "revolute")
 
@@ -97,8 +97,98 @@ def test_files(tmp_path: Path) -> None:
         condyle.Model.from_urdf(tmp_path / "missing.urdf")
 
 
+def test_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    folder = tmp_path / "pendulum_description" / "urdf"
+    folder.mkdir(parents=True)
+    (folder / "pendulum.urdf").write_text(PENDULUM, encoding="utf-8")
+    (folder.parent / "package.xml").write_text("<package/>", encoding="utf-8")
+    address = "package://pendulum_description/urdf/pendulum.urdf"
+    assert condyle.Model.from_urdf(address, packages=[tmp_path]).name == "pendulum"
+    assert condyle.Model.from_urdf(address, packages=[str(folder.parent)]).name == "pendulum"
+    with pytest.raises(condyle.ParseError, match="pendulum_description"):
+        condyle.Model.from_urdf(address)
+
+
+MJCF = """<mujoco model="pendulum"><worldbody><body name="rod">
+  <joint name="pivot" axis="0 1 0" damping="0.1"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/>
+</body></worldbody>{}</mujoco>"""
+
+
+def test_mjcf(tmp_path: Path) -> None:
+    text = MJCF.format("")
+    model = condyle.Model.from_mjcf_str(text)
+    assert (model.name, model.names, model.total_mass) == ("pendulum", ["universe", "pivot"], 2.0)
+    assert model.damping == [0.1]
+    path = tmp_path / "pendulum.xml"
+    path.write_text(text, encoding="utf-8")
+    assert condyle.Model.from_mjcf(path).names == condyle.Model.from_mjcf(str(path)).names == model.names
+    with pytest.raises(condyle.ParseError, match="^<string>:2: joint `pivot`: axis: `y` is no finite number$"):
+        condyle.Model.from_mjcf_str(text.replace("0 1 0", "0 y 0"))
+    odd = MJCF.format('<tendon><fixed name="t"><joint joint="pivot" coef="1"/></fixed></tendon>')
+    assert len(condyle.Model.from_mjcf_str(odd).warnings) == 1
+    with pytest.raises(condyle.ParseError):
+        condyle.Model.from_mjcf_str(odd, strict=True)
+
+
+def test_mjcf_meshes() -> None:
+    shapes = '<geom type="mesh" mesh="m"/><geom size="0.1" mass="1"/>'
+    asset = '<asset><mesh name="m" file="m.obj"/></asset>'
+    text = f'<mujoco>{asset}<worldbody><body name="a"><joint/>{shapes}</body></worldbody></mujoco>'
+    with pytest.raises(condyle.ParseError):
+        condyle.Model.from_mjcf_str(text)
+    model = condyle.Model.from_mjcf_str(text, weightless_meshes=True)
+    assert (model.total_mass, len(model.warnings)) == (1.0, 1)
+
+
+def test_mjcf_mimic() -> None:
+    body = '<body name="{0}"><joint name="{0}"/><geom size="0.1" mass="1"/></body>'
+    equality = '<equality><joint joint1="b" joint2="a" polycoef="0.5 2 0 0 0"/></equality>'
+    bodies = body.format("a") + body.format("b")
+    text = f"<mujoco><worldbody>{bodies}</worldbody>{equality}</mujoco>"
+    assert condyle.Model.from_mjcf_str(text).nv == 2
+    model = condyle.Model.from_mjcf_str(text, mimic=True)
+    assert (model.nv, model.mimics[2]) == (1, condyle.Mimic(2.0, 0.5))
+
+
+SDF = """<sdf version="1.7"><model name="pendulum">
+  <link name="rod"><inertial><pose>0 0 -1 0 0 0</pose><mass>2</mass></inertial></link>
+  <link name="bob"><inertial><mass>1</mass></inertial></link>
+  <joint name="pivot" type="revolute"><parent>rod</parent><child>bob</child><axis><xyz>0 1 0</xyz></axis></joint>
+</model></sdf>"""
+
+
+def test_sdf(tmp_path: Path) -> None:
+    model = condyle.Model.from_sdf_str(SDF, root_joint="free_flyer")
+    assert (model.name, model.names) == ("pendulum", ["universe", "root_joint", "pivot"])
+    assert (model.nq, model.nv, model.total_mass) == (8, 7, 3.0)
+    path = tmp_path / "pendulum.sdf"
+    path.write_text(SDF, encoding="utf-8")
+    assert condyle.Model.from_sdf(path).names == condyle.Model.from_sdf(str(path)).names == ["universe", "pivot"]
+    with pytest.raises(condyle.ParseError, match="^<string>:4: joint `pivot`: no link, joint or frame is named `bar`"):
+        condyle.Model.from_sdf_str(SDF.replace(">bob<", ">bar<"))
+    odd = SDF.replace("<inertial><mass>1</mass></inertial>", "")
+    assert len(condyle.Model.from_sdf_str(odd).warnings) == 1
+    with pytest.raises(condyle.ParseError, match="bob"):
+        condyle.Model.from_sdf_str(odd, strict=True)
+    with pytest.raises(ValueError, match="^root_joint: expected None, "):
+        condyle.Model.from_sdf_str(SDF, root_joint="free")  # type: ignore[arg-type]
+
+
+def test_sdf_mimic() -> None:
+    mimic = '<mimic joint="a"><multiplier>2</multiplier><offset>0.5</offset><reference>0</reference></mimic>'
+    joint = """<link name="{0}"><inertial><mass>1</mass></inertial></link><joint name="{0}j" type="revolute">
+      <parent>world</parent><child>{0}</child><axis><xyz>0 0 1</xyz>{1}</axis></joint>"""
+    parts = joint.format("a", "") + joint.format("b", mimic.replace('"a"', '"aj"'))
+    text = f'<sdf version="1.11"><model name="two">{parts}</model></sdf>'
+    assert condyle.Model.from_sdf_str(text).nv == 2
+    model = condyle.Model.from_sdf_str(text, mimic=True)
+    assert (model.nv, model.mimics[2]) == (1, condyle.Mimic(2.0, 0.5))
+
+
 def test_errors() -> None:
-    read = condyle.Model.from_urdf_string
+    read = condyle.Model.from_urdf_str
     assert issubclass(condyle.ParseError, condyle.Error)
     assert issubclass(condyle.ModelError, condyle.Error)
     with pytest.raises(condyle.ParseError, match="^<string>:1: not well-formed XML"):
@@ -114,7 +204,7 @@ def test_errors() -> None:
 
 
 def test_continuous_joints_have_limits_of_speed_and_effort_only() -> None:
-    limits = condyle.Model.from_urdf_string(PENDULUM.replace('"revolute"', '"continuous"')).limits
+    limits = condyle.Model.from_urdf_str(PENDULUM.replace('"revolute"', '"continuous"')).limits
     assert np.array_equal(limits.upper, [np.inf, np.inf, 1])
     assert np.array_equal(limits.velocity, [3, 1])
     assert np.array_equal(limits.effort, [4, 1])
@@ -125,20 +215,20 @@ ODD = PENDULUM.replace('ixx="0.3"', 'ixx="0.25"')
 
 
 def test_warnings() -> None:
-    assert condyle.Model.from_urdf_string(PENDULUM).warnings[0].startswith("body `rod`: principal moments 0.96")
-    model = condyle.Model.from_urdf_string(ODD)
+    assert condyle.Model.from_urdf_str(PENDULUM).warnings[0].startswith("body `rod`: principal moments 0.96")
+    model = condyle.Model.from_urdf_str(ODD)
     assert model.warnings == [
         "body `finger` moves and has no mass",
         "joint `slide` moves nothing that has inertia along it: the inertia matrix is singular",
     ]
     assert model.singular_joints == [model.joint("slide")]
-    sound = condyle.Model.from_urdf_string(ODD.replace("prismatic", "fixed"), strict=True)
+    sound = condyle.Model.from_urdf_str(ODD.replace("prismatic", "fixed"), strict=True)
     assert (sound.warnings, sound.singular_joints) == ([], [])
 
 
 def test_strict(tmp_path: Path) -> None:
     with pytest.raises(condyle.ParseError, match="^<string>: body `finger` moves and has no mass$"):
-        condyle.Model.from_urdf_string(ODD, strict=True)
+        condyle.Model.from_urdf_str(ODD, strict=True)
     path = tmp_path / "pendulum.urdf"
     path.write_text(ODD, encoding="utf-8")
     with pytest.raises(condyle.ParseError, match=r"pendulum\.urdf: body `finger` moves and has no mass$"):
@@ -147,7 +237,7 @@ def test_strict(tmp_path: Path) -> None:
 
 def test_singular() -> None:
     """What needs M⁻¹ is refused, the rest is not; a rotor makes M regular."""
-    model = condyle.Model.from_urdf_string(PENDULUM)
+    model = condyle.Model.from_urdf_str(PENDULUM)
     data, zero = condyle.Data(model), np.zeros(2)
     message = "^joint `slide` moves nothing that has inertia along it: the inertia matrix is singular$"
     for function in (condyle.aba, condyle.aba_derivatives):
@@ -190,9 +280,22 @@ def test_lock(robot: Robot) -> None:
 
 
 def test_inertial_parameters() -> None:
-    rod, finger = condyle.Model.from_urdf_string(PENDULUM).inertial_parameters.reshape(2, 10)
+    rod, finger = condyle.Model.from_urdf_str(PENDULUM).inertial_parameters.reshape(2, 10)
     np.testing.assert_allclose(rod, [3, 0, 0, -4, 6.3, 0.01, 6.2, 0, 0, 0.1], atol=1e-14)
     assert np.array_equal(finger, np.zeros(10))
+
+
+def test_other_inertias(robot: Robot) -> None:
+    """M is linear in them."""
+    model, data, q, *_ = robot
+    inertias = [condyle.Inertia.from_com(2 * i.mass, i.com, 2 * i.about_com) for i in model.inertias]
+    heavier = model.with_inertias(inertias)
+    np.testing.assert_allclose(heavier.inertial_parameters, 2 * model.inertial_parameters, atol=1e-12)
+    np.testing.assert_allclose(condyle.crba(heavier, data, q), 2 * condyle.crba(model, data, q), atol=1e-10)
+    same = model.with_inertias(model.inertias)
+    np.testing.assert_allclose(condyle.crba(same, data, q), condyle.crba(model, data, q), atol=1e-12)
+    with pytest.raises(ValueError, match=rf"^inertias: expected {model.nbodies}, found {model.nbodies - 1}$"):
+        model.with_inertias(inertias[1:])
 
 
 def test_gravity_and_armature(robot: Robot) -> None:

@@ -6,14 +6,16 @@
 //! matrix is inverted.
 
 use crate::data::{Data, Size, check, check_forces};
+use crate::dispatch::kernel;
 use crate::forward_dynamics::{Method, forward_dynamics};
-use crate::kinematics::{World, place};
+use crate::kinematics::{World, positions};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Rigid inertia. Shape: bodies. Written by: `factorize`.
     I: Vec<Inertia<S>>,
@@ -54,10 +56,10 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// Places the bodies and eliminates all degrees of freedom from the tips to the root: what depends on q alone.
+/// Eliminates all degrees of freedom from the tips to the root: what depends on q alone, for
+/// bodies that are placed.
 #[inline(always)]
-pub(crate) fn factorize<L: Layout>(l: &L, w: &mut World<L::S>, d: &mut Workspace<L::S>, q: &[L::S]) {
-    place(l, w, q);
+pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { I, IA, U, D_inv, .. } = d;
     for i in l.bodies() {
         I[i] = w.oX[i].act(l.inertia(i));
@@ -78,16 +80,8 @@ pub(crate) fn factorize<L: Layout>(l: &L, w: &mut World<L::S>, d: &mut Workspace
 
 /// The whole algorithm.
 #[inline(always)]
-fn pass<L: Layout>(
-    l: &L,
-    w: &mut World<L::S>,
-    d: &mut Workspace<L::S>,
-    q: &[L::S],
-    qd: &[L::S],
-    tau: &[L::S],
-    f_ext: &[Force<L::S>],
-) {
-    factorize(l, w, d, q);
+fn pass<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], tau: &[L::S], f_ext: &[Force<L::S>]) {
+    factorize(l, w, d);
     let Workspace { I, IA, U, D_inv, v, a, c, pA, u, qdd, .. } = d;
     let (oX, S) = (&w.oX, &w.S);
     for i in l.bodies() {
@@ -127,6 +121,12 @@ fn pass<L: Layout>(
     }
 }
 
+kernel! {
+    fn run(model, data, v: &[S], tau: &[S], f_ext: &[Force<S>]) {
+        pass(&Single::new(model), &data.world, &mut data.aba, v, tau, f_ext);
+    }
+}
+
 /// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, in O(n).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
@@ -145,7 +145,7 @@ fn pass<L: Layout>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another size, or M is singular
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 pub fn aba<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -164,6 +164,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     if model.has_mimic() {
         return forward_dynamics(model, data, q, v, tau, f_ext, Some(Method::Sparse));
     }
-    pass(&Single::new(model), &mut data.world, &mut data.aba, q, v, tau, f_ext);
+    positions(model, data, q);
+    run(model, data, v, tau, f_ext);
     &data.aba.qdd
 }

@@ -9,7 +9,9 @@
 
 use crate::aba::aba;
 use crate::data::{Data, Size};
-use crate::layout::Single;
+use crate::dispatch::kernel;
+use crate::inputs::State;
+use crate::layout::{Layout, Single};
 use crate::minv;
 use crate::model::Model;
 use crate::rnea_derivatives;
@@ -17,13 +19,14 @@ use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// The acceleration. Shape: nv. Written by: `aba_derivatives`.
     a: Vec<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
-    da_dq: DMatrix<S>,
+    pub da_dq: DMatrix<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
-    da_dv: DMatrix<S>,
+    pub da_dv: DMatrix<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -36,7 +39,7 @@ impl<S: Scalar> Workspace<S> {
 /// C = −A B, of square matrices, where column j of B has zeros but in the rows `coupled[j]`; four columns of A at a time,
 /// so that C is loaded and stored a quarter as often.
 #[inline(always)]
-fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>]) {
+pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>]) {
     let n = coupled.len();
     for j in 0..n {
         let (b, c) = (&B[j * n..(j + 1) * n], &mut C[j * n..(j + 1) * n]);
@@ -59,9 +62,9 @@ fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>
     }
 }
 
-/// q̈ = aba(q, v, τ) and its derivatives, each a full nv × nv matrix.
+/// q̈ = aba(q, v, τ) and its derivatives: three full nv × nv matrices, and [all others](Self::with_respect_to) when asked.
 #[derive(Clone, Copy, Debug)]
-pub struct AbaDerivatives<'d, S> {
+pub struct AbaDerivatives<'d, S, R = f64> {
     /// q̈ itself, nv numbers.
     pub a: &'d [S],
     /// ∂q̈/∂q in the tangent space: the change of q̈ when q moves to q ⊕ δ, per δ.
@@ -70,6 +73,16 @@ pub struct AbaDerivatives<'d, S> {
     pub da_dv: &'d DMatrix<S>,
     /// ∂q̈/∂τ = M(q)⁻¹.
     pub da_dtau: &'d DMatrix<S>,
+    pub(crate) state: State<'d, S, R>,
+}
+
+kernel! {
+    /// After `rnea_derivatives` and `minv`.
+    fn products(model, data) {
+        let (Minv, d, out) = (data.minv.matrix().as_slice(), &data.rnea_derivatives, &mut data.aba_derivatives);
+        minus_product(Minv, d.dtau_dq.as_slice(), out.da_dq.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂q
+        minus_product(Minv, d.dtau_dv.as_slice(), out.da_dv.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂v
+    }
 }
 
 /// [`aba`](crate::aba) and its derivatives with respect to q, v and τ, exact.
@@ -88,29 +101,33 @@ pub struct AbaDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another size, or M is singular
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
+    model: &'d Model<R>,
     data: &'d mut Data<S>,
     q: &[S],
     v: &[S],
     tau: &[S],
     f_ext: &[Force<S>],
-) -> AbaDerivatives<'d, S> {
+) -> AbaDerivatives<'d, S, R> {
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(aba(model, data, q, v, tau, f_ext));
-    rnea_derivatives::pass(&Single::new(model), &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext);
+    rnea_derivatives::run(model, data, v, &a_kept, f_ext, &[Single::new(model).minus_gravity()]);
+    data.aba_derivatives.a = a_kept;
     if data.minv.by_factor() {
-        minv::from_matrix(&mut data.minv, data.rnea_derivatives.view().dtau_da); // M = ∂τ/∂a
+        minv::from_derivatives(model, data);
     } else {
-        minv::from_factors(model, data); // the factors are those of `aba`
+        minv::from_factors(model, data); // those of `aba`
     }
-    let tau_derivatives = data.rnea_derivatives.view();
-    let d = &mut data.aba_derivatives;
-    d.a = a_kept;
-    let Minv = data.minv.matrix();
-    minus_product(Minv.as_slice(), tau_derivatives.dtau_dq.as_slice(), d.da_dq.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂q
-    minus_product(Minv.as_slice(), tau_derivatives.dtau_dv.as_slice(), d.da_dv.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂v
-    AbaDerivatives { a: &d.a, da_dq: &d.da_dq, da_dv: &d.da_dv, da_dtau: Minv }
+    products(model, data);
+    let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
+    data.aba_derivatives.view(data.minv.matrix(), state)
+}
+
+impl<S> Workspace<S> {
+    /// What `aba_derivatives` has left.
+    pub(crate) fn view<'d, R>(&'d self, Minv: &'d DMatrix<S>, state: State<'d, S, R>) -> AbaDerivatives<'d, S, R> {
+        AbaDerivatives { a: &self.a, da_dq: &self.da_dq, da_dv: &self.da_dv, da_dtau: Minv, state }
+    }
 }

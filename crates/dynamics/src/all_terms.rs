@@ -4,17 +4,19 @@
 //! velocities, the bodies' inertias in the world's frame and the columns Iᶜ S.
 
 use crate::centroidal::{self, CentroidalMapRate, shift_rate};
+use crate::coriolis::Coriolis;
 use crate::data::{Data, Size, check};
+use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
-use crate::kinematics::{Moving, World, advance, place};
+use crate::kinematics::{Moving, World, positions, velocities};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use crate::rnea_derivatives::Coriolis;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
 /// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `pass`.
     a: Vec<Motion<S>>,
@@ -110,6 +112,12 @@ pub struct AllTerms<'d, S, R = f64> {
     pub potential_energy: S,
 }
 
+kernel! {
+    fn run(model, data) {
+        pass(&Single::new(model), &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
+    }
+}
+
 /// M, h, Ag, dAg, hg, centre of mass, energies, and the Jacobians of all frames: what the equations of motion are made
 /// of, from one pass to the tips and one back, in O(n · depth).
 ///
@@ -130,7 +138,7 @@ pub struct AllTerms<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -140,10 +148,9 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    advance(&l, &data.world, &mut data.moving, v);
-    pass(&l, &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
+    positions(model, data, q);
+    velocities(model, data, v);
+    run(model, data);
     let kinematics = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
     let moment = data.centroidal.IC[0].mass_com;
     AllTerms {
@@ -152,6 +159,6 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
         h: &data.all_terms.h,
         centroidal: shift_rate(model, &mut data.centroidal),
         kinetic_energy: (data.all_terms.twice + kinematics.rotors()) * S::splat(0.5),
-        potential_energy: l.minus_gravity().dot(moment),
+        potential_energy: Single::<S, R>::new(model).minus_gravity().dot(moment),
     }
 }

@@ -2,9 +2,9 @@
 
 use crate::error::Error;
 use crate::joint::Joint;
-use crate::model::{Body, Column, Frame, FrameKind, Limits, Mimic, Model, Node};
+use crate::model::{Body, Frame, FrameKind, Limits, Mimic, Model};
 use crate::soundness;
-use condyle_spatial::{Act, Inertia, Se3, Vec3};
+use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use std::collections::HashSet;
 
 /// Names a body of a builder. [`WORLD`] is the one that is always there.
@@ -136,12 +136,19 @@ impl ModelBuilder {
         self.frames.push(Frame { name: name.to_owned(), kind, body: body.0, placement });
     }
 
+    /// Scales all masses and inertias.
+    pub(crate) fn scale_inertias(&mut self, by: f64) {
+        for draft in &mut self.drafts {
+            draft.body.inertia = draft.body.inertia.scale(by);
+        }
+    }
+
     /// Says that a body without mass stands between the joints of a chain.
     pub(crate) fn between(&mut self, body: BodyId) {
         self.drafts[body.0].between = true;
     }
 
-    /// Lets a joint follow another one, in place of a coordinate of its own.
+    /// Lets a joint follow another one, in place of a coordinate of its own; see [`Mimic`].
     pub fn mimic(&mut self, follower: BodyId, leader: BodyId, mimic: Mimic) {
         self.drafts[follower.0].mimic = Some((leader.0, mimic));
     }
@@ -155,8 +162,8 @@ impl ModelBuilder {
     /// the model.
     ///
     /// # Errors
-    /// [`Error::Duplicate`] and [`Error::Body`]: names, axes, masses, limits, numbers that are not finite, what a
-    /// mimic joint follows.
+    /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`] and [`Error::Frame`]: names, axes, masses, limits,
+    /// placements, numbers that are not finite, what a mimic joint follows.
     pub fn build(mut self) -> Result<Model, Error> {
         self.check()?;
         let order = self.depth_first();
@@ -181,6 +188,7 @@ impl ModelBuilder {
             coupled: Vec::new(),
             warnings: Vec::new(),
             singular: Vec::new(),
+            tree: 0,
         };
         for frame in &mut model.frames {
             frame.body = number[frame.body];
@@ -197,8 +205,10 @@ impl ModelBuilder {
             model.bodies.push(body);
         }
         for (i, &old) in order.iter().enumerate() {
-            if let Some((leader, mimic)) = self.drafts[old].mimic {
-                let (idx_q, idx_v) = (model.bodies[number[leader]].idx_q, model.bodies[number[leader]].idx_v);
+            if let Draft { mimic: Some((leader, mimic)), options, .. } = &self.drafts[old] {
+                let (leader, mimic) = (&model.bodies[number[*leader]], *mimic);
+                let (idx_q, idx_v) = (leader.idx_q, leader.idx_v);
+                model.armature[idx_v] += mimic.ratio * mimic.ratio * options.armature; // v_joint = ratio v
                 let body = &mut model.bodies[i];
                 (body.idx_q, body.idx_v, body.mimic) = (idx_q, idx_v, Some(mimic));
             }
@@ -228,7 +238,7 @@ impl ModelBuilder {
     fn check(&mut self) -> Result<(), Error> {
         let (mut bodies, mut joints, mut frames) = (HashSet::new(), HashSet::new(), HashSet::new());
         let mimics: Vec<bool> = self.drafts.iter().map(|d| d.mimic.is_some()).collect();
-        let nq: Vec<usize> = self.drafts.iter().map(|d| d.body.joint.nq()).collect();
+        let kinds: Vec<Joint> = self.drafts.iter().map(|d| d.body.joint).collect();
         for Draft { body, options, mimic, .. } in &mut self.drafts {
             let wrong = |what: String| Error::Body { body: body.name.clone(), what };
             if !bodies.insert(body.name.clone()) {
@@ -241,6 +251,11 @@ impl ModelBuilder {
                 .joint
                 .normalized()
                 .ok_or_else(|| wrong(format!("axis {:?} is no direction", body.joint.axis())))?;
+            if let Joint::Helical { pitch, .. } = body.joint
+                && !pitch.is_finite()
+            {
+                return Err(wrong(format!("pitch {pitch} is not finite")));
+            }
             let I = body.inertia;
             let finite = I.mass_com.norm_squared()
                 + [
@@ -258,6 +273,9 @@ impl ModelBuilder {
             if !finite.is_finite() {
                 return Err(wrong("inertia or placement is not finite".to_owned()));
             }
+            if !is_rotation(body.placement.rotation) {
+                return Err(wrong("placement is no rotation and translation".to_owned()));
+            }
             if !(I.mass >= 0.0 && I.mass.is_finite()) {
                 return Err(wrong(format!("mass is {}", I.mass)));
             }
@@ -271,23 +289,25 @@ impl ModelBuilder {
                 return Err(wrong("a limit, damping, friction or armature is not a number".to_owned()));
             }
             if let Some((leader, mimic)) = *mimic {
+                let wrong = |what: String| Error::Joint { joint: body.joint_name.clone(), what };
                 if !(mimic.ratio.is_finite() && mimic.offset.is_finite()) {
                     return Err(wrong(format!("mimic ratio {} or offset {} is not finite", mimic.ratio, mimic.offset)));
                 }
                 if mimics[leader] || leader == 0 {
                     return Err(wrong("mimics a joint without a coordinate of its own".to_owned()));
                 }
-                if nq[leader] != 1 || body.joint.nq() != 1 {
-                    return Err(wrong("mimic works between revolute and prismatic joints only".to_owned()));
-                }
+                body.joint.following(kinds[leader], mimic).map_err(wrong)?;
             }
         }
         for frame in &self.frames {
             let X = frame.placement;
             let columns = X.rotation.columns().into_iter().chain([X.translation]);
             if !columns.map(|c| c.norm_squared()).sum::<f64>().is_finite() {
-                let body = self.drafts[frame.body].body.name.clone();
-                return Err(Error::Body { body, what: format!("frame `{}` is not finite", frame.name) });
+                return Err(Error::Frame { frame: frame.name.clone(), what: "is not finite".to_owned() });
+            }
+            if !is_rotation(X.rotation) {
+                let what = "placement is no rotation and translation".to_owned();
+                return Err(Error::Frame { frame: frame.name.clone(), what });
             }
             if !frames.insert((frame.name.clone(), frame.kind as u8)) {
                 return Err(Error::Duplicate { kind: "frame", name: frame.name.clone() });
@@ -295,6 +315,16 @@ impl ModelBuilder {
         }
         Ok(())
     }
+}
+
+/// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
+const ROTATION_ROUNDING: f64 = 1e-6;
+
+/// Whether the columns are unit vectors at right angles, right-handed.
+fn is_rotation(R: Mat3<f64>) -> bool {
+    let Mat3 { x, y, z } = R;
+    let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
+    off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
 }
 
 impl Model {
@@ -313,60 +343,5 @@ impl Model {
         self.damping.resize(self.nv, options.damping);
         self.friction.resize(self.nv, options.friction);
         self.armature.resize(self.nv, options.armature);
-    }
-
-    /// Derives from the bodies what the algorithms see: turned frames, columns, and each body's ancestors.
-    fn add_nodes(&mut self) {
-        let mut last_column: Vec<Option<usize>> = Vec::new(); // of each body or, failing one, of its ancestors
-        for (i, body) in self.bodies.iter().enumerate() {
-            let reframing = body.joint.reframing();
-            let bXz = Se3::new(reframing, Vec3::zero());
-            let pXz = if i == 0 { Se3::identity() } else { Se3::new(self.nodes[body.parent].reframing, Vec3::zero()) };
-            let first = self.columns.len();
-            let mut path = Vec::new();
-            if i > 0 {
-                let mut parent = last_column[body.parent];
-                for k in 0..body.joint.nv() {
-                    let depth = parent.map_or(0, |p| self.columns[p].depth + 1);
-                    let ratio = body.mimic.map_or(1.0, |m| m.ratio);
-                    self.columns.push(Column { coordinate: body.idx_v + k, ratio, parent, end: 0, depth });
-                    parent = Some(first + k);
-                }
-                path.extend(std::iter::successors(parent, |&c| self.columns[c].parent));
-                path.reverse();
-                last_column.push(parent);
-            } else {
-                last_column.push(None);
-            }
-            self.nodes.push(Node {
-                joint: body.joint,
-                parent: body.parent,
-                idx_q: body.idx_q,
-                idx_v: body.idx_v,
-                mimic: body.mimic,
-                column: first,
-                support: self.support.len(),
-                depth: path.len(),
-                placement: pXz.inverse() * body.placement * bXz,
-                inertia: bXz.act_inv(body.inertia),
-                reframing,
-            });
-            self.support.extend(path);
-        }
-        // depth first, so a subtree's columns end where its last descendant's do
-        for c in (0..self.columns.len()).rev() {
-            self.columns[c].end = self.columns[c].end.max(c + 1);
-            if let Some(p) = self.columns[c].parent {
-                self.columns[p].end = self.columns[p].end.max(self.columns[c].end);
-            }
-        }
-        let coupled = |c: usize| {
-            let mut rows: Vec<usize> = std::iter::successors(Some(c), |&c| self.columns[c].parent).collect();
-            rows.reverse();
-            rows.extend(c + 1..self.columns[c].end);
-            rows
-        };
-        let all = || (0..self.nv).collect(); // joints that follow tie branches together
-        self.coupled = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) }).collect();
     }
 }

@@ -6,17 +6,19 @@
 //! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved computation
 //! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
 
+use crate::coriolis::Coriolis;
 use crate::data::{Data, Size, check};
+use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Velocities};
-use crate::kinematics::{Moving, World, advance, place};
+use crate::kinematics::{Moving, World, positions, velocities};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use crate::rnea_derivatives::Coriolis;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
 /// In the world's frame, but for what is said to be about the centre of mass.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `map`, `map_rate`, all terms.
     pub IC: Vec<Inertia<S>>,
@@ -45,14 +47,6 @@ impl<S: Scalar> Workspace<S> {
             dAg: DMatrix::from_element(6, size.nv, S::zero()),
             Jcom: DMatrix::from_element(3, size.nv, S::zero()),
         }
-    }
-}
-
-impl<S: Scalar> Coriolis<S> {
-    /// The rate of the inertia, İ m = v ×* I m − I (v × m): of the mass 0, of m c the linear momentum.
-    #[inline(always)]
-    pub(crate) fn inertia_rate(self) -> Inertia<S> {
-        Inertia { mass: S::zero(), mass_com: self.momentum.linear, rotational: self.rate }
     }
 }
 
@@ -98,7 +92,7 @@ fn map_rate<L: Layout>(l: &L, World { oX, S }: &World<L::S>, m: &Moving<L::S>, d
 
 /// Adds a column to the coordinate that it follows.
 #[inline(always)]
-fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: Force<S>) {
+pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: Force<S>) {
     let column = &model.columns[c];
     let (f, at) = (f.scale(S::splat(column.ratio)).to_array(), 6 * column.coordinate);
     for (entry, &f) in matrix.as_mut_slice()[at..at + 6].iter_mut().zip(&f) {
@@ -108,7 +102,7 @@ fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: For
 
 /// f about the point c: [f; n − c × f].
 #[inline(always)]
-fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
+pub(crate) fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
     Force::new(f.linear, f.angular - c.cross(f.linear))
 }
 
@@ -181,6 +175,12 @@ pub struct CentroidalMapRate<'d, S> {
     pub Jcom: &'d DMatrix<S>,
 }
 
+kernel! {
+    fn run_map(model, data) {
+        map(&Single::new(model), &data.world, &mut data.centroidal);
+    }
+}
+
 /// Ag(q), the centroidal momentum matrix, with the centre of mass, its Jacobian and the inertia about it, in O(n).
 ///
 /// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. Allocates
@@ -196,7 +196,7 @@ pub struct CentroidalMapRate<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another size.
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -204,10 +204,15 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
 ) -> CentroidalMap<'d, S> {
     data.check(model);
     check("q", q.len(), model.nq);
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    map(&l, &data.world, &mut data.centroidal);
+    positions(model, data, q);
+    run_map(model, data);
     shift_map(model, &mut data.centroidal)
+}
+
+kernel! {
+    fn run_map_rate(model, data) {
+        map_rate(&Single::new(model), &data.world, &data.moving, &mut data.centroidal);
+    }
 }
 
 /// Ag(q), dAg/dt along v, and the centroidal momentum hg = Ag v, with what [`centroidal_map`] gives, in O(n).
@@ -226,7 +231,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -236,10 +241,9 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    advance(&l, &data.world, &mut data.moving, v);
-    map_rate(&l, &data.world, &data.moving, &mut data.centroidal);
+    positions(model, data, q);
+    velocities(model, data, v);
+    run_map_rate(model, data);
     shift_rate(model, &mut data.centroidal)
 }
 

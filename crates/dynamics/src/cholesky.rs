@@ -8,6 +8,7 @@ use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
 /// L in place of the lower triangle of M.
+#[inline(always)]
 fn factorize<S: Scalar>(M: &mut [S], n: usize) {
     for j in 0..n {
         let (left, rest) = M.split_at_mut(j * n);
@@ -24,6 +25,7 @@ fn factorize<S: Scalar>(M: &mut [S], n: usize) {
 }
 
 /// x in place of b: L Lᵀ x = b.
+#[inline(always)]
 fn solve<S: Scalar>(L: &[S], b: &mut [S]) {
     forward(L, b, 0);
     backward(L, b, 0);
@@ -66,6 +68,7 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
 /// assert_eq!(x, [1.0, 2.0]);
 /// ```
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Cholesky<S> {
     /// L, in the lower triangle. Shape: n × n. Written by: `factorize`.
     L: DMatrix<S>,
@@ -88,6 +91,7 @@ impl<S: Scalar> Cholesky<S> {
     ///
     /// # Panics
     /// If `M` is not n × n.
+    #[inline(always)]
     pub fn factorize(&mut self, M: &DMatrix<S>) {
         let n = self.L.nrows();
         assert!(M.shape() == (n, n), "M: expected {n} × {n}, found {:?}", M.shape());
@@ -101,6 +105,7 @@ impl<S: Scalar> Cholesky<S> {
     ///
     /// # Panics
     /// If `b` has not n numbers.
+    #[inline(always)]
     pub fn solve(&self, b: &mut [S]) {
         check("b", b.len(), self.L.nrows());
         solve(self.L.as_slice(), b);
@@ -112,6 +117,7 @@ impl<S: Scalar> Cholesky<S> {
     ///
     /// # Panics
     /// If `B` has not n rows.
+    #[inline(always)]
     pub fn solve_matrix(&self, B: &mut DMatrix<S>) {
         check("B", B.nrows(), self.L.nrows());
         for column in B.as_mut_slice().chunks_exact_mut(self.L.nrows().max(1)) {
@@ -125,6 +131,7 @@ impl<S: Scalar> Cholesky<S> {
     ///
     /// # Panics
     /// If `X` is not n × n.
+    #[inline(always)]
     pub fn inverse(&self, X: &mut DMatrix<S>) {
         let n = self.L.nrows();
         assert!(X.shape() == (n, n), "X: expected {n} × {n}, found {:?}", X.shape());

@@ -98,7 +98,7 @@ impl ModelBuilder {
                 effort: finite(model.limits.effort[iv]),
                 damping: model.damping[iv],
                 friction: model.friction[iv],
-                armature: model.armature[iv],
+                armature: if body.mimic.is_some() { 0.0 } else { model.armature[iv] }, // the leader's has all of it
             };
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);

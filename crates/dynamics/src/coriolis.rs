@@ -2,24 +2,83 @@
 //!
 //! Source: Echeandia and Wensing, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for
 //! rigid-body systems* (2021), algorithm 1, in the world's frame. With Iᶜ and Bᶜ of all that the joint of column d
-//! carries (B of `rnea_derivatives.rs`), and e a column before it or of the same joint,
+//! carries (2B m = v ×* I m − I (v × m) + m ×* I v), and e a column before it or of the same joint,
 //!
 //! ```text
 //! C_de = S_dᵀ (Iᶜ Ṡ_e + Bᶜ S_e)     C_ed = S_eᵀ (Iᶜ Ṡ_d + Bᶜ S_d)
 //! ```
 //!
-//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ.
+//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 numbers other than zero, given by the momentum
+//! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
 use crate::data::{Data, Size, check};
-use crate::kinematics::{Moving, World, advance, place};
+use crate::dispatch::kernel;
+use crate::kinematics::{Moving, World, positions, velocities};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use crate::rnea_derivatives::Coriolis;
-use condyle_spatial::{Act, Constant, Inertia, Scalar};
+use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;
+
+/// The matrix 2B of a body or of all that a joint carries.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Coriolis<S> {
+    /// I v.
+    pub momentum: Force<S>,
+    /// Σ = dĪ/dt.
+    pub rate: Sym3<S>,
+}
+
+impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        self.momentum += o.momentum;
+        self.rate += o.rate;
+    }
+}
+
+impl<S: Scalar> Coriolis<S> {
+    /// Of a body at rest.
+    pub(crate) fn zero() -> Self {
+        Self { momentum: Force::zero(), rate: Sym3::zero() }
+    }
+
+    /// Of a body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
+    #[inline(always)]
+    pub(crate) fn of(I: Inertia<S>, v: Motion<S>) -> Self {
+        let turning = v.angular.skew() * I.rotational.full();
+        let (x, y, z) = (turning.x, turning.y, turning.z);
+        let two = S::splat(2.0);
+        let turning = Sym3 { xx: two * x.x, xy: x.y + y.x, yy: two * y.y, xz: x.z + z.x, yz: y.z + z.y, zz: two * z.z };
+        let shifting = Sym3::outer_sum(I.mass_com, v.linear);
+        let rate = (turning - shifting).add_diagonal(two * v.linear.dot(I.mass_com));
+        Self { momentum: I * v, rate }
+    }
+
+    /// 2B m.
+    #[inline(always)]
+    pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
+        let (p, l) = (self.momentum.linear, self.momentum.angular);
+        Force { linear: m.angular.cross(p).scale(S::splat(2.0)), angular: self.rate * m.angular + m.angular.cross(l) }
+    }
+
+    /// 2Bᵀ m, of which only the angular part is not zero.
+    #[inline(always)]
+    pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
+        let (p, l) = (self.momentum.linear, self.momentum.angular);
+        self.rate * m.angular + l.cross(m.angular) + p.cross(m.linear).scale(S::splat(2.0))
+    }
+
+    /// The rate of the inertia, İ m = v ×* I m − I (v × m): of the mass 0, of m c the linear momentum.
+    #[inline(always)]
+    pub(crate) fn inertia_rate(self) -> Inertia<S> {
+        Inertia { mass: S::zero(), mass_com: self.momentum.linear, rotational: self.rate }
+    }
+}
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Iᶜ. Shape: bodies. Written by: `pass`.
     IC: Vec<Inertia<S>>,
@@ -76,6 +135,12 @@ fn pass<L: Layout>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L
     }
 }
 
+kernel! {
+    fn run(model, data) {
+        pass(&Single::new(model), &data.world, &data.moving, &mut data.coriolis);
+    }
+}
+
 /// C(q, v), the Coriolis matrix by Christoffel symbols: C v = h − g, Ṁ = C + Cᵀ, so that Ṁ − 2C is skew. In
 /// O(n · depth).
 ///
@@ -95,7 +160,7 @@ fn pass<L: Layout>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -105,9 +170,8 @@ pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    advance(&l, &data.world, &mut data.moving, v);
-    pass(&l, &data.world, &data.moving, &mut data.coriolis);
+    positions(model, data, q);
+    velocities(model, data, v);
+    run(model, data);
     &data.coriolis.C
 }

@@ -4,13 +4,15 @@
 //! a plain sum.
 
 use crate::data::{Data, Size, check};
-use crate::kinematics::place;
+use crate::dispatch::kernel;
+use crate::kinematics::positions;
 use crate::layout::{Layout, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Inertia of the body and all that it carries, in the world's frame. Shape: bodies. Written by: `pass`.
     IC: Vec<Inertia<S>>,
@@ -30,10 +32,9 @@ impl<S> Workspace<S> {
     }
 }
 
-/// The whole algorithm.
+/// The whole algorithm, for bodies that are placed.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, data: &mut Data<L::S>, q: &[L::S]) {
-    place(l, &mut data.world, q);
+fn pass<L: Layout>(l: &L, data: &mut Data<L::S>) {
     let (oX, S) = (&data.world.oX, &data.world.S);
     let Workspace { IC, M } = &mut data.crba;
     let M = M.as_mut_slice();
@@ -60,6 +61,12 @@ fn pass<L: Layout>(l: &L, data: &mut Data<L::S>, q: &[L::S]) {
     l.add_armature(M);
 }
 
+kernel! {
+    fn run(model, data) {
+        pass(&Single::new(model), data);
+    }
+}
+
 /// M(q), the joint-space inertia matrix: τ = M a + h, kinetic energy ½ vᵀ M v. In O(n · depth).
 ///
 /// q: nq numbers. Returns the full symmetric nv × nv matrix, armature included. Allocates nothing.
@@ -75,10 +82,11 @@ fn pass<L: Layout>(l: &L, data: &mut Data<L::S>, q: &[L::S]) {
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another size.
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
     check("q", q.len(), model.nq);
-    pass(&Single::new(model), data, q);
+    positions(model, data, q);
+    run(model, data);
     &data.crba.M
 }

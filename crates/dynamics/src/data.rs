@@ -3,8 +3,9 @@
 use crate::kinematics::{Moving, World};
 use crate::model::Model;
 use crate::{
-    aba, aba_derivatives, all_terms, centroidal, coriolis, crba, forward_dynamics, minv, regressor, rnea,
-    rnea_derivatives, statics,
+    aba, aba_derivatives, aba_hessian, all_terms, centroidal, centroidal_derivatives, constrained_derivatives,
+    constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, minv, regressor, rnea,
+    rnea_derivatives, rnea_hessian, statics,
 };
 use condyle_spatial::Scalar;
 
@@ -20,8 +21,11 @@ use condyle_spatial::Scalar;
 /// # let _ = data;
 /// ```
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Data<S> {
     size: Size,
+    /// Of the tree that it was made for.
+    tree: u64,
     pub(crate) world: World<S>,
     pub(crate) moving: Moving<S>,
     pub(crate) rnea: rnea::Workspace<S>,
@@ -30,9 +34,16 @@ pub struct Data<S> {
     pub(crate) minv: minv::Workspace<S>,
     pub(crate) rnea_derivatives: rnea_derivatives::Workspace<S>,
     pub(crate) aba_derivatives: aba_derivatives::Workspace<S>,
+    pub(crate) rnea_hessian: rnea_hessian::Workspace<S>,
+    pub(crate) aba_hessian: aba_hessian::Workspace<S>,
+    pub(crate) constrained_dynamics: constrained_dynamics::Workspace<S>,
+    pub(crate) constrained_derivatives: constrained_derivatives::Workspace<S>,
+    pub(crate) impulse_dynamics: impulse_dynamics::Workspace<S>,
     pub(crate) statics: statics::Workspace<S>,
     pub(crate) coriolis: coriolis::Workspace<S>,
     pub(crate) centroidal: centroidal::Workspace<S>,
+    pub(crate) centroidal_derivatives: centroidal_derivatives::Workspace<S>,
+    pub(crate) energy: energy::Workspace<S>,
     pub(crate) all_terms: all_terms::Workspace<S>,
     pub(crate) forward_dynamics: forward_dynamics::Workspace<S>,
     pub(crate) regressor: regressor::Workspace<S>,
@@ -62,6 +73,7 @@ impl<S: Scalar> Data<S> {
         };
         Self {
             size,
+            tree: model.tree,
             world: World::new(size),
             moving: Moving::new(size),
             rnea: rnea::Workspace::new(size),
@@ -70,9 +82,16 @@ impl<S: Scalar> Data<S> {
             minv: minv::Workspace::new(size, model),
             rnea_derivatives: rnea_derivatives::Workspace::new(size),
             aba_derivatives: aba_derivatives::Workspace::new(size),
+            rnea_hessian: rnea_hessian::Workspace::new(size),
+            aba_hessian: aba_hessian::Workspace::new(size),
+            constrained_dynamics: constrained_dynamics::Workspace::new(size, model),
+            constrained_derivatives: constrained_derivatives::Workspace::new(size),
+            impulse_dynamics: impulse_dynamics::Workspace::new(size),
             statics: statics::Workspace::new(size),
             coriolis: coriolis::Workspace::new(size),
             centroidal: centroidal::Workspace::new(size),
+            centroidal_derivatives: centroidal_derivatives::Workspace::new(size),
+            energy: energy::Workspace::new(size),
             all_terms: all_terms::Workspace::new(size),
             forward_dynamics: forward_dynamics::Workspace::new(model),
             regressor: regressor::Workspace::new(size),
@@ -81,15 +100,16 @@ impl<S: Scalar> Data<S> {
 }
 
 impl<S> Data<S> {
-    /// Panics unless this was made for a model of the same size.
+    /// Panics unless this was made for a model of the same tree.
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
         let made_for = (self.size.bodies, self.size.columns, self.size.nv);
         let given = (model.nodes.len(), model.columns.len(), model.nv);
+        let other = if made_for == given { " in another tree" } else { "" };
         assert!(
-            made_for == given,
-            "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}"
+            self.tree == model.tree,
+            "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}{other}"
         );
     }
 }

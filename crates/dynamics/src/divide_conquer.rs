@@ -20,7 +20,7 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// Forward dynamics by divide and conquer: the plan for one model, and its scratch.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps: a
-/// chain of n bodies ⌈log₂ n⌉ + 1 levels. A join of two pieces costs some ten times as much as the elimination of a body,
+/// chain of n bodies ⌈log₂ n⌉ + 1 levels. A join of two pieces costs some six times as much as the elimination of a body,
 /// a body of a run between two handles half as much again as one in [`aba`](crate::aba()). So on few processors the runs
 /// must be long (n over the number of threads). On two threads this is faster than `aba` from some 200 bodies on, and on
 /// one never (`benches/divide_conquer.rs`).

@@ -1,8 +1,12 @@
-//! Kinetic and potential energy: sums over the moving bodies.
+//! Kinetic and potential energy, and their derivatives: sums over the moving bodies.
 
+use crate::data::{Data, Size};
+use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
+use crate::kinematics::{Moving, World, forward_velocities};
 use crate::layout::{Layout, Single};
-use condyle_spatial::{Act, Constant, Scalar};
+use crate::model::Model;
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), 0 at the world's
@@ -56,4 +60,106 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     pub fn mechanical_energy(&self) -> S {
         self.kinetic_energy() + self.potential_energy()
     }
+}
+
+/// In the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Inertia of all that a joint carries. Shape: bodies. Written by: `derivatives`.
+    IC: Vec<Inertia<S>>,
+    /// Momentum of all that a joint carries. Shape: bodies. Written by: `derivatives`.
+    h: Vec<Force<S>>,
+    /// Shape: nv. Written by: `derivatives`.
+    dT_dq: Vec<S>,
+    /// Shape: nv. Written by: `derivatives`.
+    dT_dv: Vec<S>,
+    /// Shape: nv. Written by: `derivatives`.
+    dV_dq: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let zeros = || vec![S::zero(); size.nv];
+        Self {
+            IC: vec![Inertia::zero(); size.bodies],
+            h: vec![Force::zero(); size.bodies],
+            dT_dq: zeros(),
+            dT_dv: zeros(),
+            dV_dq: zeros(),
+        }
+    }
+}
+
+/// The derivatives, for bodies whose velocities are known.
+#[inline(always)]
+fn derivatives<L: Layout>(l: &L, World { oX, S }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, h, dT_dq, dT_dv, dV_dq } = d;
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+        h[i] = IC[i] * m.v[i];
+    }
+    for out in [&mut *dT_dq, &mut *dT_dv, &mut *dV_dq] {
+        out.fill(L::S::zero());
+    }
+    for i in l.bodies().rev() {
+        let v_parent: Motion<_> = l.parent(&m.v, i);
+        for k in 0..l.joint(i).nv() {
+            let S = S[l.slot(i) + k];
+            l.add(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
+            l.add(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
+            let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com)); // ∂(m c)/∂q = m S_v + S_ω × m c
+            l.add(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
+        }
+        let (IC_i, h_i) = (IC[i], h[i]);
+        l.push(IC, i, IC_i);
+        l.push(h, i, h_i);
+    }
+    l.add_armature_torque(&m.qd, dT_dv);
+}
+
+/// The derivatives of the energies, nv numbers each.
+#[derive(Clone, Copy, Debug)]
+pub struct EnergyDerivatives<'d, S> {
+    /// ∂T/∂q of the kinetic energy.
+    pub dT_dq: &'d [S],
+    /// ∂T/∂v = M v, the generalised momentum.
+    pub dT_dv: &'d [S],
+    /// ∂V/∂q = g(q) of the potential energy.
+    pub dV_dq: &'d [S],
+}
+
+kernel! {
+    fn run(model, data) {
+        derivatives(&Single::new(model), &data.world, &data.moving, &mut data.energy);
+    }
+}
+
+/// The derivatives of kinetic and potential energy with respect to q and v, exact, in O(n).
+///
+/// q: nq numbers; v: nv. Returns nv numbers each (J/rad, J s/rad, J/rad; per m for axes that slide). Allocates nothing.
+/// Source: T = ½ Σ ⟨v, I v⟩ + ½ Σ armature q̇² and V = −Σ m gᵀ c, with ∂v/∂q of `frame_derivatives.rs`.
+///
+/// ```
+/// use condyle_dynamics::{Data, energy_derivatives, gravity, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let dV_dq = energy_derivatives(&arm, &mut data, &[0.3; 7], &[0.1; 7]).dV_dq.to_vec();
+/// for (dV, g) in dV_dq.iter().zip(gravity(&arm, &mut data, &[0.3; 7])) {
+///     assert!((dV - g).abs() < 1e-12);
+/// }
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> EnergyDerivatives<'d, S> {
+    forward_velocities(model, data, q, v);
+    run(model, data);
+    let Workspace { dT_dq, dT_dv, dV_dq, .. } = &data.energy;
+    EnergyDerivatives { dT_dq, dT_dv, dV_dq }
 }

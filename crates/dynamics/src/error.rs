@@ -12,6 +12,16 @@ pub enum Error {
         /// The operating system's word.
         what: String,
     },
+    /// No folder has the file that a `package://` address names.
+    #[error("{address}: no such file in a package `{package}`; {}", crate::package::said(looked))]
+    Package {
+        /// As given.
+        address: String,
+        /// The package's name.
+        package: String,
+        /// Where the file would have been.
+        looked: Vec<String>,
+    },
     /// The text is not XML.
     #[error("{file}:{line}: not well-formed XML: {what}")]
     Xml {
@@ -51,6 +61,40 @@ pub enum Error {
     Body {
         /// The body's name.
         body: String,
+        /// What is wrong, with the numbers.
+        what: String,
+    },
+    /// A joint given to a builder is wrong.
+    #[error("joint `{joint}`: {what}")]
+    Joint {
+        /// The joint's name.
+        joint: String,
+        /// What is wrong, with the numbers.
+        what: String,
+    },
+    /// A frame is wrong.
+    #[error("frame `{frame}`: {what}")]
+    Frame {
+        /// The frame's name.
+        frame: String,
+        /// What is wrong, with the numbers.
+        what: String,
+    },
+    /// A list in a model's file is too short or too long.
+    #[error("{name}: expected {expected} entries, found {found}")]
+    Length {
+        /// Of the list, for example `limits.lower`.
+        name: &'static str,
+        /// How many there must be.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// A constraint cannot be.
+    #[error("constraint {constraint}: {what}")]
+    Constraint {
+        /// Its number, counted from 0.
+        constraint: usize,
         /// What is wrong, with the numbers.
         what: String,
     },

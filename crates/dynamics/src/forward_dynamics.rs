@@ -4,6 +4,7 @@ use crate::aba::aba;
 use crate::cholesky::Cholesky;
 use crate::crba::crba;
 use crate::data::{Data, check, check_forces};
+use crate::dispatch::kernel;
 use crate::ltdl::Ltdl;
 use crate::model::Model;
 use crate::rnea::rnea;
@@ -21,6 +22,7 @@ pub enum Method {
 }
 
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// A factor of M. Written by: `forward_dynamics`.
     sparse: Ltdl<S>,
@@ -61,6 +63,32 @@ impl Method {
     }
 }
 
+/// τ − h, of which h has been computed.
+#[inline(always)]
+fn subtract<S: Scalar>(tau: &[S], h: &[S], out: &mut [S]) {
+    for k in 0..tau.len() {
+        out[k] = tau[k] - h[k];
+    }
+}
+
+kernel! {
+    fn run_dense(_model, data, tau: &[S]) {
+        let Workspace { dense, qdd, .. } = &mut data.forward_dynamics;
+        subtract(tau, data.rnea.tau(), qdd);
+        dense.factorize(data.crba.matrix());
+        dense.solve(qdd); // M q̈ = τ − h
+    }
+}
+
+kernel! {
+    fn run_sparse(_model, data, tau: &[S]) {
+        let Workspace { sparse, qdd, .. } = &mut data.forward_dynamics;
+        subtract(tau, data.rnea.tau(), qdd);
+        sparse.factorize(data.crba.matrix());
+        sparse.solve(qdd); // M q̈ = τ − h
+    }
+}
+
 /// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, or by the [`fastest`](Method::fastest).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
@@ -79,7 +107,7 @@ impl Method {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another size, or M is singular
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -104,16 +132,9 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     rnea(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
     data.forward_dynamics.zero = zero;
     crba(model, data, q);
-    let Workspace { sparse, dense, qdd, .. } = &mut data.forward_dynamics;
-    for (k, &h) in data.rnea.tau().iter().enumerate() {
-        qdd[k] = tau[k] - h;
+    match method {
+        Method::Dense => run_dense(model, data, tau),
+        _ => run_sparse(model, data, tau),
     }
-    if method == Method::Dense {
-        dense.factorize(data.crba.matrix());
-        dense.solve(qdd); // M q̈ = τ − h
-    } else {
-        sparse.factorize(data.crba.matrix());
-        sparse.solve(qdd);
-    }
-    qdd
+    &data.forward_dynamics.qdd
 }

@@ -30,7 +30,7 @@ pub enum ReferenceFrame {
 impl ReferenceFrame {
     /// oXr: its pose, for a frame at oXf.
     #[inline(always)]
-    fn pose<S: Scalar>(self, oXf: Se3<S>) -> Se3<S> {
+    pub(crate) fn pose<S: Scalar>(self, oXf: Se3<S>) -> Se3<S> {
         match self {
             Self::Local => oXf,
             Self::World => Se3::identity(),
@@ -40,7 +40,7 @@ impl ReferenceFrame {
 
     /// v_r: its own velocity in the world's frame, for a frame at oXf on a body that moves with v.
     #[inline(always)]
-    fn velocity<S: Scalar>(self, oXf: Se3<S>, v: Motion<S>) -> Motion<S> {
+    pub(crate) fn velocity<S: Scalar>(self, oXf: Se3<S>, v: Motion<S>) -> Motion<S> {
         match self {
             Self::Local => v,
             Self::World => Motion::zero(),
@@ -88,7 +88,7 @@ impl<'d, S, R> Deref for Accelerations<'d, S, R> {
 
 /// Adds a column of a Jacobian to the coordinate that it follows.
 #[inline(always)]
-fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, s: Motion<S>) {
+pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, s: Motion<S>) {
     let column = &model.columns[c];
     let s = s.scale(S::splat(column.ratio)).to_array();
     for (row, &s) in s.iter().enumerate() {
@@ -97,7 +97,7 @@ fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, s: Motion<S
 }
 
 /// Fills a Jacobian with zeros, if it is 6 × nv.
-fn clear<S: Scalar>(name: &str, J: &mut DMatrix<S>, nv: usize) {
+pub(crate) fn clear<S: Scalar>(name: &str, J: &mut DMatrix<S>, nv: usize) {
     assert!(J.shape() == (6, nv), "{name}: expected 6 × {nv}, found {:?}", J.shape());
     J.fill(S::zero());
 }

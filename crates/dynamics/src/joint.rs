@@ -1,13 +1,15 @@
-//! Joints: all that depends on the kind of a joint is here.
+//! Joints: all that depends on the kind of a joint is here, and of the group of its positions in `joint/group.rs`.
 //!
 //! A joint moves along some of the six unit motions of the body's frame, and these stay the same in that frame whatever
 //! its position: its motion subspace is constant in the body. The axis of a revolute or prismatic joint is turned to z
-//! when the model is built, so that inside, S is the same for all of them. `q ⊕ δ` is the exponential of the joint's
-//! group, with δ in the body's frame.
+//! when the model is built, so that inside, S is the same for all of them.
+
+mod group;
 
 use crate::layout::Layout;
-use condyle_spatial::lie::{self, MotionMap, Quaternion};
-use condyle_spatial::{Act, Cross, Force, Mat3, Motion, Scalar, Se3, Vec3};
+use crate::model::Mimic;
+use condyle_spatial::{Act, Cross, Force, Mat3, Motion, Quaternion, Scalar, Se3, Vec3};
+pub(crate) use group::GroupJacobian;
 use serde::{Deserialize, Serialize};
 
 /// The kind of a joint, with what it needs to know.
@@ -45,6 +47,9 @@ pub enum Joint {
     /// A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame.
     FreeFlyer,
 }
+
+/// How far from 1 rounding takes the length of a vector that was divided by it.
+const UNIT: f64 = 1e-15;
 
 /// A joint's velocity S q̇ or acceleration S q̈ in the body's frame, in the form that costs least to compute with.
 #[derive(Clone, Copy)]
@@ -130,7 +135,8 @@ impl Joint {
     pub(crate) fn normalized(self) -> Option<Self> {
         let Some(axis) = self.axis() else { return Some(self) };
         let norm = axis.norm_squared().sqrt();
-        let axis = axis.scale(1.0 / norm);
+        let unit = (norm - 1.0).abs() < UNIT; // to the last bit the same when it was normalised before
+        let axis = if unit { axis } else { axis.scale(1.0 / norm) };
         (norm.is_normal() && norm.is_finite()).then_some(match self {
             Self::Continuous { .. } => Self::Continuous { axis },
             Self::Prismatic { .. } => Self::Prismatic { axis },
@@ -162,6 +168,48 @@ impl Joint {
             x: unit(1.0 + sign * a.x * a.x * s, sign * t, -sign * a.x),
             y: unit(t, sign + a.y * a.y * s, -a.y),
             z: a,
+        }
+    }
+
+    /// The kind as which a joint that follows another one is computed, or why it cannot follow: with numbers of the
+    /// leader's kind, (cos, sin) or one.
+    ///
+    /// The (cos, sin) of a leader tells its angle up to whole turns, and a whole multiple of it up to whole turns too;
+    /// what else would follow jumps wherever the leader completes a turn.
+    pub(crate) fn following(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
+        let turns = "a continuous joint's position is known up to whole turns only";
+        match (leader, self) {
+            (Self::Continuous { .. }, Self::Revolute { axis } | Self::Continuous { axis }) => {
+                if mimic.ratio.fract() != 0.0 {
+                    return Err(format!("mimic ratio {} is not a whole number, and {turns}", mimic.ratio));
+                }
+                Ok(Self::Continuous { axis })
+            }
+            (Self::Continuous { .. }, Self::Prismatic { .. } | Self::Helical { .. }) => {
+                Err(format!("a slide or screw cannot follow a continuous joint: {turns}"))
+            }
+            _ if leader.nv() != 1 || self.nv() != 1 => {
+                Err("mimic works between joints of one degree of freedom only".to_owned())
+            }
+            (_, Self::Continuous { axis }) => Ok(Self::Revolute { axis }),
+            (_, joint) => Ok(joint),
+        }
+    }
+
+    /// The k-th number of the position of a joint that follows; q begins with its leader's.
+    #[inline(always)]
+    pub(crate) fn follow<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
+        match self {
+            Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // its offset is part of X_T
+            _ => q[k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
+        }
+    }
+
+    /// What of a follower's offset is part of its placement: the pose by which its frame, its axis turned to z, is moved.
+    pub(crate) fn offset(self, mimic: Mimic) -> Se3<f64> {
+        match self {
+            Self::Continuous { .. } => turned(Se3::identity(), mimic.offset.sin(), mimic.offset.cos()),
+            _ => Se3::identity(),
         }
     }
 
@@ -253,158 +301,23 @@ impl Joint {
             _ => Motion::new(p.cross(R.z), R.z),
         }
     }
-
-    /// The position that leaves the body at its joint's frame.
-    pub(crate) fn neutral(self, q: &mut [f64]) {
-        q.fill(0.0);
-        match self {
-            Self::Continuous { .. } => q[0] = 1.0,
-            Self::Spherical => q[3] = 1.0,
-            Self::Planar => q[2] = 1.0,
-            Self::FreeFlyer => q[6] = 1.0,
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {}
-        }
-    }
-
-    /// Which of the joint's coordinates are a vector of length 1.
-    pub(crate) fn unit_part(self) -> Option<core::ops::Range<usize>> {
-        match self {
-            Self::Continuous { .. } => Some(0..2),
-            Self::Planar => Some(2..4),
-            Self::Spherical => Some(0..4),
-            Self::FreeFlyer => Some(3..7),
-            _ => None,
-        }
-    }
-
-    /// A position drawn uniformly: lengths and angles between their limits, rotations over the whole group.
-    pub(crate) fn random(self, rng: &mut impl rand::Rng, lower: &[f64], upper: &[f64], q: &mut [f64]) {
-        use rand::RngExt;
-        for ((q, &lower), &upper) in q.iter_mut().zip(lower).zip(upper) {
-            *q = lower + (upper - lower) * rng.random::<f64>();
-        }
-        let turn = core::f64::consts::TAU * rng.random::<f64>();
-        let mut rotate = |q: &mut [f64]| {
-            // Shoemake (1992): a quaternion uniform on the sphere
-            let (u, a) = (rng.random::<f64>(), core::f64::consts::TAU * rng.random::<f64>());
-            let (r, s) = ((1.0 - u).sqrt(), u.sqrt());
-            q.copy_from_slice(&[r * turn.sin(), r * turn.cos(), s * a.sin(), s * a.cos()]);
-        };
-        match self {
-            Self::Continuous { .. } => q.copy_from_slice(&[turn.cos(), turn.sin()]),
-            Self::Planar => q[2..].copy_from_slice(&[turn.cos(), turn.sin()]),
-            Self::Spherical => rotate(q),
-            Self::FreeFlyer => rotate(&mut q[3..]),
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {}
-        }
-    }
-
-    /// q ⊕ v: the position after moving with v for one unit of time.
-    pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
-        match self {
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
-                for k in 0..q.len() {
-                    out[k] = q[k] + v[k];
-                }
-            }
-            Self::Continuous { .. } => {
-                let (sin, cos) = v[0].sin_cos();
-                let (c, s) = (q[0] * cos - q[1] * sin, q[1] * cos + q[0] * sin);
-                let r = (c * c + s * s).sqrt().recip();
-                (out[0], out[1]) = (c * r, s * r);
-            }
-            _ => {
-                let (R, p) = self.pose(q);
-                let (dR, dp) = lie::exp6(self.twist(v));
-                // of the quaternions r and −r, the one nearer to where it was
-                let sign = S::select(dR.scalar.lt(S::zero()), -S::one(), S::one());
-                let dR = Quaternion { vector: dR.vector.scale(sign), scalar: dR.scalar * sign };
-                self.set_pose((R * dR).normalize(), p + R.to_rotation() * dp, out);
-            }
-        }
-    }
-
-    /// q₁ ⊖ q₀: the v with q₀ ⊕ v = q₁.
-    pub(crate) fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
-        match self {
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
-                for k in 0..q0.len() {
-                    out[k] = q1[k] - q0[k];
-                }
-            }
-            Self::Continuous { .. } => {
-                out[0] = (q0[0] * q1[1] - q0[1] * q1[0]).atan2(q0[0] * q1[0] + q0[1] * q1[1]);
-            }
-            _ => {
-                let ((R0, p0), (R1, p1)) = (self.pose(q0), self.pose(q1));
-                let relative = R0.to_rotation().transpose_mul(p1 - p0);
-                let d = lie::log6((R0.conjugate() * R1).normalize(), relative).to_array();
-                for (out, &axis) in out.iter_mut().zip(self.axes()) {
-                    *out = d[axis];
-                }
-            }
-        }
-    }
-
-    /// Which Jacobian of the joint's group, at tangent vector v, as a map of twists; `None` where it is the identity.
-    pub(crate) fn jacobian<S: Scalar>(self, which: GroupJacobian, v: &[S]) -> Option<MotionMap<S>> {
-        if !matches!(self, Self::Spherical | Self::Planar | Self::FreeFlyer) {
-            return None;
-        }
-        let twist = self.twist(v);
-        Some(match which {
-            GroupJacobian::Exp => lie::jexp6(twist),
-            GroupJacobian::Log => lie::jlog6(twist),
-            GroupJacobian::Transport => {
-                let (R, p) = lie::exp6(-twist);
-                MotionMap::adjoint(Se3::new(R.to_rotation(), p))
-            }
-        })
-    }
-
-    /// The tangent vector as a twist of the body.
-    fn twist<S: Scalar>(self, v: &[S]) -> Motion<S> {
-        let mut m = [S::zero(); 6];
-        for (k, &axis) in self.axes().iter().enumerate() {
-            m[axis] = v[k];
-        }
-        m.into()
-    }
-
-    /// X_J(q) of the joints whose group is not commutative.
-    fn pose<S: Scalar>(self, q: &[S]) -> (Quaternion<S>, Vec3<S>) {
-        match self {
-            Self::Spherical => (Quaternion::new(q[0], q[1], q[2], q[3]), Vec3::zero()),
-            Self::Planar => {
-                let o = S::zero();
-                let R = turned(Se3::identity(), q[3], q[2]).rotation;
-                (Quaternion::from_rotation(R), Vec3::new(q[0], q[1], o))
-            }
-            _ => (Quaternion::new(q[3], q[4], q[5], q[6]), Vec3::new(q[0], q[1], q[2])),
-        }
-    }
-
-    /// The inverse of `pose`.
-    fn set_pose<S: Scalar>(self, R: Quaternion<S>, p: Vec3<S>, q: &mut [S]) {
-        let (u, w) = (R.vector, R.scalar);
-        let two = S::splat(2.0);
-        match self {
-            Self::Spherical => q.copy_from_slice(&[u.x, u.y, u.z, w]),
-            Self::Planar => q.copy_from_slice(&[p.x, p.y, w * w - u.z * u.z, two * w * u.z]),
-            _ => q.copy_from_slice(&[p.x, p.y, p.z, u.x, u.y, u.z, w]),
-        }
-    }
 }
 
-/// The Jacobians of a joint's group that integrating and taking differences need.
-#[derive(Clone, Copy)]
-pub(crate) enum GroupJacobian {
-    /// ∂(q ⊕ v)/∂v.
-    Exp,
-    /// ∂(q₁ ⊖ q₀)/∂q₁ at q₁ ⊖ q₀ = v.
-    Log,
-    /// ∂(q ⊕ v)/∂q.
-    Transport,
+/// cos kθ and sin kθ from cos θ and sin θ, k a whole number: (cos θ + i sin θ)ᵏ by repeated squaring. Rare, so
+/// kept out of the passes.
+#[cold]
+#[inline(never)]
+fn multiple<S: Scalar>([mut c, mut s]: [S; 2], k: f64) -> [S; 2] {
+    let (mut cos, mut sin) = (S::one(), S::zero());
+    let mut n = k.abs() as u64;
+    while n > 0 {
+        if n & 1 == 1 {
+            (cos, sin) = (cos * c - sin * s, sin * c + cos * s);
+        }
+        (c, s) = (c * c - s * s, (c + c) * s);
+        n >>= 1;
+    }
+    [cos, if k < 0.0 { -sin } else { sin }]
 }
 
 /// X_T, then a rotation about z.

@@ -2,6 +2,7 @@
 //! in `frames.rs`.
 
 use crate::data::{Data, Size, check};
+use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Placements, Velocities};
 use crate::joint::Joint;
 use crate::layout::{Layout, Single};
@@ -10,6 +11,7 @@ use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
 /// What depends on the position alone, in the world's frame.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct World<S> {
     /// oXi: the body's turned frame in the world. Shape: bodies. Written by: `place`.
     pub oX: Vec<Se3<S>>,
@@ -37,6 +39,7 @@ pub(crate) fn place<L: Layout>(l: &L, World { oX, S }: &mut World<L::S>, q: &[L:
 
 /// How the bodies move, in the world's frame: what depends on the velocity and the acceleration too.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Moving<S> {
     /// Velocity of the body; the world's stays 0. Shape: bodies. Written by: `advance`.
     pub v: Vec<Motion<S>>,
@@ -61,7 +64,7 @@ impl<S: Scalar> Moving<S> {
 
 /// v_i and the columns of Ṡ, for bodies that are placed.
 #[inline(always)]
-pub(crate) fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qd: &[L::S]) {
+fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qd: &[L::S]) {
     let Moving { v, dS, .. } = m;
     m.qd.copy_from_slice(qd);
     for i in l.bodies() {
@@ -90,6 +93,27 @@ fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L:
     }
 }
 
+kernel! {
+    /// Places all bodies.
+    pub(crate) fn positions(model, data, q: &[S]) {
+        place(&Single::new(model), &mut data.world, q);
+    }
+}
+
+kernel! {
+    /// The velocities of bodies that are placed.
+    pub(crate) fn velocities(model, data, v: &[S]) {
+        advance(&Single::new(model), &data.world, &mut data.moving, v);
+    }
+}
+
+kernel! {
+    /// The accelerations of bodies whose velocities are known.
+    pub(crate) fn accelerations(model, data, a: &[S]) {
+        accelerate(&Single::new(model), &data.world, &mut data.moving, a);
+    }
+}
+
 /// Places all bodies: oXi = oXλ λXi(q), in O(n).
 ///
 /// q: nq numbers. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 4.1.
@@ -105,7 +129,7 @@ fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L:
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another size.
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -113,7 +137,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 ) -> Placements<'d, S, R> {
     data.check(model);
     check("q", q.len(), model.nq);
-    place(&Single::new(model), &mut data.world, q);
+    positions(model, data, q);
     Placements { model, world: &data.world }
 }
 
@@ -132,7 +156,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -142,9 +166,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    advance(&l, &data.world, &mut data.moving, v);
+    positions(model, data, q);
+    velocities(model, data, v);
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
 }
 
@@ -165,7 +188,7 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -177,10 +200,9 @@ pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("a", a.len(), model.nv);
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    advance(&l, &data.world, &mut data.moving, v);
-    accelerate(&l, &data.world, &mut data.moving, a);
+    positions(model, data, q);
+    velocities(model, data, v);
+    accelerations(model, data, a);
     let velocities = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
     Accelerations { velocities }
 }

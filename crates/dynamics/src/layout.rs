@@ -125,7 +125,7 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
         let node = &self.model.nodes[i];
         match node.mimic {
             None => q[node.idx_q + k],
-            Some(mimic) => q[node.idx_q + k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
+            Some(mimic) => node.joint.follow(mimic, &q[node.idx_q..], k),
         }
     }
     #[inline(always)]

@@ -120,6 +120,7 @@ fn eliminate<S: Scalar, const N: usize>(tree: &Tree, rows: &mut [S], D_inv: &mut
 /// assert_eq!(factor.nonzeros(), 21 + 4 * (7 + 8 + 9)); // the base, and three joints of each leg: not 171
 /// ```
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Ltdl<S> {
     tree: Tree,
     /// Each place's row of L from the root on, then its D. Shape: nonzeros, each row in whole steps. Written by:
@@ -134,6 +135,23 @@ impl<S: Scalar> Ltdl<S> {
     pub fn new<R>(model: &Model<R>) -> Self {
         let tree = Tree::new(&model.columns, model.nv, step::<S>());
         Self { rows: vec![S::zero(); tree.first[model.nv]], D_inv: vec![S::zero(); model.nv], tree }
+    }
+
+    /// The order and the tree of the places.
+    pub(crate) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// Row k of L from the root on, without its diagonal.
+    #[inline(always)]
+    pub(crate) fn row_from_root(&self, k: usize) -> &[S] {
+        &self.rows[self.tree.first[k]..][..self.tree.depth[k]]
+    }
+
+    /// 1/D, in the order of the places.
+    #[inline(always)]
+    pub(crate) fn inverse_diagonal(&self) -> &[S] {
+        &self.D_inv
     }
 
     /// How many entries of L and D may differ from zero, the ones on L's diagonal not counted.
@@ -171,6 +189,7 @@ impl<S: Scalar> Ltdl<S> {
     ///
     /// # Panics
     /// If `M` is not nv × nv.
+    #[inline(always)]
     pub fn factorize(&mut self, M: &DMatrix<S>) {
         let nv = self.D_inv.len();
         assert!(M.shape() == (nv, nv), "M: expected {nv} × {nv}, found {:?}", M.shape());
@@ -203,6 +222,7 @@ impl<S: Scalar> Ltdl<S> {
     ///
     /// # Panics
     /// If `b` has not nv numbers.
+    #[inline(always)]
     pub fn solve(&self, b: &mut [S]) {
         check("b", b.len(), self.D_inv.len());
         let Tree { swaps, parent, depth, run, first, .. } = &self.tree;
@@ -258,6 +278,7 @@ impl<S: Scalar> Ltdl<S> {
     ///
     /// # Panics
     /// If `B` has not nv rows.
+    #[inline(always)]
     pub fn solve_matrix(&self, B: &mut DMatrix<S>) {
         check("B", B.nrows(), self.D_inv.len());
         for column in B.as_mut_slice().chunks_exact_mut(self.D_inv.len().max(1)) {
@@ -272,6 +293,7 @@ impl<S: Scalar> Ltdl<S> {
     ///
     /// # Panics
     /// If `X` is not nv × nv.
+    #[inline(always)]
     pub fn inverse(&self, X: &mut DMatrix<S>) {
         let nv = self.D_inv.len();
         assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());

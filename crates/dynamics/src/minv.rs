@@ -8,7 +8,8 @@
 use crate::aba;
 use crate::crba::crba;
 use crate::data::{Data, Size, check};
-use crate::kinematics::World;
+use crate::dispatch::kernel;
+use crate::kinematics::{World, positions};
 use crate::layout::Single;
 use crate::ltdl::Ltdl;
 use crate::model::{Column, Model};
@@ -20,6 +21,7 @@ use nalgebra::DMatrix;
 const SHORT_ROWS: usize = 12;
 
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
     P: Vec<S>,
@@ -79,7 +81,7 @@ fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S
     }
 }
 
-/// Row c of M⁻¹ for the efforts j ≥ c; the factors of the articulated bodies are those of `aba::factorize`.
+/// M⁻¹, row c for the efforts j ≥ c first; the factors of the articulated bodies are those of `aba::factorize`.
 #[inline(always)]
 fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
     let n = columns.len();
@@ -117,17 +119,38 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
     }
 }
 
-/// M⁻¹ for the articulated bodies that `aba::factorize` has left in the data.
-#[inline(always)]
-pub(crate) fn from_factors<'d, S: Scalar, R>(model: &Model<R>, data: &'d mut Data<S>) -> &'d DMatrix<S> {
-    sweep(&model.columns, &data.world, &data.aba, &mut data.minv);
-    &data.minv.Minv
-}
-
 /// M⁻¹ from M.
-pub(crate) fn from_matrix<S: Scalar>(d: &mut Workspace<S>, M: &DMatrix<S>) {
+#[inline(always)]
+fn from_matrix<S: Scalar>(d: &mut Workspace<S>, M: &DMatrix<S>) {
     d.factor.factorize(M);
     d.factor.inverse(&mut d.Minv);
+}
+
+kernel! {
+    fn factorize(model, data) {
+        aba::factorize(&Single::new(model), &data.world, &mut data.aba);
+    }
+}
+
+kernel! {
+    /// After `rnea_derivatives`, where M = ∂τ/∂a.
+    pub(crate) fn from_derivatives(_model, data) {
+        from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
+    }
+}
+
+kernel! {
+    /// After `aba`.
+    pub(crate) fn from_factors(model, data) {
+        sweep(&model.columns, &data.world, &data.aba, &mut data.minv);
+    }
+}
+
+kernel! {
+    /// After `crba`.
+    fn from_crba(_model, data) {
+        from_matrix(&mut data.minv, data.crba.matrix());
+    }
 }
 
 /// M(q)⁻¹, the accelerations for unit efforts, in O(n²).
@@ -145,7 +168,7 @@ pub(crate) fn from_matrix<S: Scalar>(d: &mut Workspace<S>, M: &DMatrix<S>) {
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, `data` was made for a model of another size, or M is singular
+/// If `q` has not nq numbers, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
@@ -153,9 +176,11 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     check("q", q.len(), model.nq);
     if data.minv.by_factor {
         crba(model, data, q);
-        from_matrix(&mut data.minv, data.crba.matrix());
+        from_crba(model, data);
         return &data.minv.Minv;
     }
-    aba::factorize(&Single::new(model), &mut data.world, &mut data.aba, q);
-    from_factors(model, data)
+    positions(model, data, q);
+    factorize(model, data);
+    from_factors(model, data);
+    &data.minv.Minv
 }

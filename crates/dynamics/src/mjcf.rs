@@ -1,7 +1,9 @@
 //! Robots from MJCF, the format of MuJoCo: kinematics, inertias, limits. Meshes are never looked at.
 
 mod attributes;
+mod equality;
 mod geometry;
+mod include;
 
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
@@ -11,6 +13,7 @@ use crate::soundness::Warning;
 use crate::xml::{self, Element};
 use attributes::{Attributes, Compiler, Defaults, FromGeoms, MAIN, turn};
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
+use equality::Joints;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +22,12 @@ use std::path::{Path, PathBuf};
 pub struct MjcfOptions {
     /// Whether what is only odd, or left out ([`Model::warnings`]), is an error.
     pub strict: bool,
+    /// Whether a `<joint>` of `<equality>` lets joint1 follow joint2 ([`Mimic`](crate::Mimic)), instead of being left
+    /// out; its `polycoef` must be linear.
+    pub mimic: bool,
+    /// Whether the mass of a mesh, on a moving body without `<inertial>`, is left out and reported in
+    /// [`Model::warnings`], instead of being an error.
+    pub weightless_meshes: bool,
 }
 
 impl Model {
@@ -34,12 +43,13 @@ impl Model {
     /// with the body's name, is apart from it by that joint's `pos`. A free joint's q is the pose of the MJCF body in
     /// the world.
     ///
-    /// Read are `<compiler>` (angle, eulerseq, autolimits, inertiafromgeom, inertiagrouprange), default classes,
-    /// `<include>`, gravity, `<frame>`, `<inertial>`, masses of primitive geoms, and of joints: pos, axis, ref, range,
-    /// armature, damping, frictionloss, actuatorfrcrange. Equality constraints and tendons are left out and reported
-    /// in [`warnings`](Model::warnings). Actuators, sensors, contacts, keyframes, springs and `gravcomp` have no part
-    /// in a model. Mass of a mesh, `replicate`, `composite`, `flexcomp`, `attach`, and what else would change the tree
-    /// or its masses is an error.
+    /// Read are `<compiler>` (angle, eulerseq, autolimits, inertiafromgeom, inertiagrouprange, boundmass, boundinertia,
+    /// balanceinertia, settotalmass), default classes, `<include>`, gravity, `<frame>`, `<inertial>`, masses of
+    /// primitive geoms, and of joints: pos, axis, ref, range, armature, damping, frictionloss, actuatorfrcrange.
+    /// Equality constraints (but see [`MjcfOptions::mimic`]) and tendons are left out and reported in
+    /// [`warnings`](Model::warnings). Actuators, sensors, contacts, keyframes, springs and `gravcomp` have no part in a
+    /// model. Mass of a mesh (but see [`MjcfOptions::weightless_meshes`]), `replicate`, `composite`, `flexcomp`,
+    /// `attach`, and what else would change the tree or its masses is an error.
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and what
@@ -75,9 +85,6 @@ impl Model {
     }
 }
 
-/// How deep bodies may be nested once the included files are in their places.
-const MAX_DEPTH: usize = 256;
-
 fn model(
     mut root: Element,
     folder: Option<&Path>,
@@ -87,40 +94,17 @@ fn model(
     if root.tag != "mujoco" {
         return Err(root.wrong("the root element of an MJCF is <mujoco>"));
     }
-    include(&mut root, folder, &mut seen, 0)?;
+    include::resolve(&mut root, folder, &mut seen, 0)?;
     let defaults = Defaults::read(&root)?;
-    let reader = Reader { compiler: Compiler::read(&root)?, defaults: &defaults, bodies: 0, names: HashMap::new() };
+    let compiler = Compiler::read(&root)?;
+    let (names, joints) = (HashMap::new(), HashMap::new());
+    let (defaults, warnings) = (&defaults, Vec::new());
+    let reader = Reader { options, compiler, defaults, bodies: 0, names, joints, mass: 0.0, warnings };
     let model = reader.model(&root)?;
     match model.warnings().first() {
         Some(warning) if options.strict => Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() }),
         _ => Ok(model),
     }
-}
-
-/// Puts what is in included files in place of the `<include>`s.
-fn include(element: &mut Element, folder: Option<&Path>, seen: &mut Vec<PathBuf>, depth: usize) -> Result<(), Error> {
-    if depth == MAX_DEPTH {
-        return Err(element.wrong(format!("is nested more than {MAX_DEPTH} levels deep")));
-    }
-    for mut child in std::mem::take(&mut element.children) {
-        if child.tag != "include" {
-            include(&mut child, folder, seen, depth + 1)?;
-            element.children.push(child);
-            continue;
-        }
-        let file = child.attribute("file").ok_or_else(|| child.wrong("has no file"))?;
-        let folder = folder.ok_or_else(|| child.wrong(format!("a string has no folder to find `{file}` in")))?;
-        let path = folder.join(file);
-        if seen.contains(&path) {
-            return Err(child.wrong(format!("`{file}` is already part of the model")));
-        }
-        seen.push(path.clone());
-        let text = xml::read(&path).map_err(|e| child.wrong(e.to_string()))?;
-        let mut included = Element::parse(&text, &path.display().to_string())?;
-        include(&mut included, Some(folder), seen, depth + 1)?;
-        element.children.append(&mut included.children);
-    }
-    Ok(())
 }
 
 /// What a body consists of, with what is inside its `<frame>`s.
@@ -148,12 +132,17 @@ struct Waiting<'a> {
 }
 
 struct Reader<'a> {
+    options: &'a MjcfOptions,
     compiler: Compiler,
     defaults: &'a Defaults,
     /// How many bodies there are so far: MuJoCo's number of the last one.
     bodies: usize,
     /// Who has a name, by kind and name.
     names: HashMap<(&'static str, String), &'a Element>,
+    joints: Joints,
+    /// Of all bodies so far (kg).
+    mass: f64,
+    warnings: Vec<Warning>,
 }
 
 impl<'a> Reader<'a> {
@@ -175,18 +164,17 @@ impl<'a> Reader<'a> {
                 wait(&mut waiting, &parts, body, bXl, false);
             }
         }
+        if let Some(total) = self.compiler.total_mass.filter(|_| self.mass > 0.0) {
+            builder.scale_inertias(total / self.mass);
+        }
+        let warnings = equality::add(&mut builder, root, &self.joints, self.options.mimic)?;
+        let place = |kind, name: &String| self.names.get(&(kind, name.clone()));
         let mut model = builder.build().map_err(|e| match &e {
-            Error::Body { body, what } => {
-                self.names.get(&("body", body.clone())).map_or(e.clone(), |at| at.wrong(what.clone()))
-            }
+            Error::Body { body, what } => place("body", body).map_or(e.clone(), |at| at.wrong(what.clone())),
+            Error::Joint { joint, what } => place("joint", joint).map_or(e.clone(), |at| at.wrong(what.clone())),
             _ => e,
         })?;
-        for section in root.children.iter().filter(|c| matches!(&*c.tag, "equality" | "tendon" | "deformable")) {
-            model.warnings.extend(section.children.iter().map(|constraint| Warning::LeftOut {
-                element: constraint.label(),
-                what: format!("<{}> has no part in a tree of bodies", section.tag),
-            }));
-        }
+        model.warnings.extend(self.warnings.into_iter().chain(warnings));
         Ok(model)
     }
 
@@ -221,7 +209,11 @@ impl<'a> Reader<'a> {
         let name = self.name("body", w.element, &format!("body{}", self.bodies))?;
         let (mut body, mut bXl) = (w.on, w.placement);
         let moves = body != WORLD || !parts.joints.is_empty();
-        let inertia = if moves { self.inertia(&parts)? } else { Inertia::zero() };
+        // what cannot move counts where all masses are scaled
+        let counts = moves || self.compiler.total_mass.is_some();
+        let inertia = if counts { self.inertia(w.element, &parts)? } else { Inertia::zero() };
+        self.mass += inertia.mass;
+        let inertia = if moves { inertia } else { Inertia::zero() };
         let count = parts.joints.len();
         for (k, a) in parts.joints.iter().enumerate() {
             let number = if count == 1 { String::new() } else { format!("{}", k + 1) };
@@ -239,6 +231,9 @@ impl<'a> Reader<'a> {
             let between = format!("{name}#{}", k + 1);
             let (called, inertia) = if last { (&name, jXl.act(inertia)) } else { (&between, Inertia::zero()) };
             body = builder.body_with((called, &joint_name), body, joint, placement, inertia, options);
+            let unit = if matches!(joint, Joint::Revolute { .. }) { self.compiler.angle } else { 1.0 };
+            let at_zero = a.number("ref")?.unwrap_or(0.0) * unit;
+            self.joints.insert(joint_name.clone(), (body, at_zero));
             if !last {
                 builder.between(body);
             }
@@ -281,7 +276,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The body's inertia in its own frame.
-    fn inertia(&self, parts: &Parts) -> Result<Inertia<f64>, Error> {
+    fn inertia(&mut self, element: &Element, parts: &Parts) -> Result<Inertia<f64>, Error> {
         let from_geoms = match self.compiler.from_geoms {
             FromGeoms::Never => false,
             FromGeoms::WithoutInertial => parts.inertial.is_none(),
@@ -290,11 +285,18 @@ impl<'a> Reader<'a> {
         if from_geoms {
             let mut sum = Inertia::zero();
             for (geom, X) in &parts.geoms {
+                if self.options.weightless_meshes && geometry::is_heavy_mesh(&self.compiler, geom)? {
+                    let what = format!("the mass of a mesh on {} is left out", element.label());
+                    self.warnings.push(Warning::LeftOut { element: geom.element.label(), what });
+                    continue;
+                }
                 sum += X.act(geometry::geom(&self.compiler, geom)?);
             }
-            return Ok(sum);
+            return geometry::corrected(&self.compiler, element, sum);
         }
-        parts.inertial.map_or(Ok(Inertia::zero()), |e| geometry::inertial(&self.compiler, &Attributes::plain(e)))
+        let given =
+            parts.inertial.map_or(Ok(Inertia::zero()), |e| geometry::inertial(&self.compiler, &Attributes::plain(e)));
+        geometry::corrected(&self.compiler, element, given?)
     }
 
     /// The joint, the poses before it (`ref` undone) and after it, and what else it has: lXl(q) = lXj X_J(q) jXl.
@@ -305,8 +307,9 @@ impl<'a> Reader<'a> {
             if a.flag("align", Some("auto"))? == Some(true) {
                 return Err(wrong("align is not supported".to_owned()));
             }
-            let armature = a.number("armature")?.unwrap_or(0.0);
-            let options = JointOptions { armature, ..JointOptions::default() };
+            let number = |name| a.number(name).map(|x| x.unwrap_or(0.0));
+            let (armature, damping) = (number("armature")?, number("damping")?);
+            let options = JointOptions { armature, damping, ..JointOptions::default() };
             return Ok((Joint::FreeFlyer, Se3::identity(), Se3::identity(), options));
         }
         let axis = a.vector("axis")?.unwrap_or(Vec3::new(0.0, 0.0, 1.0));

@@ -5,6 +5,7 @@ use crate::joint::Joint;
 use crate::soundness::Warning;
 use condyle_spatial::{Act, Constant, Inertia, Mat3, Scalar, Se3, Vec3};
 use serde::{Deserialize, Serialize};
+use std::any::Any;
 use std::fmt;
 
 /// A moving body (a link, with all that fixed joints merge into it) and the joint that carries it.
@@ -30,7 +31,14 @@ pub struct Body {
     pub mimic: Option<Mimic>,
 }
 
-/// How a joint follows another one: its position is ratio · q + offset of the coordinate that `idx_q` names.
+/// How a joint follows another one: its position is ratio · q + offset, q being the leader's position.
+///
+/// Both have one degree of freedom, and the leader follows nobody. A continuous leader has q = [cos θ, sin θ]: ratio is
+/// then a whole number, and what follows turns, by ratio · θ + offset. A continuous follower of a leader with one number
+/// turns by ratio · q + offset.
+///
+/// The follower's armature counts, as ratio² · armature of the leader's coordinate. Its limits, damping and friction do
+/// not: as in Pinocchio, those of a coordinate are its leader's alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Mimic {
@@ -102,7 +110,7 @@ mod finite {
 }
 
 /// A body as the algorithms see it: the axis of its joint turned to z, all that a pass needs side by side.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
 pub(crate) struct Node<R> {
     pub joint: Joint,
     pub parent: usize,
@@ -123,7 +131,7 @@ pub(crate) struct Node<R> {
 }
 
 /// A degree of freedom of a joint, and the coordinate that it follows.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
 pub(crate) struct Column {
     pub coordinate: usize,
     pub ratio: f64,
@@ -141,13 +149,16 @@ pub(crate) struct Column {
 /// a URDF; as Pinocchio numbers them) or in which a builder was given them. `R` is the type of the constants: `f64`,
 /// or a dual number for derivatives with respect to inertias ([`with_inertias`](Self::with_inertias)).
 ///
+/// A model of plain numbers can be written to a file and read from it (serde). A file may be edited: what it says is
+/// checked as in [`ModelBuilder::build`](crate::ModelBuilder::build) when it is read.
+///
 /// ```
 /// let arm = condyle_dynamics::robots::arm7();
 /// assert_eq!((arm.nq(), arm.nv()), (7, 7));
 /// assert_eq!(arm.frames()[arm.frame("tool")?].body, 7);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct Model<R = f64> {
     pub(crate) name: String,
     pub(crate) bodies: Vec<Body>,
@@ -167,6 +178,8 @@ pub struct Model<R = f64> {
     pub(crate) warnings: Vec<Warning>,
     /// Bodies whose joints make M singular.
     pub(crate) singular: Vec<usize>,
+    /// Tells trees apart: a hash of the parents, joints and coordinates.
+    pub(crate) tree: u64,
 }
 
 impl<R> Model<R> {
@@ -220,6 +233,13 @@ impl<R> Model<R> {
         self.columns.len() != self.nv
     }
 
+    /// The same robot under another gravity (m/s², in the world's frame).
+    #[must_use]
+    pub fn with_gravity(mut self, gravity: Vec3<R>) -> Self {
+        self.gravity = gravity;
+        self
+    }
+
     /// The number of the frame with this name: a link's, else the user's, else a joint's.
     ///
     /// # Errors
@@ -250,13 +270,6 @@ pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> S
 }
 
 impl Model {
-    /// The same robot under another gravity (m/s², in the world's frame).
-    #[must_use]
-    pub fn with_gravity(mut self, gravity: Vec3<f64>) -> Self {
-        self.gravity = gravity;
-        self
-    }
-
     /// The same robot with another armature, one number for each degree of freedom (kg m², kg).
     ///
     /// # Panics
@@ -271,7 +284,8 @@ impl Model {
 
     /// The same robot with constants of another type, its inertias given by a function of (body, inertia).
     ///
-    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters.
+    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters. [`Body::inertia`]
+    /// is a plain number: it follows if the new ones are.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Inertia, robots, rnea};
@@ -291,6 +305,15 @@ impl Model {
         &self,
         mut inertia: impl FnMut(usize, Inertia<f64>) -> Inertia<T>,
     ) -> Model<T> {
+        let mut bodies = self.bodies.clone();
+        let replace = |(i, b): (usize, &mut Body)| {
+            let I = inertia(i, b.inertia);
+            if let Some(&plain) = (&I as &dyn Any).downcast_ref::<Inertia<f64>>() {
+                b.inertia = plain;
+            }
+            I
+        };
+        let inertias: Vec<Inertia<T>> = bodies.iter_mut().enumerate().map(replace).collect();
         let node = |(i, n): (usize, &Node<f64>)| Node {
             joint: n.joint,
             parent: n.parent,
@@ -301,7 +324,7 @@ impl Model {
             support: n.support,
             depth: n.depth,
             placement: n.placement.lift(),
-            inertia: Se3::new(n.reframing, Vec3::zero()).lift().act_inv(inertia(i, self.bodies[i].inertia)),
+            inertia: Se3::new(n.reframing, Vec3::zero()).lift().act_inv(inertias[i]),
             reframing: n.reframing,
         };
         Model {
@@ -309,7 +332,7 @@ impl Model {
             armature: self.armature.iter().map(|&a| T::of(a)).collect(),
             gravity: self.gravity.lift(),
             name: self.name.clone(),
-            bodies: self.bodies.clone(),
+            bodies,
             frames: self.frames.clone(),
             limits: self.limits.clone(),
             damping: self.damping.clone(),
@@ -321,6 +344,7 @@ impl Model {
             singular: self.singular.clone(),
             nq: self.nq,
             nv: self.nv,
+            tree: self.tree,
         }
     }
 }

@@ -20,9 +20,10 @@ use condyle_spatial::{Act, Constant, Cross, Motion, Scalar};
 use nalgebra::DMatrix;
 
 /// How many numbers describe the inertia of a body.
-const PARAMETERS: usize = 10;
+pub(crate) const PARAMETERS: usize = 10;
 
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Y. Shape: nv × 10 (bodies − 1). Written by: `joint_torque_regressor`.
     torque: DMatrix<S>,
@@ -62,6 +63,13 @@ fn pairing<S: Scalar>(m: Motion<S>, w: Motion<S>) -> [S; PARAMETERS] {
     ]
 }
 
+/// y(S, a) − y(v × S, v): the effort at a column S of a body with velocity v and acceleration a, per parameter.
+#[inline(always)]
+pub(crate) fn effort<S: Scalar>(column: Motion<S>, v: Motion<S>, a: Motion<S>) -> [S; PARAMETERS] {
+    let (linear, quadratic) = (pairing(column, a), pairing(v.cross(column), v));
+    core::array::from_fn(|k| linear[k] - quadratic[k])
+}
+
 /// The rows of body i's ten parameters in a vector of all.
 #[inline(always)]
 fn of_body<S>(parameters: &mut [S], i: usize) -> &mut [S] {
@@ -87,7 +95,7 @@ fn of_body<S>(parameters: &mut [S], i: usize) -> &mut [S] {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -107,10 +115,8 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
         for &c in l.support(i) {
             let column = &model.columns[c];
             let S_b = oXb.act_inv(data.world.S[c]).scale(S::splat(column.ratio));
-            let (linear, quadratic) = (pairing(S_b, a_b), pairing(v_b.cross(S_b), v_b));
-            for k in 0..PARAMETERS {
-                // τ_S = (y(S, a) − y(v × S, v)) · π_i
-                Y[column.coordinate + model.nv * (PARAMETERS * (i - 1) + k)] += linear[k] - quadratic[k];
+            for (k, y) in effort(S_b, v_b, a_b).into_iter().enumerate() {
+                Y[column.coordinate + model.nv * (PARAMETERS * (i - 1) + k)] += y; // τ_S = (y(S, a) − y(v × S, v)) · π_i
             }
         }
     }
@@ -133,7 +139,7 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -164,7 +170,7 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another size.
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn potential_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

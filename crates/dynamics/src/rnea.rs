@@ -3,6 +3,7 @@
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 5.1; in the bodies' own frames.
 
 use crate::data::{Data, Size, check, check_forces};
+use crate::dispatch::kernel;
 use crate::joint::Joint;
 use crate::layout::{Layout, Single};
 use crate::model::Model;
@@ -10,6 +11,7 @@ use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Se3, Vec3};
 
 /// In the bodies' turned frames.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// λXi. Shape: bodies. Written by: `pass`.
     X: Vec<Se3<S>>,
@@ -70,6 +72,12 @@ fn pass<L: Layout>(l: &L, d: &mut Workspace<L::S>, q: &[L::S], qd: &[L::S], qdd:
     l.add_armature_torque(qdd, tau);
 }
 
+kernel! {
+    fn run(model, data, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
+        pass(&Single::new(model), &mut data.rnea, q, v, a, f_ext);
+    }
+}
+
 /// τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n).
 ///
 /// q: nq numbers; v, a: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
@@ -85,7 +93,7 @@ fn pass<L: Layout>(l: &L, d: &mut Workspace<L::S>, q: &[L::S], qd: &[L::S], qdd:
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -99,7 +107,7 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     check("v", v.len(), model.nv);
     check("a", a.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
-    pass(&Single::new(model), &mut data.rnea, q, v, a, f_ext);
+    run(model, data, q, v, a, f_ext);
     &data.rnea.tau
 }
 
@@ -108,7 +116,7 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
 /// q: nq numbers; v: nv. Returns nv numbers (N m, N). Allocates nothing.
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -119,7 +127,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     let zero = core::mem::take(&mut data.rnea.zero);
-    pass(&Single::new(model), &mut data.rnea, q, v, &zero, &[]);
+    run(model, data, q, v, &zero, &[]);
     data.rnea.zero = zero;
     &data.rnea.tau
 }
@@ -138,12 +146,12 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another size.
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
     data.check(model);
     check("q", q.len(), model.nq);
     let zero = core::mem::take(&mut data.rnea.zero);
-    pass(&Single::new(model), &mut data.rnea, q, &zero, &zero, &[]);
+    run(model, data, q, &zero, &zero, &[]);
     data.rnea.zero = zero;
     &data.rnea.tau
 }

@@ -18,91 +18,49 @@
 //! ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F)     ∂τ_e/∂q̇_d = S_eᵀ (Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d)
 //! ```
 //!
-//! (Iᶜ, B, F of the joint of d). 2B has 9 numbers other than zero, given by the momentum (p, l) = I v and the rate Σ
-//! of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
+//! (Iᶜ, B, F of the joint of d).
 
+use crate::coriolis::Coriolis;
 use crate::data::{Data, Size, check, check_forces};
-use crate::kinematics::{World, place};
+use crate::dispatch::kernel;
+use crate::inputs::State;
+use crate::kinematics::{World, positions};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Sym3, Vec3};
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
-
-/// The matrix 2B of a body or of all that a joint carries.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Coriolis<S> {
-    /// I v.
-    pub momentum: Force<S>,
-    /// Σ = dĪ/dt.
-    pub rate: Sym3<S>,
-}
-
-impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
-    #[inline(always)]
-    fn add_assign(&mut self, o: Self) {
-        self.momentum += o.momentum;
-        self.rate += o.rate;
-    }
-}
-
-impl<S: Scalar> Coriolis<S> {
-    /// Of a body at rest.
-    pub(crate) fn zero() -> Self {
-        Self { momentum: Force::zero(), rate: Sym3::zero() }
-    }
-
-    /// Of a body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
-    #[inline(always)]
-    pub(crate) fn of(I: Inertia<S>, v: Motion<S>) -> Self {
-        let turning = v.angular.skew() * I.rotational.full();
-        let (x, y, z) = (turning.x, turning.y, turning.z);
-        let two = S::splat(2.0);
-        let turning = Sym3 { xx: two * x.x, xy: x.y + y.x, yy: two * y.y, xz: x.z + z.x, yz: y.z + z.y, zz: two * z.z };
-        let shifting = Sym3::outer_sum(I.mass_com, v.linear);
-        let rate = (turning - shifting).add_diagonal(two * v.linear.dot(I.mass_com));
-        Self { momentum: I * v, rate }
-    }
-
-    /// 2B m.
-    #[inline(always)]
-    pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
-        let (p, l) = (self.momentum.linear, self.momentum.angular);
-        Force { linear: m.angular.cross(p).scale(S::splat(2.0)), angular: self.rate * m.angular + m.angular.cross(l) }
-    }
-
-    /// 2Bᵀ m, of which only the angular part is not zero.
-    #[inline(always)]
-    pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
-        let (p, l) = (self.momentum.linear, self.momentum.angular);
-        self.rate * m.angular + l.cross(m.angular) + p.cross(m.linear).scale(S::splat(2.0))
-    }
-}
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Velocity. Shape: bodies. Written by: `pass`.
-    v: Vec<Motion<S>>,
+    pub v: Vec<Motion<S>>,
     /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
-    a: Vec<Motion<S>>,
+    pub a: Vec<Motion<S>>,
     /// Iᶜ. Shape: bodies. Written by: `pass`.
-    IC: Vec<Inertia<S>>,
+    pub IC: Vec<Inertia<S>>,
     /// 2Bᶜ. Shape: bodies. Written by: `pass`.
-    BC: Vec<Coriolis<S>>,
+    pub BC: Vec<Coriolis<S>>,
     /// F. Shape: bodies. Written by: `pass`.
-    F: Vec<Force<S>>,
+    pub F: Vec<Force<S>>,
     /// Ψ̇. Shape: columns. Written by: `pass`.
-    Psid: Vec<Motion<S>>,
+    pub Psid: Vec<Motion<S>>,
     /// Ψ̈. Shape: columns. Written by: `pass`.
-    Psidd: Vec<Motion<S>>,
+    pub Psidd: Vec<Motion<S>>,
     /// Ψ̇ + Ṡ. Shape: columns. Written by: `pass`.
-    PsidSd: Vec<Motion<S>>,
+    pub PsidSd: Vec<Motion<S>>,
+    /// The velocity and acceleration coordinates. Shape: nv. Written by: `pass`.
+    pub qd: Vec<S>,
+    pub qdd: Vec<S>,
+    /// No acceleration. Shape: nv. Written by: `new`.
+    still: Vec<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    dtau_dq: DMatrix<S>,
+    pub dtau_dq: DMatrix<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    dtau_dv: DMatrix<S>,
+    pub dtau_dv: DMatrix<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    dtau_da: DMatrix<S>,
+    pub dtau_da: DMatrix<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -117,6 +75,9 @@ impl<S: Scalar> Workspace<S> {
             Psid: vec![Motion::zero(); size.columns],
             Psidd: vec![Motion::zero(); size.columns],
             PsidSd: vec![Motion::zero(); size.columns],
+            qd: vec![S::zero(); size.nv],
+            qdd: vec![S::zero(); size.nv],
+            still: vec![S::zero(); size.nv],
             dtau_dq: square.clone(),
             dtau_dv: square.clone(),
             dtau_da: square,
@@ -133,10 +94,13 @@ pub(crate) fn pass<L: Layout>(
     qd: &[L::S],
     qdd: &[L::S],
     f_ext: &[Force<L::S>],
+    minus_gravity: Vec3<L::S>,
 ) {
     let (oX, S) = (&w.oX, &w.S);
-    let Workspace { v, a, IC, BC, F, Psid, Psidd, PsidSd, dtau_dq, dtau_dv, dtau_da } = d;
-    a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
+    d.qd.copy_from_slice(qd);
+    d.qdd.copy_from_slice(qdd);
+    let Workspace { v, a, IC, BC, F, Psid, Psidd, PsidSd, dtau_dq, dtau_dv, dtau_da, .. } = d;
+    a[0] = Motion::new(minus_gravity, Vec3::zero());
     for i in l.bodies() {
         let (v_parent, a_parent) = (l.parent(v, i), l.parent(a, i));
         let (mut vJ, mut aJ) = (Motion::zero(), Motion::zero());
@@ -200,15 +164,23 @@ pub(crate) fn pass<L: Layout>(
     l.add_armature(da);
 }
 
-/// The derivatives of τ = rnea(q, v, a), each a full nv × nv matrix.
+kernel! {
+    /// For bodies that are placed.
+    pub(crate) fn run(model, data, v: &[S], a: &[S], f_ext: &[Force<S>], minus_gravity: &[Vec3<S>]) {
+        pass(&Single::new(model), &data.world, &mut data.rnea_derivatives, v, a, f_ext, minus_gravity[0]);
+    }
+}
+
+/// The derivatives of τ = rnea(q, v, a): three full nv × nv matrices, and [all others](Self::with_respect_to) when asked.
 #[derive(Clone, Copy, Debug)]
-pub struct RneaDerivatives<'d, S> {
+pub struct RneaDerivatives<'d, S, R = f64> {
     /// ∂τ/∂q in the tangent space: the change of τ when q moves to q ⊕ δ, per δ.
     pub dtau_dq: &'d DMatrix<S>,
     /// ∂τ/∂v.
     pub dtau_dv: &'d DMatrix<S>,
     /// ∂τ/∂a = M(q), armature included.
     pub dtau_da: &'d DMatrix<S>,
+    pub(crate) state: State<'d, S, R>,
 }
 
 /// The derivatives of [`rnea`](crate::rnea) with respect to q, v and a, exact, in O(n · depth).
@@ -227,28 +199,72 @@ pub struct RneaDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
+    model: &'d Model<R>,
     data: &'d mut Data<S>,
     q: &[S],
     v: &[S],
     a: &[S],
     f_ext: &[Force<S>],
-) -> RneaDerivatives<'d, S> {
+) -> RneaDerivatives<'d, S, R> {
     data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("a", a.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    pass(&l, &data.world, &mut data.rnea_derivatives, v, a, f_ext);
-    data.rnea_derivatives.view()
+    positions(model, data, q);
+    run(model, data, v, a, f_ext, &[Single::new(model).minus_gravity()]);
+    view(model, &data.world, &data.rnea_derivatives)
 }
 
-impl<S> Workspace<S> {
-    pub(crate) fn view(&self) -> RneaDerivatives<'_, S> {
-        RneaDerivatives { dtau_dq: &self.dtau_dq, dtau_dv: &self.dtau_dv, dtau_da: &self.dtau_da }
-    }
+/// What `pass` has left.
+pub(crate) fn view<'d, S, R>(
+    model: &'d Model<R>,
+    world: &'d World<S>,
+    d: &'d Workspace<S>,
+) -> RneaDerivatives<'d, S, R> {
+    let state = State { model, world, pass: d };
+    RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
+}
+
+/// The derivatives of the Coriolis product C(q, v) v, each a full nv × nv matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct CoriolisDerivatives<'d, S> {
+    /// ∂(C v)/∂q.
+    pub dq: &'d DMatrix<S>,
+    /// ∂(C v)/∂v.
+    pub dv: &'d DMatrix<S>,
+}
+
+/// The derivatives of C(q, v) v = h(q, v) − g(q), the Coriolis and centrifugal efforts, exact, in O(n · depth).
+///
+/// q: nq numbers; v: nv. Returns two nv × nv matrices (N m/rad, N m s/rad). Allocates nothing. Source: those of
+/// [`rnea`](crate::rnea) at a = 0 where nothing weighs anything.
+///
+/// ```
+/// use condyle_dynamics::{Data, coriolis_derivatives, coriolis_matrix, robots};
+/// let arm = robots::arm7();
+/// let (mut data, q, v) = (Data::new(&arm), [0.3; 7], [0.1; 7]);
+/// let dv = coriolis_derivatives(&arm, &mut data, &q, &v).dv.clone();
+/// assert!((dv - coriolis_matrix(&arm, &mut data, &q, &v) * 2.0).amax() < 1e-13); // C v is quadratic in v
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> CoriolisDerivatives<'d, S> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    let still = core::mem::take(&mut data.rnea_derivatives.still);
+    positions(model, data, q);
+    run(model, data, v, &still, &[], &[Vec3::zero()]);
+    let d = &mut data.rnea_derivatives;
+    d.still = still;
+    CoriolisDerivatives { dq: &d.dtau_dq, dv: &d.dtau_dv }
 }

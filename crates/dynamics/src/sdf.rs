@@ -1,5 +1,6 @@
 //! Robots from SDF, the format of Gazebo: kinematics, inertias, limits. Meshes are never looked at.
 
+mod mimics;
 mod poses;
 
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
@@ -9,6 +10,7 @@ use crate::model::{FrameKind, Model};
 use crate::soundness::Warning;
 use crate::xml::{self, Element};
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
+use mimics::Axes;
 use poses::{Poses, optional, three};
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::Path;
@@ -20,6 +22,8 @@ pub struct SdfOptions {
     pub root_joint: Option<Joint>,
     /// Whether what is only odd, or left out ([`Model::warnings`]), is an error.
     pub strict: bool,
+    /// Whether an axis with a `<mimic>` follows another one ([`Mimic`](crate::Mimic)), instead of being free.
+    pub mimic: bool,
 }
 
 impl Model {
@@ -32,15 +36,16 @@ impl Model {
     ///
     /// **Joints.** `revolute` has one number, limits or not ([`Joint::Revolute`]); `continuous` has q = [cos, sin], as
     /// in a URDF; `ball` is [`Joint::Spherical`]; `universal` and `revolute2` become two revolute joints, the first
-    /// called `name#1`, with a body `child#1` between them. `prismatic` and `fixed` are what they say; others
-    /// (`screw`, `gearbox`) are never part of the tree, and errors where they close no loop. The body of the model
+    /// called `name#1`, with a body `child#1` between them. `screw` is [`Joint::Helical`], by its `screw_thread_pitch`
+    /// or the older `thread_pitch`. `prismatic` and `fixed` are what they say; others (`gearbox`) are never part of the
+    /// tree, and errors where they close no loop. The body of the model
     /// sits at the joint's frame: the child link is a frame ([`FrameKind::Link`]) apart from it by the joint's
     /// `<pose>`. Siblings are numbered in the order of the file.
     ///
     /// **Poses** may be `relative_to` links, joints and frames; `<frame>`s become [`FrameKind::User`]. An axis is
     /// `expressed_in` the joint's frame unless it says otherwise; `use_parent_model_frame` of SDF 1.6 means the
     /// model's frame. A link without `<inertial>` has SDF's 1 kg and 1 kg m², and a warning. Friction and damping are
-    /// stored; springs, mimics and what is drawn or sensed have no part in a model. Nested models, `<include>` and
+    /// stored; springs and what is drawn or sensed have no part in a model. Nested models, `<include>` and
     /// inertia from shapes (`auto="true"`) are errors.
     ///
     /// # Errors
@@ -104,7 +109,7 @@ fn model(root: &Element, options: &SdfOptions) -> Result<Model, Error> {
 const WORLD_LINK: &str = "world";
 
 /// The types of joints that a tree can have.
-const KINDS: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "ball", "universal", "revolute2"];
+const KINDS: [&str; 8] = ["fixed", "revolute", "continuous", "prismatic", "screw", "ball", "universal", "revolute2"];
 
 /// A joint, and the links that it connects.
 struct Edge<'a> {
@@ -119,6 +124,7 @@ struct Reader<'a> {
     /// In the order of the file.
     edges: Vec<Edge<'a>>,
     poses: Poses<'a>,
+    axes: Axes<'a>,
     warnings: Vec<Warning>,
 }
 
@@ -138,7 +144,7 @@ impl<'a> Reader<'a> {
         if links.is_empty() {
             return Err(model.wrong("has no links"));
         }
-        Ok(Self { model, links, edges, poses, warnings: Vec::new() })
+        Ok(Self { model, links, edges, poses, axes: Axes::default(), warnings: Vec::new() })
     }
 
     fn warn(&mut self, element: &Element, what: String) {
@@ -247,11 +253,14 @@ impl<'a> Reader<'a> {
             let mXl = link.map_or(Ok(Se3::identity()), |l| self.poses.of(l))?;
             builder.frame_of_kind(name, FrameKind::User, body, bXl * mXl.inverse() * mXf);
         }
+        self.warnings.append(&mut self.axes.follow(&mut builder, options.mimic)?);
+        let joint = |name: &str| {
+            let name = name.trim_end_matches("#1");
+            self.edges.iter().map(|e| e.element).find(|e| e.attribute("name") == Some(name))
+        };
         builder.build().map_err(|e| match &e {
-            Error::Body { body, what } => match self.links.get(body.as_str()) {
-                Some(link) => link.wrong(what.clone()),
-                None => e,
-            },
+            Error::Body { body, what } => self.links.get(body.as_str()).map_or(e.clone(), |at| at.wrong(what.clone())),
+            Error::Joint { joint: name, what } => joint(name).map_or(e.clone(), |at| at.wrong(what.clone())),
             _ => e,
         })
     }
@@ -273,6 +282,7 @@ impl<'a> Reader<'a> {
             "revolute" => vec![(Joint::Revolute { axis: axis("axis")? }, "axis")],
             "continuous" => vec![(Joint::Continuous { axis: axis("axis")? }, "axis")],
             "prismatic" => vec![(Joint::Prismatic { axis: axis("axis")? }, "axis")],
+            "screw" => vec![(Joint::Helical { axis: axis("axis")?, pitch: pitch(element)? }, "axis")],
             "ball" => vec![(Joint::Spherical, "")],
             _ => vec![
                 (Joint::Revolute { axis: axis("axis")? }, "axis"),
@@ -284,9 +294,6 @@ impl<'a> Reader<'a> {
         for (k, (joint, axis)) in joints.into_iter().enumerate() {
             let joint = joint.normalized().ok_or_else(|| element.wrong(format!("{axis}: xyz is no direction")))?;
             let options = element.child(axis).map_or(Ok(JointOptions::default()), |a| limits(element, a, joint))?;
-            if element.child(axis).is_some_and(|a| a.child("mimic").is_some()) {
-                self.warn(element, "<mimic> left out: the joint is free".to_owned());
-            }
             let last = k + 1 == count;
             let (link, called, inertia) = if last {
                 (child.to_owned(), name.to_owned(), inertia)
@@ -294,6 +301,7 @@ impl<'a> Reader<'a> {
                 (format!("{child}#{}", k + 1), format!("{name}#{}", k + 1), Inertia::zero())
             };
             body = builder.body_with((&link, &called), body, joint, at, inertia, options);
+            self.axes.add(element, axis, body);
             if !last {
                 builder.between(body);
             }
@@ -338,6 +346,15 @@ impl<'a> Reader<'a> {
         };
         Ok(poses::pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
     }
+}
+
+/// The metres of a screw for each radian, positive where the thread is right-handed.
+fn pitch(joint: &Element) -> Result<f64, Error> {
+    let number = |tag| optional(joint, joint, tag, f64::NAN);
+    let (each_turn, radians) = (number("screw_thread_pitch")?, number("thread_pitch")?);
+    // thread_pitch: radians for each metre, positive where the thread is left-handed
+    let pitch = if each_turn.is_nan() { -1.0 / radians } else { each_turn / core::f64::consts::TAU };
+    if pitch.is_finite() { Ok(pitch) } else { Err(joint.wrong("has no finite screw_thread_pitch")) }
 }
 
 /// What an `<axis>` says beside its direction. 1e16 and more is SDF's way to say that there is no limit, and so is a

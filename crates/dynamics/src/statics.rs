@@ -1,30 +1,50 @@
-//! The efforts that hold a robot still: weights and external forces, summed from the tips to the root.
+//! The efforts that hold a robot still: weights and external forces, summed from the tips to the root; and their
+//! derivatives.
+//!
+//! When coordinate e turns what its joint carries about S_e, weights stay where they point, while external forces turn
+//! along. In the terms of `rnea_derivatives.rs` at rest, with a₀ = −g and Ψ̈ = a₀ × S, F the sum of Iᶜ a₀ − f_ext,
+//!
+//! ```text
+//! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)
+//! ```
 
 use crate::data::{Data, Size, check, check_forces};
-use crate::kinematics::{World, place};
+use crate::dispatch::kernel;
+use crate::kinematics::{World, positions};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use condyle_spatial::{Act, Constant, Force, Scalar};
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Weight and external force of all that a joint carries. Shape: bodies. Written by: `pass`.
     F: Vec<Force<S>>,
     /// Joint efforts. Shape: nv. Written by: `pass`.
     tau: Vec<S>,
+    /// Inertia of all that a joint carries. Shape: bodies. Written by: `derivative`.
+    IC: Vec<Inertia<S>>,
+    /// Shape: nv × nv. Written by: `derivative`.
+    dtau_dq: DMatrix<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        Self { F: vec![Force::zero(); size.bodies], tau: vec![S::zero(); size.nv] }
+        Self {
+            F: vec![Force::zero(); size.bodies],
+            tau: vec![S::zero(); size.nv],
+            IC: vec![Inertia::zero(); size.bodies],
+            dtau_dq: DMatrix::from_element(size.nv, size.nv, S::zero()),
+        }
     }
 }
 
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
 fn pass<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
-    let Workspace { F, tau } = d;
+    let Workspace { F, tau, .. } = d;
     let g = -l.minus_gravity();
     for i in l.bodies() {
         let I = l.inertia(i);
@@ -41,6 +61,12 @@ fn pass<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>
         }
         let F_i = F[i];
         l.push(F, i, F_i); // F_λ += F_i
+    }
+}
+
+kernel! {
+    fn run(model, data, f_ext: &[Force<S>]) {
+        pass(&Single::new(model), &data.world, &mut data.statics, f_ext);
     }
 }
 
@@ -63,7 +89,7 @@ fn pass<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
 pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -73,8 +99,78 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq);
     check_forces(f_ext.len(), model.nodes.len());
-    let l = Single::new(model);
-    place(&l, &mut data.world, q);
-    pass(&l, &data.world, &mut data.statics, f_ext);
+    positions(model, data, q);
+    run(model, data, f_ext);
     &data.statics.tau
+}
+
+/// The derivative, for bodies that are placed.
+#[inline(always)]
+fn derivative<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
+    let Workspace { F, IC, dtau_dq, .. } = d;
+    let a_0 = Motion::new(l.minus_gravity(), Vec3::zero());
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+        F[i] = IC[i] * a_0; // F = I a₀ − f_ext
+        if let Some(external) = l.force(f_ext, i) {
+            F[i] -= oX[i].act(external);
+        }
+    }
+    let dq = dtau_dq.as_mut_slice();
+    dq.fill(L::S::zero());
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        let (before, own) = support.split_at(support.len() - nv);
+        for k in 0..nv {
+            let (S_d, column) = (S[l.slot(i) + k], own[k]);
+            let weight = (IC[i] * S_d).linear.cross(a_0.linear); // S_dᵀ Iᶜ (a₀ × S_e) = S_e · [0; (Iᶜ S_d)_linear × a₀]
+            let by_q = IC[i] * a_0.cross(S_d) + S_d.cross(F[i]); // Iᶜ Ψ̈_d + S_d ×* F
+            for &e in before {
+                let S_e = l.at(S, e);
+                l.add_at(dq, column, e, S_e.angular.dot(weight)); // ∂τ_d/∂q_e
+                l.add_at(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
+            }
+            for &e in own {
+                l.add_at(dq, column, e, l.at(S, e).angular.dot(weight));
+            }
+        }
+        let (IC_i, F_i) = (IC[i], F[i]);
+        l.push(IC, i, IC_i);
+        l.push(F, i, F_i);
+    }
+}
+
+kernel! {
+    fn run_derivative(model, data, f_ext: &[Force<S>]) {
+        derivative(&Single::new(model), &data.world, &mut data.statics, f_ext);
+    }
+}
+
+/// ∂τ/∂q of [`static_torque`], and without forces of [`gravity`](crate::gravity): exact, in O(n · depth).
+///
+/// q: nq numbers; f_ext: a force on each body in its frame (it moves with the body), or empty for none. Returns the full
+/// nv × nv matrix (N m/rad, N/m), entry (i, j) being ∂τᵢ/∂q_j. Allocates nothing. Source: see the head of the file.
+///
+/// ```
+/// use condyle_dynamics::{Data, robots, static_torque_derivative};
+/// let arm = robots::arm7();
+/// let stiffness = static_torque_derivative(&arm, &mut Data::new(&arm), &[0.3; 7], &[]);
+/// assert!((stiffness - stiffness.transpose()).amax() < 1e-12); // gravity has a potential
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    f_ext: &[Force<S>],
+) -> &'d DMatrix<S> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    check_forces(f_ext.len(), model.nodes.len());
+    positions(model, data, q);
+    run_derivative(model, data, f_ext);
+    &data.statics.dtau_dq
 }

@@ -10,14 +10,19 @@
 //! ```
 //!
 //! which needs no inverse of an inertia, only those of the articulated-body algorithm: bodies may be without mass. (In
-//! scattering theory two such pieces are joined by Redheffer's star product.) With the second piece on the last body of the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f): the first piece is,
-//! for the second, a joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric G = E Y₁,
+//! scattering theory two such pieces are joined by Redheffer's star product.) With the second piece on the last body of
+//! the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f): the first piece is, for the second, a
+//! joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric G = E Y₁,
 //!
 //! ```text
 //! a₂ = N a + e + G L₂ᵀ f,      N = E L₁,              e = E (b₁ − Y₁ p₂)
 //! K = K₁ + L₁ᵀ K₂ N,           p = p₁ + L₁ᵀ (p₂ + K₂ e)
 //! L = L₂ N,                    b = b₂ + L₂ e,         Y = Y₂ + L₂ G L₂ᵀ
 //! ```
+//!
+//! 1 + Y₁ K₂ has no eigenvalue below 1, since Y₁ and K₂ have none below 0. It is eliminated as it stands: a root of Y₁
+//! would make a symmetric matrix of it, but Y₁ is of the rank of its piece's degrees of freedom, and what rounding leaves
+//! of a pivot that should be zero can be anything.
 //!
 //! Each handle is described in a frame along the world's axes, at its own origin: Y has rotations and translations of
 //! a body of this size in it, not of its distance from the world's origin.
@@ -27,9 +32,8 @@ use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3
 /// A 6 × 6 matrix by its columns, each with its linear part first.
 type Matrix<S> = [[S; 6]; 6];
 
-/// A pivot below this part of its diagonal entry is the rounding of a zero: Y has as many zero pivots as its piece lacks
-/// degrees of freedom to six. What is left out is within a hundred roundings of Y.
-const NEGLIGIBLE: f64 = 1e-14;
+/// 1 + Y₁ K₂, L₁, b₁ − Y₁ p₂ and Y₁ side by side.
+const WIDTH: usize = 6 + 6 + 1 + 6;
 
 /// A piece between two handles.
 #[derive(Clone, Debug)]
@@ -107,12 +111,27 @@ impl<S: Scalar> TwoHandles<S> {
     #[inline(always)]
     pub(crate) fn join(&mut self, upper: &Self, lower: &Self, open: bool) {
         let (L1, Y1, K2, p2) = (&upper.L, &upper.Y, full(lower.K), lower.p);
-        let G = compliance(Y1, &K2);
+        let x = (upper.b - Motion::from(times(Y1, &p2.to_array()))).to_array();
+        let mut A = product(Y1, &K2);
         for j in 0..6 {
-            self.N[j] = divide(&L1[j], Y1, &K2, &G); // N = E L₁
+            A[j][j] += S::one();
         }
-        let x = upper.b - Motion::from(times(Y1, &p2.to_array()));
-        self.e = divide(&x.to_array(), Y1, &K2, &G).into(); // e = E (b₁ − Y₁ p₂)
+        let mut rows = [[S::zero(); WIDTH]; 6]; // [1 + Y₁ K₂, L₁, b₁ − Y₁ p₂, Y₁]
+        for i in 0..6 {
+            for j in 0..6 {
+                (rows[i][j], rows[i][6 + j], rows[i][13 + j]) = (A[j][i], L1[j][i], Y1[j][i]);
+            }
+            rows[i][12] = x[i];
+        }
+        eliminate(&mut rows); // E = (1 + Y₁ K₂)⁻¹
+        let (mut e, mut G) = (x, zero());
+        for i in 0..6 {
+            for j in 0..6 {
+                (self.N[j][i], G[j][i]) = (rows[i][6 + j], rows[i][13 + j]); // N = E L₁, G = E Y₁
+            }
+            e[i] = rows[i][12]; // e = E (b₁ − Y₁ p₂)
+        }
+        self.e = e.into();
         self.K = upper.K + symmetric(&transpose_product(L1, &product(&K2, &self.N))); // K = K₁ + L₁ᵀ K₂ N
         let push = (p2 + lower.K * self.e).to_array();
         self.p = upper.p + Force::from(transpose_times(L1, &push)); // p = p₁ + L₁ᵀ (p₂ + K₂ e)
@@ -144,71 +163,40 @@ impl<S: Scalar> TwoHandles<S> {
     }
 }
 
-/// E x = (1 + Y K)⁻¹ x = x − G K x, and the same once more for what remains: a light body on which much hangs has a large Y,
-/// and the difference loses as many digits as Y K is large.
+/// Turns the rows of [A, B] into those of [·, A⁻¹ B], by Gaussian elimination: of the rows left, the one with the largest
+/// pivot goes first.
 #[inline(always)]
-fn divide<S: Scalar>(x: &[S; 6], Y: &Matrix<S>, K: &Matrix<S>, G: &Matrix<S>) -> [S; 6] {
-    let (mut y, mut r) = (*x, *x);
-    let GKx = times(G, &times(K, x));
-    for i in 0..6 {
-        y[i] -= GKx[i]; // y = x − G K x
-    }
-    let YKy = times(Y, &times(K, &y));
-    for i in 0..6 {
-        r[i] = x[i] - YKy[i] - y[i]; // r = x − (1 + Y K) y
-    }
-    let GKr = times(G, &times(K, &r));
-    for i in 0..6 {
-        y[i] += r[i] - GKr[i]; // y ← y + r − G K r
-    }
-    y
-}
-
-/// G = (1 + Y K)⁻¹ Y = R (1 + Rᵀ K R)⁻¹ Rᵀ with Y = R Rᵀ.
-#[inline(always)]
-fn compliance<S: Scalar>(Y: &Matrix<S>, K: &Matrix<S>) -> Matrix<S> {
-    let R = root(Y, NEGLIGIBLE);
-    let mut H = transpose_product(&R, &product(K, &R));
-    for j in 0..6 {
-        H[j][j] += S::one();
-    }
-    let C = root(&H, 0.0); // H = C Cᵀ
-    let mut W = R; // W Cᵀ = R, so that G = W Wᵀ
-    for j in 0..6 {
-        let mut column = W[j];
-        for k in 0..j {
-            add(&mut column, -C[k][j], &W[k]);
-        }
-        let r = C[j][j].recip();
-        W[j] = column.map(|x| x * r);
-    }
-    let mut G = zero();
+fn eliminate<S: Scalar>(rows: &mut [[S; WIDTH]; 6]) {
     for k in 0..6 {
-        for j in 0..6 {
-            add(&mut G[j], W[k][j], &W[k]);
+        let mut pivot = rows[k];
+        for i in k + 1..6 {
+            let larger = pivot[k].abs().lt(rows[i][k].abs());
+            for j in k..WIDTH {
+                let (a, b) = (pivot[j], rows[i][j]);
+                (pivot[j], rows[i][j]) = (S::select(larger, b, a), S::select(larger, a, b));
+            }
+        }
+        let r = pivot[k].recip();
+        for j in k + 1..WIDTH {
+            pivot[j] = pivot[j] * r;
+        }
+        for i in k + 1..6 {
+            let factor = -rows[i][k];
+            for j in k + 1..WIDTH {
+                rows[i][j] = pivot[j].mul_add(factor, rows[i][j]);
+            }
+        }
+        rows[k] = pivot;
+    }
+    for k in (1..6).rev() {
+        let solved = rows[k];
+        for i in 0..k {
+            let factor = -rows[i][k];
+            for j in 6..WIDTH {
+                rows[i][j] = solved[j].mul_add(factor, rows[i][j]);
+            }
         }
     }
-    G
-}
-
-/// The lower triangular R with R Rᵀ = A, where a pivot that is a negligible part of its diagonal entry counts as zero.
-#[inline(always)]
-fn root<S: Scalar>(A: &Matrix<S>, negligible: f64) -> Matrix<S> {
-    let mut R = *A;
-    for j in 0..6 {
-        let least = A[j][j] * S::splat(negligible);
-        let keep = least.lt(R[j][j]);
-        let r = S::select(keep, R[j][j], S::one()).sqrt().recip();
-        let r = S::select(keep, r, S::zero());
-        for i in 0..6 {
-            R[j][i] = if i < j { S::zero() } else { R[j][i] * r };
-        }
-        let column = R[j];
-        for k in j + 1..6 {
-            add(&mut R[k], -column[k], &column);
-        }
-    }
-    R
 }
 
 #[inline(always)]

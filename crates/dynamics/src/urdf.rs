@@ -8,33 +8,41 @@ use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::{FrameKind, Mimic, Model};
+use crate::package;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
 use roxmltree::{Document, Node};
 use std::collections::{HashMap, HashSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How a URDF becomes a model.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct UrdfOptions {
     /// The joint between the world and the root link, named `root_joint`; none fixes the root link to the world.
     pub root_joint: Option<Joint>,
-    /// Whether joints with a `<mimic>` share the coordinate of the joint they follow, instead of having their own.
+    /// Whether joints with a `<mimic>` share the coordinate of the joint they follow, instead of having their own; see
+    /// [`Mimic`].
     pub mimic: bool,
     /// Whether what is only odd ([`Model::warnings`]) is an error.
     pub strict: bool,
+    /// Folders that have packages in them, or are packages, for `package://` addresses; before those that the
+    /// environment names in `ROS_PACKAGE_PATH` and, with `/share` behind them, in `AMENT_PREFIX_PATH`.
+    pub packages: Vec<PathBuf>,
 }
 
 impl Model {
-    /// Reads a URDF file.
+    /// Reads a URDF file, given by its path or as `package://name/path/in/the/package`
+    /// ([`UrdfOptions::packages`]).
     ///
+    /// Shapes are not read, and the meshes that they name need not be there.
     /// Fixed joints are merged into the body that they sit on and stay as frames; siblings are numbered in the order of
     /// their joints' names (bytes), as Pinocchio does.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Xml`], [`Error::Urdf`] (with file, line and element), and what
+    /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Urdf`] (with file, line and element), and what
     /// [`ModelBuilder::build`] finds.
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
-        let file = path.as_ref().display().to_string();
+        let path = package::locate(path.as_ref(), &options.packages)?;
+        let file = path.display().to_string();
         let text =
             std::fs::read_to_string(&path).map_err(|e| Error::File { file: file.clone(), what: e.to_string() })?;
         Reader::new(&text, &file)?.model(options)
@@ -272,6 +280,9 @@ impl<'a> Reader<'a> {
         match &error {
             Error::Body { body: name, what } if self.links.contains_key(name) => {
                 self.wrong(self.links[name].line, format!("link `{name}`"), what.clone())
+            }
+            Error::Joint { joint: name, what } if self.joints.contains_key(name) => {
+                self.wrong_joint(&self.joints[name], what.clone())
             }
             Error::Duplicate { kind: "body", name } if self.links.contains_key(name) => {
                 self.wrong(self.links[name].line, format!("link `{name}`"), own())

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// The inertia of a rigid body: the ten numbers that its dynamics is linear in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
 pub struct Inertia<S> {
     /// m (kg).
     pub mass: S,
@@ -68,6 +69,7 @@ impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
 /// The inertia that an articulated body shows at its handle: a symmetric 6×6 matrix, in blocks
 /// [[linear, coupling], [couplingᵀ, rotational]].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct ArticulatedInertia<S> {
     /// Force per linear acceleration.
     pub linear: Sym3<S>,

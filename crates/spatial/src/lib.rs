@@ -19,10 +19,14 @@
 
 mod dual;
 mod inertia;
+#[doc(hidden)]
+pub mod lanes;
+pub mod level;
 pub mod lie;
 mod motion;
 mod scalar;
 mod se3;
+mod sin_cos;
 mod vector;
 
 pub use inertia::{ArticulatedInertia, Inertia};

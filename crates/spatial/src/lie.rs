@@ -63,6 +63,7 @@ fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
 
 /// A unit quaternion, stored x, y, z, w.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Quaternion<S> {
     /// sin(θ/2) times the axis.
     pub vector: Vec3<S>,

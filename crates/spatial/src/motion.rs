@@ -13,6 +13,7 @@ pub trait Cross<T> {
 /// A spatial velocity or acceleration, [linear; angular]: that of the body's point at the frame's origin, and of the
 /// body's rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
 pub struct Motion<S> {
     /// Of the point of the body at the origin of the frame: m/s or m/s².
     pub linear: Vec3<S>,
@@ -23,6 +24,7 @@ impl_linear!(Motion { linear, angular });
 
 /// A spatial force or momentum, [linear; angular]: the sum of the forces, and their moment about the frame's origin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
 pub struct Force<S> {
     /// Force (N) or momentum (kg m/s).
     pub linear: Vec3<S>,

@@ -1,5 +1,8 @@
 //! The numbers an algorithm can run on.
 
+use crate::lanes::Kernel;
+use crate::level::{Level, level};
+use crate::sin_cos;
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -36,6 +39,16 @@ pub trait Scalar:
     type Mask: Copy;
     /// How many numbers lie side by side in one value.
     const LANES: usize;
+    /// Which instructions it is made of. A number above [`Level::Baseline`] exists only inside functions that are compiled
+    /// for its level.
+    const LEVEL: Level = Level::Baseline;
+
+    /// Runs a kernel on this scalar, compiled for its level.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn enter(kernel: impl Kernel) {
+        kernel.run();
+    }
 
     /// The constant `x`, in every lane, without derivative.
     fn splat(x: f64) -> Self;
@@ -95,11 +108,15 @@ impl<S: Scalar> Constant<S> for f64 {
 }
 
 macro_rules! impl_float {
-    ($($float:ident),*) => {$(
+    ($($float:ident $sin_cos:ident up to $largest:ident),*) => {$(
         impl Scalar for $float {
             type Mask = bool;
             const LANES: usize = 1;
 
+            #[inline(always)]
+            fn enter(kernel: impl Kernel) {
+                if level() >= Level::Avx2 { kernel.run_fused() } else { kernel.run() }
+            }
             #[inline(always)]
             fn splat(x: f64) -> Self {
                 x as $float
@@ -123,6 +140,9 @@ macro_rules! impl_float {
             }
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
+                if $float::abs(self) <= sin_cos::$largest as $float {
+                    return sin_cos::$sin_cos(self);
+                }
                 $float::sin_cos(self)
             }
             #[inline(always)]
@@ -152,4 +172,4 @@ macro_rules! impl_float {
         }
     )*};
 }
-impl_float!(f64, f32);
+impl_float!(f64 double up to LARGEST, f32 single up to LARGEST_SINGLE);

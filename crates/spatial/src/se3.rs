@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// The pose aXb of frame b in frame a: it takes coordinates in b to coordinates in a.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
 pub struct Se3<S> {
     /// aRb: its columns are the axes of b in a.
     pub rotation: Mat3<S>,

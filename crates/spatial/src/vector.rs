@@ -126,6 +126,7 @@ impl<S: Scalar> Scale<S> for S {
 /// A vector in three dimensions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
+#[repr(C)]
 pub struct Vec3<S> {
     pub x: S,
     pub y: S,
@@ -181,6 +182,7 @@ impl<S> From<[S; 3]> for Vec3<S> {
 /// A 3×3 matrix by its columns. Of a rotation aRb they are the axes of b in a.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
+#[repr(C)]
 pub struct Mat3<S> {
     pub x: Vec3<S>,
     pub y: Vec3<S>,
@@ -240,6 +242,7 @@ impl<S: Scalar> Mul for Mat3<S> {
 /// A symmetric 3×3 matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
+#[repr(C)]
 pub struct Sym3<S> {
     pub xx: S,
     pub xy: S,

@@ -6,21 +6,39 @@ import pytest
 from comparison import Pair, State, ours_of, theirs_of
 
 import condyle
+from condyle.simulation import Simulation
 
+METHODS = (None, "aba", "dense", "sparse")
+GRAINS = (1, 4)
+"""Of divide and conquer: as many cuts as there can be, and fewer."""
+CUTS = 10.0
+"""Its pieces are worse conditioned than the whole robot, so it may be so many times further from Pinocchio."""
 FRAMES = {
     "local": pin.ReferenceFrame.LOCAL,
     "world": pin.ReferenceFrame.WORLD,
     "local_world_aligned": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
 }
+STEP = 1e-5
+"""Of central differences."""
+DIFFERENCES = 1e-7
+"""A tenth of what they may be off by: rounding of 1e-16/step, and step² times a third derivative."""
 KINDS = {
     pin.FrameType.BODY: "link",
     pin.FrameType.JOINT: "joint",
     pin.FrameType.FIXED_JOINT: "joint",
+    pin.FrameType.OP_FRAME: "user",
 }
 
 
 def check_model(pair: Pair) -> None:
     """Sizes, names, order, placements, inertias, limits, frames."""
+    check_bodies(pair)
+    check_limits(pair)
+    check_frames(pair)
+
+
+def check_bodies(pair: Pair) -> None:
+    """Sizes, names, order, placements, inertias, losses."""
     ours, theirs = pair.ours, pair.theirs
     assert ours.name == theirs.name
     assert (ours.nq, ours.nv, ours.nbodies) == (theirs.nq, theirs.nv, theirs.njoints)
@@ -41,8 +59,7 @@ def check_model(pair: Pair) -> None:
     pair.expect("inertial parameters", ours.inertial_parameters, np.concatenate(parameters))
     pair.expect("damping", ours.damping, theirs.damping)
     pair.expect("friction", ours.friction, theirs.upperDryFrictionLimit)
-    check_limits(pair)
-    check_frames(pair)
+    pair.expect("armature", ours.armature, theirs.armature)
 
 
 def check_limits(pair: Pair) -> None:
@@ -71,18 +88,27 @@ def check_frames(pair: Pair) -> None:
         pair.expect("frames in their bodies", ours[key].placement, frame.placement.homogeneous)
 
 
+def common_frames(pair: Pair) -> list[tuple[int, int]]:
+    """The numbers of the frames that both have; of a URDF's these are all but Pinocchio's `universe` (check_frames)."""
+    theirs = {(f.name, KINDS[f.type]): i for i, f in enumerate(pair.theirs.frames) if i > 0}
+    ours = [(f.name, f.kind) for f in pair.ours.frames]
+    found = [(i, theirs[key]) for i, key in enumerate(ours) if key in theirs]
+    assert found
+    return found
+
+
 def check_kinematics(state: State) -> None:
     """Placements of bodies and frames, and the Jacobians of all frames in all three frames of reference."""
     pair, ours, q = state.pair, ours_of(state), state.q
     model, data = pair.theirs, pair.their_data
     pin.framesForwardKinematics(model, data, q)
-    pair.expect("forward_kinematics", ours(condyle.forward_kinematics, q), poses(data.oMi))
+    pair.expect("forward_kinematics", ours(condyle.forward_kinematics, q)[pair.bodies], poses(data.oMi))
     pin.computeJointJacobians(model, data, q)
-    kinds = {frame.type for frame in model.frames}
-    assert kinds <= KINDS.keys()
-    ids = {(f.name, KINDS[f.type]): i for i, f in enumerate(model.frames) if i > 0}
-    for i, frame in enumerate(pair.ours.frames):
-        j = ids[frame.name, frame.kind]
+    for i, body in enumerate(pair.bodies):
+        for name, reference in FRAMES.items():
+            J = ours(condyle.body_jacobian, q, body, name)
+            pair.expect(f"body_jacobian, {name}", J, pin.getJointJacobian(model, data, i, reference))
+    for i, j in common_frames(pair):
         pair.expect("frame_placement", ours(condyle.frame_placement, q, i), data.oMf[j].homogeneous)
         for name, reference in FRAMES.items():
             J = ours(condyle.frame_jacobian, q, i, name)
@@ -99,10 +125,22 @@ def check_motion(state: State) -> None:
     pin.computeJointJacobiansTimeVariation(model, data, q, v)
     pin.forwardKinematics(model, data, q, v, a)
     pin.updateFramePlacements(model, data)
-    ids = {(f.name, KINDS[f.type]): i for i, f in enumerate(model.frames) if i > 0}
-    for i, frame in enumerate(pair.ours.frames):
+    for i, body in enumerate(pair.bodies):
         for name, reference in FRAMES.items():
-            theirs = (model, data, ids[frame.name, frame.kind], reference)
+            theirs = (model, data, i, reference)
+            velocity = ours(condyle.body_velocity, q, v, body, name)
+            pair.expect(f"body_velocity, {name}", velocity, pin.getVelocity(*theirs).vector)
+            acceleration = ours(condyle.body_acceleration, q, v, a, body, name)
+            pair.expect(f"body_acceleration, {name}", acceleration, pin.getAcceleration(*theirs).vector)
+            acceleration = ours(condyle.body_classical_acceleration, q, v, a, body, name)
+            expected = pin.getClassicalAcceleration(*theirs).vector
+            pair.expect(f"body_classical_acceleration, {name}", acceleration, expected)
+            if pair.rates:
+                dJ = ours(condyle.body_jacobian_rate, q, v, body, name)
+                pair.expect(f"body_jacobian_rate, {name}", dJ, pin.getJointJacobianTimeVariation(*theirs))
+    for i, j in common_frames(pair):
+        for name, reference in FRAMES.items():
+            theirs = (model, data, j, reference)
             velocity = ours(condyle.frame_velocity, q, v, i, name)
             pair.expect(f"frame_velocity, {name}", velocity, pin.getFrameVelocity(*theirs).vector)
             acceleration = ours(condyle.frame_acceleration, q, v, a, i, name)
@@ -110,8 +148,9 @@ def check_motion(state: State) -> None:
             acceleration = ours(condyle.frame_classical_acceleration, q, v, a, i, name)
             expected = pin.getFrameClassicalAcceleration(*theirs).vector
             pair.expect(f"frame_classical_acceleration, {name}", acceleration, expected)
-            dJ = ours(condyle.frame_jacobian_rate, q, v, i, name)
-            pair.expect(f"frame_jacobian_rate, {name}", dJ, pin.getFrameJacobianTimeVariation(*theirs))
+            if pair.rates:
+                dJ = ours(condyle.frame_jacobian_rate, q, v, i, name)
+                pair.expect(f"frame_jacobian_rate, {name}", dJ, pin.getFrameJacobianTimeVariation(*theirs))
 
 
 def check_centroidal(state: State) -> None:
@@ -128,7 +167,7 @@ def check_centroidal(state: State) -> None:
     expected = {"Ag": data.Ag, "Ig": data.Ig.matrix(), "com": data.com[0], "Jcom": Jcom}
     expect_fields(pair, "centroidal_map", ours(condyle.centroidal_map, q), expected)
     theirs(pin.dccrba, q, v)
-    expected |= {"dAg": data.dAg, "hg": data.hg.vector, "com_velocity": data.vcom[0]}
+    expected |= {"hg": data.hg.vector, "com_velocity": data.vcom[0]} | ({"dAg": data.dAg} if pair.rates else {})
     expect_fields(pair, "centroidal_map_rate", ours(condyle.centroidal_map_rate, q, v), expected)
     expect_fields(pair, "compute_all_terms: centroidal", ours(condyle.compute_all_terms, q, v).centroidal, expected)
     hg = theirs(pin.computeCentroidalMomentum, q, v).vector
@@ -138,9 +177,9 @@ def check_centroidal(state: State) -> None:
 
 
 def expect_fields(pair: Pair, what: str, ours: "tuple[np.ndarray, ...]", theirs: dict[str, np.ndarray]) -> None:
-    """Each member of a named tuple by its name."""
-    for name, value in zip(ours._fields, ours, strict=True):
-        pair.expect(f"{what}: {name}", value, theirs[name])
+    """Members of a named tuple by their names."""
+    for name, value in theirs.items():
+        pair.expect(f"{what}: {name}", getattr(ours, name), value)
 
 
 def check_energy(state: State) -> None:
@@ -153,9 +192,10 @@ def check_energy(state: State) -> None:
     pair.expect("potential_energy", ours(condyle.potential_energy, q), theirs(pin.computePotentialEnergy, q))
     pair.expect("mechanical_energy", ours(condyle.mechanical_energy, q, v), theirs(pin.computeMechanicalEnergy, q, v))
     y = theirs(pin.computeKineticEnergyRegressor, q, v)
-    pair.expect("kinetic_energy_regressor", ours(condyle.kinetic_energy_regressor, q, v), y)
+    columns = pair.columns
+    pair.expect("kinetic_energy_regressor", ours(condyle.kinetic_energy_regressor, q, v)[columns], y)
     y = theirs(pin.computePotentialEnergyRegressor, q)
-    pair.expect("potential_energy_regressor", ours(condyle.potential_energy_regressor, q), y)
+    pair.expect("potential_energy_regressor", ours(condyle.potential_energy_regressor, q)[columns], y)
     terms = ours(condyle.compute_all_terms, q, v)
     theirs(pin.computeAllTerms, q, v)
     pair.expect("compute_all_terms: kinetic_energy", terms.kinetic_energy, pair.their_data.kinetic_energy)
@@ -165,13 +205,15 @@ def check_energy(state: State) -> None:
 def check_equations_of_motion(state: State) -> None:
     """What stands in the equations of motion: Coriolis matrix, M and h in one call, static efforts, regressor."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
-    pair.expect("coriolis_matrix", ours(condyle.coriolis_matrix, q, v), theirs(pin.computeCoriolisMatrix, q, v))
+    if pair.rates:
+        C = theirs(pin.computeCoriolisMatrix, q, v)
+        pair.expect("coriolis_matrix", ours(condyle.coriolis_matrix, q, v), C)
     tau = theirs(pin.computeStaticTorque, q, state.their_forces)
     pair.expect("static_torque, f_ext", ours(condyle.static_torque, q, state.f_ext), tau)
     tau = theirs(pin.computeGeneralizedGravity, q)
     pair.expect("static_torque", ours(condyle.static_torque, q), tau)
     Y = theirs(pin.computeJointTorqueRegressor, q, v, a)
-    pair.expect("joint_torque_regressor", ours(condyle.joint_torque_regressor, q, v, a), Y)
+    pair.expect("joint_torque_regressor", ours(condyle.joint_torque_regressor, q, v, a)[:, pair.columns], Y)
     terms = ours(condyle.compute_all_terms, q, v)
     theirs(pin.computeAllTerms, q, v)
     M = np.triu(pair.their_data.M)
@@ -182,23 +224,154 @@ def check_equations_of_motion(state: State) -> None:
 def check_lock(state: State) -> None:
     """Every third joint locked, unless Pinocchio refuses: it finds no frame where a joint and a link have one name."""
     pair, rng = state.pair, np.random.default_rng(0)
-    locked = list(range(1, pair.ours.nbodies, 3))
-    ours = pair.ours.lock(locked, state.q)
+    locked = list(range(1, pair.theirs.njoints, 3))
+    ours = pair.ours.lock([body for i in locked for body in pair.chains[i]], state.q)
     try:
         theirs = pin.buildReducedModel(pair.theirs, locked, state.q)
     except ValueError as error:
         if "Several frames match the filter" not in str(error):
             raise
         return
-    assert ours.names == list(theirs.names)
+    assert [name for name in ours.names if "#" not in name] == list(theirs.names)
     assert (ours.nq, ours.nv) == (theirs.nq, theirs.nv)
     if not ours.nv:
         return
     q = condyle.random_configuration(ours, 0)
     v, a = rng.standard_normal((2, ours.nv))
+    data, their_data = condyle.Data(ours), theirs.createData()
+    pair.expect("lock: rnea", condyle.rnea(ours, data, q, v, a), pin.rnea(theirs, their_data, q, v, a))
+    pair.expect("lock: crba", condyle.crba(ours, data, q), pin.crba(theirs, their_data, q))
+    placements = poses(theirs.jointPlacements)[1:]
+    if len(placements) == ours.nbodies - 1:
+        pair.expect("lock: joint placements", ours.joint_placements[1:], placements)
+
+
+def check_motion_derivatives(state: State) -> None:
+    """How the motion of bodies and frames, momentum and the centre of mass change with position and velocity."""
+    pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
+    if not pair.rates:
+        return
+    model, data = pair.theirs, pair.their_data
+    pin.computeForwardKinematicsDerivatives(model, data, q, v, a)
+    pin.updateFramePlacements(model, data)
+    for i, body in enumerate(pair.bodies):
+        for name, reference in FRAMES.items() if i else ():
+            of_joint = (model, data, i, reference)
+            v_q, a_q, a_v, J = pin.getJointAccelerationDerivatives(*of_joint)
+            if name == "local_world_aligned":
+                v_q, a_q = (
+                    of_numbers(v_q, pin.getVelocity(*of_joint), J),
+                    of_numbers(a_q, pin.getAcceleration(*of_joint), J),
+                )
+            pair.expect(
+                f"body_velocity_derivative, {name}", ours(condyle.body_velocity_derivative, q, v, body, name), v_q
+            )
+            da_dq, da_dv = ours(condyle.body_acceleration_derivatives, q, v, a, body, name)
+            right = trusted_columns(model, name)
+            pair.expect(f"body_acceleration_derivatives, {name}: da_dq", da_dq[:, right], a_q[:, right])
+            pair.expect(f"body_acceleration_derivatives, {name}: da_dv", da_dv, a_v)
+    for i, j in common_frames(pair):
+        for name, reference in FRAMES.items():
+            of_frame = (model, data, j, reference)
+            v_q, a_q, a_v, J = pin.getFrameAccelerationDerivatives(*of_frame)
+            if name == "local_world_aligned":
+                v_q = of_numbers(v_q, pin.getFrameVelocity(*of_frame), J)
+                a_q = of_numbers(a_q, pin.getFrameAcceleration(*of_frame), J)
+            dv_dq = ours(condyle.frame_velocity_derivative, q, v, i, name)
+            pair.expect(f"frame_velocity_derivative, {name}", dv_dq, v_q)
+            da_dq, da_dv = ours(condyle.frame_acceleration_derivatives, q, v, a, i, name)
+            right = trusted_columns(model, name)
+            pair.expect(f"frame_acceleration_derivatives, {name}: da_dq", da_dq[:, right], a_q[:, right])
+            pair.expect(f"frame_acceleration_derivatives, {name}: da_dv", da_dv, a_v)
+    d = ours(condyle.centroidal_derivatives, q, v, a)
+    for field, their in zip(
+        ("dh_dq", "drate_dq", "drate_dv", "drate_da"),
+        theirs(pin.computeCentroidalDynamicsDerivatives, q, v, a),
+        strict=True,
+    ):
+        pair.expect(f"centroidal_derivatives: {field}", getattr(d, field), their)
+    theirs(pin.jacobianCenterOfMass, q)
+    pair.expect("centroidal_derivatives: dcom_dq", d.dcom_dq, data.Jcom)
+    theirs(pin.computeForwardKinematicsDerivatives, q, v, a)
+    theirs(pin.centerOfMass, q, v, a)
+    dvcom_dq = pin.getCenterOfMassVelocityDerivatives(model, data)
+    if np.isfinite(dvcom_dq).all():  # it divides by the mass of what each joint carries
+        pair.expect("centroidal_derivatives: dvcom_dq", d.dvcom_dq, dvcom_dq)
+
+
+def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
+    """Where Pinocchio's ∂a/∂q is right: in the world's axes it contradicts differences of Pinocchio's own accelerations
+    (and ours does not) in the columns of joints of several degrees of freedom, if they sit on a body that moves.
+    """
+    right = np.ones(model.nv, bool)
+    for joint, parent in zip(model.joints, model.parents, strict=True):
+        if reference != "local" and joint.nv > 1 and parent > 0:
+            right[joint.idx_v : joint.idx_v + joint.nv] = False
+    return right
+
+
+def of_numbers(by_q: np.ndarray, motion: pin.Motion, J: np.ndarray) -> np.ndarray:
+    """The derivative of a motion's six numbers in LOCAL_WORLD_ALIGNED, whose origin moves with q by J's linear part.
+
+    Pinocchio's is that of the motion itself, seen at the origin where it now is.
+    """
+    moved = by_q.copy()
+    moved[:3] += np.cross(motion.angular, J[:3], axisb=0).T
+    return moved
+
+
+def check_effort_derivatives(state: State) -> None:
+    """The derivatives of static efforts, by inertial parameters and forces; and the Hessian of inverse dynamics."""
+    pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
+    if not pair.rates:
+        return
+    dtau_dq = theirs(pin.computeStaticTorqueDerivatives, q, state.their_forces)
+    pair.expect("static_torque_derivative, f_ext", ours(condyle.static_torque_derivative, q, state.f_ext), dtau_dq)
+    dtau_dq = theirs(pin.computeGeneralizedGravityDerivatives, q)
+    pair.expect("static_torque_derivative", ours(condyle.static_torque_derivative, q), dtau_dq)
     pair.expect(
-        "lock: rnea", condyle.rnea(ours, condyle.Data(ours), q, v, a), pin.rnea(theirs, theirs.createData(), q, v, a)
+        "energy_derivatives: dV_dq",
+        ours(condyle.energy_derivatives, q, v).dV_dq,
+        theirs(pin.computeGeneralizedGravity, q),
     )
+    Y = theirs(pin.computeJointTorqueRegressor, q, v, a)
+    pin.computeJointJacobians(pair.theirs, pair.their_data, q)
+    for i in range(1, pair.theirs.njoints):
+        body = pair.bodies[i]
+        by_inertia = ours(condyle.rnea_input_derivative, q, v, a, ("inertia", body))
+        pair.expect("rnea_input_derivative: inertia", by_inertia, Y[:, 10 * (i - 1) : 10 * i])
+        J = pin.getJointJacobian(pair.theirs, pair.their_data, i, pin.LOCAL)
+        by_force = ours(condyle.rnea_input_derivative, q, v, a, ("force", body))
+        pair.expect("rnea_input_derivative: force", by_force, -J.T)
+    by_gravity = ours(condyle.rnea_input_derivative, q, v, a, "gravity")
+    pair.expect(
+        "rnea_input_derivative: gravity",
+        by_gravity @ pair.theirs.gravity.linear,
+        theirs(pin.computeGeneralizedGravity, q),
+    )
+    check_hessian(state)
+
+
+def check_hessian(state: State) -> None:
+    """The Hessian of λᵀ τ along a direction, against differences of Pinocchio's first derivatives; it has none of the
+    second in Python. Along one direction d the tangent spaces of q ⊕ h d do not matter.
+    """
+    pair, q, v, a, tau = state.pair, state.q, state.v, state.a, state.tau
+    d = np.random.default_rng(0).standard_normal(pair.theirs.nv)
+    d, weights = d / np.linalg.norm(d), tau / np.linalg.norm(tau)
+
+    def slopes(h: float, dv: float = 0.0) -> tuple[float, np.ndarray, np.ndarray]:
+        there = pin.integrate(pair.theirs, q, h * d)
+        by_q, by_v, by_a = theirs_of(state)(pin.computeRNEADerivatives, there, v + dv * d, a)
+        return weights @ by_q @ d, weights @ by_v, weights @ by_a
+
+    hessian = ours_of(state)(condyle.rnea_hessian, q, v, a, weights)
+    along_q = [(plus - minus) / (2 * STEP) for plus, minus in zip(slopes(STEP), slopes(-STEP), strict=True)]
+    along_v = [(plus - minus) / (2 * STEP) for plus, minus in zip(slopes(0.0, STEP), slopes(0.0, -STEP), strict=True)]
+    pair.expect("rnea_hessian: dqdq (differences)", d @ hessian.dqdq @ d, along_q[0], DIFFERENCES)
+    pair.expect("rnea_hessian: dvdq (differences)", hessian.dvdq @ d, along_q[1], DIFFERENCES)
+    pair.expect("rnea_hessian: dadq (differences)", hessian.dadq @ d, along_q[2], DIFFERENCES)
+    pair.expect("rnea_hessian: dvdv (differences)", hessian.dvdv @ d, along_v[1], DIFFERENCES)
 
 
 def check_inverse_dynamics(state: State) -> None:
@@ -224,6 +397,8 @@ def check_gravity(state: State) -> None:
 
 def check_rnea_derivatives(state: State) -> None:
     """∂τ/∂q, ∂τ/∂v, ∂τ/∂a, with and without external forces."""
+    if not state.pair.rates:
+        return
     for label, ours_extra, theirs_extra in (("", (), ()), (", f_ext", (state.f_ext,), (state.their_forces,))):
         ours = ours_of(state)(condyle.rnea_derivatives, state.q, state.v, state.a, *ours_extra)
         theirs = theirs_of(state)(pin.computeRNEADerivatives, state.q, state.v, state.a, *theirs_extra)
@@ -249,6 +424,17 @@ def check_forward_dynamics(state: State) -> bool:
     for label, ours_extra, theirs_extra in (("", (), ()), (", f_ext", (state.f_ext,), (state.their_forces,))):
         a = theirs(pin.aba, q, v, tau, *theirs_extra, pin.Convention.WORLD).copy()
         pair.expect(f"aba{label}", ours(condyle.aba, q, v, tau, *ours_extra), a, distance)
+        for method in METHODS:
+            a_here = ours(condyle.forward_dynamics, q, v, tau, *(ours_extra or (None,)), method)
+            pair.expect(f"forward_dynamics, {method}{label}", a_here, a, distance)
+        geared = bool(pair.ours.armature.any())
+        for grain in GRAINS:
+            divided = condyle.DivideConquer(pair.ours, grain)
+            a_here = divided.aba(pair.ours, q, v, tau, *ours_extra)
+            what = f"DivideConquer.aba, grain {grain}{', armature' * geared}{label}"
+            pair.expect(what, a_here, a, CUTS * distance)
+        if not pair.rates:
+            continue
         d = ours(condyle.aba_derivatives, q, v, tau, *ours_extra)
         pair.expect(f"aba_derivatives{label}: a", d.a, a, distance)
         da_dq, da_dv, da_dtau = theirs(pin.computeABADerivatives, q, v, tau, *theirs_extra)
@@ -256,7 +442,37 @@ def check_forward_dynamics(state: State) -> bool:
         pair.expect(f"aba_derivatives{label}: da_dv", d.da_dv, da_dv, distance)
         pair.expect(f"aba_derivatives{label}: da_dtau", d.da_dtau, da_dtau, distance)
     pair.expect("minv", ours(condyle.minv, q), theirs(pin.computeMinverse, q), distance)
+    check_factors(state)
+    check_euler(state)
     return True
+
+
+def check_factors(state: State) -> None:
+    """What the factors of M solve, against Pinocchio's factor of its own."""
+    pair, q, tau, distance = state.pair, state.q, state.tau, state.pair.self_distance
+    M = ours_of(state)(condyle.crba, q)
+    theirs_of(state)(pin.crba, q)
+    theirs = (pair.theirs, pair.their_data)
+    pin.cholesky.decompose(*theirs)
+    x, Minv = pin.cholesky.solve(*theirs, tau), pin.cholesky.computeMinv(*theirs)
+    for factor in (condyle.Ltdl(pair.ours), condyle.Cholesky(pair.ours.nv)):
+        factor.factorize(M)
+        name = type(factor).__name__
+        pair.expect(f"{name}.solve", factor.solve(tau), x, distance)
+        pair.expect(f"{name}.solve_matrix", factor.solve_matrix(tau[:, None]), x[:, None], distance)
+        pair.expect(f"{name}.inverse", factor.inverse(), Minv, distance)
+
+
+def check_euler(state: State) -> None:
+    """A step of the semi-implicit Euler method, of Pinocchio's aba and integrate."""
+    pair, q, v, tau, h = state.pair, state.q, state.v, state.tau, 1e-3
+    simulation = Simulation(pair.ours, "semi_implicit_euler", h)
+    simulation.set_state(q, v)
+    assert simulation.step(tau, state.f_ext) == "done"
+    v = v + h * theirs_of(state)(pin.aba, q, v, tau, state.their_forces)
+    moved = with_nearer_quaternions(pair.theirs, q, pin.integrate(pair.theirs, q, h * v))
+    pair.expect("Simulation.step, semi_implicit_euler: v", simulation.v, v, pair.self_distance)
+    pair.expect("Simulation.step, semi_implicit_euler: q", simulation.q, moved, pair.self_distance)
 
 
 def check_configuration(state: State) -> None:

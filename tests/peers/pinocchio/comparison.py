@@ -1,4 +1,4 @@
-"""One robot read by both libraries, states to compare them at, and what counts as equal."""
+"""One robot in both libraries, states to compare them at, and what counts as equal."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -56,23 +56,40 @@ sizes: dict[str, tuple[str, int, int, int]] = {}
 
 
 class Pair:
-    """A robot as Pinocchio and as we read it from the same URDF."""
+    """A robot as Pinocchio and as we have it."""
 
-    def __init__(self, name: str, path: str, root_joint: str | None, mimic: bool = False) -> None:
-        self.name, self.path, self.root_joint = name, path, root_joint
-        root = (ROOT_JOINTS[root_joint](),) if root_joint else ()
-        self.theirs = pin.buildModelFromUrdf(path, *root, mimic=mimic)
-        self.ours = condyle.Model.from_urdf(path, root_joint=root_joint, mimic=mimic)
-        self.their_data, self.data = self.theirs.createData(), condyle.Data(self.ours)
-        if not mimic:
-            sizes[name] = (root_joint or "none", self.ours.nbodies - 1, self.ours.nq, self.ours.nv)
+    def __init__(
+        self,
+        name: str,
+        theirs: pin.Model,
+        ours: condyle.Model,
+        root_joint: str | None = None,
+        chains: list[list[int]] | None = None,
+    ) -> None:
+        self.name, self.theirs, self.ours, self.root_joint = name, theirs, ours, root_joint
+        self.their_data, self.data = theirs.createData(), condyle.Data(ours)
+        self.chains = chains or [[i] for i in range(ours.nbodies)]
+        """For each of Pinocchio's joints the bodies that its joints carry here: several if it is a composite."""
+        self.bodies = [chain[-1] for chain in self.chains]
+        """For each of Pinocchio's joints the body that it carries here."""
+        self.rates = all(len(chain) == 1 for chain in self.chains)
+        """Whether Pinocchio's rates and derivatives hold: it takes a composite joint's axes for fixed in the body."""
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """The columns of our regressors that Pinocchio's have: those of the bodies that its joints carry."""
+        return np.concatenate([np.arange(10 * body - 10, 10 * body) for body in self.bodies[1:]])
+
+    def record_size(self) -> None:
+        """Lets the summary count the robot."""
+        ours = self.ours
+        sizes[self.name] = (self.root_joint or "none", ours.nbodies - 1, ours.nq, ours.nv)
 
     def with_armature(self, armature: np.ndarray) -> "Pair":
         """The same robot, with armature for both."""
-        other = Pair(self.name, self.path, self.root_joint)
-        other.theirs.armature = armature
-        other.ours = other.ours.with_armature(armature)
-        return other
+        theirs = self.theirs.copy()
+        theirs.armature = armature
+        return Pair(self.name, theirs, self.ours.with_armature(armature), self.root_joint, self.chains)
 
     def states(self, count: int, seed: int = 0) -> "list[State]":
         """Random states: q inside its limits, the rest standard normal."""
@@ -96,6 +113,16 @@ class Pair:
         assert difference <= bound, f"{what} of {self.name}: differs by {difference:.1e}, allowed are {bound:.1e}"
 
 
+def from_urdf(name: str, path: str, root_joint: str | None, mimic: bool = False) -> Pair:
+    """A robot as both read it from the same URDF; with `mimic` its size is not recorded."""
+    root = (ROOT_JOINTS[root_joint](),) if root_joint else ()
+    theirs = pin.buildModelFromUrdf(path, *root, mimic=mimic)
+    pair = Pair(name, theirs, condyle.Model.from_urdf(path, root_joint=root_joint, mimic=mimic), root_joint)
+    if not mimic:
+        pair.record_size()
+    return pair
+
+
 class State:
     """A position, velocity, acceleration, efforts and external forces."""
 
@@ -108,13 +135,14 @@ class State:
         self.q = pin.randomConfiguration(model, lower, upper)
         self.q1 = pin.randomConfiguration(model, lower, upper)
         self.v, self.a, self.tau = rng.standard_normal((3, model.nv))
-        self.f_ext = rng.standard_normal((model.njoints, 6))
+        self.f_ext = np.zeros((pair.ours.nbodies, 6))
+        self.f_ext[pair.bodies] = rng.standard_normal((model.njoints, 6))
         self.pair = pair
 
     @cached_property
     def their_forces(self) -> "pin.StdVec_Force":
         forces = pin.StdVec_Force()
-        for row in self.f_ext:
+        for row in self.f_ext[self.pair.bodies]:
             forces.append(pin.Force(row))
         return forces
 

@@ -8,6 +8,9 @@ NAMES = ("J3", "_0", "j1", "j10", "j2", "J", "hip.left", "hip-left", "Über", "a
 """Their order in bytes is neither that of the alphabet nor of the numbers."""
 KINDS = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
+ONE = ("revolute", "continuous", "prismatic")
+"""Those with one degree of freedom, which may follow another."""
+
 
 class RandomUrdf:
     """A random robot of some links; `mimics` lets some joints follow others."""
@@ -21,15 +24,21 @@ class RandomUrdf:
         lines = [f'<robot name="random{seed}">']
         # a body that moves has mass, or M would have no inverse
         lines += [self._link(i, moves=i == 0 or kinds[i - 1] != "fixed") for i in range(links)]
+        self.kinds = dict(zip(names, kinds, strict=True))
         leaders: list[str] = []
         for i, (name, kind, parent) in enumerate(zip(names, kinds, parents, strict=True), start=1):
-            one = kind in ("revolute", "prismatic")
-            follows = str(self.rng.choice(leaders)) if mimics and one and leaders and self.rng.random() < 0.4 else None
+            follows = self._leader(kind, leaders) if mimics else None
             lines.append(self._joint(name, kind, parent, i, follows))
-            if one and not follows:
+            if kind in ONE and not follows:
                 leaders.append(name)
         order = self.rng.permutation(len(lines) - 1) + 1
         self.text = "\n".join([lines[0], *(lines[i] for i in order), "</robot>\n"])
+
+    def _leader(self, kind: str, leaders: list[str]) -> str | None:
+        """A joint to follow, for some; what follows a continuous joint turns."""
+        turns = kind in ("revolute", "continuous")
+        leaders = [name for name in leaders if turns or self.kinds[name] != "continuous"]
+        return str(self.rng.choice(leaders)) if kind in ONE and leaders and self.rng.random() < 0.4 else None
 
     def _numbers(self, count: int, scale: float) -> str:
         return " ".join(repr(float(x)) for x in self.rng.uniform(-scale, scale, count))
@@ -54,6 +63,7 @@ class RandomUrdf:
         damping, friction = self.rng.uniform(0, 1, 2)
         dynamics = f'<dynamics damping="{damping}" friction="{friction}"/>' if self.rng.random() < 0.5 else ""
         ratio, offset = self.rng.uniform(-2, 2, 2)
+        ratio = round(ratio) if follows and self.kinds[follows] == "continuous" else ratio
         mimic = f'<mimic joint="{follows}" multiplier="{ratio}" offset="{offset}"/>' if follows else ""
         ends = f'<parent link="link{parent}"/><child link="link{child}"/>'
         content = self._origin() + ends + axis + limit + dynamics + mimic

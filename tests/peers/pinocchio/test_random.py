@@ -5,7 +5,7 @@ from pathlib import Path
 import checks
 import numpy as np
 import pytest
-from comparison import ROOT_JOINTS, Pair
+from comparison import ROOT_JOINTS, from_urdf
 from random_urdf import RandomUrdf
 
 ROBOTS = 60
@@ -17,7 +17,7 @@ def test_random_robot(seed: int, tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(RandomUrdf(seed).text, encoding="utf-8")
     root_joint = (None, *ROOT_JOINTS)[seed % (1 + len(ROOT_JOINTS))]
-    pair = Pair(f"robot {seed}", str(path), root_joint)
+    pair = from_urdf(f"robot {seed}", str(path), root_joint)
     checks.check_model(pair)
     armature = np.random.default_rng(seed).random(pair.ours.nv)
     for state in pair.states(STATES, seed):
@@ -32,5 +32,7 @@ def test_random_robot(seed: int, tmp_path: Path) -> None:
         checks.check_crba(state)
         checks.check_gravity(state)
         checks.check_rnea_derivatives(state)
+        checks.check_motion_derivatives(state)
+        checks.check_effort_derivatives(state)
         assert checks.check_forward_dynamics(state)
         checks.check_configuration(state)

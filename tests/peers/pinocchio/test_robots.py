@@ -5,7 +5,7 @@ import os
 import checks
 import numpy as np
 import pytest
-from comparison import Pair
+from comparison import Pair, from_urdf
 from example_robot_data.robots_loader import ROBOTS, getModelPath
 
 STATES = 3
@@ -30,7 +30,7 @@ def root_joint(name: str) -> str | None:
 
 
 def load(name: str, mimic: bool = False) -> Pair:
-    return Pair(name, urdf_path(name), root_joint(name), mimic)
+    return from_urdf(name, urdf_path(name), root_joint(name), mimic)
 
 
 @pytest.fixture(scope="module", params=[name for name in ROBOTS if name not in NO_URDF])
@@ -66,6 +66,12 @@ def test_equations_of_motion(pair: Pair) -> None:
     for state in pair.states(STATES):
         checks.check_equations_of_motion(state)
         checks.check_lock(state)
+
+
+def test_derivatives(pair: Pair) -> None:
+    for state in pair.states(STATES):
+        checks.check_motion_derivatives(state)
+        checks.check_effort_derivatives(state)
 
 
 def test_forward_dynamics(pair: Pair) -> None:

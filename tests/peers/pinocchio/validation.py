@@ -2,6 +2,7 @@
 
 import platform
 
+import checks
 import comparison
 import numpy as np
 import pinocchio as pin
@@ -27,15 +28,28 @@ The relative difference is max |ours − theirs| / (1 + max |theirs|), over all 
 the bound, {tolerance:.0e}; what contains M⁻¹ may instead be {factor:.0f} times as far from Pinocchio as Pinocchio's
 own forward dynamics in the world's frame is from that in the bodies' frames, where that is more. The states are
 random: positions within their limits, the rest standard normal. The robots are those of example-robot-data, and
-random ones (`robot 0`, …, `mimic robot 0`, …: every kind of joint and of root joint, odd axes, names and orders).
+random ones: of URDFs (`robot 0`, …, `mimic robot 0`, …: every kind of joint and of root joint, odd axes, names and
+orders), of MJCFs (`mjcf robot 0`, …), and made with both libraries' own calls (`built robot 0`, …: all kinds of joints,
+helical, universal, spherical ZYX and composite ones too).
 
 Where the libraries mean different things, the comparison says so in `tests/peers/pinocchio/checks.py`. In short:
 Pinocchio's kinetic energy leaves armature out for revolute joints about axes that are not aligned, so energies are
 compared without armature; its `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q, our `transport` with the inverse, so
 ours is compared as what undoes it; its `dJ` in LOCAL_WORLD_ALIGNED belongs, like ours, to the classical acceleration.
-Its `buildReducedModel` refuses robots in which a joint to be locked has the name of a link, so fewer robots are locked.
+Its derivatives with respect to q of loops of points, and of rigid constraints along the world's axes, are not always
+those of its own results, so ours are held against differences of these there (`test_constrained.py`);
+those of impacts are of v⁺ − v. Its `buildReducedModel` refuses robots in which a joint to be locked has the name of a
+link, so fewer robots are locked.
 Rows that begin with `mimic` are of robots whose joints follow others: Pinocchio computes the same robot with free
 joints, and the result is projected (`test_mimic.py`), as few of its functions know such joints.
+
+Its universal, spherical ZYX and composite joints are one joint each, ours are chains of joints with bodies without mass
+between them; q and v are laid out alike. Of these it takes the axes for fixed in the body, so that its rates and
+derivatives are not those of its own rnea (`test_joints.py` holds both against differences): such robots are compared
+twice, in everything with the joints as chains in Pinocchio too, and in all but rates and derivatives with its own.
+
+`DivideConquer` cuts a robot into pieces that may be worse conditioned than the whole, and has {cuts:.0f} times the room
+where Pinocchio's distance from itself counts.
 
 ## Differences
 
@@ -56,6 +70,7 @@ def report() -> str:
         python=platform.python_version(),
         tolerance=comparison.TOLERANCE,
         factor=comparison.SELF_DISTANCE,
+        cuts=checks.CUTS,
     )
     rows = [
         f"| {what} | {r.bound:.1e} | {r.difference:.1e} | {r.where} | {len(r.robots)} |"

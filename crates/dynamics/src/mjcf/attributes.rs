@@ -129,6 +129,12 @@ pub(super) struct Compiler {
     pub(super) from_geoms: FromGeoms,
     /// Geoms of these groups count for inertia.
     pub(super) groups: [f64; 2],
+    /// No body has less mass (kg), no principal moment of inertia is less (kg m²).
+    pub(super) bounds: [f64; 2],
+    /// Whether principal moments that no body has are replaced by their mean.
+    pub(super) balance: bool,
+    /// What all masses are scaled to (kg).
+    pub(super) total_mass: Option<f64>,
 }
 
 impl Compiler {
@@ -139,6 +145,9 @@ impl Compiler {
             autolimits: true,
             from_geoms: FromGeoms::WithoutInertial,
             groups: [0.0, 5.0],
+            bounds: [0.0, 0.0],
+            balance: false,
+            total_mass: None,
         };
         for element in root.all("compiler") {
             let a = Attributes::plain(element);
@@ -167,16 +176,14 @@ impl Compiler {
             if a.get("coordinate").is_some_and(|c| c != "local") {
                 return Err(element.wrong("coordinate: only local coordinates are read"));
             }
-            for name in ["balanceinertia", "alignfree"] {
-                if a.flag(name, None)? == Some(true) {
-                    return Err(element.wrong(format!("{name} is not supported")));
-                }
+            if a.flag("alignfree", None)? == Some(true) {
+                return Err(element.wrong("alignfree is not supported"));
             }
-            for name in ["boundmass", "boundinertia", "settotalmass"] {
-                if a.number(name)?.is_some_and(|x| x > 0.0) {
-                    return Err(element.wrong(format!("{name} is not supported")));
-                }
+            compiler.balance = a.flag("balanceinertia", None)?.unwrap_or(compiler.balance);
+            for (name, bound) in ["boundmass", "boundinertia"].into_iter().zip(&mut compiler.bounds) {
+                *bound = a.number(name)?.unwrap_or(*bound);
             }
+            compiler.total_mass = a.number("settotalmass")?.filter(|&x| x > 0.0).or(compiler.total_mass);
         }
         Ok(compiler)
     }

@@ -2,8 +2,10 @@
 
 use super::attributes::{Attributes, Compiler};
 use crate::error::Error;
+use crate::xml::Element;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use core::f64::consts::PI;
+use nalgebra::Matrix3;
 
 /// Density of a geom that says neither mass nor density (kg/m³).
 const DENSITY: f64 = 1000.0;
@@ -28,16 +30,51 @@ pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<Inertia<f6
     Ok(compiler.pose(a)?.act(Inertia::from_com(mass, Vec3::zero(), I)))
 }
 
+/// A body's inertia as the compiler corrects it: mass and principal moments not below their bounds, and moments that no
+/// distribution of mass has balanced.
+pub(super) fn corrected(compiler: &Compiler, body: &Element, I: Inertia<f64>) -> Result<Inertia<f64>, Error> {
+    let ([least_mass, least_moment], balance) = (compiler.bounds, compiler.balance);
+    if least_mass <= 0.0 && least_moment <= 0.0 && !balance {
+        return Ok(I);
+    }
+    let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
+    let about = I.rotational - Inertia::from_com(I.mass, com, Sym3::zero()).rotational;
+    let matrix = Matrix3::new(about.xx, about.xy, about.xz, about.xy, about.yy, about.yz, about.xz, about.yz, about.zz);
+    if !matrix.sum().is_finite() {
+        return Err(body.wrong("its inertia is not finite"));
+    }
+    let eigen = matrix.symmetric_eigen();
+    let mut moments = eigen.eigenvalues.map(|x| x.max(least_moment));
+    let largest = moments.max();
+    if balance && largest > moments.sum() - largest {
+        moments.fill(moments.mean());
+    }
+    let m = eigen.eigenvectors * Matrix3::from_diagonal(&moments) * eigen.eigenvectors.transpose();
+    let about = Sym3 { xx: m.m11, xy: m.m12, yy: m.m22, xz: m.m13, yz: m.m23, zz: m.m33 };
+    Ok(Inertia::from_com(I.mass.max(least_mass), com, about))
+}
+
+/// Mass (kg) if it is given, and density (kg/m³) if not, of a geom that counts; none if it weighs nothing.
+fn weight(compiler: &Compiler, a: &Attributes) -> Result<Option<(Option<f64>, f64)>, Error> {
+    let group = a.number("group")?.unwrap_or(0.0);
+    let (mass, density) = (a.number("mass")?, a.number("density")?.unwrap_or(DENSITY));
+    let counts = (compiler.groups[0]..=compiler.groups[1]).contains(&group);
+    Ok((counts && mass.unwrap_or(density) != 0.0).then_some((mass, density)))
+}
+
+fn is_mesh(a: &Attributes) -> bool {
+    a.get("mesh").is_some() || matches!(a.get("type"), Some("mesh" | "sdf"))
+}
+
+/// Whether a geom is a mesh that has mass.
+pub(super) fn is_heavy_mesh(compiler: &Compiler, a: &Attributes) -> Result<bool, Error> {
+    Ok(is_mesh(a) && weight(compiler, a)?.is_some())
+}
+
 /// A geom's inertia, in the frame in which the geom's pose is.
 pub(super) fn geom(compiler: &Compiler, a: &Attributes) -> Result<Inertia<f64>, Error> {
     let wrong = |what: String| a.element.wrong(what);
-    let group = a.number("group")?.unwrap_or(0.0);
-    let mass = a.number("mass")?;
-    let density = a.number("density")?.unwrap_or(DENSITY);
-    let counts = (compiler.groups[0]..=compiler.groups[1]).contains(&group);
-    if !counts || mass.unwrap_or(density) == 0.0 {
-        return Ok(Inertia::zero());
-    }
+    let Some((mass, density)) = weight(compiler, a)? else { return Ok(Inertia::zero()) };
     if mass.unwrap_or(density) < 0.0 {
         return Err(wrong(format!("mass {} kg or density {density} kg/m³ is negative", mass.unwrap_or(0.0))));
     }
@@ -45,7 +82,7 @@ pub(super) fn geom(compiler: &Compiler, a: &Attributes) -> Result<Inertia<f64>, 
         return Err(wrong("shellinertia is not supported".to_owned()));
     }
     let kind = a.get("type").unwrap_or("sphere");
-    if a.get("mesh").is_some() || matches!(kind, "mesh" | "sdf") {
+    if is_mesh(a) {
         let what = "has mass, and meshes are not read: give the body an <inertial>, or the geom mass=\"0\"";
         return Err(wrong(what.to_owned()));
     }

@@ -1,6 +1,7 @@
 //! Random robots and states, and how the tests compare numbers.
 #![allow(dead_code)] // each test file uses a part of it
 
+pub(crate) mod contacts;
 pub(crate) mod table;
 
 use condyle_dynamics::{
@@ -117,7 +118,7 @@ impl Tree {
         let single = |tree: &Self, i: usize| tree.parts[i - 1].joint.nq() == 1;
         let earlier = (1..=n).find(|&i| single(&tree, i)).expect("there are revolute joints");
         let mut axis = || normal3(rng);
-        let [a, b, c, d] = [(); 4].map(|()| axis());
+        let [a, b, c, d, e] = [(); 5].map(|()| axis());
         let leader = tree.add(rng, n, Joint::Revolute { axis: a });
         let below = tree.add(rng, leader, Joint::Revolute { axis: b });
         let between = tree.add(rng, below, Joint::Prismatic { axis: c });
@@ -127,6 +128,14 @@ impl Tree {
         tree.follow(far_below, leader, 1.0, 0.0);
         tree.follow(across, leader, 0.4, -0.2);
         tree.follow(earlier, between, 1.5, 0.1); // numbered before its leader
+        // continuous joints, as leaders and as followers
+        let endless = tree.add(rng, below, Joint::Continuous { axis: e });
+        let backwards = tree.add(rng, endless, Joint::Revolute { axis: a });
+        let faster = tree.add(rng, 0, Joint::Continuous { axis: d });
+        let wheel = tree.add(rng, across, Joint::Continuous { axis: b });
+        tree.follow(backwards, endless, -1.0, 0.5);
+        tree.follow(faster, endless, 3.0, -0.4);
+        tree.follow(wheel, leader, 1.7, 0.2);
         tree
     }
 
@@ -145,9 +154,7 @@ impl Tree {
     }
 
     fn follow(&mut self, follower: usize, leader: usize, ratio: f64, offset: f64) {
-        let part = &mut self.parts[follower - 1];
-        part.mimic = Some((leader, Mimic { ratio, offset }));
-        part.armature = 0.0;
+        self.parts[follower - 1].mimic = Some((leader, Mimic { ratio, offset }));
     }
 
     pub(crate) fn without_mimics(&self) -> Self {
@@ -256,6 +263,17 @@ pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
         _ => unreachable!("there are no other joints"),
     };
     Se3::new(rotation, translation)
+}
+
+/// The position of joint i as it would have it if it followed nobody: ratio · q + offset, by way of angles.
+pub(crate) fn own_position(model: &Model, i: usize, q: &[f64]) -> Vec<f64> {
+    let body = &model.bodies()[i];
+    let Some(Mimic { ratio, offset }) = body.mimic else { return q[body.idx_q..body.idx_q + body.joint.nq()].to_vec() };
+    let leads = |b: &&condyle_dynamics::Body| b.mimic.is_none() && b.idx_v == body.idx_v;
+    let leader = model.bodies()[1..].iter().find(leads).expect("it has a leader").joint;
+    let q = &q[body.idx_q..];
+    let x = ratio * if leader.nq() == 2 { q[1].atan2(q[0]) } else { q[0] } + offset;
+    if body.joint.nq() == 2 { vec![x.cos(), x.sin()] } else { vec![x] }
 }
 
 /// aXb as the twelve numbers.

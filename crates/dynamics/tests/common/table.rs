@@ -1,12 +1,21 @@
 //! Every function that a control loop calls, in one table: what holds for all of them is tested over it.
+//!
+//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not among them: rayon allocates when threads meet, and robots
+//! with mimic joints are refused.
 
 use super::{State, lift, lift_forces};
+use condyle_dynamics::inertial_parameters::{self, from_log_cholesky, log_cholesky_jacobian};
+use condyle_dynamics::simulation::{Integrator, Settings, Simulation};
 use condyle_dynamics::{
-    Data, DifferenceArgument, Force, IntegrateArgument, Method, Model, ReferenceFrame, Scalar, Se3, aba,
-    aba_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, coriolis_matrix, crba, difference,
-    difference_jacobian, forward_accelerations, forward_dynamics, forward_kinematics, forward_velocities, gravity,
-    integrate, integrate_jacobian, minv, nonlinear_effects, random_configuration, rnea, rnea_derivatives,
-    static_torque,
+    Cholesky, Constraint, ConstraintSet, Data, DifferenceArgument, Force, IntegrateArgument, Ltdl, Method, Model,
+    Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, aba, aba_derivatives, aba_hessian,
+    centroidal_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, constrained_dynamics,
+    constrained_dynamics_derivatives, coriolis_derivatives, coriolis_matrix, crba, difference, difference_jacobian,
+    distance, energy_derivatives, forward_accelerations, forward_dynamics, forward_kinematics, forward_velocities,
+    gravity, impulse_dynamics, impulse_dynamics_derivatives, integrate, integrate_jacobian, interpolate,
+    joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects, normalize, passive_torque,
+    passive_torque_derivative, potential_energy_regressor, random_configuration, rnea, rnea_derivatives, rnea_hessian,
+    rnea_second_derivatives, static_torque, static_torque_derivative, transport,
 };
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
@@ -42,25 +51,52 @@ impl<S: Scalar> Input<S> {
     }
 }
 
-/// Where the functions of the table put what they return.
-pub(crate) struct Output<S> {
+/// Where the functions of the table put what they return, and the scratch that is not in a `Data`.
+pub(crate) struct Output<'m, S> {
     pub(crate) numbers: Vec<S>,
     q: Vec<S>,
     v: Vec<S>,
     square: DMatrix<S>,
     six: DMatrix<S>,
+    six2: DMatrix<S>,
+    by_inputs: [DMatrix<S>; 6],
+    tensors: RneaSecondDerivatives<S>,
+    simulation: Simulation<'m, S>,
+    ltdl: Ltdl<S>,
+    cholesky: Cholesky<S>,
+    constraints: ConstraintSet<S>,
 }
 
-impl<S: Scalar> Output<S> {
-    pub(crate) fn new(model: &Model) -> Self {
+impl<'m, S: Scalar> Output<'m, S> {
+    pub(crate) fn new(model: &'m Model) -> Self {
         let (nv, o) = (model.nv(), S::splat(f64::NAN));
         Self {
-            numbers: Vec::with_capacity(6 * nv * nv + 100 * model.frames().len() + nv * 18 * model.frames().len()),
+            numbers: Vec::with_capacity(
+                6 * nv * nv + 40 * nv + 100 * model.frames().len() + nv * 54 * model.frames().len(),
+            ),
             q: vec![o; model.nq()],
             v: vec![o; nv],
             square: DMatrix::from_element(nv, nv, o),
             six: DMatrix::from_element(6, nv, o),
+            six2: DMatrix::from_element(6, nv, o),
+            by_inputs: other_inputs(model).map(|input| DMatrix::from_element(nv, input.len(model), o)),
+            tensors: RneaSecondDerivatives::new(model),
+            simulation: Simulation::new(model, Settings { max_iterations: ITERATIONS, ..Settings::default() }),
+            ltdl: Ltdl::new(model),
+            cholesky: Cholesky::new(nv),
+            constraints: constraints(model),
         }
+    }
+
+    /// The state after a step of 1 ms, and whether it was taken.
+    fn step(&mut self, integrator: Integrator, i: &Input<S>) {
+        self.simulation.settings.integrator = integrator;
+        self.simulation.settings.passive = Some(0.1);
+        self.simulation.set_state(&i.q, &i.v);
+        let taken = self.simulation.step(&i.x, &i.f_ext).is_done();
+        self.numbers.extend_from_slice(self.simulation.q());
+        self.numbers.extend_from_slice(self.simulation.v());
+        self.numbers.push(if taken { S::one() } else { S::zero() });
     }
 
     fn pose(&mut self, X: Se3<S>) {
@@ -70,10 +106,55 @@ impl<S: Scalar> Output<S> {
     }
 }
 
-pub(crate) type Function<S> = fn(&Model, &mut Data<S>, &Input<S>, &mut Output<S>);
+/// A contact and a loop, with a round more than is needed.
+fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
+    let bodies = model.bodies().len();
+    let frame = |body: usize| model.frames().iter().position(|f| f.body == body).expect("each body has a frame");
+    let (reference, other) = (ReferenceFrame::LocalWorldAligned, Some(frame(bodies / 2)));
+    let contact = Constraint { reference, kp: 2.0, kd: 3.0, ..Constraint::point(frame(bodies - 1)) };
+    let closure = Constraint { other, kp: 2.0, kd: 3.0, ..Constraint::rigid(frame(bodies - 1)) };
+    let mut set = ConstraintSet::new(model, &[contact, closure]).expect("the frames are on different bodies");
+    set.proximal = Proximal { mu: 1e-6, iterations: 2 };
+    set
+}
 
-/// Name and call of each function. A call allocates only if the function does.
-pub(crate) fn functions<S: Scalar>() -> [(&'static str, Function<S>); 26] {
+/// What τ and q̈ depend on beside q, v, and each other.
+fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
+    use condyle_dynamics::Input::*;
+    let last = model.bodies().len() - 1;
+    [Force(last), Inertia(last), Gravity, Armature, Damping, Friction { smoothing: 0.1 }]
+}
+
+/// The functions that need no `Data`, or bring their own.
+const WITHOUT_DATA: [&str; 9] = [
+    "integrate",
+    "difference",
+    "interpolate",
+    "distance",
+    "normalize",
+    "transport",
+    "passive_torque",
+    "log-Cholesky",
+    "simulation",
+];
+
+pub(crate) fn has_data(name: &str) -> bool {
+    !WITHOUT_DATA.iter().any(|f| name.starts_with(f))
+}
+
+/// Newton's iterations of a simulated step: from random states three are enough.
+const ITERATIONS: usize = 5;
+
+/// Whether a function looks at all lanes at once: a simulation steps in all of them or in none, and Newton's method
+/// iterates until it is at its end in all.
+pub(crate) fn in_step(name: &str) -> bool {
+    name.starts_with("simulation")
+}
+
+pub(crate) type Function<S> = for<'m> fn(&'m Model, &mut Data<S>, &Input<S>, &mut Output<'m, S>);
+
+/// Name and call of each function that is compiled for every level as a whole. A call allocates only if the function does.
+pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
     [
         ("rnea", |m, d, i, o| o.numbers.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &i.f_ext))),
         ("rnea without forces", |m, d, i, o| o.numbers.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &[]))),
@@ -99,6 +180,68 @@ pub(crate) fn functions<S: Scalar>() -> [(&'static str, Function<S>); 26] {
             let r = aba_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
             o.numbers.extend_from_slice(r.a);
             [r.da_dq, r.da_dv, r.da_dtau].into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("rnea_hessian", |m, d, i, o| {
+            let r = rnea_hessian(m, d, &i.q, &i.v, &i.x, &i.f_ext, &i.v);
+            [r.dqdq, r.dvdq, r.dvdv, r.dadq].into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("static_torque_derivative", |m, d, i, o| {
+            o.numbers.extend_from_slice(static_torque_derivative(m, d, &i.q, &i.f_ext).as_slice());
+        }),
+        ("static_torque", |m, d, i, o| o.numbers.extend_from_slice(static_torque(m, d, &i.q, &i.f_ext))),
+        ("coriolis_matrix", |m, d, i, o| o.numbers.extend_from_slice(coriolis_matrix(m, d, &i.q, &i.v).as_slice())),
+    ]
+}
+
+/// Name and call of each function. A call allocates only if the function does.
+pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
+    let others: [(&'static str, Function<S>); 38] = [
+        ("rnea_derivatives by all other inputs", |m, d, i, o| {
+            let r = rnea_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
+            other_inputs(m).into_iter().zip(&mut o.by_inputs).for_each(|(input, out)| r.with_respect_to(input, out));
+            o.by_inputs.iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("aba_derivatives by all other inputs", |m, d, i, o| {
+            let r = aba_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
+            other_inputs(m).into_iter().zip(&mut o.by_inputs).for_each(|(input, out)| r.with_respect_to(input, out));
+            o.by_inputs.iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("aba_hessian", |m, d, i, o| {
+            let r = aba_hessian(m, d, &i.q, &i.v, &i.x, &i.f_ext, &i.v);
+            [r.dqdq, r.dvdq, r.dvdv, r.dtaudq].into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("rnea_second_derivatives", |m, d, i, o| {
+            rnea_second_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext, &mut o.tensors);
+            let t = &o.tensors;
+            let last = m.nv() - 1;
+            let some = [&t.dqdq[0], &t.dvdq[last], &t.dvdv[0], &t.dadq[last]];
+            some.into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("frame derivatives", |m, d, i, o| {
+            let k = forward_accelerations(m, d, &i.q, &i.v, &i.x);
+            for reference in [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned] {
+                for f in 0..m.frames().len() {
+                    k.frame_velocity_derivative(f, reference, &mut o.six);
+                    o.numbers.extend_from_slice(o.six.as_slice());
+                    k.frame_acceleration_derivatives(f, reference, &mut o.six, &mut o.six2);
+                    o.numbers.extend_from_slice(o.six.as_slice());
+                    k.frame_classical_acceleration_derivatives(f, reference, &mut o.six, &mut o.six2);
+                    o.numbers.extend_from_slice(o.six2.as_slice());
+                }
+            }
+        }),
+        ("centroidal_derivatives", |m, d, i, o| {
+            let r = centroidal_derivatives(m, d, &i.q, &i.v, &i.x);
+            let all = [r.dh_dq, r.drate_dq, r.drate_dv, r.drate_da, r.dcom_dq, r.dvcom_dq, r.dacom_dq, r.dacom_dv];
+            all.into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("energy_derivatives", |m, d, i, o| {
+            let r = energy_derivatives(m, d, &i.q, &i.v);
+            [r.dT_dq, r.dT_dv, r.dV_dq].into_iter().for_each(|x| o.numbers.extend_from_slice(x));
+        }),
+        ("coriolis_derivatives", |m, d, i, o| {
+            let r = coriolis_derivatives(m, d, &i.q, &i.v);
+            [r.dq, r.dv].into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
         }),
         ("forward_kinematics", |m, d, i, o| {
             let placements = forward_kinematics(m, d, &i.q);
@@ -138,8 +281,6 @@ pub(crate) fn functions<S: Scalar>() -> [(&'static str, Function<S>); 26] {
             o.numbers.extend_from_slice(&k.com_acceleration().to_array());
             o.numbers.extend_from_slice(&k.centroidal_momentum_rate().to_array());
         }),
-        ("static_torque", |m, d, i, o| o.numbers.extend_from_slice(static_torque(m, d, &i.q, &i.f_ext))),
-        ("coriolis_matrix", |m, d, i, o| o.numbers.extend_from_slice(coriolis_matrix(m, d, &i.q, &i.v).as_slice())),
         ("centroidal_map", |m, d, i, o| {
             let r = centroidal_map(m, d, &i.q);
             [r.Ag, r.Jcom].into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
@@ -182,5 +323,84 @@ pub(crate) fn functions<S: Scalar>() -> [(&'static str, Function<S>); 26] {
                 o.numbers.extend_from_slice(o.square.as_slice());
             }
         }),
-    ]
+        ("interpolate", |m, _, i, o| {
+            interpolate(m, &i.q, &i.q1, S::splat(0.3), &mut o.v, &mut o.q);
+            o.numbers.extend_from_slice(&o.q);
+        }),
+        ("distance", |m, _, i, o| {
+            let distance = distance(m, &i.q, &i.q1, &mut o.v);
+            o.numbers.push(distance);
+        }),
+        ("normalize", |m, _, i, o| {
+            o.q.copy_from_slice(&i.q);
+            o.q.iter_mut().for_each(|x| *x = *x * S::splat(1.5));
+            normalize(m, &mut o.q);
+            o.numbers.extend_from_slice(&o.q);
+        }),
+        ("transport", |m, _, i, o| {
+            o.square.column_iter_mut().for_each(|mut column| column.copy_from_slice(&i.x));
+            transport(m, &i.v, &mut o.square);
+            o.numbers.extend_from_slice(o.square.as_slice());
+        }),
+        ("joint_torque_regressor", |m, d, i, o| {
+            o.numbers.extend_from_slice(joint_torque_regressor(m, d, &i.q, &i.v, &i.x).as_slice());
+        }),
+        ("kinetic_energy_regressor", |m, d, i, o| {
+            o.numbers.extend_from_slice(kinetic_energy_regressor(m, d, &i.q, &i.v));
+        }),
+        ("potential_energy_regressor", |m, d, i, o| {
+            o.numbers.extend_from_slice(potential_energy_regressor(m, d, &i.q));
+        }),
+        ("passive_torque", |m, _, i, o| {
+            passive_torque(m, &i.v, 0.1, &mut o.v);
+            o.numbers.extend_from_slice(&o.v);
+            passive_torque_derivative(m, &i.v, 0.1, &mut o.v);
+            o.numbers.extend_from_slice(&o.v);
+        }),
+        ("log-Cholesky parameters", |_, _, i, o| {
+            let theta = core::array::from_fn(|k| i.v[k % i.v.len()]);
+            o.numbers.extend_from_slice(&inertial_parameters::from_inertia(from_log_cholesky(theta)));
+            o.numbers.extend_from_slice(log_cholesky_jacobian(theta).as_slice());
+        }),
+        ("Ltdl", |m, d, i, o| {
+            o.ltdl.factorize(crba(m, d, &i.q));
+            o.v.copy_from_slice(&i.x);
+            o.ltdl.solve(&mut o.v);
+            o.numbers.extend_from_slice(&o.v);
+            o.ltdl.inverse(&mut o.square);
+            o.numbers.extend_from_slice(o.square.as_slice());
+        }),
+        ("Cholesky", |m, d, i, o| {
+            o.cholesky.factorize(crba(m, d, &i.q));
+            o.v.copy_from_slice(&i.x);
+            o.cholesky.solve(&mut o.v);
+            o.numbers.extend_from_slice(&o.v);
+            o.cholesky.inverse(&mut o.square);
+            o.numbers.extend_from_slice(o.square.as_slice());
+        }),
+        ("simulation, Euler", |_, _, i, o| o.step(Integrator::SemiImplicitEuler, i)),
+        ("simulation, Runge-Kutta", |_, _, i, o| o.step(Integrator::RungeKutta4, i)),
+        ("simulation, variational", |_, _, i, o| o.step(Integrator::Variational, i)),
+        ("constrained_dynamics", |m, d, i, o| {
+            let r = constrained_dynamics(m, d, &mut o.constraints, &i.q, &i.v, &i.x, &i.f_ext);
+            [r.a, r.lambda, &[r.residual, r.redundant]].into_iter().for_each(|x| o.numbers.extend_from_slice(x));
+        }),
+        ("constrained_dynamics_derivatives", |m, d, i, o| {
+            let r = constrained_dynamics_derivatives(m, d, &mut o.constraints, &i.q, &i.v, &i.x, &i.f_ext);
+            o.numbers.extend_from_slice(r.a);
+            let matrices = [r.da_dq, r.da_dv, r.da_dtau, r.dlambda_dq, r.dlambda_dv, r.dlambda_dtau, r.inertia];
+            matrices.into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("impulse_dynamics", |m, d, i, o| {
+            let r = impulse_dynamics(m, d, &mut o.constraints, &i.q, &i.v, S::splat(0.3));
+            [r.v, r.lambda, &[r.residual, r.redundant]].into_iter().for_each(|x| o.numbers.extend_from_slice(x));
+        }),
+        ("impulse_dynamics_derivatives", |m, d, i, o| {
+            let r = impulse_dynamics_derivatives(m, d, &mut o.constraints, &i.q, &i.v, S::splat(0.3));
+            o.numbers.extend_from_slice(r.v);
+            let matrices = [r.dv_dq, r.dv_dv, r.dlambda_dq, r.dlambda_dv, r.inertia];
+            matrices.into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+    ];
+    kernels().into_iter().chain(others).collect()
 }

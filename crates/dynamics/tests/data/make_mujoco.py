@@ -2,6 +2,7 @@
 
 Quaternions stay w first and a free joint's linear velocity in the world's frame: the test converts.
 """
+
 import json
 import pathlib
 
@@ -23,7 +24,9 @@ for name in ["arm", "quadruped"]:
         "nv": model.nv,
         "armature": model.dof_armature.tolist(),
         "damping": model.dof_damping.tolist(),
-        "range": [r.tolist() if l else None for r, l in zip(model.jnt_range, model.jnt_limited)],
+        "range": [
+            r.tolist() if limited else None for r, limited in zip(model.jnt_range, model.jnt_limited, strict=True)
+        ],
         "bodies": {model.body(i).name: float(model.body_mass[i]) for i in range(1, model.nbody) if model.body(i).name},
         "states": [],
     }
@@ -35,18 +38,61 @@ for name in ["arm", "quadruped"]:
         mujoco.mj_forward(model, data)
         M = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, M)
-        out["states"].append({
-            "q": data.qpos.tolist(),
-            "v": data.qvel.tolist(),
-            "M": M.tolist(),
-            "bias": data.qfrc_bias.tolist(),
-            "bodies": {
-                model.body(i).name: {"p": data.xpos[i].tolist(), "R": data.xmat[i].tolist(), "com": data.xipos[i].tolist()}
-                for i in range(1, model.nbody) if model.body(i).name
-            },
-            "sites": {
-                model.site(i).name: {"p": data.site_xpos[i].tolist(), "R": data.site_xmat[i].tolist()}
-                for i in range(model.nsite)
-            },
-        })
+        out["states"].append(
+            {
+                "q": data.qpos.tolist(),
+                "v": data.qvel.tolist(),
+                "M": M.tolist(),
+                "bias": data.qfrc_bias.tolist(),
+                "bodies": {
+                    model.body(i).name: {
+                        "p": data.xpos[i].tolist(),
+                        "R": data.xmat[i].tolist(),
+                        "com": data.xipos[i].tolist(),
+                    }
+                    for i in range(1, model.nbody)
+                    if model.body(i).name
+                },
+                "sites": {
+                    model.site(i).name: {"p": data.site_xpos[i].tolist(), "R": data.site_xmat[i].tolist()}
+                    for i in range(model.nsite)
+                },
+            }
+        )
     (here / f"{name}_mujoco.json").write_text(json.dumps(out) + "\n")
+
+# Joints that follow others: positions at which MuJoCo finds the equality constraints met, and what it computes there in
+# the coordinates of those that lead, v = G v_leaders.
+model = mujoco.MjModel.from_xml_path(str(here / "gripper.xml"))
+data = mujoco.MjData(model)
+rng = np.random.default_rng(1)
+follows = {"right": ("left", 0.2, 1.5), "left_tip": ("twist", -0.1, -0.8), "pad": ("left", 0.01, 0.03)}
+index = {model.joint(i).name: i for i in range(model.njnt)}
+leaders = [i for name, i in index.items() if name not in follows]
+G = np.eye(model.nv)[:, leaders]
+for name, (leader, _, slope) in follows.items():
+    G[index[name], leaders.index(index[leader])] = slope
+out = {"armature": np.diag(G.T @ np.diag(model.dof_armature) @ G).tolist(), "states": []}
+for _ in range(3):
+    q = rng.standard_normal(model.nv)
+    for name, (leader, constant, slope) in follows.items():
+        follower, leader = index[name], index[leader]
+        q[follower] = model.qpos0[follower] + constant + slope * (q[leader] - model.qpos0[leader])
+    v = rng.standard_normal(len(leaders))
+    data.qpos, data.qvel = q, G @ v
+    mujoco.mj_forward(model, data)
+    equality = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    assert equality.sum() == len(follows) and abs(data.efc_pos[equality]).max() < 1e-15
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    out["states"].append(
+        {
+            "q": q[leaders].tolist(),
+            "v": v.tolist(),
+            "M": (G.T @ M @ G).tolist(),
+            "bias": (G.T @ data.qfrc_bias).tolist(),
+            "pad": data.body("pad").xpos.tolist(),
+            "left_tip": data.body("left_tip").xpos.tolist(),
+        }
+    )
+(here / "gripper_mujoco.json").write_text(json.dumps(out))

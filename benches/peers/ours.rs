@@ -1,0 +1,103 @@
+//! What Condyle takes for one call: see `dynamics.py`, which builds and runs this beside Pinocchio.
+//!
+//! ```text
+//! ours URDF fixed|free_flyer LOCKED,JOINTS STATES
+//! ```
+//!
+//! STATES has q, v, a, τ of one state after the other as doubles. Prints a line for each algorithm: its name and the median
+//! time of a call in ns; and of the derivatives of `rnea` also by dual numbers and by central differences.
+
+use condyle::{
+    Data, Joint, Model, UrdfOptions, aba, aba_derivatives, aba_hessian, crba, integrate, minv, rnea, rnea_derivatives,
+    rnea_hessian,
+};
+use num_dual::Dual64;
+use std::hint::black_box;
+use std::time::Instant;
+
+struct State {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    a: Vec<f64>,
+    tau: Vec<f64>,
+}
+
+/// The median over batches of the mean time of a call, in ns.
+fn median(states: &[State], mut call: impl FnMut(&State)) -> f64 {
+    let mut batch = |calls: usize| {
+        let start = Instant::now();
+        (0..calls).for_each(|i| call(black_box(&states[i % states.len()])));
+        start.elapsed().as_secs_f64() * 1e9 / calls as f64
+    };
+    batch(200);
+    let calls = ((2e6 / batch(50)) as usize).max(10);
+    let mut times: Vec<f64> = (0..21).map(|_| batch(calls)).collect();
+    times.sort_by(f64::total_cmp);
+    times[10]
+}
+
+/// ∂τ/∂q by dual numbers, a column at a time.
+fn by_duals(model: &Model, data: &mut Data<Dual64>, s: &State) -> f64 {
+    let lift = |x: &[f64]| -> Vec<Dual64> { x.iter().map(|&x| x.into()).collect() };
+    let (q0, v, a) = (lift(&s.q), lift(&s.v), lift(&s.a));
+    let (mut q, mut step) = (q0.clone(), vec![Dual64::from(0.0); model.nv()]);
+    let mut sum = 0.0;
+    for k in 0..model.nv() {
+        step[k].eps = 1.0;
+        integrate(model, &q0, &step, &mut q);
+        sum += rnea(model, data, &q, &v, &a, &[])[0].eps;
+        step[k].eps = 0.0;
+    }
+    sum
+}
+
+/// ∂τ/∂q by central differences.
+fn by_differences(model: &Model, data: &mut Data<f64>, s: &State) -> f64 {
+    let (mut q, mut step) = (s.q.clone(), vec![0.0; model.nv()]);
+    let mut sum = 0.0;
+    for k in 0..model.nv() {
+        for h in [1e-5, -1e-5] {
+            step[k] = h;
+            integrate(model, &s.q, &step, &mut q);
+            sum += rnea(model, data, &q, &s.v, &s.a, &[])[0] / (2.0 * h);
+        }
+        step[k] = 0.0;
+    }
+    sum
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let [urdf, root, locked, states] = arguments.as_slice() else {
+        println!("python3 benches/peers/dynamics.py runs this");
+        return Ok(());
+    };
+    let root_joint = (root == "free_flyer").then_some(Joint::FreeFlyer);
+    let model = Model::from_urdf(urdf, &UrdfOptions { root_joint, ..UrdfOptions::default() })?;
+    let joints = locked.split(',').filter(|name| !name.is_empty()).map(|name| model.joint(name));
+    let joints = joints.collect::<Result<Vec<_>, _>>()?;
+    let model = if joints.is_empty() { model } else { model.lock(&joints, &condyle::neutral(&model))? };
+    let bytes = std::fs::read(states)?;
+    let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|&b| f64::from_le_bytes(b)).collect();
+    let (nq, nv) = (model.nq(), model.nv());
+    let states: Vec<State> = numbers
+        .chunks_exact(nq + 3 * nv)
+        .map(|x| {
+            let part = |k: usize| x[nq + k * nv..nq + (k + 1) * nv].to_vec();
+            State { q: x[..nq].to_vec(), v: part(0), a: part(1), tau: part(2) }
+        })
+        .collect();
+    let (m, d, duals) = (&model, &mut Data::new(&model), &mut Data::<Dual64>::new(&model));
+    let print = |name: &str, ns: f64| println!("{name} {ns:.2}");
+    print("rnea", median(&states, |s| _ = black_box(rnea(m, d, &s.q, &s.v, &s.a, &[]))));
+    print("aba", median(&states, |s| _ = black_box(aba(m, d, &s.q, &s.v, &s.tau, &[]))));
+    print("crba", median(&states, |s| _ = black_box(crba(m, d, &s.q))));
+    print("minv", median(&states, |s| _ = black_box(minv(m, d, &s.q))));
+    print("rnea_derivatives", median(&states, |s| _ = black_box(rnea_derivatives(m, d, &s.q, &s.v, &s.a, &[]))));
+    print("aba_derivatives", median(&states, |s| _ = black_box(aba_derivatives(m, d, &s.q, &s.v, &s.tau, &[]))));
+    print("rnea_hessian", median(&states, |s| _ = black_box(rnea_hessian(m, d, &s.q, &s.v, &s.a, &[], &s.tau))));
+    print("aba_hessian", median(&states, |s| _ = black_box(aba_hessian(m, d, &s.q, &s.v, &s.tau, &[], &s.a))));
+    print("dtau_dq_by_duals", median(&states, |s| _ = black_box(by_duals(m, duals, s))));
+    print("dtau_dq_by_differences", median(&states, |s| _ = black_box(by_differences(m, d, s))));
+    Ok(())
+}

@@ -1,0 +1,210 @@
+//! How the centre of mass, the centroidal momentum and its rate change with position, velocity and acceleration.
+//!
+//! About the world's origin, momentum h = Σ I v and rate F = Σ I a + v ×* I v change with coordinate e by what its joint
+//! carries (Ψ̇, Ψ̈, B of `rnea_derivatives.rs`, Y = Ψ̇ + Ṡ):
+//!
+//! ```text
+//! ∂h/∂q_e = S ×* hᶜ + Iᶜ Ψ̇     ∂F/∂q_e = S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇     ∂F/∂q̇_e = Iᶜ Y + 2Bᶜ S     ∂F/∂q̈_e = Iᶜ S
+//! ```
+//!
+//! Shifted to the centre of mass, f becomes [f; n − c × f], and its derivative gains −∂c × f. The linear rows over the mass
+//! are the derivatives of ċ and c̈.
+//!
+//! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the root.
+
+use crate::centroidal::{about, add};
+use crate::coriolis::Coriolis;
+use crate::data::{Data, Size, check};
+use crate::dispatch::kernel;
+use crate::kinematics::{Moving, World, accelerations, positions, velocities};
+use crate::layout::{Layout, Single};
+use crate::model::Model;
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+/// The derivatives of a column, about the world's origin.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+struct Column<S> {
+    h_q: Force<S>,
+    F_q: Force<S>,
+    F_v: Force<S>,
+    F_a: Force<S>,
+}
+
+/// In the world's frame, but for what is said to be about the centre of mass.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `pass`.
+    IC: Vec<Inertia<S>>,
+    /// hᶜ and 2Bᶜ, likewise. Shape: bodies. Written by: `pass`.
+    BC: Vec<Coriolis<S>>,
+    /// Fᶜ, likewise. Shape: bodies. Written by: `pass`.
+    F: Vec<Force<S>>,
+    /// Shape: columns. Written by: `pass`.
+    columns: Vec<Column<S>>,
+    /// About the centre of mass. Shape: 6 × nv. Written by: `shift`.
+    dh_dq: DMatrix<S>,
+    drate_dq: DMatrix<S>,
+    drate_dv: DMatrix<S>,
+    drate_da: DMatrix<S>,
+    /// Shape: 3 × nv. Written by: `shift`.
+    dcom_dq: DMatrix<S>,
+    dvcom_dq: DMatrix<S>,
+    dacom_dq: DMatrix<S>,
+    dacom_dv: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let rows = |n| DMatrix::from_element(n, size.nv, S::zero());
+        let (six, three, o) = (rows(6), rows(3), Force::zero());
+        Self {
+            IC: vec![Inertia::zero(); size.bodies],
+            BC: vec![Coriolis::zero(); size.bodies],
+            F: vec![o; size.bodies],
+            columns: vec![Column { h_q: o, F_q: o, F_v: o, F_a: o }; size.columns],
+            dh_dq: six.clone(),
+            drate_dq: six.clone(),
+            drate_dv: six.clone(),
+            drate_da: six,
+            dcom_dq: three.clone(),
+            dvcom_dq: three.clone(),
+            dacom_dq: three.clone(),
+            dacom_dv: three,
+        }
+    }
+}
+
+/// The derivatives about the world's origin, for bodies whose velocities and accelerations are known.
+#[inline(always)]
+fn pass<L: Layout>(l: &L, World { oX, S }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, BC, F, columns, .. } = d;
+    (IC[0], BC[0], F[0]) = (Inertia::zero(), Coriolis::zero(), Force::zero());
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+        BC[i] = Coriolis::of(IC[i], m.v[i]);
+        F[i] = IC[i] * m.a[i] + m.v[i].cross(BC[i].momentum); // F = I a + v ×* I v
+    }
+    for i in l.bodies().rev() {
+        let (v_parent, a_parent): (Motion<_>, Motion<_>) = (l.parent(&m.v, i), l.parent(&m.a, i));
+        for k in 0..l.joint(i).nv() {
+            let c = l.slot(i) + k;
+            let Psid = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
+            let Psidd = a_parent.cross(S[c]) + v_parent.cross(Psid); // Ψ̈ = a_λ × S + v_λ × Ψ̇
+            columns[c] = Column {
+                h_q: S[c].cross(BC[i].momentum) + IC[i] * Psid, // S ×* hᶜ + Iᶜ Ψ̇
+                F_q: S[c].cross(F[i]) + IC[i] * Psidd + BC[i].apply(Psid), // S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇
+                F_v: IC[i] * (Psid + m.dS[c]) + BC[i].apply(S[c]), // Iᶜ Y + 2Bᶜ S
+                F_a: IC[i] * S[c],
+            };
+        }
+        let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
+        l.push(IC, i, IC_i);
+        l.push(BC, i, BC_i);
+        l.push(F, i, F_i);
+    }
+}
+
+/// The derivatives about the centre of mass, after `pass`.
+#[inline(always)]
+fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalDerivatives<'d, S> {
+    let per_mass = d.IC[0].mass.recip();
+    let com = d.IC[0].mass_com.scale(per_mass);
+    let (p, f) = (d.BC[0].momentum.linear, d.F[0].linear);
+    let moved = |dcom: Vec3<S>, x: Vec3<S>| Force::new(Vec3::zero(), -dcom.cross(x)); // −∂c × f
+    for matrix in [&mut d.dh_dq, &mut d.drate_dq, &mut d.drate_dv, &mut d.drate_da] {
+        matrix.fill(S::zero());
+    }
+    for (c, &Column { h_q, F_q, F_v, F_a }) in d.columns.iter().enumerate() {
+        let dcom = F_a.linear.scale(per_mass); // m ∂c/∂q_e is the linear momentum of S_e
+        add(model, &mut d.dh_dq, c, about(com, h_q) + moved(dcom, p));
+        add(model, &mut d.drate_dq, c, about(com, F_q) + moved(dcom, f));
+        add(model, &mut d.drate_dv, c, about(com, F_v));
+        add(model, &mut d.drate_da, c, about(com, F_a));
+    }
+    let of = [&d.drate_da, &d.dh_dq, &d.drate_dq, &d.drate_dv];
+    for (to, from) in [&mut d.dcom_dq, &mut d.dvcom_dq, &mut d.dacom_dq, &mut d.dacom_dv].into_iter().zip(of) {
+        for j in 0..model.nv {
+            for i in 0..3 {
+                to[(i, j)] = from[(i, j)] * per_mass;
+            }
+        }
+    }
+    CentroidalDerivatives {
+        dh_dq: &d.dh_dq,
+        dh_dv: &d.drate_da,
+        drate_dq: &d.drate_dq,
+        drate_dv: &d.drate_dv,
+        drate_da: &d.drate_da,
+        dcom_dq: &d.dcom_dq,
+        dvcom_dq: &d.dvcom_dq,
+        dacom_dq: &d.dacom_dq,
+        dacom_dv: &d.dacom_dv,
+    }
+}
+
+/// The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c. The axes are the world's.
+#[derive(Clone, Copy, Debug)]
+pub struct CentroidalDerivatives<'d, S> {
+    /// ∂hg/∂q, 6 × nv, linear rows first.
+    pub dh_dq: &'d DMatrix<S>,
+    /// ∂hg/∂v = Ag, 6 × nv.
+    pub dh_dv: &'d DMatrix<S>,
+    /// ∂dhg/∂q, 6 × nv.
+    pub drate_dq: &'d DMatrix<S>,
+    /// ∂dhg/∂v, 6 × nv.
+    pub drate_dv: &'d DMatrix<S>,
+    /// ∂dhg/∂a = Ag, 6 × nv.
+    pub drate_da: &'d DMatrix<S>,
+    /// ∂c/∂q = ∂ċ/∂v = ∂c̈/∂a, the Jacobian of the centre of mass, 3 × nv.
+    pub dcom_dq: &'d DMatrix<S>,
+    /// ∂ċ/∂q, 3 × nv.
+    pub dvcom_dq: &'d DMatrix<S>,
+    /// ∂c̈/∂q, 3 × nv.
+    pub dacom_dq: &'d DMatrix<S>,
+    /// ∂c̈/∂v, 3 × nv.
+    pub dacom_dv: &'d DMatrix<S>,
+}
+
+kernel! {
+    fn run(model, data) {
+        pass(&Single::new(model), &data.world, &data.moving, &mut data.centroidal_derivatives);
+    }
+}
+
+/// The derivatives of the centroidal momentum, its rate, and the centre of mass and its velocity and acceleration, with
+/// respect to q, v and a, exact, in O(n).
+///
+/// q: nq numbers; v, a: nv. Gravity is not among the accelerations. What is fixed to the world does not count; not a
+/// number if nothing that moves has a mass. Allocates nothing. Source: Carpentier and Mansard (2018); see the head of the
+/// file.
+///
+/// ```
+/// use condyle_dynamics::{Data, centroidal_derivatives, centroidal_map, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let (mut data, q, o) = (Data::new(&quadruped), neutral(&quadruped), [0.0; 18]);
+/// let Ag = centroidal_derivatives(&quadruped, &mut data, &q, &o, &o).drate_da.clone();
+/// assert!((Ag - centroidal_map(&quadruped, &mut data, &q).Ag).amax() < 1e-13);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another size.
+pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> CentroidalDerivatives<'d, S> {
+    data.check(model);
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    check("a", a.len(), model.nv);
+    positions(model, data, q);
+    velocities(model, data, v);
+    accelerations(model, data, a);
+    run(model, data);
+    shift(model, &mut data.centroidal_derivatives)
+}

@@ -1,0 +1,372 @@
+//! The derivatives of forward dynamics under constraints, by hand.
+//!
+//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. Differentiated at q̈ and λ as they are, with
+//! r = ∂(M q̈ + h − Jᵀ λ) and c = ∂(J q̈ + γ), they are equations with the same matrix, whose inverse has the blocks
+//!
+//! ```text
+//! K⁻¹ = [ P    J̄  ]      Λ = (J M⁻¹ Jᵀ)⁻¹,   J̄ = M⁻¹ Jᵀ Λ,   P = M⁻¹ − J̄ J M⁻¹
+//!       [ J̄ᵀ  −Λ ]
+//! ∂q̈/∂x = −P r − J̄ c,   ∂λ/∂x = J̄ᵀ r − Λ c,   ∂q̈/∂τ = P,   ∂λ/∂τ = −J̄ᵀ
+//! ```
+//!
+//! r comes from the derivatives of inverse dynamics with the forces of the constraints as external ones, each fixed in
+//! its body, and what is different: along the world's axes λ does not turn with frame 1, and the force on the other
+//! body is carried by frame 1 (a point's force: turned by frame 1, its point carried by body 2). Source: Carpentier and
+//! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier,
+//! Mastalli, Mansard, *Differential dynamic programming for multi-phase rigid contact dynamics* (2018).
+
+use crate::constrained_dynamics;
+use crate::constraint::ConstraintKind;
+use crate::constraint_motion::{Columns, Ends};
+use crate::constraint_set::{ConstraintSet, Proximal};
+use crate::data::{Data, Size, check, check_forces};
+use crate::delassus::Delassus;
+use crate::frames::Placements;
+use crate::kinematics::World;
+use crate::layout::{Layout, Single};
+use crate::ltdl::{Ltdl, axpy};
+use crate::model::Model;
+use crate::rnea_derivatives;
+use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// All forces on each body, in its frame. Shape: bodies. Written by: `load`.
+    pub forces: Vec<Force<S>>,
+    /// M⁻¹, then P. Shape: nv × nv. Written by: `finish`.
+    pub P: DMatrix<S>,
+    /// Of q̈ or of the velocity. Shape: nv × nv. Written by: `constrained_dynamics_derivatives`,
+    /// `impulse_dynamics_derivatives`.
+    pub da_dq: DMatrix<S>,
+    pub da_dv: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        Self { forces: vec![Force::zero(); size.bodies], P: square.clone(), da_dq: square.clone(), da_dv: square }
+    }
+}
+
+/// C −= A B, where column j of B has zeros but in the rows `rows[j]`; four columns of A at a time, so that C is loaded and
+/// stored a quarter as often.
+#[inline(always)]
+fn subtract_product<S: Scalar>(A: &DMatrix<S>, B: &DMatrix<S>, C: &mut DMatrix<S>, rows: &[Vec<usize>]) {
+    let (n, m) = A.shape();
+    let (A, B, C) = (A.as_slice(), B.as_slice(), C.as_mut_slice());
+    for j in 0..rows.len() {
+        let (b, c) = (&B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n]);
+        let (fours, rest) = rows[j].as_chunks::<4>();
+        for &[k0, k1, k2, k3] in fours {
+            let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
+            let (a2, a3) = (&A[k2 * n..(k2 + 1) * n], &A[k3 * n..(k3 + 1) * n]);
+            let (b0, b1, b2, b3) = (-b[k0], -b[k1], -b[k2], -b[k3]);
+            for i in 0..n {
+                c[i] = a0[i].mul_add(b0, a1[i].mul_add(b1, a2[i].mul_add(b2, a3[i].mul_add(b3, c[i]))));
+            }
+        }
+        for &k in rest {
+            axpy(-b[k], &A[k * n..(k + 1) * n], c);
+        }
+    }
+}
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// The force λ of constraint i along the axes of its frame.
+    #[inline(always)]
+    fn local_force(&self, i: usize, ends: &Ends<S>) -> Force<S> {
+        let f = self.force(i);
+        if self.plans[i].aligned() {
+            let R = ends.x1.rotation;
+            return Force::new(R.transpose_mul(f.linear), R.transpose_mul(f.angular));
+        }
+        f
+    }
+
+    /// The force on the other body, its sign turned, in the world's frame.
+    #[inline(always)]
+    fn reaction(&self, i: usize, ends: &Ends<S>) -> Force<S> {
+        let f = self.local_force(i, ends);
+        match self.plans[i].kind {
+            ConstraintKind::Rigid => ends.x1.act(f),
+            ConstraintKind::Point => {
+                let linear = ends.x1.rotation * f.linear;
+                Force::new(linear, ends.x2.translation.cross(linear))
+            }
+        }
+    }
+
+    /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
+    #[inline(always)]
+    pub(crate) fn load<R: Constant<S>>(
+        &self,
+        model: &Model<R>,
+        world: &World<S>,
+        f_ext: &[Force<S>],
+        forces: &mut [Force<S>],
+    ) {
+        forces.fill(Force::zero());
+        forces[..f_ext.len()].copy_from_slice(f_ext);
+        for (i, plan) in self.plans.iter().enumerate() {
+            let ends = Ends::at_rest(plan, &self.targets[i], world);
+            forces[plan.bodies[0]] += plan.placements[0].lift().act(self.local_force(i, &ends));
+            let oXb = Placements { model, world }.body(plan.bodies[1]);
+            forces[plan.bodies[1]] -= oXb.act_inv(self.reaction(i, &ends));
+        }
+    }
+
+    /// Adds to r = ∂(M q̈ + h − Jᵀ λ)/∂q what is different from forces that are fixed in their bodies.
+    #[inline(always)]
+    pub(crate) fn add_turning(&self, world: &World<S>, r: &mut DMatrix<S>) {
+        for (i, plan) in self.plans.iter().enumerate() {
+            if plan.bodies[1] > 0 {
+                let ends = Ends::at_rest(plan, &self.targets[i], world);
+                let f = self.reaction(i, &ends);
+                for e in &plan.touches {
+                    if e.first == e.second {
+                        continue;
+                    }
+                    let s = world.S[e.column];
+                    let change = match plan.kind {
+                        ConstraintKind::Rigid => s.cross(f),
+                        ConstraintKind::Point => {
+                            let linear = s.angular.cross(f.linear);
+                            Force::new(linear, ends.x2.translation.cross(linear))
+                        }
+                    };
+                    let change = change.scale(S::splat(if e.first { e.ratio } else { -e.ratio }));
+                    for j in &plan.touches {
+                        if j.second {
+                            let x = world.S[j.column].dot(change);
+                            r[(j.coordinate, e.coordinate)] += x * S::splat(j.ratio);
+                        }
+                    }
+                }
+            }
+            if plan.aligned() {
+                let f = self.force(i);
+                for e in &plan.touches {
+                    if !e.first {
+                        continue;
+                    }
+                    let w = world.S[e.column].angular.scale(S::splat(e.ratio));
+                    let turned = Motion::new(w.cross(f.linear), w.cross(f.angular)).to_array(); // ω × λ
+                    for k in 0..plan.rows() {
+                        let J = &self.J[plan.range(k)];
+                        for (at, &coordinate) in plan.coordinates.iter().enumerate() {
+                            r[(coordinate, e.coordinate)] += J[at] * turned[k]; // Jᵀ (ω × λ)
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Λ, J̄ and P of K⁻¹, for M and J M⁻¹ Jᵀ that are factorised.
+    #[inline(always)]
+    pub(crate) fn invert(&mut self, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
+        factor.inverse(P); // M⁻¹
+        self.delassus.invert(self.proximal);
+        let (n, rows) = (self.nv, self.lambda.len());
+        let Self { U, Jbar, dlambda_dtau, .. } = self;
+        let (U, Jbar, Minv) = (U.as_mut_slice(), Jbar.as_mut_slice(), P.as_mut_slice());
+        U.fill(S::zero());
+        for plan in &self.plans {
+            for r in 0..plan.rows() {
+                let (row, u) = (&self.J[plan.range(r)], &mut U[(plan.row + r) * n..][..n]);
+                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                    axpy(row[k], &Minv[coordinate * n..(coordinate + 1) * n], u); // U = M⁻¹ Jᵀ
+                }
+            }
+        }
+        for j in 0..n {
+            let row = &mut dlambda_dtau.as_mut_slice()[j * rows..(j + 1) * rows];
+            for r in 0..rows {
+                row[r] = -U[r * n + j];
+            }
+            self.delassus.solve(self.proximal, row); // ∂λ/∂τ = −J̄ᵀ = −Λ Uᵀ
+            for r in 0..rows {
+                Jbar[r * n + j] = -row[r];
+            }
+        }
+        for j in 0..n {
+            let (above, rest) = Minv.split_at_mut(j * n);
+            let column = &mut rest[j..n];
+            for k in 0..rows {
+                axpy(-Jbar[k * n + j], &U[k * n + j..(k + 1) * n], column); // P = M⁻¹ − U J̄ᵀ
+            }
+            for i in 0..j {
+                rest[i] = above[i * n + j];
+            }
+        }
+    }
+}
+
+/// The blocks of a right-hand side [r; c] of the equations differentiated, where they may differ from zero, and K⁻¹.
+struct Equations<'e, S> {
+    P: &'e DMatrix<S>,
+    Jbar: &'e DMatrix<S>,
+    /// −J̄ᵀ.
+    dlambda_dtau: &'e DMatrix<S>,
+    delassus: &'e mut Delassus<S>,
+    proximal: Proximal,
+    r: &'e DMatrix<S>,
+    c: &'e DMatrix<S>,
+    coupled: &'e [Vec<usize>],
+    touching: &'e [Vec<usize>],
+}
+
+impl<S: Scalar> Equations<'_, S> {
+    #[inline(always)]
+    fn solve(self, da: &mut DMatrix<S>, dlambda: &mut DMatrix<S>) {
+        da.fill(S::zero());
+        subtract_product(self.P, self.r, da, self.coupled); // −P r − J̄ c
+        subtract_product(self.Jbar, self.c, da, self.touching);
+        let rows = self.c.nrows();
+        for j in 0..self.coupled.len() {
+            let (c, out) = (&self.c.as_slice()[j * rows..], &mut dlambda.as_mut_slice()[j * rows..(j + 1) * rows]);
+            for r in 0..rows {
+                out[r] = -c[r];
+            }
+            self.delassus.solve(self.proximal, out);
+        }
+        subtract_product(self.dlambda_dtau, self.r, dlambda, self.coupled); // J̄ᵀ r − Λ c
+    }
+}
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// The derivatives of acceleration and forces with respect to q, for r and `dgamma_dq`.
+    #[inline(always)]
+    pub(crate) fn respond_to_q(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
+        let Self { Jbar, dlambda_dtau, delassus, coupled, touching, dgamma_dq, dlambda_dq, .. } = self;
+        let (c, proximal) = (dgamma_dq, self.proximal);
+        Equations { P, Jbar, dlambda_dtau, delassus, proximal, r, c, coupled, touching }.solve(da, dlambda_dq);
+    }
+
+    /// The same with respect to v, for r and `dgamma_dv`.
+    #[inline(always)]
+    fn respond_to_v(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
+        let Self { Jbar, dlambda_dtau, delassus, coupled, touching, dgamma_dv, dlambda_dv, .. } = self;
+        let (c, proximal) = (dgamma_dv, self.proximal);
+        Equations { P, Jbar, dlambda_dtau, delassus, proximal, r, c, coupled, touching }.solve(da, dlambda_dv);
+    }
+}
+
+/// What [`constrained_dynamics_derivatives`] gives. The blocks of K⁻¹ are ∂q̈/∂τ, −∂λ/∂τ (transposed) and −Λ.
+#[derive(Clone, Copy, Debug)]
+pub struct ConstrainedDerivatives<'d, S> {
+    /// q̈ itself, nv numbers.
+    pub a: &'d [S],
+    /// λ itself, as many numbers as there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J q̈ + γ (m/s², rad/s²).
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding.
+    pub redundant: S,
+    /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ when q moves to q ⊕ δ, per δ.
+    pub da_dq: &'d DMatrix<S>,
+    /// ∂q̈/∂v, nv × nv.
+    pub da_dv: &'d DMatrix<S>,
+    /// ∂q̈/∂τ, nv × nv, symmetric.
+    pub da_dtau: &'d DMatrix<S>,
+    /// ∂λ/∂q in the tangent space, rows × nv.
+    pub dlambda_dq: &'d DMatrix<S>,
+    /// ∂λ/∂v, rows × nv.
+    pub dlambda_dv: &'d DMatrix<S>,
+    /// ∂λ/∂τ, rows × nv.
+    pub dlambda_dtau: &'d DMatrix<S>,
+    /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
+    pub inertia: &'d DMatrix<S>,
+}
+
+/// [`constrained_dynamics`](crate::constrained_dynamics()) and its derivatives with respect to q, v and τ, exact.
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
+/// Targets of the constraints are fixed. In O(n · depth) for what goes into them and O((n + rows)² n) for the products
+/// with K⁻¹, of which zeros of the tree are left out. Allocates nothing. Where constraints are redundant, the derivatives
+/// of q̈ are exact up to the residual; those of λ are the solution of the same kind (without μ: redundant rows without
+/// force; with μ: the smallest one) of the equations differentiated. Source: Carpentier and Mansard (2018).
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};
+/// use nalgebra::DMatrix;
+/// let arm = robots::arm7();
+/// let touch = Constraint { kp: 100.0, kd: 20.0, ..Constraint::point(arm.frame("tool")?) };
+/// let (mut touch, mut data) = (ConstraintSet::new(&arm, &[touch])?, Data::new(&arm));
+/// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
+/// let da_dtau = constrained_dynamics_derivatives(&arm, &mut data, &mut touch, &q, &v, &tau, &[]).da_dtau.clone();
+/// let mut J = DMatrix::<f64>::zeros(3, 7);
+/// touch.jacobian(&mut J);
+/// assert!((J * da_dtau).amax() < 1e-12); // no effort moves the point
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> ConstrainedDerivatives<'d, S> {
+    data.check(model);
+    constraints.check(model);
+    model.check_regular();
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+    check("tau", tau.len(), model.nv);
+    check_forces(f_ext.len(), model.nodes.len());
+    pass(model, data, constraints, q, v, tau, f_ext);
+    let (d, c) = (&data.constrained_derivatives, &*constraints);
+    ConstrainedDerivatives {
+        a: &data.constrained_dynamics.qdd,
+        lambda: &c.lambda,
+        residual: c.residual(),
+        redundant: c.delassus.redundant,
+        da_dq: &d.da_dq,
+        da_dv: &d.da_dv,
+        da_dtau: &d.P,
+        dlambda_dq: &c.dlambda_dq,
+        dlambda_dv: &c.dlambda_dv,
+        dlambda_dtau: &c.dlambda_dtau,
+        inertia: &c.delassus.inverse,
+    }
+}
+
+/// The whole algorithm.
+#[inline(always)]
+fn pass<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) {
+    let l = Single::new(model);
+    constrained_dynamics::pass(&l, data, constraints, q, v, tau, f_ext);
+    let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
+    let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
+    constraints.load(model, world, f_ext, &mut d.forces);
+    rnea_derivatives::pass(&l, world, id, v, qdd, &d.forces, l.minus_gravity());
+    constraints.add_turning(world, &mut id.dtau_dq);
+    let columns = Columns { S: &world.S, Psid: &id.Psid, Psidd: &id.Psidd, PsidSd: &id.PsidSd };
+    let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = &mut *constraints;
+    dgamma_dq.fill(S::zero());
+    dgamma_dv.fill(S::zero());
+    for (plan, target) in plans.iter().zip(targets.iter()) {
+        let ends = Ends::new(plan, target, world, &id.v, &id.a);
+        let error = &error[plan.row..plan.row + plan.rows()];
+        ends.acceleration_derivatives(plan, target, columns, error, dgamma_dq, dgamma_dv);
+    }
+    constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
+    constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
+    constraints.respond_to_v(&d.P, &id.dtau_dv, &mut d.da_dv);
+}

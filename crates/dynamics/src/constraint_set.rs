@@ -1,0 +1,322 @@
+//! Constraints of one model, planned: which coordinates each of them touches, and memory for all that they need.
+//!
+//! The coordinates that move a constraint's frames lie on the ways from the frames to the root of the tree of M's factor.
+//! Sorted, they are what both ways share, then the rest of one way, then the rest of the other: three runs at most. Rows
+//! of J are stored on these coordinates alone.
+
+use crate::constraint::{Constraint, ConstraintKind, Target};
+use crate::delassus::Delassus;
+use crate::elimination::NONE;
+use crate::error::Error;
+use crate::frames::ReferenceFrame;
+use crate::ltdl::Ltdl;
+use crate::model::Model;
+use condyle_spatial::{Scalar, Se3, Vec3};
+use core::ops::Range;
+use nalgebra::DMatrix;
+use std::collections::BTreeSet;
+
+/// How J M⁻¹ Jᵀ is regularised, so that redundant constraints share their forces.
+///
+/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found: each
+/// iteration takes the error of the motion to μ/(σ + μ) of what it was (σ: the least singular value of J M⁻¹ Jᵀ that is
+/// not 0), and redundant forces stay the smallest ones. With μ = 0 one iteration is exact, and rows that depend on
+/// earlier ones get no force. The number of iterations is fixed, so that all lanes and dual numbers do the same. Source:
+/// Carpentier, Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic equations* (2021).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proximal {
+    /// μ (1/kg): small beside J M⁻¹ Jᵀ, large beside its rounding errors, as 1e-8.
+    pub mu: f64,
+    /// How many iterations; 0 counts as 1.
+    pub iterations: usize,
+}
+
+impl Default for Proximal {
+    /// μ = 0, one iteration.
+    fn default() -> Self {
+        Self { mu: 0.0, iterations: 1 }
+    }
+}
+
+/// A degree of freedom that moves a frame of a constraint.
+#[derive(Clone, Debug)]
+pub(crate) struct Touch {
+    /// The joint's column.
+    pub column: usize,
+    /// Where its coordinate stands among the constraint's.
+    pub at: usize,
+    pub coordinate: usize,
+    pub ratio: f64,
+    /// Whether it moves the constraint's frame.
+    pub first: bool,
+    /// Whether it moves the other frame.
+    pub second: bool,
+}
+
+/// A constraint as the algorithms see it.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    pub kind: ConstraintKind,
+    pub reference: ReferenceFrame,
+    pub kp: f64,
+    pub kd: f64,
+    pub bodies: [usize; 2],
+    /// bXf in the bodies' public and in their turned frames.
+    pub placements: [Se3<f64>; 2],
+    pub turned: [Se3<f64>; 2],
+    /// The first of its rows.
+    pub row: usize,
+    /// The places that it touches, the roots' first, and their coordinates.
+    pub places: Vec<usize>,
+    pub coordinates: Vec<usize>,
+    /// How many places both ways share, and where the second way goes on.
+    pub shared: usize,
+    pub second: usize,
+    pub touches: Vec<Touch>,
+    /// Where its rows begin in an array with an entry for each place of each row.
+    pub start: usize,
+    /// For each constraint up to this one, the runs of places that both touch: where here, where there, how many.
+    pub common: Vec<Vec<[usize; 3]>>,
+}
+
+impl Plan {
+    pub(crate) fn rows(&self) -> usize {
+        self.kind.rows()
+    }
+
+    /// Where row r (counted from the constraint's first) stands in the array of all rows.
+    #[inline(always)]
+    pub(crate) fn range(&self, r: usize) -> Range<usize> {
+        let n = self.places.len();
+        self.start + r * n..self.start + (r + 1) * n
+    }
+
+    /// Whether the rows turn with the world's axes, not the frame's.
+    #[inline(always)]
+    pub(crate) fn aligned(&self) -> bool {
+        self.reference == ReferenceFrame::LocalWorldAligned
+    }
+}
+
+/// Places common to two sorted lists, as runs.
+fn common(a: &[usize], b: &[usize]) -> Vec<[usize; 3]> {
+    let mut runs: Vec<[usize; 3]> = Vec::new();
+    for (i, place) in a.iter().enumerate() {
+        if let Ok(j) = b.binary_search(place) {
+            match runs.last_mut() {
+                Some([x, y, n]) if *x + *n == i && *y + *n == j => *n += 1,
+                _ => runs.push([i, j, 1]),
+            }
+        }
+    }
+    runs
+}
+
+/// Constraints of one model: contacts and loops, and the scratch and results of [`constrained_dynamics`] and its like.
+///
+/// All memory is allocated here. Make one set for each combination of contacts, and change where they shall be through
+/// [`target_mut`](Self::target_mut); the [`Data`](crate::Data) can be the same for all sets.
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, robots};
+/// let quadruped = robots::quadruped();
+/// let feet = ["LF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
+/// let trot = ConstraintSet::<f64>::new(&quadruped, &feet.map(Constraint::point))?;
+/// assert_eq!((trot.rows(), trot.range(1)), (6, 3..6));
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// [`constrained_dynamics`]: crate::constrained_dynamics()
+#[derive(Clone, Debug)]
+pub struct ConstraintSet<S> {
+    /// How redundant constraints share their forces; may be changed between calls.
+    pub proximal: Proximal,
+    pub(crate) plans: Vec<Plan>,
+    pub(crate) targets: Vec<Target<S>>,
+    pub(crate) nv: usize,
+    /// Of the tree that it was made for.
+    tree: u64,
+    /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
+    pub(crate) coupled: Vec<Vec<usize>>,
+    /// For each coordinate, the rows of J in which it may differ from zero.
+    pub(crate) touching: Vec<Vec<usize>>,
+    /// J on the places of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
+    pub(crate) J: Vec<S>,
+    /// γ: the constraints' accelerations for q̈ = 0, with all corrections. Shape: rows. Written by: `constraint_motion`.
+    pub(crate) gamma: Vec<S>,
+    pub(crate) delassus: Delassus<S>,
+    /// The forces, or impulses. Shape: rows. Written by: the algorithms.
+    pub(crate) lambda: Vec<S>,
+    /// J q̈ + γ. Shape: rows. Written by: the algorithms.
+    pub(crate) error: Vec<S>,
+    /// Of the constraints' accelerations (velocities). Shape: rows × nv. Written by: the algorithms' derivatives.
+    pub(crate) dgamma_dq: DMatrix<S>,
+    pub(crate) dgamma_dv: DMatrix<S>,
+    /// M⁻¹ Jᵀ, and M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
+    pub(crate) U: DMatrix<S>,
+    pub(crate) Jbar: DMatrix<S>,
+    /// Of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
+    pub(crate) dlambda_dq: DMatrix<S>,
+    pub(crate) dlambda_dv: DMatrix<S>,
+    pub(crate) dlambda_dtau: DMatrix<S>,
+}
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// Plans constraints of a model and allocates everything.
+    ///
+    /// # Errors
+    /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
+    /// is `World`, a gain is negative or not finite, or two constraints are the same.
+    pub fn new<R>(model: &Model<R>, constraints: &[Constraint]) -> Result<Self, Error> {
+        let factor = Ltdl::<S>::new(model);
+        let tree = factor.tree();
+        let mut place = vec![0; model.nv];
+        for (k, &coordinate) in tree.order.iter().enumerate() {
+            place[coordinate] = k;
+        }
+        let support = |body: usize| &model.support[model.nodes[body].support..][..model.nodes[body].depth];
+        let mut plans: Vec<Plan> = Vec::new();
+        let (mut row, mut start) = (0, 0);
+        for (i, constraint) in constraints.iter().enumerate() {
+            let bodies = constraint.bodies(model, &constraints[..i])?;
+            let ways = bodies.map(|body| {
+                let mut way = BTreeSet::new(); // with all places before, to the root
+                for &c in support(body) {
+                    let mut k = place[model.columns[c].coordinate];
+                    while k != NONE && way.insert(k) {
+                        k = tree.parent[k];
+                    }
+                }
+                way
+            });
+            let places: Vec<usize> = ways[0].union(&ways[1]).copied().collect();
+            let shared = ways[0].intersection(&ways[1]).count();
+            let branch = |k: &usize| ways[0].contains(k) && !ways[1].contains(k);
+            let second = (shared + 1..places.len()).find(|&j| branch(&places[j]) != branch(&places[j - 1]));
+            let columns: BTreeSet<usize> = bodies.iter().flat_map(|&body| support(body)).copied().collect();
+            let touch = |column: usize| {
+                let c = &model.columns[column];
+                Touch {
+                    column,
+                    at: places.binary_search(&place[c.coordinate]).expect("its place is on the way"),
+                    coordinate: c.coordinate,
+                    ratio: c.ratio,
+                    first: support(bodies[0]).contains(&column),
+                    second: support(bodies[1]).contains(&column),
+                }
+            };
+            let placement = |frame: usize| model.frames[frame].placement;
+            let placements = [placement(constraint.frame), constraint.other.map_or(Se3::identity(), placement)];
+            let turn = |k: usize| Se3::new(model.nodes[bodies[k]].reframing.transpose(), Vec3::zero()) * placements[k];
+            let mut plan = Plan {
+                kind: constraint.kind,
+                reference: constraint.reference,
+                kp: constraint.kp,
+                kd: constraint.kd,
+                bodies,
+                placements,
+                turned: [turn(0), turn(1)],
+                row,
+                coordinates: places.iter().map(|&k| tree.order[k]).collect(),
+                shared,
+                second: second.unwrap_or(places.len()),
+                touches: columns.into_iter().map(touch).collect(),
+                places,
+                start,
+                common: Vec::new(),
+            };
+            plan.common = plans.iter().chain([&plan]).map(|other| common(&plan.places, &other.places)).collect();
+            row += plan.rows();
+            start += plan.rows() * plan.places.len();
+            plans.push(plan);
+        }
+        let (rows, entries, nv) = (row, start, model.nv);
+        let touching = |k: usize| {
+            let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
+            touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
+        };
+        let coupled = |k: usize| {
+            // what carries a frame moves the force on the other one
+            let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
+            let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
+            model.coupled[k].iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
+        };
+        let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
+        Ok(Self {
+            proximal: Proximal::default(),
+            targets: constraints.iter().map(|c| c.target.lift()).collect(),
+            nv,
+            tree: model.tree,
+            coupled: (0..nv).map(coupled).collect(),
+            touching: (0..nv).map(touching).collect(),
+            J: vec![o; entries],
+            gamma: vec![o; rows],
+            delassus: Delassus::new(rows, entries),
+            lambda: vec![o; rows],
+            error: vec![o; rows],
+            dgamma_dq: wide.clone(),
+            dgamma_dv: wide.clone(),
+            U: DMatrix::from_element(tall.0, tall.1, o),
+            Jbar: DMatrix::from_element(tall.0, tall.1, o),
+            dlambda_dq: wide.clone(),
+            dlambda_dv: wide.clone(),
+            dlambda_dtau: wide,
+            plans,
+        })
+    }
+
+    /// How many constraints there are.
+    pub fn len(&self) -> usize {
+        self.plans.len()
+    }
+
+    /// Whether there is no constraint.
+    pub fn is_empty(&self) -> bool {
+        self.plans.is_empty()
+    }
+
+    /// How many rows J has, and λ numbers.
+    pub fn rows(&self) -> usize {
+        self.lambda.len()
+    }
+
+    /// The rows of constraint k.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    pub fn range(&self, k: usize) -> Range<usize> {
+        self.plans[k].row..self.plans[k].row + self.plans[k].rows()
+    }
+
+    /// Where constraint k wants its frame to be: to be changed between calls, in each lane by itself.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    pub fn target_mut(&mut self, k: usize) -> &mut Target<S> {
+        &mut self.targets[k]
+    }
+
+    /// J, rows × nv, as the last call left it: J is overwritten.
+    ///
+    /// # Panics
+    /// If `J` is not rows × nv.
+    pub fn jacobian(&self, J: &mut DMatrix<S>) {
+        let shape = (self.rows(), self.nv);
+        assert!(J.shape() == shape, "J: expected {} × {}, found {:?}", shape.0, shape.1, J.shape());
+        J.fill(S::zero());
+        for plan in &self.plans {
+            for r in 0..plan.rows() {
+                let row = &self.J[plan.range(r)];
+                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                    J[(plan.row + r, coordinate)] = row[k];
+                }
+            }
+        }
+    }
+
+    /// Panics unless this was made for a model of the same tree.
+    #[track_caller]
+    pub(crate) fn check<R>(&self, model: &Model<R>) {
+        assert!(self.tree == model.tree, "constraints: made for another model than `{}`", model.name);
+    }
+}

@@ -1,0 +1,278 @@
+//! Impacts: how velocities jump when constraints set in, and the derivatives, by hand.
+//!
+//! An impulse Λ of the constraints, in no time, so that nothing else acts and no body moves, makes them part again with
+//! the restitution ε, 0 (they stick) to 1 (nothing is lost):
+//!
+//! ```text
+//! M (v⁺ − v) = Jᵀ Λ,   J v⁺ = −ε J v          (A Newtonian restitution: Featherstone 2008, section 11.7)
+//! ```
+//!
+//! These are the equations of constrained dynamics for Δ = v⁺ − v in place of q̈, τ − h = 0 and γ = (1 + ε) J v, and so
+//! are their derivatives, with r = ∂(M Δ − Jᵀ Λ)/∂q (inverse dynamics of a robot at rest, weightless, that accelerates
+//! with Δ) and c = ∂(J w)/∂q, w = v⁺ + ε v:
+//!
+//! ```text
+//! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
+//! ```
+
+use crate::constrained_dynamics::inertia;
+use crate::constraint_motion::Ends;
+use crate::constraint_set::ConstraintSet;
+use crate::data::{Data, Size, check};
+use crate::kinematics::{World, place};
+use crate::layout::{Layout, Single};
+use crate::ltdl::axpy;
+use crate::model::Model;
+use crate::rnea_derivatives;
+use condyle_spatial::{Constant, Cross, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// v⁺. Shape: nv. Written by: `pass`.
+    v_after: Vec<S>,
+    /// w = v⁺ + ε v. Shape: nv. Written by: `pass`.
+    w: Vec<S>,
+    /// The bodies' velocities for w, in the world's frame. Shape: bodies. Written by: `spread`.
+    velocity: Vec<Motion<S>>,
+    /// Ψ̇ for w. Shape: columns. Written by: `spread`.
+    Psid: Vec<Motion<S>>,
+    /// Zeros. Shape: nv. Written by: nobody.
+    zero: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            v_after: vec![S::zero(); size.nv],
+            w: vec![S::zero(); size.nv],
+            velocity: vec![Motion::zero(); size.bodies],
+            Psid: vec![Motion::zero(); size.columns],
+            zero: vec![S::zero(); size.nv],
+        }
+    }
+}
+
+/// What [`impulse_dynamics`] gives.
+#[derive(Clone, Copy, Debug)]
+pub struct Impulse<'d, S> {
+    /// v⁺, the velocity after the impact, nv numbers (rad/s, m/s).
+    pub v: &'d [S],
+    /// Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s); as many
+    /// numbers as there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding.
+    pub redundant: S,
+}
+
+/// v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact.
+///
+/// q: nq numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy. Of the
+/// constraints, frames and reference frames count; gains and targets do not, but for where the other frame's point is.
+/// Works on the tree's zeros, as [`constrained_dynamics`](crate::constrained_dynamics()) does, with the same
+/// [`Proximal`](crate::Proximal) settings. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms*
+/// (2008), section 11.7.
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, impulse_dynamics, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let feet = ["LF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
+/// let mut touchdown = ConstraintSet::new(&quadruped, &feet.map(Constraint::point))?;
+/// let (mut data, q, mut v) = (Data::new(&quadruped), neutral(&quadruped), [0.0; 18]);
+/// v[2] = -1.0; // falling
+/// let after = impulse_dynamics(&quadruped, &mut data, &mut touchdown, &q, &v, 0.0);
+/// assert!(after.residual < 1e-12 && after.lambda[2] > 0.0); // the ground pushes upwards
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn impulse_dynamics<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    restitution: S,
+) -> Impulse<'d, S> {
+    checks(model, data, constraints, q, v);
+    pass(&Single::new(model), data, constraints, q, v, restitution);
+    Impulse {
+        v: &data.impulse_dynamics.v_after,
+        lambda: &constraints.lambda,
+        residual: constraints.residual(),
+        redundant: constraints.delassus.redundant,
+    }
+}
+
+#[track_caller]
+fn checks<S, R>(model: &Model<R>, data: &Data<S>, constraints: &ConstraintSet<S>, q: &[S], v: &[S])
+where
+    S: Scalar,
+{
+    data.check(model);
+    constraints.check(model);
+    model.check_regular();
+    check("q", q.len(), model.nq);
+    check("v", v.len(), model.nv);
+}
+
+/// The whole algorithm.
+#[inline(always)]
+fn pass<L: Layout>(
+    l: &L,
+    data: &mut Data<L::S>,
+    constraints: &mut ConstraintSet<L::S>,
+    q: &[L::S],
+    v: &[L::S],
+    restitution: L::S,
+) {
+    place(l, &mut data.world, q);
+    let (world, d, out) = (&data.world, &mut data.constrained_dynamics, &mut data.impulse_dynamics);
+    inertia(l, world, d);
+    d.factor.factorize(&d.M);
+    for (i, plan) in constraints.plans.iter().enumerate() {
+        Ends::at_rest(plan, &constraints.targets[i], world).jacobian(plan, &world.S, &mut constraints.J);
+    }
+    for k in 0..v.len() {
+        out.w[k] = v[k].mul_add(restitution, v[k]); // (1 + ε) v
+    }
+    let mut gamma = core::mem::take(&mut constraints.gamma);
+    gamma.fill(L::S::zero());
+    constraints.add_motion(&out.w, &mut gamma);
+    constraints.gamma = gamma;
+    constraints.solve(&d.factor, &out.zero, &mut d.qdd); // Δ
+    for k in 0..v.len() {
+        out.v_after[k] = v[k] + d.qdd[k];
+        out.w[k] = v[k].mul_add(restitution, out.v_after[k]);
+    }
+}
+
+/// The velocities of all bodies for w and Ψ̇ = v_λ × S, for bodies that are placed.
+#[inline(always)]
+fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { w, velocity, Psid, .. } = d;
+    for i in l.bodies() {
+        let v_parent = l.parent(velocity, i);
+        let mut v_i = v_parent;
+        for k in 0..l.joint(i).nv() {
+            let c = l.slot(i) + k;
+            Psid[c] = v_parent.cross(S[c]);
+            v_i = S[c].scale_add(l.load(w, i, k), v_i);
+        }
+        velocity[i] = v_i;
+    }
+}
+
+/// What [`impulse_dynamics_derivatives`] gives.
+#[derive(Clone, Copy, Debug)]
+pub struct ImpulseDerivatives<'d, S> {
+    /// v⁺ itself, nv numbers.
+    pub v: &'d [S],
+    /// Λ itself, as many numbers as there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding.
+    pub redundant: S,
+    /// ∂v⁺/∂q in the tangent space, nv × nv: the change of v⁺ when q moves to q ⊕ δ, per δ.
+    pub dv_dq: &'d DMatrix<S>,
+    /// ∂v⁺/∂v, nv × nv.
+    pub dv_dv: &'d DMatrix<S>,
+    /// ∂Λ/∂q in the tangent space, rows × nv.
+    pub dlambda_dq: &'d DMatrix<S>,
+    /// ∂Λ/∂v, rows × nv.
+    pub dlambda_dv: &'d DMatrix<S>,
+    /// (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
+    pub inertia: &'d DMatrix<S>,
+}
+
+/// [`impulse_dynamics`] and its derivatives with respect to q and the velocity before the impact, exact.
+///
+/// q: nq numbers; v: nv; restitution: ε. As
+/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()) in cost, and in what it says of redundant
+/// constraints. Allocates nothing.
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, impulse_dynamics_derivatives, robots};
+/// let arm = robots::arm7();
+/// let (mut hit, mut data) = (ConstraintSet::new(&arm, &[Constraint::point(arm.frame("tool")?)])?, Data::new(&arm));
+/// let d = impulse_dynamics_derivatives(&arm, &mut data, &mut hit, &[0.3; 7], &[0.1; 7], 0.0);
+/// let again = d.dv_dv * d.dv_dv; // an impact that sticks is a projection
+/// assert!((again - d.dv_dv).amax() < 1e-9);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    restitution: S,
+) -> ImpulseDerivatives<'d, S> {
+    checks(model, data, constraints, q, v);
+    let l = Single::new(model);
+    pass(&l, data, constraints, q, v, restitution);
+    let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
+    let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
+    constraints.load(model, world, &[], &mut d.forces);
+    rnea_derivatives::pass(&l, world, id, &out.zero, change, &d.forces, Vec3::zero()); // ∂(M Δ − Jᵀ Λ)/∂q
+    constraints.add_turning(world, &mut id.dtau_dq);
+    spread(&l, world, out);
+    constraints.dgamma_dq.fill(S::zero());
+    for (plan, target) in constraints.plans.iter().zip(&constraints.targets) {
+        let ends = Ends::new(plan, target, world, &out.velocity, &out.velocity);
+        let value = &constraints.error[plan.row..plan.row + plan.rows()];
+        ends.velocity_derivative(plan, &world.S, &out.Psid, value, &mut constraints.dgamma_dq);
+    }
+    constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
+    constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
+    constraints.respond_to_v_before(restitution, &mut d.da_dv);
+    let (d, c) = (&data.constrained_derivatives, &*constraints);
+    ImpulseDerivatives {
+        v: &data.impulse_dynamics.v_after,
+        lambda: &c.lambda,
+        residual: c.residual(),
+        redundant: c.delassus.redundant,
+        dv_dq: &d.da_dq,
+        dv_dv: &d.da_dv,
+        dlambda_dq: &c.dlambda_dq,
+        dlambda_dv: &c.dlambda_dv,
+        inertia: &c.delassus.inverse,
+    }
+}
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
+    #[inline(always)]
+    fn respond_to_v_before(&mut self, restitution: S, dv: &mut DMatrix<S>) {
+        let (n, rows) = (self.nv, self.lambda.len());
+        let (Jbar, inertia) = (self.Jbar.as_slice(), self.delassus.inverse.as_slice());
+        let (dv, dlambda) = (dv.as_mut_slice(), self.dlambda_dv.as_mut_slice());
+        let scale = -(S::one() + restitution);
+        dv.fill(S::zero());
+        dlambda.fill(S::zero());
+        for k in 0..n {
+            dv[k * (n + 1)] = S::one();
+        }
+        for plan in &self.plans {
+            for r in 0..plan.rows() {
+                let (J, row) = (&self.J[plan.range(r)], plan.row + r);
+                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                    let x = J[k] * scale;
+                    axpy(x, &Jbar[row * n..(row + 1) * n], &mut dv[coordinate * n..(coordinate + 1) * n]);
+                    let column = &mut dlambda[coordinate * rows..(coordinate + 1) * rows];
+                    axpy(x, &inertia[row * rows..(row + 1) * rows], column);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! What the algorithms see of a tree of bodies.
+
+use crate::model::{Body, Column, Model, Node};
+use condyle_spatial::{Act, Se3, Vec3};
+
+impl Model {
+    /// Derives from the bodies what the algorithms see: turned frames, columns, and each body's ancestors.
+    pub(crate) fn add_nodes(&mut self) {
+        let mut last_column: Vec<Option<usize>> = Vec::new(); // of each body or, failing one, of its ancestors
+        for (i, body) in self.bodies.iter().enumerate() {
+            let reframing = body.joint.reframing();
+            let bXz = Se3::new(reframing, Vec3::zero());
+            let leads = |b: &&Body| b.mimic.is_none() && b.idx_v == body.idx_v;
+            let (joint, offset) = match body.mimic {
+                None => (body.joint, Se3::identity()),
+                Some(mimic) => {
+                    let leader = self.bodies[1..].iter().find(leads).expect("a mimic joint follows a joint");
+                    let joint = body.joint.following(leader.joint, mimic).expect("the builder has checked it");
+                    (joint, joint.offset(mimic))
+                }
+            };
+            let pXz = if i == 0 { Se3::identity() } else { Se3::new(self.nodes[body.parent].reframing, Vec3::zero()) };
+            let first = self.columns.len();
+            let mut path = Vec::new();
+            if i > 0 {
+                let mut parent = last_column[body.parent];
+                for k in 0..body.joint.nv() {
+                    let depth = parent.map_or(0, |p| self.columns[p].depth + 1);
+                    let ratio = body.mimic.map_or(1.0, |m| m.ratio);
+                    self.columns.push(Column { coordinate: body.idx_v + k, ratio, parent, end: 0, depth });
+                    parent = Some(first + k);
+                }
+                path.extend(std::iter::successors(parent, |&c| self.columns[c].parent));
+                path.reverse();
+                last_column.push(parent);
+            } else {
+                last_column.push(None);
+            }
+            self.nodes.push(Node {
+                joint,
+                parent: body.parent,
+                idx_q: body.idx_q,
+                idx_v: body.idx_v,
+                mimic: body.mimic,
+                column: first,
+                support: self.support.len(),
+                depth: path.len(),
+                placement: pXz.inverse() * body.placement * bXz * offset,
+                inertia: bXz.act_inv(body.inertia),
+                reframing,
+            });
+            self.support.extend(path);
+        }
+        // depth first, so a subtree's columns end where its last descendant's do
+        for c in (0..self.columns.len()).rev() {
+            self.columns[c].end = self.columns[c].end.max(c + 1);
+            if let Some(p) = self.columns[c].parent {
+                self.columns[p].end = self.columns[p].end.max(self.columns[c].end);
+            }
+        }
+        let coupled = |c: usize| {
+            let mut rows: Vec<usize> = std::iter::successors(Some(c), |&c| self.columns[c].parent).collect();
+            rows.reverse();
+            rows.extend(c + 1..self.columns[c].end);
+            rows
+        };
+        // Fowler, Noll, Vo (1991): FNV-1a
+        let structure = self.columns.iter().flat_map(|c| [c.coordinate, c.parent.map_or(0, |p| p + 1)]);
+        let structure = structure.chain(self.nodes.iter().flat_map(|n| [n.parent, n.column]));
+        self.tree = structure.fold(0xcbf2_9ce4_8422_2325, |hash, x| (hash ^ x as u64).wrapping_mul(0x100_0000_01b3));
+        let all = || (0..self.nv).collect(); // joints that follow tie branches together
+        self.coupled = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) }).collect();
+    }
+}

@@ -1,0 +1,282 @@
+//! The second derivatives of inverse dynamics, contracted with a vector, by hand.
+//!
+//! φ = λᵀ τ(q, v, a) is the power of the efforts at the velocity λ: φ = Σ ⟨w_i, F_i⟩, where w_i is the velocity of body i
+//! when the joints move with λ. When coordinate e changes, all that its joint carries turns rigidly about S_e, which no
+//! power feels, and beside that (`rnea_derivatives.rs`, with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e)
+//!
+//! ```text
+//! by q_e:  δw = W_e,  δv = Ψ̇_e,  δa = Ψ̈_e + Ψ̇_e × v        by q̇_e:  δv = S_e,  δa = Y_e + S_e × v
+//! ```
+//!
+//! for each body it carries. Applied twice, to a column d and a column e before it, everything that depends on the bodies
+//! collapses to sums over what joint d carries: Iᶜ, 2Bᶜ, F as in the first derivatives, the momentum P = Σ I w, the rate
+//! of inertia D = Σ (w ×* I − I w ×), and Q = Σ 2Bᵀ w. Six forces of column d serve all columns e before it:
+//!
+//! ```text
+//! A₁ = Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F     A₂ = Iᶜ W_d + S_d ×* P     A₃ = 2Bᵀ W_d + S_d ×* Q + Ψ̇_d ×* P − D Ψ̇_d
+//! B₁ = Iᶜ Y_d + 2B S_d                  B₂ = S_d ×* P − D S_d       C = Iᶜ S_d
+//!
+//! ∂²φ/∂q_d∂q_e = ⟨W_e, A₁⟩ + ⟨Ψ̈_e, A₂⟩ + ⟨Ψ̇_e, A₃⟩
+//! ∂²φ/∂q̇_e∂q_d = ⟨Y_e, A₂⟩ + ⟨S_e, A₃⟩     ∂²φ/∂q̇_d∂q_e = ⟨W_e, B₁⟩ + ⟨Ψ̇_e, B₂⟩     ∂²φ/∂q̇_d∂q̇_e = ⟨S_e, B₂⟩
+//! ∂²φ/∂q̈_e∂q_d = ⟨S_e, A₂⟩                  ∂²φ/∂q̈_d∂q_e = ⟨W_e, C⟩
+//! ```
+//!
+//! Two columns of one joint: B₁ and C as above, ∂²φ/∂q̇_d∂q̇_e = −⟨S_e, D S_d⟩, and ∂²φ/∂q_d∂q_e is the mean of the line
+//! above and the same with d and e exchanged, since q ⊕ δ is an exponential of δ. So the price is that of a few first
+//! derivatives, O(n · depth), where the tensors have n³ entries.
+//!
+//! The papers on the tensors are Singh, Russell, Wensing, *On second-order derivatives of rigid-body dynamics: theory and
+//! implementation* (2024), and on the contracted form Nganga and Wensing, *Accelerating second-order differential dynamic
+//! programming for rigid-body systems* (2021); the sums above are those of the first, contracted before they are expanded.
+
+use crate::coriolis::Coriolis;
+use crate::data::{Data, Size, check};
+use crate::dispatch::kernel;
+use crate::kinematics::World;
+use crate::layout::{Layout, Single};
+use crate::model::Model;
+use crate::rnea_derivatives::{self, RneaDerivatives, rnea_derivatives};
+use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+/// In the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// w, the velocity at λ. Shape: bodies. Written by: `pass`.
+    w: Vec<Motion<S>>,
+    /// W = w_λ × S. Shape: columns. Written by: `pass`.
+    W: Vec<Motion<S>>,
+    /// P and D. Shape: bodies. Written by: `pass`.
+    PD: Vec<Coriolis<S>>,
+    /// Q, of which only the angular part is not zero. Shape: bodies. Written by: `pass`.
+    Q: Vec<Vec3<S>>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub dqdq: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub dvdq: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub dvdv: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub dadq: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        Self {
+            w: vec![Motion::zero(); size.bodies],
+            W: vec![Motion::zero(); size.columns],
+            PD: vec![Coriolis::zero(); size.bodies],
+            Q: vec![Vec3::zero(); size.bodies],
+            dqdq: square.clone(),
+            dvdq: square.clone(),
+            dvdv: square.clone(),
+            dadq: square,
+        }
+    }
+}
+
+/// The whole algorithm, after `rnea_derivatives::pass`, whose sums over what joints carry it reads.
+#[inline(always)]
+fn pass<L: Layout>(
+    l: &L,
+    World { oX, S }: &World<L::S>,
+    first: &rnea_derivatives::Workspace<L::S>,
+    d: &mut Workspace<L::S>,
+    lambda: &[L::S],
+) {
+    let rnea_derivatives::Workspace { v, IC, BC, F, Psid, Psidd, PsidSd: Y, .. } = first;
+    let Workspace { w, W, PD, Q, dqdq, dvdq, dvdv, dadq } = d;
+    for i in l.bodies() {
+        let w_parent = l.parent(w, i);
+        let mut w_i = w_parent;
+        for k in 0..l.joint(i).nv() {
+            let c = l.slot(i) + k;
+            W[c] = w_parent.cross(S[c]); // W = w_λ × S
+            w_i = S[c].scale_add(l.load(lambda, i, k), w_i); // w_i = w_λ + S λ
+        }
+        w[i] = w_i;
+        let I = oX[i].act(l.inertia(i));
+        PD[i] = Coriolis::of(I, w_i); // P = I w, D = w ×* I − I w ×
+        Q[i] = Coriolis::of(I, v[i]).apply_transpose(w_i); // Q = 2Bᵀ w
+    }
+    let half = L::S::splat(0.5);
+    let (qq, vq) = (dqdq.as_mut_slice(), dvdq.as_mut_slice());
+    let (vv, aq) = (dvdv.as_mut_slice(), dadq.as_mut_slice());
+    for block in [&mut *qq, &mut *vq, &mut *vv, &mut *aq] {
+        block.fill(L::S::zero());
+    }
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        let (before, own) = support.split_at(support.len() - nv);
+        let (P, D) = (PD[i].momentum, PD[i].inertia_rate());
+        for k in 0..nv {
+            let s = l.slot(i) + k;
+            let column = own[k];
+            let SP = S[s].cross(P);
+            let DS = D * S[s];
+            let A1 = IC[i] * Psidd[s] + BC[i].apply(Psid[s]) + S[s].cross(F[i]); // A₁ = Iᶜ Ψ̈ + 2B Ψ̇ + S ×* F
+            let A2 = IC[i] * W[s] + SP; // A₂ = Iᶜ W + S ×* P
+            let mut A3 = Psid[s].cross(P) - D * Psid[s]; // A₃ = Ψ̇ ×* P − D Ψ̇
+            A3.angular += BC[i].apply_transpose(W[s]) + S[s].angular.cross(Q[i]); //  + 2Bᵀ W + S ×* Q
+            let B1 = IC[i] * Y[s] + BC[i].apply(S[s]); // B₁ = Iᶜ Y + 2B S
+            let B2 = SP - DS; // B₂ = S ×* P − D S
+            let C = IC[i] * S[s]; // C = Iᶜ S
+            for &e in before {
+                let (S_e, W_e, Y_e) = (l.at(S, e), l.at(W, e), l.at(Y, e));
+                let (Psid_e, Psidd_e) = (l.at(Psid, e), l.at(Psidd, e));
+                let x = W_e.dot(A1) + Psidd_e.dot(A2) + Psid_e.dot(A3); // ∂²φ/∂q_d∂q_e
+                l.add_at(qq, column, e, x);
+                l.add_at(qq, e, column, x);
+                l.add_at(vq, e, column, Y_e.dot(A2) + S_e.dot(A3)); // ∂²φ/∂q̇_e∂q_d
+                l.add_at(vq, column, e, W_e.dot(B1) + Psid_e.dot(B2)); // ∂²φ/∂q̇_d∂q_e
+                let x = S_e.dot(B2); // ∂²φ/∂q̇_d∂q̇_e
+                l.add_at(vv, column, e, x);
+                l.add_at(vv, e, column, x);
+                l.add_at(aq, e, column, S_e.dot(A2)); // ∂²φ/∂q̈_e∂q_d
+                l.add_at(aq, column, e, W_e.dot(C)); // ∂²φ/∂q̈_d∂q_e
+            }
+            for &e in own {
+                let (W_e, Psid_e) = (l.at(W, e), l.at(Psid, e));
+                let x = (W_e.dot(A1) + l.at(Psidd, e).dot(A2) + Psid_e.dot(A3)) * half;
+                l.add_at(qq, column, e, x);
+                l.add_at(qq, e, column, x);
+                l.add_at(vq, column, e, W_e.dot(B1) + Psid_e.dot(B2));
+                l.add_at(vv, column, e, -l.at(S, e).dot(DS));
+                l.add_at(aq, column, e, W_e.dot(C));
+            }
+        }
+        let (PD_i, Q_i) = (PD[i], Q[i]);
+        l.push(PD, i, PD_i);
+        l.push(Q, i, Q_i);
+    }
+}
+
+kernel! {
+    /// After `rnea_derivatives::pass`.
+    pub(crate) fn run(model, data, lambda: &[S]) {
+        pass(&Single::new(model), &data.world, &data.rnea_derivatives, &mut data.rnea_hessian, lambda);
+    }
+}
+
+/// The second derivatives of φ = λᵀ rnea(q, v, a), each a full nv × nv matrix; those by v and a, and by a twice, are zero.
+///
+/// They are the Hessian of φ(q ⊕ δ, v + …, a + …) at δ = 0.
+#[derive(Clone, Copy, Debug)]
+pub struct RneaHessian<'d, S, R = f64> {
+    /// ∂²φ/∂q∂q, symmetric.
+    pub dqdq: &'d DMatrix<S>,
+    /// ∂²φ/∂v∂q: entry (j, k) is ∂²φ/∂v_j∂q_k.
+    pub dvdq: &'d DMatrix<S>,
+    /// ∂²φ/∂v∂v, symmetric.
+    pub dvdv: &'d DMatrix<S>,
+    /// ∂²φ/∂a∂q: entry (j, k) is ∂²φ/∂a_j∂q_k, the derivative of M λ by q.
+    pub dadq: &'d DMatrix<S>,
+    /// The first derivatives of τ, which come with them.
+    pub first: RneaDerivatives<'d, S, R>,
+}
+
+/// The second derivatives of [`rnea`](crate::rnea), contracted with a vector λ: the Hessian of φ = λᵀ τ(q, v, a), exact,
+/// in O(n · depth).
+///
+/// q: nq numbers; v, a, lambda: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
+/// Returns four nv × nv matrices (in units of λᵀ τ by those of q, v and a), and the first derivatives of τ. Allocates
+/// nothing. Source: see the head of the file.
+///
+/// ```
+/// use condyle_dynamics::{Data, rnea_hessian, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, a, lambda) = ([0.3; 7], [0.1; 7], [0.2; 7], [1.0; 7]);
+/// let hessian = rnea_hessian(&arm, &mut data, &q, &v, &a, &[], &lambda);
+/// // φ is quadratic in v: λᵀ (τ(v) + τ(−v) − 2 τ(0)) = vᵀ ∂²φ/∂v² v
+/// let v = nalgebra::DVector::from_row_slice(&v);
+/// let quadratic = v.dot(&(hessian.dvdv * &v));
+/// let mut effort = |s: f64| condyle_dynamics::rnea(&arm, &mut data, &q, (&v * s).as_slice(), &a, &[]).iter().sum::<f64>();
+/// assert!((effort(1.0) + effort(-1.0) - 2.0 * effort(0.0) - quadratic).abs() < 1e-12);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+    f_ext: &[Force<S>],
+    lambda: &[S],
+) -> RneaHessian<'d, S, R> {
+    check("lambda", lambda.len(), model.nv);
+    rnea_derivatives(model, data, q, v, a, f_ext);
+    run(model, data, lambda);
+    let first = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives);
+    let Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
+    RneaHessian { dqdq, dvdq, dvdv, dadq, first }
+}
+
+/// The second derivatives of τ = rnea(q, v, a): one Hessian for each effort, 4 nv³ numbers.
+#[derive(Clone, Debug)]
+pub struct RneaSecondDerivatives<S> {
+    /// ∂²τ_i/∂q∂q for each i, symmetric.
+    pub dqdq: Vec<DMatrix<S>>,
+    /// ∂²τ_i/∂v∂q for each i: entry (j, k) is ∂²τ_i/∂v_j∂q_k.
+    pub dvdq: Vec<DMatrix<S>>,
+    /// ∂²τ_i/∂v∂v for each i, symmetric.
+    pub dvdv: Vec<DMatrix<S>>,
+    /// ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
+    pub dadq: Vec<DMatrix<S>>,
+    /// The unit vectors. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
+    lambda: Vec<S>,
+}
+
+impl<S: Scalar> RneaSecondDerivatives<S> {
+    /// Memory for the tensors of a model.
+    pub fn new<R>(model: &Model<R>) -> Self {
+        let zeros = || vec![DMatrix::from_element(model.nv, model.nv, S::zero()); model.nv];
+        let lambda = vec![S::zero(); model.nv];
+        Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
+    }
+}
+
+/// The second derivatives of [`rnea`](crate::rnea) as full tensors, in O(n² · depth).
+///
+/// q: nq numbers; v, a: nv; f_ext: a force on each body in its frame, or empty for none; out is overwritten. Allocates
+/// nothing. A solver wants them contracted: [`rnea_hessian`], which this calls for each unit vector.
+///
+/// ```
+/// use condyle_dynamics::{Data, RneaSecondDerivatives, rnea_second_derivatives, robots};
+/// let arm = robots::arm7();
+/// let mut tensors = RneaSecondDerivatives::new(&arm);
+/// let (q, o) = ([0.3; 7], [0.0; 7]);
+/// rnea_second_derivatives(&arm, &mut Data::new(&arm), &q, &o, &o, &[], &mut tensors);
+/// let (dM_01, dM_10) = (tensors.dadq[0].row(1), tensors.dadq[1].row(0));
+/// assert!((dM_01 - dM_10).amax() < 1e-14); // M is symmetric wherever q goes
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` or `out` was made for a model of another tree.
+pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+    f_ext: &[Force<S>],
+    out: &mut RneaSecondDerivatives<S>,
+) {
+    check("out", out.lambda.len(), model.nv);
+    rnea_derivatives(model, data, q, v, a, f_ext);
+    for i in 0..model.nv {
+        out.lambda[i] = S::one();
+        run(model, data, &out.lambda);
+        out.lambda[i] = S::zero();
+        let Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
+        out.dqdq[i].copy_from(dqdq);
+        out.dvdq[i].copy_from(dvdq);
+        out.dvdv[i].copy_from(dvdv);
+        out.dadq[i].copy_from(dadq);
+    }
+}

@@ -1,0 +1,57 @@
+//! Random constraints.
+
+use super::{State, all_models, normal3, random_pose, rng};
+use condyle_dynamics::{
+    Constraint, ConstraintKind, ConstraintSet, Data, Model, Motion, ReferenceFrame, Target,
+    constrained_dynamics_derivatives,
+};
+use rand::RngExt;
+use rand::rngs::StdRng;
+
+/// Sets whose Λ has a greater condition number say nothing about the algorithm.
+const WORST_CONDITION: f64 = 1e4;
+
+/// A contact or loop, a point or a frame, in either reference, with any gains and targets.
+pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> Constraint {
+    let frames = model.frames().len();
+    let motion = |rng: &mut StdRng| Motion::new(normal3(rng), normal3(rng));
+    let gain = |rng: &mut StdRng| if rng.random::<bool>() { 5.0 * rng.random::<f64>() } else { 0.0 };
+    Constraint {
+        frame: rng.random_range(0..frames),
+        other: rng.random::<bool>().then(|| rng.random_range(0..frames)),
+        kind: if rng.random::<bool>() { ConstraintKind::Point } else { ConstraintKind::Rigid },
+        reference: if rng.random::<bool>() { ReferenceFrame::Local } else { ReferenceFrame::LocalWorldAligned },
+        kp: gain(rng),
+        kd: gain(rng),
+        target: Target { placement: random_pose(rng), velocity: motion(rng), acceleration: motion(rng) },
+    }
+}
+
+/// Some constraints that the robot can satisfy at a state, in one way.
+pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng) -> Vec<Constraint> {
+    let mut chosen = Vec::new();
+    let mut data = Data::new(model);
+    for _ in 0..12 {
+        chosen.push(random_constraint(model, rng));
+        let regular = ConstraintSet::new(model, &chosen).is_ok_and(|mut set| {
+            let d = constrained_dynamics_derivatives(model, &mut data, &mut set, &state.q, &state.v, &state.tau, &[]);
+            let inertias = d.inertia.clone().symmetric_eigenvalues();
+            d.redundant == 0.0 && inertias.max() < WORST_CONDITION * inertias.min()
+        });
+        if !regular {
+            chosen.pop();
+        }
+    }
+    chosen
+}
+
+/// Models, each with a state and constraints that it can satisfy in one way.
+pub(crate) fn cases(trees: u64) -> Vec<(Model, State, Vec<Constraint>)> {
+    let with_constraints = |(seed, model): (usize, Model)| {
+        let mut rng = rng(seed as u64);
+        let state = State::random(&model, &mut rng);
+        let constraints = random_constraints(&model, &state, &mut rng);
+        (model, state, constraints)
+    };
+    all_models(trees).into_iter().enumerate().map(with_constraints).collect()
+}

@@ -1,0 +1,360 @@
+//! Constrained dynamics and impacts: the constraints hold, with forces of theirs and no others.
+#![allow(non_snake_case)]
+
+use crate::common;
+
+use common::contacts::{cases, random_constraint};
+use common::{State, Worst, all_models, dual, lift, moved, normal, rng};
+use condyle_dynamics::{
+    Act, Constraint, ConstraintKind, ConstraintSet, Data, Error, Force, Model, ModelBuilder, Motion, Proximal,
+    ReferenceFrame, Se3, Target, aba, constrained_dynamics, constrained_dynamics_derivatives, crba,
+    forward_accelerations, forward_kinematics, forward_velocities, impulse_dynamics, impulse_dynamics_derivatives, lie,
+    minv, rnea, robots,
+};
+use nalgebra::{DMatrix, DVector};
+use num_dual::Dual64;
+
+/// Two exact ways, some thousand roundings each.
+const EXACT: f64 = 1e-11;
+/// The same after a product with M or its inverse, whose condition is up to 1e4, or Λ's.
+const CONDITIONED: f64 = 1e-9;
+const TREES: u64 = 15;
+
+/// What a constraint asks to vanish, from the public kinematics, the velocities' rates by dual numbers in time.
+fn wanted(model: &Model, c: &Constraint, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
+    let world = ReferenceFrame::World;
+    let mut data = Data::<Dual64>::new(model);
+    let later = moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v));
+    let later = forward_velocities(model, &mut data, &later, &dual(v, a));
+    let (x1, v1) = (later.frame(c.frame), later.frame_velocity(c.frame, world));
+    let target = c.target.placement.lift();
+    let (x2, v2) = match c.other {
+        Some(f) => (later.frame(f) * target, later.frame_velocity(f, world)),
+        None => (target, Motion::zero()),
+    };
+    let mut data = Data::new(model);
+    let now = forward_kinematics(model, &mut data, q);
+    let now = (now.frame(c.frame), c.other.map_or(Se3::identity(), |f| now.frame(f)) * c.target.placement);
+    let turn = Se3::new(now.0.rotation, condyle_dynamics::Vec3::zero());
+    let shift = Se3::new(condyle_dynamics::Mat3::identity(), now.0.translation);
+    let local = c.reference == ReferenceFrame::Local;
+    let split =
+        |m: Motion<Dual64>| [Motion::from(m.to_array().map(|x| x.re)), Motion::from(m.to_array().map(|x| x.eps))];
+    let ([velocity, rate], error) = match c.kind {
+        ConstraintKind::Rigid => {
+            let x = now.1.inverse() * now.0;
+            let error = lie::log6(lie::Quaternion::from_rotation(x.rotation), x.translation);
+            if local {
+                (split(x1.act_inv(v1 - v2)), error)
+            } else {
+                (split(v1 - v2).map(|m| shift.act_inv(m)), turn.act(error))
+            }
+        }
+        ConstraintKind::Point => {
+            let at = |v: Motion<Dual64>, p: condyle_dynamics::Vec3<Dual64>| v.linear + v.angular.cross(p);
+            let u = at(v1, x1.translation) - at(v2, x2.translation);
+            let zero = condyle_dynamics::Vec3::zero();
+            let parts = split(Motion::new(u, condyle_dynamics::Vec3::zero()));
+            let error = Motion::new(now.0.translation - now.1.translation, zero);
+            if local { (parts.map(|m| turn.act_inv(m)), turn.act_inv(error)) } else { (parts, error) }
+        }
+    };
+    let Target { velocity: v_wanted, acceleration: a_wanted, .. } = c.target;
+    let value = rate - a_wanted + (velocity - v_wanted).scale(c.kd) + error.scale(c.kp);
+    value.to_array()[..c.kind.rows()].to_vec()
+}
+
+/// The effort of a constraint's force, from the public Jacobians.
+fn effort(model: &Model, c: &Constraint, force: Force<f64>, q: &[f64]) -> DVector<f64> {
+    let mut data = Data::new(model);
+    let placements = forward_kinematics(model, &mut data, q);
+    let mut J = DMatrix::zeros(6, model.nv());
+    placements.frame_jacobian(c.frame, c.reference, &mut J);
+    let own = J.tr_mul(&DVector::from_row_slice(&force.to_array()));
+    let Some(other) = c.other else { return own };
+    let x1 = placements.frame(c.frame);
+    let shift = Se3::new(condyle_dynamics::Mat3::identity(), x1.translation);
+    let oF = if c.reference == ReferenceFrame::Local { x1.act(force) } else { shift.act(force) };
+    let oF = match c.kind {
+        ConstraintKind::Rigid => oF,
+        ConstraintKind::Point => {
+            let p = (placements.frame(other) * c.target.placement).translation;
+            Force::new(oF.linear, p.cross(oF.linear))
+        }
+    };
+    placements.frame_jacobian(other, ReferenceFrame::World, &mut J);
+    own - J.tr_mul(&DVector::from_row_slice(&oF.to_array()))
+}
+
+/// Every constraint holds, and M q̈ + h − Jᵀ λ = τ: the two halves of what defines the solution.
+#[test]
+fn constraints_hold_by_forces_of_their_own() {
+    let mut held = Worst::new("J q̈ + γ", CONDITIONED);
+    let mut balance = Worst::new("M q̈ + h − Jᵀ λ − τ", CONDITIONED);
+    let (mut kinds, mut rows) = (std::collections::BTreeSet::new(), 0);
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        let d = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &s.f_ext);
+        assert_eq!(d.redundant, 0.0);
+        assert!(d.residual < CONDITIONED);
+        let (a, lambda) = (d.a.to_vec(), d.lambda.to_vec());
+        let mut tau = DVector::from_row_slice(rnea(&model, &mut data, &s.q, &s.v, &a, &s.f_ext));
+        for (k, c) in constraints.iter().enumerate() {
+            let value = wanted(&model, c, &s.q, &s.v, &a);
+            held.see(&model, &value, &vec![0.0; value.len()]);
+            assert_eq!(set.force(k).to_array()[..c.kind.rows()], lambda[set.range(k)]);
+            tau -= effort(&model, c, set.force(k), &s.q);
+            kinds.insert((c.kind.rows(), c.other.is_some(), c.reference == ReferenceFrame::Local));
+        }
+        balance.see(&model, tau.as_slice(), &s.tau);
+        rows += set.rows();
+    }
+    assert_eq!(kinds.len(), 8, "points and frames, contacts and loops, in both references");
+    println!("{rows} rows in all");
+}
+
+/// Of a contact, the axes of the rows change λ's axes and nothing else.
+#[test]
+fn references_turn_forces_only() {
+    let mut worst = Worst::new("q̈ in both references", CONDITIONED);
+    for (seed, model) in all_models(TREES).into_iter().enumerate() {
+        let mut rng = rng(seed as u64);
+        let (s, mut data) = (State::random(&model, &mut rng), Data::new(&model));
+        let contact = |rng: &mut _| {
+            let c = Constraint { other: None, kd: 3.0, kp: 2.0, ..random_constraint(&model, rng) };
+            let target = Target { placement: c.target.placement, ..Target::identity() };
+            Constraint { target, ..c }
+        };
+        let Some(c) = (0..100).map(|_| contact(&mut rng)).find(|&c| {
+            ConstraintSet::<f64>::new(&model, &[c]).is_ok_and(|mut set| {
+                let d = impulse_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, 0.0);
+                d.redundant == 0.0 && d.inertia.amax() < 1e4
+            })
+        }) else {
+            panic!("no contact on\n{model}");
+        };
+        let mut run = |reference| {
+            let mut set = ConstraintSet::new(&model, &[Constraint { reference, ..c }]).unwrap();
+            let a = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]).a.to_vec();
+            (a, set.force(0))
+        };
+        let (a, local) = run(ReferenceFrame::Local);
+        let (same, aligned) = run(ReferenceFrame::LocalWorldAligned);
+        worst.see(&model, &a, &same);
+        let R = forward_kinematics(&model, &mut data, &s.q).frame(c.frame).rotation;
+        worst.see(&model, &(R * local.linear).to_array(), &aligned.linear.to_array());
+        worst.see(&model, &(R * local.angular).to_array(), &aligned.angular.to_array());
+    }
+}
+
+/// Where the robot stands: the humanoid on both soles, its knees bent.
+fn standing() -> (Model, State, [usize; 2]) {
+    let model = robots::humanoid();
+    let mut state = State::random(&model, &mut rng(7));
+    let soles = ["left_sole", "right_sole"].map(|name| model.frame(name).unwrap());
+    for (q, lower) in state.q.iter_mut().skip(7).zip(7..) {
+        *q = 0.2 + 0.01 * f64::from(lower);
+    }
+    (model, state, soles)
+}
+
+/// Rows that depend on others are found and get no force; with μ they share it, the motion being the same.
+#[test]
+fn redundant_constraints() {
+    let (model, s, [left, right]) = standing();
+    let mut data = Data::new(&model);
+    let once = [
+        Constraint::rigid(left),
+        Constraint { reference: ReferenceFrame::LocalWorldAligned, ..Constraint::rigid(right) },
+    ];
+    // the ankle's frame is on the same body as the sole
+    let body = model.frames()[left].body;
+    let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
+    let twice = [once[0], once[1], Constraint::rigid(again)];
+    let mut single = ConstraintSet::new(&model, &once).unwrap();
+    let reference = constrained_dynamics_derivatives(&model, &mut data, &mut single, &s.q, &s.v, &s.tau, &[]);
+    assert_eq!(reference.redundant, 0.0);
+    let (a, da_dq) = (reference.a.to_vec(), reference.da_dq.clone());
+    for proximal in [Proximal::default(), Proximal { mu: 1e-8, iterations: 4 }] {
+        let mut set = ConstraintSet::new(&model, &twice).unwrap();
+        set.proximal = proximal;
+        let d = constrained_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
+        assert_eq!(d.redundant, if proximal.mu > 0.0 { 0.0 } else { 6.0 });
+        assert!(d.residual < CONDITIONED);
+        assert!(common::relative(d.a, &a) < CONDITIONED);
+        assert!(common::relative(d.da_dq.as_slice(), da_dq.as_slice()) < CONDITIONED);
+        let shared = d.lambda[12..].iter().any(|&x| x != 0.0);
+        assert_eq!(shared, proximal.mu > 0.0, "the third constraint carries a share with μ only");
+    }
+}
+
+/// The forces found with μ are the smallest ones: those of M⁻¹ and the pseudo-inverse, however many points stand in line.
+#[test]
+fn smallest_forces() {
+    let mut builder = ModelBuilder::new("box");
+    let inertia =
+        condyle_dynamics::Inertia::from_com(3.0, condyle_dynamics::Vec3::zero(), condyle_dynamics::Sym3::diagonal(0.1));
+    let body =
+        builder.body("box", condyle_dynamics::WORLD, condyle_dynamics::Joint::FreeFlyer, Se3::identity(), inertia);
+    for (k, x) in [-1.0, 0.0, 2.0].into_iter().enumerate() {
+        let placement = Se3 { translation: condyle_dynamics::Vec3::new(x, 0.0, -0.5), ..Se3::identity() };
+        builder.frame(&format!("f{k}"), body, placement);
+    }
+    let model = builder.build().unwrap();
+    let points = ["f0", "f1", "f2"].map(|name| Constraint::point(model.frame(name).unwrap()));
+    let (mut data, q) = (Data::new(&model), [0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0]);
+    let mut set = ConstraintSet::new(&model, &points).unwrap();
+    let d = constrained_dynamics(&model, &mut data, &mut set, &q, &[0.0; 6], &[0.0; 6], &[]);
+    assert_eq!(d.redundant, 4.0, "a line of points holds all but its own rotation");
+    assert!(d.residual < 1e-12 && d.a.iter().all(|a: &f64| a.abs() < 1e-12));
+    set.proximal = Proximal { mu: 1e-6, iterations: 5 };
+    let d = constrained_dynamics(&model, &mut data, &mut set, &q, &[0.0; 6], &[0.0; 6], &[]);
+    assert!(d.redundant == 0.0 && d.residual < CONDITIONED);
+    let lambda = DVector::from_row_slice(d.lambda);
+    let mut J = DMatrix::zeros(9, 6);
+    set.jacobian(&mut J);
+    let Minv = minv(&model, &mut data, &q).clone();
+    let free = DVector::from_row_slice(aba(&model, &mut data, &q, &[0.0; 6], &[0.0; 6], &[]));
+    let smallest = -(&J * Minv * J.transpose()).pseudo_inverse(1e-9).unwrap() * J * free;
+    assert!((lambda - smallest).amax() < 1e-6);
+}
+
+/// Constraints that contradict each other give the solution of the first, finite, and say so.
+#[test]
+fn contradictions() {
+    let (model, s, [left, _]) = standing();
+    let body = model.frames()[left].body;
+    let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
+    let mut data = Data::new(&model);
+    let mut first = ConstraintSet::new(&model, &[Constraint::rigid(left)]).unwrap();
+    let a = constrained_dynamics(&model, &mut data, &mut first, &s.q, &s.v, &s.tau, &[]).a.to_vec();
+    let mut other = Constraint::point(again);
+    other.target.acceleration.linear.z = 1.0 + 1e3;
+    let mut set = ConstraintSet::new(&model, &[Constraint::rigid(left), other]).unwrap();
+    let d = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
+    assert_eq!(d.redundant, 3.0);
+    assert!(d.residual > 500.0);
+    assert!(common::relative(d.a, &a) < CONDITIONED);
+}
+
+/// Without constraints it is forward dynamics, and nothing happens in an impact.
+#[test]
+fn no_constraint() {
+    for (seed, model) in all_models(4).iter().enumerate() {
+        let (s, mut data) = (State::random(model, &mut rng(seed as u64)), Data::new(model));
+        let mut set = ConstraintSet::new(model, &[]).unwrap();
+        assert!(set.is_empty() && set.rows() == 0);
+        let d = constrained_dynamics_derivatives(model, &mut data, &mut set, &s.q, &s.v, &s.tau, &s.f_ext);
+        assert_eq!(d.residual, 0.0);
+        let a = d.a.to_vec();
+        let expected = aba(model, &mut data, &s.q, &s.v, &s.tau, &s.f_ext);
+        assert!(common::relative(&a, expected) < EXACT);
+        assert_eq!(impulse_dynamics(model, &mut data, &mut set, &s.q, &s.v, 0.0).v, s.v);
+    }
+}
+
+/// T⁺ = T for ε = 1; for ε = 0 the energy lost is that of the velocity lost, ½ Δᵀ M Δ (Carnot's theorem).
+#[test]
+fn energy_of_impacts() {
+    let mut worst = Worst::new("energy of impacts", CONDITIONED);
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        let M = crba(&model, &mut data, &s.q).clone();
+        let energy = |v: &DVector<f64>| 0.5 * v.dot(&(&M * v));
+        let before = DVector::from_row_slice(&s.v);
+        let mut after = |restitution| {
+            let d = impulse_dynamics(&model, &mut data, &mut set, &s.q, &s.v, restitution);
+            assert!(d.residual < CONDITIONED && d.redundant == 0.0);
+            DVector::from_row_slice(d.v)
+        };
+        let (bounced, stuck) = (after(1.0), after(0.0));
+        worst.see(&model, &[energy(&bounced)], &[energy(&before)]);
+        worst.see(&model, &[energy(&stuck) + energy(&(before - &stuck))], &[energy(&DVector::from_row_slice(&s.v))]);
+    }
+}
+
+/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0; and the
+/// acceleration is the allowed one nearest to the free one, so no allowed change brings it nearer (Gauss).
+#[test]
+fn gauss_principle() {
+    let mut worst = Worst::new("Gauss's principle", CONDITIONED);
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        let d = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &s.f_ext);
+        let a = DVector::from_row_slice(d.a);
+        let free = DVector::from_row_slice(aba(&model, &mut data, &s.q, &s.v, &s.tau, &s.f_ext));
+        let any = normal(&mut rng(3), model.nv());
+        let allowed = DVector::from_row_slice(impulse_dynamics(&model, &mut data, &mut set, &s.q, &any, 0.0).v);
+        let work = allowed.dot(&(crba(&model, &mut data, &s.q) * (a - free)));
+        worst.see(&model, &[work], &[0.0]);
+    }
+}
+
+/// Targets in the set count, and can be changed.
+#[test]
+fn moving_targets() {
+    let (model, s, [left, right]) = standing();
+    let mut data = Data::new(&model);
+    let mut set = ConstraintSet::new(&model, &[Constraint::rigid(left), Constraint::point(right)]).unwrap();
+    constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
+    set.target_mut(1).acceleration.linear.y = 0.7;
+    let a = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]).a.to_vec();
+    let motion = forward_accelerations(&model, &mut data, &s.q, &s.v, &a);
+    let found = motion.frame_classical_acceleration(right, ReferenceFrame::Local).linear;
+    assert!(common::relative(&found.to_array(), &[0.0, 0.7, 0.0]) < EXACT);
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let model = robots::quadruped();
+    let [foot, trunk] = ["LF_foot", "trunk"].map(|name| model.frame(name).unwrap());
+    let (point, none) = (Constraint::point(foot), model.frames().len());
+    let refused = |constraints: &[Constraint]| match ConstraintSet::<f64>::new(&model, constraints) {
+        Err(error @ Error::Constraint { .. }) => error.to_string(),
+        other => panic!("{other:?}"),
+    };
+    let cases = [
+        (
+            refused(&[point, Constraint::point(none)]),
+            format!("constraint 1: there is no frame {none}: the model has {none}"),
+        ),
+        (
+            refused(&[Constraint { other: Some(none), ..point }]),
+            format!("constraint 0: there is no frame {none}: the model has {none}"),
+        ),
+        (
+            refused(&[Constraint { other: Some(foot), ..point }]),
+            "constraint 0: frames `LF_foot` and `LF_foot` do not move relative to each other".to_owned(),
+        ),
+        (
+            refused(&[Constraint { reference: ReferenceFrame::World, ..point }]),
+            "constraint 0: its reference frame must be Local or LocalWorldAligned, found World".to_owned(),
+        ),
+        (
+            refused(&[Constraint { kd: -1.0, ..point }]),
+            "constraint 0: kd must be a number of at least 0, found -1".to_owned(),
+        ),
+        (
+            refused(&[Constraint { kp: f64::NAN, ..point }]),
+            "constraint 0: kp must be a number of at least 0, found NaN".to_owned(),
+        ),
+        (
+            refused(&[point, Constraint::point(trunk), point]),
+            "constraint 2: it holds frame `LF_foot` as constraint 0 does already".to_owned(),
+        ),
+    ];
+    for (found, expected) in cases {
+        assert_eq!(found, expected);
+    }
+}
+
+#[test]
+#[should_panic = "constraints: made for another model than `arm7`"]
+fn another_robots_constraints() {
+    let (arm, quadruped) = (robots::arm7(), robots::quadruped());
+    let mut set = ConstraintSet::<f64>::new(&quadruped, &[]).unwrap();
+    constrained_dynamics(&arm, &mut Data::new(&arm), &mut set, &[0.0; 7], &[0.0; 7], &[0.0; 7], &[]);
+}

@@ -1,0 +1,210 @@
+//! The derivatives of constrained dynamics and of impacts by hand against dual numbers and against differences.
+#![allow(non_snake_case)]
+
+use crate::common;
+
+use common::contacts::cases;
+use common::{State, Worst, dual, eps, lift, lift_forces, moved, unit};
+use condyle_dynamics::{
+    Constraint, ConstraintSet, Data, Force, Model, Scalar, constrained_dynamics, constrained_dynamics_derivatives,
+    crba, impulse_dynamics, impulse_dynamics_derivatives,
+};
+use nalgebra::{DMatrix, DVector};
+use num_dual::Dual64;
+
+/// Two exact ways, some thousand roundings each.
+const EXACT: f64 = 1e-11;
+/// The same after a product with M or its inverse, whose condition is up to 1e4, or Λ's.
+const CONDITIONED: f64 = 1e-9;
+/// Central differences with a step of 1e-5: rounding of 1e-16/step, and step² times a third derivative.
+const DIFFERENCES: f64 = 1e-6;
+const STEP: f64 = 1e-5;
+const TREES: u64 = 15;
+
+/// q̈ and λ, or v⁺ and Λ, as a function of q, v and τ.
+trait Algorithm {
+    fn run<S: Scalar>(
+        model: &Model,
+        data: &mut Data<S>,
+        set: &mut ConstraintSet<S>,
+        x: [&[S]; 3],
+        f: &[Force<S>],
+    ) -> Vec<S>;
+}
+
+struct Dynamics;
+
+impl Algorithm for Dynamics {
+    fn run<S: Scalar>(
+        model: &Model,
+        data: &mut Data<S>,
+        set: &mut ConstraintSet<S>,
+        [q, v, tau]: [&[S]; 3],
+        f: &[Force<S>],
+    ) -> Vec<S> {
+        let d = constrained_dynamics(model, data, set, q, v, tau, f);
+        [d.a, d.lambda].concat()
+    }
+}
+
+const RESTITUTION: f64 = 0.3;
+
+struct Impact;
+
+impl Algorithm for Impact {
+    fn run<S: Scalar>(
+        model: &Model,
+        data: &mut Data<S>,
+        set: &mut ConstraintSet<S>,
+        [q, v, _]: [&[S]; 3],
+        _: &[Force<S>],
+    ) -> Vec<S> {
+        let d = impulse_dynamics(model, data, set, q, v, S::splat(RESTITUTION));
+        [d.v, d.lambda].concat()
+    }
+}
+
+/// The derivatives with respect to q, v and τ by dual numbers.
+fn by_duals<A: Algorithm>(
+    model: &Model,
+    s: &State,
+    constraints: &[Constraint],
+    f_ext: &[Force<f64>],
+) -> [DMatrix<f64>; 3] {
+    let nv = model.nv();
+    let mut data = Data::new(model);
+    let mut set = ConstraintSet::<Dual64>::new(model, constraints).unwrap();
+    let f = lift_forces(f_ext);
+    let mut out = [(); 3].map(|()| DMatrix::zeros(nv + set.rows(), nv));
+    for k in 0..nv {
+        let e = unit(nv, k);
+        let (q, v, tau) = (lift(&s.q), lift(&s.v), lift(&s.tau));
+        let q_later = moved(model, &q, &dual(&vec![0.0; nv], &e));
+        let (v_later, tau_later) = (dual(&s.v, &e), dual(&s.tau, &e));
+        let inputs = [[&q_later[..], &v, &tau], [&q, &v_later, &tau], [&q, &v, &tau_later]];
+        for (which, x) in inputs.into_iter().enumerate() {
+            out[which].column_mut(k).copy_from_slice(&eps(&A::run(model, &mut data, &mut set, x, &f)));
+        }
+    }
+    out
+}
+
+/// The same by central differences.
+fn by_differences<A: Algorithm>(
+    model: &Model,
+    s: &State,
+    constraints: &[Constraint],
+    f_ext: &[Force<f64>],
+) -> [DMatrix<f64>; 3] {
+    let nv = model.nv();
+    let mut data = Data::new(model);
+    let mut set = ConstraintSet::<f64>::new(model, constraints).unwrap();
+    let mut out = [(); 3].map(|()| DMatrix::zeros(nv + set.rows(), nv));
+    for k in 0..nv {
+        let mut run = |which: usize, h: f64| {
+            let d: Vec<f64> = unit(nv, k).iter().map(|e| e * h).collect();
+            let add = |y: &[f64]| y.iter().zip(&d).map(|(y, d)| y + d).collect::<Vec<_>>();
+            let (q, v, tau) = (moved(model, &s.q, &d), add(&s.v), add(&s.tau));
+            let x = [[&q[..], &s.v, &s.tau], [&s.q, &v, &s.tau], [&s.q, &s.v, &tau]][which];
+            DVector::from_vec(A::run(model, &mut data, &mut set, x, f_ext))
+        };
+        for (which, out) in out.iter_mut().enumerate() {
+            out.set_column(k, &((run(which, STEP) - run(which, -STEP)) / (2.0 * STEP)));
+        }
+    }
+    out
+}
+
+fn stack(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
+    out.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    out
+}
+
+#[test]
+fn derivatives_of_constrained_dynamics() {
+    let names = ["∂(q̈, λ)/∂q", "∂(q̈, λ)/∂v", "∂(q̈, λ)/∂τ"];
+    let mut exact = names.map(|name| Worst::new(name, EXACT));
+    let mut near = names.map(|name| Worst::new(name, DIFFERENCES));
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        for f_ext in [&[][..], &s.f_ext] {
+            let value = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+            let value = [value.a, value.lambda].concat();
+            let d = constrained_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+            assert_eq!([d.a, d.lambda].concat(), value);
+            let found = [stack(d.da_dq, d.dlambda_dq), stack(d.da_dv, d.dlambda_dv), stack(d.da_dtau, d.dlambda_dtau)];
+            let duals = by_duals::<Dynamics>(&model, &s, &constraints, f_ext);
+            let differences = by_differences::<Dynamics>(&model, &s, &constraints, f_ext);
+            for k in 0..3 {
+                exact[k].see(&model, found[k].as_slice(), duals[k].as_slice());
+                near[k].see(&model, found[k].as_slice(), differences[k].as_slice());
+            }
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_impulse_dynamics() {
+    let names = ["∂(v⁺, Λ)/∂q", "∂(v⁺, Λ)/∂v"];
+    let mut exact = names.map(|name| Worst::new(name, EXACT));
+    let mut near = names.map(|name| Worst::new(name, DIFFERENCES));
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        let d = impulse_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, RESTITUTION);
+        let found = [stack(d.dv_dq, d.dlambda_dq), stack(d.dv_dv, d.dlambda_dv)];
+        let duals = by_duals::<Impact>(&model, &s, &constraints, &[]);
+        let differences = by_differences::<Impact>(&model, &s, &constraints, &[]);
+        for k in 0..2 {
+            exact[k].see(&model, found[k].as_slice(), duals[k].as_slice());
+            near[k].see(&model, found[k].as_slice(), differences[k].as_slice());
+        }
+    }
+}
+
+/// K K⁻¹ = 1, with the blocks of K⁻¹ as they are returned.
+#[test]
+fn inverse_of_the_whole_matrix() {
+    let mut worst = Worst::new("K K⁻¹ − 1", CONDITIONED);
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        let d = constrained_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
+        let (P, inertia, dlambda_dtau) = (d.da_dtau.clone(), d.inertia.clone(), d.dlambda_dtau.clone());
+        let (nv, rows) = (model.nv(), set.rows());
+        let (mut K, mut inverse) = (DMatrix::zeros(nv + rows, nv + rows), DMatrix::zeros(nv + rows, nv + rows));
+        let mut J = DMatrix::zeros(rows, nv);
+        set.jacobian(&mut J);
+        K.view_mut((0, 0), (nv, nv)).copy_from(crba(&model, &mut data, &s.q));
+        K.view_mut((nv, 0), (rows, nv)).copy_from(&J);
+        K.view_mut((0, nv), (nv, rows)).copy_from(&J.transpose());
+        inverse.view_mut((0, 0), (nv, nv)).copy_from(&P);
+        inverse.view_mut((nv, 0), (rows, nv)).copy_from(&-&dlambda_dtau);
+        inverse.view_mut((0, nv), (nv, rows)).copy_from(&-dlambda_dtau.transpose());
+        inverse.view_mut((nv, nv), (rows, rows)).copy_from(&-inertia);
+        worst.see(&model, (K * inverse).as_slice(), DMatrix::identity(nv + rows, nv + rows).as_slice());
+    }
+}
+
+/// Rows that depend on others have no force at neighbouring states either, so all derivatives are exact.
+#[test]
+fn redundant_constraints() {
+    let mut exact = Worst::new("redundant constraints", EXACT);
+    for (model, s, constraints) in cases(TREES) {
+        let Some(&first) = constraints.first() else { continue };
+        let body = |frame: usize| model.frames()[frame].body;
+        let twin = (0..model.frames().len()).find(|&f| f != first.frame && body(f) == body(first.frame));
+        let Some(frame) = twin else { continue };
+        let twice: Vec<_> = constraints.into_iter().chain([Constraint { frame, ..first }]).collect();
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &twice).unwrap();
+        let d = constrained_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
+        let found = [stack(d.da_dq, d.dlambda_dq), stack(d.da_dv, d.dlambda_dv), stack(d.da_dtau, d.dlambda_dtau)];
+        let duals = by_duals::<Dynamics>(&model, &s, &twice, &[]);
+        for k in 0..3 {
+            exact.see(&model, found[k].as_slice(), duals[k].as_slice());
+        }
+    }
+}

@@ -1,0 +1,375 @@
+//! Divide and conquer gives the accelerations of the articulated-body algorithm, in O(log n) steps, whatever the threads.
+#![allow(non_snake_case)]
+
+use crate::common;
+
+use common::{State, Worst, all_models, lift, lift_forces, random_inertia, random_pose, rng};
+use condyle_dynamics::{
+    BodyId, Data, DivideConquer, Error, Inertia, Joint, JointOptions, Mat3, Model, ModelBuilder, Scalar, Se3, Sym3,
+    Vec3, WORLD, aba, robots,
+};
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use num_dual::Dual64;
+use std::cell::Cell;
+
+/// Some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in the robots and grows with the cube
+/// of a chain's length: 1e8 for 300 links. Of that, aba itself loses as much; the largest accelerations, to which the
+/// error is relative, are those of the light tips and grow alike.
+const INVERTED: f64 = 1e-10;
+const TREES: u64 = 30;
+
+/// n hinges (and slides, one in four), each body on the one that `parent` names; on a free-flyer if `floating`.
+fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) -> Model {
+    let rng = &mut rng(n as u64);
+    let mut builder = ModelBuilder::new("tree");
+    let mut ids: Vec<BodyId> = vec![WORLD];
+    for i in 1..=n {
+        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
+        let joint = match i {
+            1 if floating => Joint::FreeFlyer,
+            _ if i % 4 == 0 => Joint::Prismatic { axis },
+            _ => Joint::Revolute { axis },
+        };
+        ids.push(builder.body(&format!("b{i}"), ids[parent(i)], joint, random_pose(rng), random_inertia(rng)));
+    }
+    builder.build().expect("a tree is well-formed")
+}
+
+fn chain(n: usize) -> Model {
+    tree(n, false, |i| i - 1)
+}
+
+fn shapes(n: usize, floating: bool) -> [Model; 4] {
+    [
+        tree(n, floating, |i| i - 1),                                                // chain
+        tree(n, floating, |i| i / 2),                                                // binary tree
+        tree(n, floating, |i| usize::from(i > 1)),                                   // star
+        tree(n, floating, |i| if i % 3 == 1 { i.saturating_sub(3) } else { i - 1 }), // caterpillar
+    ]
+}
+
+fn without_mimics(trees: u64) -> Vec<Model> {
+    all_models(trees).into_iter().filter(|m| m.bodies().iter().all(|b| b.mimic.is_none())).collect()
+}
+
+fn check(worst: &mut Worst, model: &Model, seed: u64) {
+    let State { q, v, tau, f_ext, .. } = State::random(model, &mut rng(seed));
+    let mut data = Data::new(model);
+    let n = model.bodies().len() - 1;
+    for grain in [1, 2, 5, n.div_ceil(2), n] {
+        let mut divided = DivideConquer::new(model, grain).expect("no joint follows another");
+        for f_ext in [&f_ext[..], &[]] {
+            let expected = aba(model, &mut data, &q, &v, &tau, f_ext);
+            worst.see(model, divided.aba(model, &q, &v, &tau, f_ext), expected);
+        }
+    }
+}
+
+#[test]
+fn every_joint_type() {
+    let mut worst = Worst::new("divide and conquer on robots and random trees", INVERTED);
+    for (seed, model) in without_mimics(TREES).iter().enumerate() {
+        check(&mut worst, model, seed as u64);
+    }
+}
+
+#[test]
+fn chains() {
+    let mut worst = Worst::new("divide and conquer on chains", INVERTED);
+    for n in (1..=20).chain([31, 32, 33, 64, 100, 127, 200, 300]) {
+        check(&mut worst, &chain(n), n as u64);
+    }
+}
+
+#[test]
+fn branches_and_floating_bases() {
+    let mut worst = Worst::new("divide and conquer on other shapes", INVERTED);
+    for floating in [false, true] {
+        for n in [1, 2, 3, 7, 20, 63, 150] {
+            for model in shapes(n, floating) {
+                check(&mut worst, &model, n as u64);
+            }
+        }
+    }
+}
+
+/// Several robots on the world are one model.
+#[test]
+fn a_forest() {
+    let mut worst = Worst::new("divide and conquer on forests", INVERTED);
+    for n in [2, 9, 40] {
+        check(&mut worst, &tree(n, false, |i| if i % 4 == 1 { 0 } else { i - 1 }), n as u64);
+    }
+}
+
+/// Bodies without mass, and point masses on their hinge's axis, are no trouble as long as something below them has mass.
+#[test]
+fn bodies_without_mass() {
+    let mut worst = Worst::new("divide and conquer with massless bodies", INVERTED);
+    for n in [4, 11, 30, 60] {
+        let rng = &mut rng(n);
+        let mut builder = ModelBuilder::new("chain");
+        let mut last = WORLD;
+        for i in 1..=n {
+            let axis = Vec3::new(0.0, 1.0, 0.0);
+            let inertia = match i % 5 {
+                _ if i == n => random_inertia(rng),
+                1 => Inertia::zero(),
+                2 => Inertia::from_com(1.0, axis.scale(0.3), Sym3::zero()),
+                _ => random_inertia(rng),
+            };
+            last = builder.body(&format!("b{i}"), last, Joint::Revolute { axis }, random_pose(rng), inertia);
+        }
+        let model = builder.build().expect("a chain is well-formed");
+        check(&mut worst, &model, n);
+        let size = DivideConquer::<f64>::new(&model, 1).expect("no joint follows another").size();
+        assert_eq!(size.longest_run, 3, "a massless body, a point mass, and the one below");
+    }
+}
+
+/// A floating palm with four fingers of four hinges, the last three of them parallel, and light tips. The larger a finger's
+/// joint number, the larger its rotor.
+fn hand(rotor: f64) -> Model {
+    let inertia = |mass: f64| Inertia::from_com(mass, Vec3::new(0.0, 0.0, 0.02), Sym3::diagonal(1e-4 * mass));
+    let at = |y: f64, z: f64| Se3::new(Mat3::identity(), Vec3::new(0.0, y, z));
+    let mut builder = ModelBuilder::new("hand");
+    let palm = builder.body("palm", WORLD, Joint::FreeFlyer, at(0.0, 0.0), inertia(0.5));
+    for finger in 0..4 {
+        let mut last = palm;
+        for k in 0..4 {
+            let axis = if k == 0 { Vec3::new(0.0, 0.0, 1.0) } else { Vec3::new(0.0, 1.0, 0.0) };
+            let placement = if k == 0 { at(0.03 * f64::from(finger), 0.1) } else { at(0.0, 0.04) };
+            let mass = if k == 3 { 1e-3 } else { 0.05 };
+            let options = JointOptions { armature: rotor * f64::from(1 + k), ..JointOptions::default() };
+            let name = format!("finger {finger}, joint {k}");
+            let joint = Joint::Revolute { axis };
+            last = builder.body_with((&name, &name), last, joint, placement, inertia(mass), options);
+        }
+    }
+    builder.build().expect("a hand is well-formed")
+}
+
+/// Fewer degrees of freedom than six, in a plane, between the handles of a piece: its compliance Y is singular.
+#[test]
+fn fingers() {
+    let mut worst = Worst::new("divide and conquer on hands", INVERTED);
+    for rotor in [0.0, 1e-3, 0.1, 0.3] {
+        let model = hand(rotor);
+        for seed in 0..20 {
+            check(&mut worst, &model, seed);
+        }
+    }
+}
+
+/// Tangents, by the same source.
+#[test]
+fn on_dual_numbers() {
+    let mut worst = Worst::new("derivatives by divide and conquer", INVERTED);
+    for (seed, model) in without_mimics(4).iter().enumerate() {
+        let State { q, v, a, tau, f_ext } = State::random(model, &mut rng(seed as u64));
+        let q = common::moved(model, &lift(&q), &common::dual(&vec![0.0; a.len()], &a));
+        let (v, tau, f_ext): (Vec<Dual64>, Vec<Dual64>, _) = (lift(&v), lift(&tau), lift_forces(&f_ext));
+        let expected = common::eps(aba(model, &mut Data::new(model), &q, &v, &tau, &f_ext));
+        for grain in [1, 4] {
+            let mut divided = DivideConquer::new(model, grain).expect("no joint follows another");
+            worst.see(model, &common::eps(divided.aba(model, &q, &v, &tau, &f_ext)), &expected);
+        }
+    }
+}
+
+/// The assembly fixes every sum, so the bits do not depend on who computes it.
+#[test]
+fn same_bits_for_any_number_of_threads() {
+    let pools: Vec<_> = [1, 2, 3]
+        .into_iter()
+        .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started"))
+        .collect();
+    let models = without_mimics(4).into_iter().chain(shapes(90, true)).chain([chain(300)]);
+    for (seed, model) in models.enumerate() {
+        let State { q, v, tau, f_ext, .. } = State::random(&model, &mut rng(seed as u64));
+        for grain in [1, 7] {
+            let mut divided = DivideConquer::new(&model, grain).expect("no joint follows another");
+            let expected = pools[0].install(|| divided.aba(&model, &q, &v, &tau, &f_ext).to_vec());
+            for pool in &pools {
+                for _ in 0..5 {
+                    let found = pool.install(|| divided.aba(&model, &q, &v, &tau, &f_ext).to_vec());
+                    assert_eq!(found, expected, "{} threads on\n{model}", pool.current_num_threads());
+                }
+            }
+            assert_eq!(divided.aba(&model, &q, &v, &tau, &f_ext), expected);
+        }
+    }
+}
+
+/// A chain of n bodies has ⌈log₂ n⌉ levels of joins; other trees at most about twice as many (heavy paths, cut by weight).
+#[test]
+fn levels() {
+    let log2 = |n: usize| n.next_power_of_two().ilog2() as usize;
+    for n in [1, 2, 3, 4, 5, 8, 31, 32, 33, 300, 1000] {
+        let size = DivideConquer::<f64>::new(&chain(n), 1).expect("no joint follows another").size();
+        assert_eq!((size.levels, size.joins, size.runs, size.longest_run), (1 + log2(n), n - 1, n, 1));
+        for model in shapes(n, false) {
+            let size = DivideConquer::<f64>::new(&model, 1).expect("no joint follows another").size();
+            assert!(size.levels <= 3 + 2 * log2(n), "{size:?} on {n} bodies");
+            assert_eq!(size.bodies, n);
+            for grain in [4, 30] {
+                let size = DivideConquer::<f64>::new(&model, grain).expect("no joint follows another").size();
+                assert!(size.longest_run <= grain, "{size:?}");
+            }
+            let size = DivideConquer::<f64>::new(&model, n).expect("no joint follows another").size();
+            assert_eq!((size.levels, size.runs, size.longest_run), (1, 1, n));
+        }
+    }
+}
+
+thread_local! {
+    static OPERATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// A number that knows how many operations had to be done one after the other for it, and counts all of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Counted {
+    value: f64,
+    steps: u32,
+}
+
+impl Counted {
+    fn after(value: f64, of: &[Self]) -> Self {
+        OPERATIONS.set(OPERATIONS.get() + 1);
+        Self { value, steps: 1 + of.iter().map(|x| x.steps).max().unwrap_or(0) }
+    }
+}
+
+macro_rules! operators {
+    ($($trait:ident $name:ident),*) => {$(
+        impl $trait for Counted {
+            type Output = Self;
+            fn $name(self, o: Self) -> Self {
+                Self::after(self.value.$name(o.value), &[self, o])
+            }
+        }
+    )*};
+}
+operators!(Add add, Sub sub, Mul mul, Div div);
+
+impl Neg for Counted {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { value: -self.value, ..self }
+    }
+}
+impl AddAssign for Counted {
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
+impl SubAssign for Counted {
+    fn sub_assign(&mut self, o: Self) {
+        *self = *self - o;
+    }
+}
+impl Scalar for Counted {
+    type Mask = bool;
+    const LANES: usize = 1;
+
+    fn splat(value: f64) -> Self {
+        Self { value, steps: 0 }
+    }
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self::after(self.value * b.value + c.value, &[self, b, c])
+    }
+    fn recip(self) -> Self {
+        Self::after(self.value.recip(), &[self])
+    }
+    fn sqrt(self) -> Self {
+        Self::after(self.value.sqrt(), &[self])
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.value.sin_cos();
+        (Self::after(sin, &[self]), Self::after(cos, &[self]))
+    }
+    fn atan2(self, x: Self) -> Self {
+        Self::after(self.value.atan2(x.value), &[self, x])
+    }
+    fn abs(self) -> Self {
+        Self { value: self.value.abs(), ..self }
+    }
+    fn lt(self, o: Self) -> bool {
+        self.value < o.value
+    }
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        Self { value: if mask { a.value } else { b.value }, steps: a.steps.max(b.steps) }
+    }
+    fn and(a: bool, b: bool) -> bool {
+        a && b
+    }
+    fn or(a: bool, b: bool) -> bool {
+        a || b
+    }
+}
+
+/// Operations in all, and the longest row of operations that had to wait for one another.
+fn counted<'a>(f: impl FnOnce() -> &'a [Counted]) -> (u64, u32) {
+    let before = OPERATIONS.get();
+    let steps = f().iter().map(|x| x.steps).max().unwrap_or(0);
+    (OPERATIONS.get() - before, steps)
+}
+
+/// What was computed, not what was planned: each doubling of a chain adds the same number of steps, where the
+/// articulated-body algorithm doubles them, for a fixed multiple of its work.
+#[test]
+fn steps_grow_with_the_logarithm() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");
+    println!("{:>5} {:>12} {:>7} {:>12} {:>7}", "links", "aba: work", "steps", "here: work", "steps");
+    let mut rows = Vec::new();
+    for n in [8, 16, 32, 64, 128, 256] {
+        let model = chain(n);
+        let State { q, v, tau, .. } = State::random(&model, &mut rng(0));
+        let [q, v, tau]: [Vec<Counted>; 3] = [&q, &v, &tau].map(|x| lift(x));
+        let mut data = Data::new(&model);
+        let recursive = counted(|| aba(&model, &mut data, &q, &v, &tau, &[]));
+        let mut divided = DivideConquer::new(&model, 1).expect("no joint follows another");
+        let divided = pool.install(|| counted(|| divided.aba(&model, &q, &v, &tau, &[])));
+        println!("{n:5} {:12} {:7} {:12} {:7}", recursive.0, recursive.1, divided.0, divided.1);
+        rows.push((recursive, divided));
+    }
+    let added: Vec<u32> = rows.windows(2).map(|w| w[1].1.1 - w[0].1.1).collect();
+    let (least, most) = (added.iter().min(), added.iter().max());
+    assert!(most.unwrap() - least.unwrap() <= most.unwrap() / 4, "steps that a doubling adds: {added:?}");
+    for w in rows.windows(2) {
+        let ratio = f64::from(w[1].0.1) / f64::from(w[0].0.1);
+        assert!((1.8..2.1).contains(&ratio), "the articulated-body algorithm's steps grow by {ratio}");
+    }
+    let (recursive, divided) = rows[rows.len() - 1];
+    assert!(divided.1 * 4 < recursive.1, "{divided:?} against {recursive:?}");
+    assert!(divided.0 < 8 * recursive.0, "{divided:?} against {recursive:?}");
+}
+
+#[test]
+fn joints_that_follow_are_refused() {
+    let model = common::Tree::random_with_mimics(&mut rng(1)).build();
+    let error = DivideConquer::<f64>::new(&model, 1).expect_err("a joint follows another");
+    assert!(matches!(error, Error::Body { .. }), "{error}");
+    assert!(error.to_string().contains("follows another"), "{error}");
+}
+
+#[test]
+fn a_robot_of_nothing() {
+    let model = ModelBuilder::new("nothing").build().expect("nothing is well-formed");
+    assert!(DivideConquer::<f64>::new(&model, 1).expect("no joint").aba(&model, &[], &[], &[], &[]).is_empty());
+}
+
+#[test]
+#[should_panic(expected = "v: expected 7 numbers, found 0")]
+fn wrong_velocity() {
+    let arm = robots::arm7();
+    DivideConquer::new(&arm, 1).unwrap().aba(&arm, &[0.0; 7], &[], &[0.0; 7], &[]);
+}
+
+#[test]
+#[should_panic(expected = "model: planned for 8 bodies, found 14")]
+fn wrong_model() {
+    let quadruped = robots::quadruped();
+    let mut divided = DivideConquer::new(&robots::arm7(), 1).unwrap();
+    divided.aba(&quadruped, &condyle_dynamics::neutral(&quadruped), &[0.0; 18], &[0.0; 18], &[]);
+}

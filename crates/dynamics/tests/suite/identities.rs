@@ -1,0 +1,207 @@
+//! The algorithms against each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia matrix.
+#![allow(non_snake_case)]
+
+use crate::common;
+
+use common::{State, Tree, Worst, all_models, embedded, joint_placement, own_position, rng};
+use condyle_dynamics::{
+    Act, Data, Force, Joint, Mat3, Model, Se3, Vec3, aba, crba, forward_kinematics, gravity, minv, nonlinear_effects,
+    rnea,
+};
+use nalgebra::{DMatrix, DVector};
+use rand::RngExt;
+
+/// Some hundreds of operations, relative to the largest effort.
+const ROUNDING: f64 = 1e-12;
+/// The same times the condition number of M, which is 1e2 to 1e5 in these robots.
+const INVERTED: f64 = 1e-10;
+const STATES: usize = 1000;
+const TREES: u64 = 30;
+
+fn vector(x: &[f64]) -> DVector<f64> {
+    DVector::from_column_slice(x)
+}
+
+/// rnea = M a + h, h = rnea(q, v, 0), g = rnea(q, 0, 0), M M⁻¹ = 1, aba = M⁻¹ (τ − h), rnea ∘ aba = 1.
+fn check(model: &Model, states: usize, seed: u64) {
+    let mut inverse = Worst::new("M a + h = rnea", ROUNDING);
+    let mut identity = Worst::new("M M⁻¹ = 1", INVERTED);
+    let mut forward = Worst::new("aba = M⁻¹ (τ − h)", INVERTED);
+    let mut round = Worst::new("rnea(aba(τ)) = τ", INVERTED);
+    let mut forced = Worst::new("the same with external forces", INVERTED);
+    let (nv, zero) = (model.nv(), vec![0.0; model.nv()]);
+    let (mut data, mut rng) = (Data::new(model), rng(seed));
+    for _ in 0..states {
+        let State { q, v, a, tau, f_ext } = State::random(model, &mut rng);
+        let h = vector(nonlinear_effects(model, &mut data, &q, &v));
+        assert_eq!(rnea(model, &mut data, &q, &v, &zero, &[]), h.as_slice());
+        let g = gravity(model, &mut data, &q).to_vec();
+        assert_eq!(rnea(model, &mut data, &q, &zero, &zero, &[]), g);
+        let M = crba(model, &mut data, &q).clone();
+        assert_eq!(M, M.transpose());
+        inverse.see(model, (&M * vector(&a) + &h).as_slice(), rnea(model, &mut data, &q, &v, &a, &[]));
+        let Minv = minv(model, &mut data, &q).clone();
+        identity.see(model, (&Minv * &M).as_slice(), DMatrix::identity(nv, nv).as_slice());
+        let qdd = aba(model, &mut data, &q, &v, &tau, &[]).to_vec();
+        forward.see(model, (&Minv * (vector(&tau) - &h)).as_slice(), &qdd);
+        round.see(model, rnea(model, &mut data, &q, &v, &qdd, &[]), &tau);
+        let qdd = aba(model, &mut data, &q, &v, &tau, &f_ext).to_vec();
+        forced.see(model, rnea(model, &mut data, &q, &v, &qdd, &f_ext), &tau);
+    }
+}
+
+#[test]
+fn arm() {
+    check(&embedded()[0], STATES, 1);
+}
+
+#[test]
+fn quadruped() {
+    check(&embedded()[1], STATES, 2);
+}
+
+#[test]
+fn humanoid() {
+    check(&embedded()[2], STATES, 3);
+}
+
+#[test]
+fn random_trees() {
+    for seed in 0..TREES {
+        check(&Tree::random(&mut rng(seed)).build(), 5, seed);
+    }
+}
+
+#[test]
+fn random_trees_with_mimics() {
+    for seed in 0..TREES {
+        check(&Tree::random_with_mimics(&mut rng(seed)).build(), 5, seed);
+    }
+}
+
+/// M is positive definite, on every branching and joint.
+#[test]
+fn inertia_matrix_is_positive() {
+    for (seed, model) in all_models(TREES).iter().enumerate() {
+        let mut data = Data::new(model);
+        let q = State::random(model, &mut rng(seed as u64)).q;
+        assert!(crba(model, &mut data, &q).clone().cholesky().is_some(), "{model}");
+    }
+}
+
+/// Joints that follow are joints of the free robot under a constraint: v_joint = G v, τ = Gᵀ τ_joint, M = Gᵀ M_joint G.
+#[test]
+fn mimics_are_a_projection() {
+    let mut efforts = Worst::new("τ = Gᵀ rnea(G q + o, G v, G a)", ROUNDING);
+    let mut matrix = Worst::new("M = Gᵀ M G", ROUNDING);
+    for seed in 0..TREES {
+        let tree = Tree::random_with_mimics(&mut rng(seed));
+        let (model, free) = (tree.build(), tree.without_mimics().build());
+        assert_eq!(free.nv() - model.nv(), 7);
+        let mut G = DMatrix::zeros(free.nv(), model.nv());
+        let State { q, v, a, f_ext, .. } = State::random(&model, &mut rng(seed));
+        let mut q_free = vec![0.0; free.nq()];
+        for (i, (own, other)) in model.bodies().iter().zip(free.bodies()).enumerate().skip(1) {
+            assert_eq!(own.name, other.name);
+            q_free[other.idx_q..other.idx_q + other.joint.nq()].copy_from_slice(&own_position(&model, i, &q));
+            let ratio = own.mimic.map_or(1.0, |m| m.ratio);
+            for k in 0..own.joint.nv() {
+                G[(other.idx_v + k, own.idx_v + k)] = ratio;
+            }
+        }
+        let (v_free, a_free) = (&G * vector(&v), &G * vector(&a));
+        let mut data = (Data::new(&model), Data::new(&free));
+        let tau_free = rnea(&free, &mut data.1, &q_free, v_free.as_slice(), a_free.as_slice(), &f_ext);
+        let projected = G.transpose() * vector(tau_free);
+        efforts.see(&model, rnea(&model, &mut data.0, &q, &v, &a, &f_ext), projected.as_slice());
+        let M = G.transpose() * crba(&free, &mut data.1, &q_free) * &G;
+        matrix.see(&model, crba(&model, &mut data.0, &q).as_slice(), M.as_slice());
+    }
+}
+
+/// The same robot with its bodies' frames chosen otherwise: any orientation, any origin on the axis of a hinge, any origin
+/// at all on a slide. The coordinates are the same, so efforts, accelerations and M are.
+#[test]
+fn frames_do_not_matter() {
+    let mut efforts = Worst::new("rnea in other frames", ROUNDING);
+    let mut accelerations = Worst::new("aba in other frames", INVERTED);
+    let mut places = Worst::new("frames in other frames", ROUNDING);
+    for seed in 0..2 * TREES {
+        let rng = &mut rng(seed);
+        let tree = if seed % 2 == 0 { Tree::random(rng) } else { Tree::random_with_mimics(rng) };
+        let mut other = tree.clone();
+        // oXn: the new frame of each body in the old one
+        let mut news = vec![Se3::identity()];
+        for part in &mut other.parts {
+            let axis = part.joint.axis().map(|a| a.scale(1.0 / a.norm_squared().sqrt()));
+            let turned = common::random_rotation(rng);
+            let new = match (part.joint, axis) {
+                (Joint::Prismatic { .. }, _) => Se3::new(turned, common::normal3(rng)),
+                (Joint::Translation, _) => Se3::new(Mat3::identity(), common::normal3(rng)),
+                (_, Some(axis)) => Se3::new(turned, axis.scale(rng.random())),
+                _ => Se3::identity(),
+            };
+            let axis = axis.map_or(Vec3::zero(), |a| new.rotation.transpose_mul(a));
+            part.joint = match part.joint {
+                Joint::Revolute { .. } => Joint::Revolute { axis },
+                Joint::Continuous { .. } => Joint::Continuous { axis },
+                Joint::Prismatic { .. } => Joint::Prismatic { axis },
+                Joint::Helical { pitch, .. } => Joint::Helical { axis, pitch },
+                joint => joint,
+            };
+            part.placement = news[part.parent].inverse() * part.placement * new;
+            part.inertia = new.act_inv(part.inertia);
+            part.frame = new.inverse() * part.frame;
+            news.push(new);
+        }
+        let (one, two) = (tree.build(), other.build());
+        let State { q, v, a, tau, f_ext } = State::random(&one, rng);
+        let mut f_other = f_ext.clone();
+        for (i, body) in two.bodies().iter().enumerate().skip(1) {
+            let part: usize = body.name[1..].parse().expect("parts are named by number");
+            f_other[i] = news[part].act_inv(f_ext[i]);
+        }
+        let mut data = (Data::new(&one), Data::new(&two));
+        let expected = rnea(&one, &mut data.0, &q, &v, &a, &f_ext);
+        efforts.see(&one, rnea(&two, &mut data.1, &q, &v, &a, &f_other), expected);
+        let expected = aba(&one, &mut data.0, &q, &v, &tau, &f_ext);
+        accelerations.see(&one, aba(&two, &mut data.1, &q, &v, &tau, &f_other), expected);
+        let expected = forward_kinematics(&one, &mut data.0, &q);
+        let found = forward_kinematics(&two, &mut data.1, &q);
+        for f in 0..one.frames().len() {
+            places.see(&one, &common::flat(found.frame(f)), &common::flat(expected.frame(f)));
+        }
+    }
+}
+
+/// Bodies are where a product of textbook matrices puts them, in the frames that were given.
+#[test]
+fn placements() {
+    let mut worst = Worst::new("oX_i = oX_λ X_T X_J", ROUNDING);
+    for (seed, model) in all_models(TREES).iter().enumerate() {
+        let q = State::random(model, &mut rng(seed as u64)).q;
+        let mut data = Data::new(model);
+        let placements = forward_kinematics(model, &mut data, &q);
+        assert_eq!(placements.body(0), Se3::identity());
+        for (i, body) in model.bodies().iter().enumerate().skip(1) {
+            let own = own_position(model, i, &q);
+            let expected = placements.body(body.parent) * body.placement * joint_placement(body.joint, &own);
+            worst.see(model, &common::flat(placements.body(i)), &common::flat(expected));
+        }
+        for (f, frame) in model.frames().iter().enumerate() {
+            let expected = placements.body(frame.body) * frame.placement;
+            worst.see(model, &common::flat(placements.frame(f)), &common::flat(expected));
+        }
+    }
+}
+
+/// A force on the world moves nothing.
+#[test]
+fn force_on_the_world() {
+    let [arm, ..] = embedded();
+    let State { q, v, a, mut f_ext, .. } = State::random(&arm, &mut rng(0));
+    let mut data = Data::new(&arm);
+    let before = rnea(&arm, &mut data, &q, &v, &a, &f_ext).to_vec();
+    f_ext[0] = Force::new(Vec3::new(1e9, 0.0, 0.0), Vec3::zero());
+    assert_eq!(rnea(&arm, &mut data, &q, &v, &a, &f_ext), before);
+}

@@ -1,0 +1,33 @@
+//! One program for most tests, since each program compiles the generic algorithms again. On their own stand those that
+//! count allocations, look at the environment or choose the instructions to run on.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod accelerations;
+mod centroidal;
+mod closed_forms;
+mod compose;
+mod constrained;
+mod constrained_derivatives;
+mod coriolis;
+mod derivatives;
+mod divide_conquer;
+mod energy;
+mod factorisation;
+mod guarantees;
+mod identities;
+mod inertial_parameters;
+mod inputs;
+mod kinematics;
+mod mimic;
+mod mjcf;
+mod model_files;
+mod motion_derivatives;
+mod passive;
+mod regressor;
+mod sdf;
+mod second_order;
+mod urdf;
+mod urdf_errors;
+mod urdf_fuzz;

@@ -1,0 +1,319 @@
+//! From MJCF to a model, against MuJoCo's numbers (data/make_mujoco.py), and whatever else a file can contain.
+#![allow(non_snake_case)]
+
+use condyle_dynamics::{
+    Data, Error, FrameKind, Joint, MjcfOptions, Model, Vec3, Warning, crba, forward_kinematics, rnea,
+};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Relative; both sides sum some hundred products, MuJoCo through principal axes that it finds by iteration.
+const AGREES: f64 = 1e-10;
+
+fn data(file: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+}
+
+fn text(file: &str) -> String {
+    std::fs::read_to_string(data(file)).unwrap()
+}
+
+fn load(text: &str) -> Result<Model, Error> {
+    Model::from_mjcf_str(text, &MjcfOptions::default())
+}
+
+fn said(text: &str) -> String {
+    load(text).expect_err(text).to_string()
+}
+
+fn floats(value: &Value) -> Vec<f64> {
+    let all = value.as_array().unwrap().iter();
+    all.flat_map(|x| x.as_f64().map_or_else(|| floats(x), |x| vec![x])).collect()
+}
+
+fn close(what: &str, ours: &[f64], theirs: &[f64]) {
+    assert_eq!(ours.len(), theirs.len(), "{what}");
+    let scale = theirs.iter().fold(1.0, |a: f64, x| a.max(x.abs()));
+    let error = ours.iter().zip(theirs).fold(0.0, |a: f64, (x, y)| a.max((x - y).abs())) / scale;
+    assert!(error <= AGREES, "{what}: {error:e}");
+}
+
+/// Position, and rotation by rows.
+fn flat(X: &condyle_dynamics::Se3<f64>) -> Vec<f64> {
+    let (p, R) = (X.translation, X.rotation.transpose());
+    [p, R.x, R.y, R.z].iter().flat_map(|v| v.to_array()).collect()
+}
+
+/// Placements, M and nonlinear effects equal MuJoCo's, once its quaternions and free joints are in our conventions.
+fn against_mujoco(name: &str) {
+    let model = Model::from_mjcf(data(&format!("{name}.xml")), &MjcfOptions::default()).unwrap();
+    let reference: Value = serde_json::from_str(&text(&format!("{name}_mujoco.json"))).unwrap();
+    assert_eq!(
+        (model.nq() as u64, model.nv() as u64),
+        (reference["nq"].as_u64().unwrap(), reference["nv"].as_u64().unwrap())
+    );
+    close("armature", model.armature(), &floats(&reference["armature"]));
+    close("damping", model.damping(), &floats(&reference["damping"]));
+    for (body, range) in model.bodies().iter().skip(1).zip(reference["range"].as_array().unwrap()) {
+        let ours = [model.limits().lower[body.idx_q], model.limits().upper[body.idx_q]];
+        match body.joint {
+            Joint::Revolute { .. } | Joint::Prismatic { .. } if !range.is_null() => {
+                close(&body.joint_name, &ours, &floats(range));
+            }
+            _ => assert_eq!(ours, [f64::NEG_INFINITY, f64::INFINITY], "{}", body.joint_name),
+        }
+    }
+    let free = model.bodies()[1].joint == Joint::FreeFlyer;
+    let mut work = Data::new(&model);
+    for state in reference["states"].as_array().unwrap() {
+        let (mut q, mut v) = (floats(&state["q"]), floats(&state["v"]));
+        for body in &model.bodies()[1..] {
+            match body.joint {
+                Joint::FreeFlyer => q[body.idx_q + 3..body.idx_q + 7].rotate_left(1),
+                Joint::Spherical => q[body.idx_q..body.idx_q + 4].rotate_left(1),
+                _ => {}
+            }
+        }
+        let placements = forward_kinematics(&model, &mut work, &q);
+        for (kind, frame_kind) in [("bodies", FrameKind::Link), ("sites", FrameKind::User)] {
+            for (name, there) in state[kind].as_object().unwrap() {
+                let i = model.frames().iter().position(|f| &f.name == name && f.kind == frame_kind).unwrap();
+                let theirs = [floats(&there["p"]), floats(&there["R"])].concat();
+                close(name, &flat(&placements.frame(i)), &theirs);
+            }
+        }
+        // v = T v_mujoco, a = T a_mujoco + Ṫ v_mujoco, τ_mujoco = Tᵀ τ with T = Rᵀ for the free joint's linear part
+        let R = placements.body(1).rotation;
+        let mut a = vec![0.0; model.nv()];
+        let linear = |x: &[f64]| Vec3::new(x[0], x[1], x[2]);
+        if free {
+            let w = linear(&v[3..6]);
+            let body = R.transpose_mul(linear(&v));
+            v[..3].copy_from_slice(&body.to_array());
+            a[..3].copy_from_slice(&(-w.cross(body)).to_array());
+        }
+        let to_mujoco = |x: &mut [f64]| {
+            if free {
+                let world = R * linear(x);
+                x[..3].copy_from_slice(&world.to_array());
+            }
+        };
+        let mut bias = rnea(&model, &mut work, &q, &v, &a, &[]).to_vec();
+        to_mujoco(&mut bias);
+        close("bias", &bias, &floats(&state["bias"]));
+        let mut M = crba(&model, &mut work, &q).clone();
+        for _ in 0..2 {
+            M.column_iter_mut().for_each(|mut c| to_mujoco(c.as_mut_slice()));
+            M = M.transpose();
+        }
+        close("M", M.as_slice(), &floats(&state["M"]));
+    }
+    // a body's own mass: bodies without joints are merged into their parents, so compare sums
+    let masses: f64 = reference["bodies"].as_object().unwrap().values().filter_map(Value::as_f64).sum();
+    if free {
+        close("mass", &[model.total_mass()], &[masses]);
+    }
+}
+
+#[test]
+fn arm_equals_mujoco() {
+    against_mujoco("arm");
+}
+
+#[test]
+fn quadruped_equals_mujoco() {
+    against_mujoco("quadruped");
+}
+
+/// Joints that follow by equality constraints, rotors of followers, and inertias that the compiler corrects.
+#[test]
+fn gripper_equals_mujoco() {
+    let options = MjcfOptions { mimic: true, strict: true, ..MjcfOptions::default() };
+    let model = Model::from_mjcf(data("gripper.xml"), &options).unwrap();
+    let reference: Value = serde_json::from_str(&text("gripper_mujoco.json")).unwrap();
+    assert_eq!((model.nq(), model.nv(), model.bodies().len()), (2, 2, 6));
+    close("armature", model.armature(), &floats(&reference["armature"]));
+    let mut work = Data::new(&model);
+    for state in reference["states"].as_array().unwrap() {
+        let (q, v) = (floats(&state["q"]), floats(&state["v"]));
+        close("M", crba(&model, &mut work, &q).as_slice(), &floats(&state["M"]));
+        close("bias", rnea(&model, &mut work, &q, &v, &[0.0; 2], &[]), &floats(&state["bias"]));
+        let placements = forward_kinematics(&model, &mut work, &q);
+        for body in ["pad", "left_tip"] {
+            let found = placements.frame(model.frame(body).unwrap()).translation.to_array();
+            close(body, &found, &floats(&state[body]));
+        }
+    }
+    let free = Model::from_mjcf(data("gripper.xml"), &MjcfOptions::default()).unwrap();
+    assert_eq!((free.nv(), free.warnings().len()), (5, 3)); // an inactive constraint is none
+}
+
+#[test]
+fn joints_that_cannot_follow() {
+    let mimic = |equality: &str| {
+        let joints = format!("<joint name='a'/>{BALL}<body><joint name='b'/>{BALL}</body>");
+        let text = body(&joints).replace("</mujoco>", &format!("\n<equality>{equality}</equality></mujoco>"));
+        let options = MjcfOptions { mimic: true, ..MjcfOptions::default() };
+        Model::from_mjcf_str(&text, &options).map(|m| m.warnings().iter().map(ToString::to_string).collect::<Vec<_>>())
+    };
+    let left_out = [
+        (
+            "<joint joint1='a' joint2='b' polycoef='0 1 2'/>",
+            "<joint>: polycoef [0.0, 1.0, 2.0, 0.0, 0.0] is not linear",
+        ),
+        ("<joint joint1='a'/>", "<joint>: holds `a` where it is: <equality> has no part in a tree of bodies"),
+        (
+            "<joint joint1='a' joint2='b'/><joint joint1='a' joint2='b' polycoef='1 2'/>",
+            "<joint>: `a` follows another joint already",
+        ),
+    ];
+    for (equality, expected) in left_out {
+        assert_eq!(mimic(equality).unwrap(), [expected]);
+    }
+    let said = |equality: &str| mimic(equality).unwrap_err().to_string();
+    assert_eq!(said("<joint joint2='b'/>"), "<string>:6: <joint>: has no joint1");
+    assert_eq!(said("<joint joint1='c'/>"), "<string>:6: <joint>: joint1: no joint is named `c`");
+    let each_other = "<joint joint1='a' joint2='b'/><joint joint1='b' joint2='a'/>";
+    assert_eq!(said(each_other), "<string>:4: joint `a`: mimics a joint without a coordinate of its own");
+}
+
+#[test]
+fn arm_has_what_its_classes_say() {
+    let arm = Model::from_mjcf(data("arm.xml"), &MjcfOptions { strict: true, ..MjcfOptions::default() }).unwrap();
+    let names: Vec<&str> = arm.bodies().iter().skip(1).map(|b| b.joint_name.as_str()).collect();
+    assert_eq!(names, ["pan", "lift", "elbow", "body4_joint", "wrist"]);
+    assert_eq!(arm.bodies()[1].name, "shoulder#1");
+    assert_eq!(arm.limits().effort[0], 40.0);
+    assert_eq!(arm.friction(), [0.05; 7]);
+    assert_eq!(*arm.gravity(), Vec3::new(0.3, -0.2, -9.7));
+    assert_eq!(arm.frames()[arm.frame("bracket").unwrap()].body, 4);
+    assert!(arm.warnings().is_empty());
+}
+
+fn body(inside: &str) -> String {
+    format!("<mujoco>\n<worldbody>\n<body name='b'>\n{inside}\n</body></worldbody></mujoco>")
+}
+
+const BALL: &str = "<geom size='0.1'/>";
+
+#[test]
+fn errors_name_file_line_and_element() {
+    let cases = [
+        ("<joint name='j' axis='0 0 0'/><geom size='1'/>", "<string>:4: joint `j`: axis"),
+        ("<joint axis='0 0'/>", "<string>:4: <joint>: axis: expected 3 numbers, found 2"),
+        ("<joint type='hing'/>", "<string>:4: <joint>: type: `hing` is none of hinge, slide, ball and free"),
+        ("<joint range='2 1'/>", "<string>:4: <joint>: range: lower limit"),
+        ("<joint limited='true'/>", "<string>:4: <joint>: limited: there is no range"),
+        ("<joint class='none'/>", "<string>:4: <joint>: no default class is named `none`; nearest is `main`"),
+        ("<joint/><freejoint/>", "<string>:4: <freejoint>: a free joint is the only joint"),
+        ("<joint/><geom type='mesh' mesh='m'/>", "<string>:4: <geom>: has mass, and meshes are not read"),
+        ("<joint/><geom type='plane' size='1 1 1'/>", "<string>:4: <geom>: a moving body has no geom of type `plane`"),
+        ("<joint/><geom type='box' size='1 1'/>", "<string>:4: <geom>: size: a box needs 3 positive numbers"),
+        ("<joint/><inertial pos='0 0 0'/>", "<string>:4: <inertial>: has no mass"),
+        ("<joint/><inertial pos='0 0 0' mass='-1'/>", "<string>:4: <inertial>: mass is -1 kg"),
+        ("<replicate count='3'/>", "<string>:4: <replicate>: is not supported"),
+        ("<body name='b'/>", "<string>:4: body `b`: the name is taken by the body on line 3"),
+        ("<body euler='0 0 1' zaxis='0 0 1'/>", "<string>:4: <body>: has more than one of"),
+        ("<include file='x.xml'/>", "<string>:4: <include>: a string has no folder to find `x.xml` in"),
+    ];
+    for (inside, expected) in cases {
+        let said = said(&body(inside));
+        assert!(said.starts_with(expected), "{said}\n{expected}");
+    }
+    assert!(said("<robot/>").starts_with("<string>:1: <robot>: the root element of an MJCF"));
+    assert!(said("<mujoco>").starts_with("<string>:1: not well-formed XML"));
+    assert!(said(&"<body>".repeat(300)).starts_with("<string>:"));
+    let deep = format!("<mujoco>{}{}</mujoco>", "<worldbody>".repeat(300), "</worldbody>".repeat(300));
+    assert!(said(&deep).contains("is nested more than 256 levels deep"));
+    let missing = Model::from_mjcf(data("nowhere.xml"), &MjcfOptions::default()).unwrap_err();
+    assert!(matches!(missing, Error::File { .. }));
+}
+
+/// An error in an included file has that file's name.
+#[test]
+fn includes() {
+    let folder = std::env::temp_dir().join(format!("condyle-mjcf-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    let read = || Model::from_mjcf(folder.join("main.xml"), &MjcfOptions::default());
+    write("main.xml", "<mujoco><worldbody><include file='a.xml'/></worldbody></mujoco>");
+    write("a.xml", &format!("<mujoco>\n<body name='a'><joint/>{BALL}</body></mujoco>"));
+    assert_eq!(read().unwrap().nv(), 1);
+    write("a.xml", "<mujoco>\n<body name='a'><joint axis='x'/></body></mujoco>");
+    let Error::Element { file, line, .. } = read().unwrap_err() else { panic!() };
+    assert!(file.ends_with("a.xml") && line == 2);
+    write("a.xml", "<mujoco><include file='main.xml'/></mujoco>");
+    assert!(read().unwrap_err().to_string().contains("`main.xml` is already part of the model"));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn what_is_left_out_is_said() {
+    let text = body(&format!("<joint/>{BALL}")).replace("</mujoco>", "<equality><weld body1='b'/></equality></mujoco>");
+    let model = load(&text).unwrap();
+    assert!(matches!(model.warnings(), [Warning::LeftOut { element, .. }] if element == "<weld>"));
+    let strict = Model::from_mjcf_str(&text, &MjcfOptions { strict: true, ..MjcfOptions::default() }).unwrap_err();
+    assert!(matches!(strict, Error::Strict { .. }));
+}
+
+/// A mesh without an <inertial> beside it: refused, or left out where that is asked for.
+#[test]
+fn meshes_weigh_nothing_if_asked() {
+    let text = body(&format!("<joint/>{BALL}<geom name='cover' type='mesh' mesh='m'/><geom type='mesh' mass='0'/>"));
+    assert!(said(&text).starts_with("<string>:4: geom `cover`: has mass, and meshes are not read"));
+    let light =
+        Model::from_mjcf_str(&text, &MjcfOptions { weightless_meshes: true, ..MjcfOptions::default() }).unwrap();
+    assert_eq!(light.total_mass(), load(&body(&format!("<joint/>{BALL}"))).unwrap().total_mass());
+    let said: Vec<String> = light.warnings().iter().map(ToString::to_string).collect();
+    assert_eq!(said, ["geom `cover`: the mass of a mesh on body `b` is left out"]);
+}
+
+const PIECES: [&str; 14] = [
+    "<",
+    ">",
+    "\"",
+    "/",
+    "nan",
+    "-1",
+    "1e999",
+    "<body>",
+    "</body>",
+    "<freejoint/>",
+    "<joint type=\"ball\"/>",
+    "<geom/>",
+    "<default class=\"dog\"/>",
+    "é",
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever a file contains, reading it gives a model that can be used, or an error.
+    #[test]
+    fn fuzz(
+        arm in any::<bool>(),
+        changes in prop::collection::vec((0.0..1.0, 0.0..1.0, 0..120_usize, 0..4_u8, prop::sample::select(&PIECES[..])), 1..5),
+    ) {
+        let include = "<include file=\"arm_defaults.xml\"/>";
+        let defaults = text("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
+        let mut bytes = if arm { text("arm.xml").replace(include, &defaults) } else { text("quadruped.xml") }.into_bytes();
+        prop_assert!(load(std::str::from_utf8(&bytes).unwrap()).is_ok());
+        for (at, to, length, change, piece) in changes {
+            let place = |x: f64| (x * bytes.len() as f64) as usize;
+            let (at, to) = (place(at), place(to));
+            let end = (at + length).min(bytes.len());
+            match change {
+                0 => drop(bytes.drain(at..end)),
+                1 => drop(bytes.splice(at..at, piece.bytes())),
+                2 => { let copy = bytes[at..end].to_vec(); drop(bytes.splice(to..to, copy)); }
+                _ => if let Some(b) = bytes.get_mut(at) { *b = b'0' + (length % 10) as u8; },
+            }
+        }
+        match load(&String::from_utf8_lossy(&bytes)) {
+            Ok(model) => drop(crba(&model, &mut Data::new(&model), &condyle_dynamics::neutral(&model)).clone()),
+            Err(error) => prop_assert!(!error.to_string().is_empty()),
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Robots by `package://` addresses: folders that are given, folders of the environment, and what is said of a package
+//! that is in none of them.
+
+use condyle_dynamics::{Error, Model, UrdfOptions, robots};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A folder with packages in it, for one test.
+struct Workspace(PathBuf);
+
+impl Workspace {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("condyle-{name}-{}", std::process::id()));
+        for (file, text) in [
+            ("src/arm_description/urdf/arm.urdf", robots::ARM7),
+            ("src/dog_description/dog.urdf", robots::QUADRUPED),
+            ("install/share/dog_description/dog.urdf", robots::HUMANOID),
+        ] {
+            let file = folder.join(file);
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            std::fs::write(file, text).unwrap();
+        }
+        Self(folder)
+    }
+}
+
+impl Drop for Workspace {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn load(address: &str, packages: &[&Path]) -> Result<Model, Error> {
+    let packages = packages.iter().map(|p| p.to_path_buf()).collect();
+    Model::from_urdf(address, &UrdfOptions { packages, ..UrdfOptions::default() })
+}
+
+#[test]
+fn folders_that_are_given() {
+    let workspace = Workspace::new("given");
+    let (src, share) = (workspace.0.join("src"), workspace.0.join("install/share"));
+    let arm = "package://arm_description/urdf/arm.urdf";
+    assert_eq!(load(arm, &[&share, &src]).unwrap().nv(), 7);
+    assert_eq!(load(arm, &[&src.join("arm_description")]).unwrap().nv(), 7); // the package itself
+    // the first folder that has it
+    let dog = "package://dog_description/dog.urdf";
+    assert_eq!(load(dog, &[&src, &share]).unwrap().nv(), 12);
+    assert_eq!(load(dog, &[&share, &src]).unwrap().nv(), 32);
+    // a plain path is no address
+    let file = workspace.0.join("src/arm_description/urdf/arm.urdf");
+    assert_eq!(load(file.to_str().unwrap(), &[]).unwrap().nv(), 7);
+}
+
+#[test]
+fn a_missing_package_is_named() {
+    let workspace = Workspace::new("missing");
+    let src = workspace.0.join("src");
+    for (address, package, end) in [
+        ("package://nowhere/a.urdf", "nowhere", "nowhere/a.urdf"),
+        ("package://arm_description/b.urdf", "arm_description", "arm_description/b.urdf"),
+        ("package://arm_description/urdf", "arm_description", "arm_description/urdf"), // a folder
+        ("package://arm_description", "arm_description", "arm_description/"),
+    ] {
+        let error = load(address, &[&src]).unwrap_err();
+        let looked_for = src.join(end).display().to_string();
+        let Error::Package { package: named, looked, .. } = &error else { panic!("{error}") };
+        assert_eq!((named.as_str(), &looked[0]), (package, &looked_for));
+        assert!(
+            error.to_string().starts_with(&format!("{address}: no such file in a package `{package}`; looked for "))
+        );
+    }
+    assert!(matches!(load("package://", &[&src]), Err(Error::Package { .. })));
+}
+
+/// ROS_PACKAGE_PATH, then AMENT_PREFIX_PATH; in a process of its own, whose environment can be chosen.
+#[test]
+fn folders_of_the_environment() {
+    const CHILD: &str = "CONDYLE_CHILD";
+    let dog = "package://dog_description/dog.urdf";
+    if let Some(expected) = std::env::var_os(CHILD) {
+        let found = load(dog, &[]).map_or_else(|e| e.to_string(), |model| model.nv().to_string());
+        assert_eq!(found, expected.to_str().unwrap());
+        return;
+    }
+    let workspace = Workspace::new("environment");
+    let run = |ros: Option<PathBuf>, ament: Option<PathBuf>, expected: &str| {
+        let mut child = Command::new(std::env::current_exe().unwrap());
+        child.args(["--exact", "folders_of_the_environment"]).env(CHILD, expected);
+        child.env_remove("ROS_PACKAGE_PATH").env_remove("AMENT_PREFIX_PATH");
+        child.envs(ros.map(|p| ("ROS_PACKAGE_PATH", p))).envs(ament.map(|p| ("AMENT_PREFIX_PATH", p)));
+        let output = child.output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    };
+    let (src, install) = (workspace.0.join("src"), workspace.0.join("install"));
+    run(Some(src.clone()), None, "12");
+    run(None, Some(install.clone()), "32");
+    run(Some(src), Some(install), "12");
+    let nowhere = "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)";
+    run(None, None, &format!("{dog}: no such file in a package `dog_description`; {nowhere}"));
+}
+
+/// Shapes are never looked at, wherever their meshes are.
+#[test]
+fn meshes_are_not_needed() {
+    let mesh = |tag: &str| format!(r#"<{tag}><geometry><mesh filename="package://nowhere/a.stl"/></geometry></{tag}>"#);
+    let text = robots::ARM7.replacen("</link>", &format!("{}{}</link>", mesh("visual"), mesh("collision")), 1);
+    assert!(text.contains("package://nowhere/a.stl"));
+    let model = Model::from_urdf_str(&text, &UrdfOptions::default()).unwrap();
+    assert_eq!(model.to_string(), robots::arm7().to_string());
+}

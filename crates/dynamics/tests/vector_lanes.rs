@@ -1,0 +1,89 @@
+//! Several knots in a vector register: the same bits as single calls, at the same level.
+#![cfg(target_arch = "x86_64")]
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::table::{Input, Output, kernels};
+use common::{all_models, rng};
+use condyle_dynamics::level::{Level, pin};
+use condyle_dynamics::{Data, Force, Model, Scalar};
+use condyle_spatial::lanes::Lanes;
+
+/// A vector of numbers as the tests see it.
+trait Vector: Scalar {
+    fn pack(x: &[f64]) -> Self;
+    fn unpack(self) -> Vec<f64>;
+}
+
+macro_rules! vector {
+    ($n:literal) => {
+        impl Vector for Lanes<f64, $n> {
+            fn pack(x: &[f64]) -> Self {
+                Self::from_array(x.try_into().unwrap())
+            }
+            fn unpack(self) -> Vec<f64> {
+                self.to_array().to_vec()
+            }
+        }
+    };
+}
+vector!(4);
+vector!(8);
+
+fn side_by_side<S: Vector>(knots: &[Input<f64>]) -> Input<S> {
+    let pack = |part: fn(&Input<f64>) -> &[f64]| -> Vec<S> {
+        let n = part(&knots[0]).len();
+        (0..n).map(|i| S::pack(&knots.iter().map(|k| part(k)[i]).collect::<Vec<_>>())).collect()
+    };
+    let force = |b: usize| {
+        let six: [Vec<f64>; 6] =
+            core::array::from_fn(|r| knots.iter().map(|k| k.f_ext[b].to_array()[r]).collect::<Vec<_>>());
+        Force::from(six.map(|x| S::pack(&x)))
+    };
+    Input {
+        q: pack(|k| &k.q),
+        q1: pack(|k| &k.q1),
+        v: pack(|k| &k.v),
+        x: pack(|k| &k.x),
+        f_ext: (0..knots[0].f_ext.len()).map(force).collect(),
+    }
+}
+
+fn knots_are_single_calls<S: Vector>(models: &[Model]) {
+    for (seed, model) in models.iter().enumerate() {
+        let mut rng = rng(seed as u64);
+        let knots: Vec<Input<f64>> = (0..S::LANES).map(|_| Input::random(model, &mut rng)).collect();
+        let (mut data, mut lanes) = (Data::<f64>::new(model), Data::<S>::new(model));
+        for ((name, one), (_, many)) in kernels().into_iter().zip(kernels()) {
+            let mut found = Output::new(model);
+            many(model, &mut lanes, &side_by_side::<S>(&knots), &mut found);
+            for (k, knot) in knots.iter().enumerate() {
+                let mut expected = Output::new(model);
+                one(model, &mut data, knot, &mut expected);
+                let found: Vec<f64> = found.numbers.iter().map(|x| x.unpack()[k]).collect();
+                assert!(found == expected.numbers, "{name} has other bits in lane {k} of {}, on\n{model}", S::LANES);
+            }
+            // a lane that is not a number stays alone
+            let mut broken = knots.clone();
+            broken[1] = broken[1].map(|_| f64::NAN);
+            let mut beside = Output::new(model);
+            many(model, &mut lanes, &side_by_side::<S>(&broken), &mut beside);
+            let lane = |of: &Output<S>, k: usize| of.numbers.iter().map(|x| x.unpack()[k]).collect::<Vec<_>>();
+            (0..S::LANES).filter(|&k| k != 1).for_each(|k| assert!(lane(&beside, k) == lane(&found, k), "{name}"));
+        }
+    }
+}
+
+/// One test for all levels: they share the level in use.
+#[test]
+fn every_level() {
+    let models = all_models(4);
+    for level in [Level::Avx2, Level::Avx512] {
+        match pin(level) {
+            Ok(()) if level == Level::Avx2 => knots_are_single_calls::<Lanes<f64, 4>>(&models),
+            Ok(()) => knots_are_single_calls::<Lanes<f64, 8>>(&models),
+            Err(error) => eprintln!("NOT RUN: {error}"),
+        }
+    }
+}

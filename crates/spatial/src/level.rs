@@ -1,0 +1,146 @@
+//! Which vector instructions this machine has, and which of them are used.
+//!
+//! A build holds code for every level; the best that the processor has is chosen at the first call. The environment
+//! variable `CONDYLE_LEVEL` (`baseline`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that results can be repeated
+//! to the last bit on machines that differ: a level decides where products and sums are fused.
+
+use core::fmt;
+use core::sync::atomic::{AtomicU8, Ordering};
+
+/// A set of vector instructions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// What every processor of its architecture has: SSE2, or NEON with fused products on Arm.
+    Baseline = 1,
+    /// AVX2 and FMA: four numbers at once, fused products.
+    Avx2 = 2,
+    /// AVX-512 (F, DQ, VL, BW): eight numbers at once.
+    Avx512 = 3,
+}
+
+impl Level {
+    /// All of them, the lowest first.
+    pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
+
+    /// Whether this processor can run it.
+    pub fn is_supported(self) -> bool {
+        match self {
+            Self::Baseline => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                Self::Avx2.is_supported()
+                    && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512bw")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+
+    /// As `CONDYLE_LEVEL` writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Baseline => "baseline",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+
+    /// How many `f64` it computes with at once.
+    pub fn lanes(self) -> usize {
+        match self {
+            Self::Baseline => 1,
+            Self::Avx2 => 4,
+            Self::Avx512 => 8,
+        }
+    }
+
+    fn from_number(n: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|&level| level as u8 == n)
+    }
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A level that this processor does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unsupported(
+    /// The level.
+    pub Level,
+);
+
+impl fmt::Display for Unsupported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "this processor cannot run level {}", self.0)
+    }
+}
+
+impl std::error::Error for Unsupported {}
+
+/// The level in use; 0 until it is first asked for.
+static LEVEL: AtomicU8 = AtomicU8::new(0);
+
+/// The level in use: the one pinned, else `CONDYLE_LEVEL`, else the best that this processor has.
+///
+/// ```
+/// let level = condyle_spatial::level::level();
+/// assert!(level.is_supported());
+/// ```
+///
+/// # Panics
+/// At the first call, if `CONDYLE_LEVEL` names no level, or one that this processor cannot run.
+#[inline]
+pub fn level() -> Level {
+    match LEVEL.load(Ordering::Relaxed) {
+        2 => Level::Avx2,
+        3 => Level::Avx512,
+        1 => Level::Baseline,
+        _ => choose(),
+    }
+}
+
+#[cold]
+fn choose() -> Level {
+    let level = match std::env::var("CONDYLE_LEVEL") {
+        Ok(name) => {
+            let level = Level::ALL.into_iter().find(|level| level.name() == name);
+            let level =
+                level.unwrap_or_else(|| panic!("CONDYLE_LEVEL: expected baseline, avx2 or avx512, found {name}"));
+            assert!(level.is_supported(), "CONDYLE_LEVEL: {}", Unsupported(level));
+            level
+        }
+        Err(_) => Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap_or(Level::Baseline),
+    };
+    // another thread may have pinned one meanwhile
+    match LEVEL.compare_exchange(0, level as u8, Ordering::Relaxed, Ordering::Relaxed) {
+        Ok(_) => level,
+        Err(pinned) => Level::from_number(pinned).unwrap_or(level),
+    }
+}
+
+/// Uses this level from now on, in all threads.
+///
+/// ```
+/// use condyle_spatial::level::{Level, level, pin};
+/// pin(Level::Baseline)?;
+/// assert_eq!(level(), Level::Baseline);
+/// # Ok::<(), condyle_spatial::level::Unsupported>(())
+/// ```
+///
+/// # Errors
+/// [`Unsupported`], if this processor does not have it.
+pub fn pin(level: Level) -> Result<(), Unsupported> {
+    if !level.is_supported() {
+        return Err(Unsupported(level));
+    }
+    LEVEL.store(level as u8, Ordering::Relaxed);
+    Ok(())
+}

@@ -1,0 +1,345 @@
+//! Models made body by body: joints, and the builder.
+
+use crate::arrays::{Give, pose, three};
+use crate::exceptions::exception;
+use crate::inertial_parameters::read_inertia;
+use crate::model::{Model, kind};
+use condyle::{Inertia, JointOptions, Mimic, Se3};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The kind of a joint, with what it needs to know.
+///
+/// | | q | v |
+/// | --- | --- | --- |
+/// | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
+/// | `continuous` | 2: cos θ, sin θ | 1 |
+/// | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
+/// | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
+/// | `translation` | 3 | 3 |
+/// | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
+///
+/// An axis is a vector in the body's frame, of any length but 0.
+///
+/// >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
+/// 1
+#[pyclass(frozen, module = "condyle")]
+pub(crate) struct Joint(pub(crate) condyle::Joint);
+
+#[pymethods]
+impl Joint {
+    /// One angle about an axis: q = [θ], v = [θ̇].
+    #[staticmethod]
+    fn revolute(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Revolute { axis: three("axis", axis)? }))
+    }
+
+    /// One angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇].
+    #[staticmethod]
+    fn continuous(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Continuous { axis: three("axis", axis)? }))
+    }
+
+    /// One length along an axis: q = [d], v = [ḋ].
+    #[staticmethod]
+    fn prismatic(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Prismatic { axis: three("axis", axis)? }))
+    }
+
+    /// A screw: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it.
+    #[staticmethod]
+    fn helical(axis: &Bound<'_, PyAny>, pitch: f64) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Helical { axis: three("axis", axis)?, pitch }))
+    }
+
+    /// A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
+    #[staticmethod]
+    fn spherical() -> Self {
+        Self(condyle::Joint::Spherical)
+    }
+
+    /// Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇].
+    #[staticmethod]
+    fn planar() -> Self {
+        Self(condyle::Joint::Planar)
+    }
+
+    /// Three lengths: q = [x, y, z], v = q̇.
+    #[staticmethod]
+    fn translation() -> Self {
+        Self(condyle::Joint::Translation)
+    }
+
+    /// A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame.
+    #[staticmethod]
+    fn free_flyer() -> Self {
+        Self(condyle::Joint::FreeFlyer)
+    }
+
+    /// How many numbers the position has.
+    #[getter]
+    fn nq(&self) -> usize {
+        self.0.nq()
+    }
+
+    /// How many degrees of freedom it has: the numbers of its velocity.
+    #[getter]
+    fn nv(&self) -> usize {
+        self.0.nv()
+    }
+
+    /// The axis, 3 numbers in the body's frame, a unit vector in a model; None if the joint has none.
+    #[getter]
+    fn axis<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.0.axis().map(|axis| axis.give(py, None)).transpose()
+    }
+
+    /// The kind and the axis.
+    fn __repr__(&self) -> String {
+        let axis = self.0.axis().map_or(String::new(), |a| format!(" about or along {:?}", a.to_array()));
+        format!("<condyle.Joint {}{axis}>", kind(self.0))
+    }
+}
+
+/// Names a body of a builder: what `ModelBuilder.body` and others return. `WORLD` is always there.
+#[pyclass(frozen, module = "condyle")]
+pub(crate) struct BodyId {
+    inner: condyle::BodyId,
+    /// Of which builder; none of the world.
+    builder: Option<u64>,
+}
+
+#[pymethods]
+impl BodyId {
+    /// Whether it is the world.
+    fn __repr__(&self) -> &'static str {
+        if self.builder.is_none() { "condyle.WORLD" } else { "<condyle.BodyId>" }
+    }
+}
+
+/// The world, on which the first joints sit.
+pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
+    static WORLD: PyOnceLock<Py<BodyId>> = PyOnceLock::new();
+    WORLD.get_or_try_init(py, || Py::new(py, BodyId { inner: condyle::WORLD, builder: None }))
+}
+
+/// Makes a `Model`, body by body, parents first.
+///
+/// Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
+/// joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
+/// and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
+/// the rows of f_ext count them.
+///
+/// name: the robot's.
+///
+/// >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
+/// >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
+/// >>> elbow = np.eye(4)
+/// >>> elbow[2, 3] = -1.0
+/// >>> robot = ModelBuilder("double pendulum")
+/// >>> upper = robot.body("upper", WORLD, Joint.revolute([0.0, 1.0, 0.0]), inertia=rod)
+/// >>> lower = robot.body("lower", upper, Joint.revolute([0.0, 1.0, 0.0]), elbow, rod, damping=0.1)
+/// >>> robot.frame("tip", lower, elbow)
+/// >>> robot.build()
+/// <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
+#[pyclass(module = "condyle")]
+pub(crate) struct ModelBuilder {
+    /// None once the model is built.
+    inner: Option<condyle::ModelBuilder>,
+    /// Equal for no two of them.
+    number: u64,
+}
+
+fn placed(argument: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Se3<f64>> {
+    value.map_or(Ok(Se3::identity()), |value| pose(argument, value))
+}
+
+fn massive(value: Option<&Bound<'_, PyAny>>) -> PyResult<Inertia<f64>> {
+    value.map_or(Ok(Inertia::zero()), |value| read_inertia("inertia", value))
+}
+
+impl ModelBuilder {
+    fn builder(&mut self) -> PyResult<&mut condyle::ModelBuilder> {
+        self.inner.as_mut().ok_or_else(|| PyRuntimeError::new_err("the model is built; make another builder"))
+    }
+
+    fn body_of(&self, argument: &str, body: &Bound<'_, BodyId>) -> PyResult<condyle::BodyId> {
+        let BodyId { inner, builder } = body.get();
+        if builder.is_none_or(|number| number == self.number) {
+            return Ok(*inner);
+        }
+        Err(PyValueError::new_err(format!("{argument}: a body of another builder")))
+    }
+
+    fn added(&self, body: condyle::BodyId) -> BodyId {
+        BodyId { inner: body, builder: Some(self.number) }
+    }
+}
+
+#[pymethods]
+impl ModelBuilder {
+    #[new]
+    fn new(name: &str) -> Self {
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
+        Self { inner: Some(condyle::ModelBuilder::new(name)), number: NUMBER.fetch_add(1, Ordering::Relaxed) }
+    }
+
+    /// Adds a body and its joint.
+    ///
+    /// name: the body's, and the joint's unless it has a `joint_name` of its own.
+    /// parent: the body on which the joint sits.
+    /// placement: the joint's frame at position zero in the parent's frame.
+    /// inertia: in the body's frame, which is the joint's at position zero.
+    /// position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
+    /// velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
+    /// damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
+    /// armature: inertia of the rotor as seen at the joint (kg m², kg).
+    #[pyo3(signature = (name, parent, joint, placement=None, inertia=None, *, joint_name=None, position=None, velocity=None, effort=None, damping=0.0, friction=0.0, armature=0.0))]
+    fn body(
+        &mut self,
+        name: &str,
+        parent: &Bound<'_, BodyId>,
+        joint: &Bound<'_, Joint>,
+        placement: Option<&Bound<'_, PyAny>>,
+        inertia: Option<&Bound<'_, PyAny>>,
+        joint_name: Option<&str>,
+        position: Option<(f64, f64)>,
+        velocity: Option<f64>,
+        effort: Option<f64>,
+        damping: f64,
+        friction: f64,
+        armature: f64,
+    ) -> PyResult<BodyId> {
+        let parent = self.body_of("parent", parent)?;
+        let (placement, inertia) = (placed("placement", placement)?, massive(inertia)?);
+        let options = JointOptions { position, velocity, effort, damping, friction, armature };
+        let names = (name, joint_name.unwrap_or(name));
+        let body = self.builder()?.body_with(names, parent, joint.get().0, placement, inertia, options);
+        Ok(self.added(body))
+    }
+
+    /// Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+    ///
+    /// Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
+    /// `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
+    /// `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+    ///
+    /// joints: a list of (joint, placement).
+    #[pyo3(signature = (name, parent, joints, inertia=None))]
+    fn chain(
+        &mut self,
+        name: &str,
+        parent: &Bound<'_, BodyId>,
+        joints: Vec<(Bound<'_, Joint>, Option<Bound<'_, PyAny>>)>,
+        inertia: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<BodyId> {
+        if joints.is_empty() {
+            return Err(PyValueError::new_err("joints: expected at least one"));
+        }
+        let parent = self.body_of("parent", parent)?;
+        let joint = |(joint, placement): &(Bound<'_, Joint>, Option<Bound<'_, PyAny>>)| {
+            Ok((joint.get().0, placed("joints", placement.as_ref())?))
+        };
+        let joints = joints.iter().map(joint).collect::<PyResult<Vec<_>>>()?;
+        let inertia = massive(inertia)?;
+        let body = self.builder()?.chain(name, parent, &joints, inertia);
+        Ok(self.added(body))
+    }
+
+    /// Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+    ///
+    /// M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
+    #[pyo3(signature = (name, parent, placement=None, inertia=None))]
+    fn spherical_zyx(
+        &mut self,
+        name: &str,
+        parent: &Bound<'_, BodyId>,
+        placement: Option<&Bound<'_, PyAny>>,
+        inertia: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<BodyId> {
+        let parent = self.body_of("parent", parent)?;
+        let (placement, inertia) = (placed("placement", placement)?, massive(inertia)?);
+        let body = self.builder()?.spherical_zyx(name, parent, placement, inertia);
+        Ok(self.added(body))
+    }
+
+    /// Fixes more inertia to a body, given in a frame that is at `placement` in the body's.
+    fn merge(
+        &mut self,
+        body: &Bound<'_, BodyId>,
+        placement: Option<&Bound<'_, PyAny>>,
+        inertia: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let body = self.body_of("body", body)?;
+        let (placement, inertia) = (placed("placement", placement)?, read_inertia("inertia", inertia)?);
+        self.builder()?.merge(body, placement, inertia);
+        Ok(())
+    }
+
+    /// Adds a frame at `placement` in the body's frame.
+    #[pyo3(signature = (name, body, placement=None))]
+    fn frame(&mut self, name: &str, body: &Bound<'_, BodyId>, placement: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let (body, placement) = (self.body_of("body", body)?, placed("placement", placement)?);
+        self.builder()?.frame(name, body, placement);
+        Ok(())
+    }
+
+    /// Lets a joint follow another one, in place of a coordinate of its own: its position is ratio q + offset.
+    ///
+    /// follower, leader: the bodies that the joints carry.
+    #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
+    fn mimic(
+        &mut self,
+        follower: &Bound<'_, BodyId>,
+        leader: &Bound<'_, BodyId>,
+        ratio: f64,
+        offset: f64,
+    ) -> PyResult<()> {
+        let (follower, leader) = (self.body_of("follower", follower)?, self.body_of("leader", leader)?);
+        self.builder()?.mimic(follower, leader, Mimic { ratio, offset });
+        Ok(())
+    }
+
+    /// Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before
+    /// them.
+    ///
+    /// >>> from condyle import ModelBuilder, WORLD
+    /// >>> two = ModelBuilder("two arms")
+    /// >>> for side, y in ("left_", 0.4), ("right_", -0.4):
+    /// ...     at = np.eye(4)
+    /// ...     at[1, 3] = y
+    /// ...     two.append(WORLD, at, condyle.robots.arm7(), side)
+    /// >>> two.build().nv
+    /// 14
+    #[pyo3(signature = (parent, placement, model, prefix=""))]
+    fn append(
+        &mut self,
+        parent: &Bound<'_, BodyId>,
+        placement: Option<&Bound<'_, PyAny>>,
+        model: &Bound<'_, Model>,
+        prefix: &str,
+    ) -> PyResult<()> {
+        let (parent, placement) = (self.body_of("parent", parent)?, placed("placement", placement)?);
+        self.builder()?.append(parent, placement, &model.get().inner, prefix);
+        Ok(())
+    }
+
+    /// Sets the acceleration of free fall (m/s², 3 numbers, in the world's frame); (0, 0, −9.81) otherwise.
+    fn gravity(&mut self, gravity: &Bound<'_, PyAny>) -> PyResult<()> {
+        let gravity = three("gravity", gravity)?;
+        self.builder()?.gravity(gravity);
+        Ok(())
+    }
+
+    /// Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and
+    /// freezes the model. The builder cannot be used any more.
+    ///
+    /// Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
+    fn build(&mut self) -> PyResult<Model> {
+        self.builder()?;
+        let builder = self.inner.take().expect("was just looked at");
+        Ok(builder.build().map_err(exception)?.into())
+    }
+}

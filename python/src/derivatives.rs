@@ -1,0 +1,242 @@
+//! Derivatives beyond the first ones of `rnea` and `aba`: the library's functions one to one.
+
+use crate::arrays::{Array, Give, members, named_tuple, named_tuples};
+use crate::functions::{functions, regular};
+use condyle::{Model, RneaSecondDerivatives};
+use nalgebra::DMatrix;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyTuple, PyType};
+
+named_tuples! {
+    RneaHessian { dqdq, dvdq, dvdv, dadq }
+    AbaHessian { dqdq, dvdq, dvdv, dtaudq }
+    CentroidalDerivatives {
+        dh_dq, dh_dv, drate_dq, drate_dv, drate_da, dcom_dq, dvcom_dq, dacom_dq, dacom_dv
+    }
+    EnergyDerivatives { dT_dq, dT_dv, dV_dq }
+    CoriolisDerivatives { dq, dv }
+}
+
+/// Matrices of one shape, one after the other.
+impl Array for [DMatrix<f64>] {
+    fn shape(&self) -> impl AsRef<[usize]> {
+        let (rows, columns) = self.first().map_or((0, 0), DMatrix::shape);
+        [self.len(), rows, columns]
+    }
+    fn write(&self, x: &mut [f64]) {
+        let size = self.first().map_or(1, DMatrix::len).max(1);
+        self.iter().zip(x.chunks_exact_mut(size)).for_each(|(matrix, x)| matrix.write(x));
+    }
+}
+
+impl Give for RneaSecondDerivatives<f64> {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let mut out = members(out, &["dqdq", "dvdq", "dvdv", "dadq"])?.into_iter();
+        let tensors = [&self.dqdq, &self.dvdq, &self.dvdv, &self.dadq];
+        let tensors = tensors.map(|tensor| tensor[..].give(py, out.next().flatten().as_ref()));
+        let tensors = tensors.into_iter().collect::<PyResult<Vec<_>>>()?;
+        named_tuple(py, &CLASS, "RneaSecondDerivatives")?.call1(PyTuple::new(py, tensors)?)
+    }
+}
+
+/// The derivatives of an acceleration by q and by v.
+struct Both(DMatrix<f64>, DMatrix<f64>);
+
+impl Give for Both {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        let mut out = members(out, &["da_dq", "da_dv"])?.into_iter();
+        let mut give = |matrix: &DMatrix<f64>| matrix.give(py, out.next().flatten().as_ref());
+        let both = [give(&self.0)?, give(&self.1)?];
+        Ok(PyTuple::new(py, both)?.into_any())
+    }
+}
+
+fn six(model: &Model) -> DMatrix<f64> {
+    DMatrix::zeros(6, model.nv())
+}
+
+functions! {
+/// ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at most O(n) a
+/// column.
+///
+/// q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
+/// (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
+/// frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
+/// `passive_torque`; f_ext: as for `rnea`.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
+/// >>> dtau_dg = condyle.rnea_input_derivative(arm, data, q, zero, zero, "gravity")
+/// >>> np.allclose(dtau_dg @ [0.0, 0.0, -9.81], condyle.gravity(arm, data, q))  # τ is linear in g
+/// True
+fn rnea_input_derivative(model, data; q: Position, v: Tangent, a: Tangent, wrt: InputOf, f_ext: Forces = None; out) {
+    let mut dtau = DMatrix::zeros(model.nv(), wrt.len(model));
+    condyle::rnea_derivatives(model, data, &q, &v, &a, &f_ext).with_respect_to(wrt, &mut dtau);
+    dtau
+}
+
+/// ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at most O(n²) a
+/// column.
+///
+/// q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
+///
+/// >>> quadruped = condyle.robots.quadruped()
+/// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+/// >>> da_df = condyle.aba_input_derivative(quadruped, data, q, zero, zero, ("force", "root_joint"))
+/// >>> np.allclose(da_df, condyle.minv(quadruped, data, q)[:, :6])  # a force on the trunk is an effort of its joint
+/// True
+fn aba_input_derivative(model, data; q: Position, v: Tangent, tau: Tangent, wrt: InputOf, f_ext: Forces = None; out) {
+    regular(model)?;
+    let mut da = DMatrix::zeros(model.nv(), wrt.len(model));
+    condyle::aba_derivatives(model, data, &q, &v, &tau, &f_ext).with_respect_to(wrt, &mut da);
+    da
+}
+
+/// The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
+/// (nv, nv); the other blocks are zero.
+///
+/// q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+/// derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
+/// >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, np.ones(7))
+/// >>> np.allclose(hessian.dqdq, hessian.dqdq.T)
+/// True
+fn rnea_hessian(model, data; q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
+    condyle::rnea_hessian(model, data, &q, &v, &a, &f_ext, &lambda_)
+}
+
+/// The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
+/// other blocks are zero.
+///
+/// q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+/// derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+fn aba_hessian(model, data; q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
+    regular(model)?;
+    condyle::aba_hessian(model, data, &q, &v, &tau, &f_ext, &lambda_)
+}
+
+/// The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
+/// `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
+///
+/// q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
+/// contracted with a vector, many times faster.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
+/// >>> tensors = condyle.rnea_second_derivatives(arm, data, q, v, a)
+/// >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, weights)
+/// >>> np.allclose(np.einsum("i,ijk->jk", weights, tensors.dqdq), hessian.dqdq)
+/// True
+fn rnea_second_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
+    let mut tensors = RneaSecondDerivatives::new(model);
+    condyle::rnea_second_derivatives(model, data, &q, &v, &a, &f_ext, &mut tensors);
+    tensors
+}
+
+/// ∂v/∂q of a frame's velocity, (6, nv), linear rows first; ∂v/∂(velocity) is its Jacobian.
+///
+/// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
+/// >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
+/// True
+fn frame_velocity_derivative(model, data;
+    q: Position, v: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
+    let mut dv_dq = six(model);
+    condyle::forward_velocities(model, data, &q, &v).frame_velocity_derivative(frame, reference, &mut dv_dq);
+    dv_dq
+}
+
+/// ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
+/// Jacobian.
+///
+/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+fn frame_acceleration_derivatives(model, data;
+    q: Position, v: Tangent, a: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
+    let (mut da_dq, mut da_dv) = (six(model), six(model));
+    let motion = condyle::forward_accelerations(model, data, &q, &v, &a);
+    motion.frame_acceleration_derivatives(frame, reference, &mut da_dq, &mut da_dv);
+    Both(da_dq, da_dv)
+}
+
+/// ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
+/// Jacobian.
+///
+/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+fn frame_classical_acceleration_derivatives(model, data;
+    q: Position, v: Tangent, a: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
+    let (mut da_dq, mut da_dv) = (six(model), six(model));
+    let motion = condyle::forward_accelerations(model, data, &q, &v, &a);
+    motion.frame_classical_acceleration_derivatives(frame, reference, &mut da_dq, &mut da_dv);
+    Both(da_dq, da_dv)
+}
+
+/// ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+///
+/// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+fn body_velocity_derivative(model, data; q: Position, v: Tangent, body: BodyOf, reference: Reference = "local"; out) {
+    let mut dv_dq = six(model);
+    condyle::forward_velocities(model, data, &q, &v).body_velocity_derivative(body, reference, &mut dv_dq);
+    dv_dq
+}
+
+/// ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+/// `frame_acceleration_derivatives` of its own frame.
+///
+/// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+fn body_acceleration_derivatives(model, data;
+    q: Position, v: Tangent, a: Tangent, body: BodyOf, reference: Reference = "local"; out) {
+    let (mut da_dq, mut da_dv) = (six(model), six(model));
+    let motion = condyle::forward_accelerations(model, data, &q, &v, &a);
+    motion.body_acceleration_derivatives(body, reference, &mut da_dq, &mut da_dv);
+    Both(da_dq, da_dv)
+}
+
+/// The derivatives of the centroidal momentum, its rate and the centre of mass by q, v and a, exact, in O(n), as
+/// `CentroidalDerivatives`.
+///
+/// q: nq numbers; v, a: nv. Gravity is not among the accelerations.
+///
+/// >>> quadruped = condyle.robots.quadruped()
+/// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+/// >>> d = condyle.centroidal_derivatives(quadruped, data, q, zero, zero)
+/// >>> np.allclose(d.drate_da, condyle.centroidal_map(quadruped, data, q).Ag)
+/// True
+fn centroidal_derivatives(model, data; q: Position, v: Tangent, a: Tangent; out) {
+    condyle::centroidal_derivatives(model, data, &q, &v, &a)
+}
+
+/// The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
+/// `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
+///
+/// q: nq numbers; v: nv.
+fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
+    condyle::energy_derivatives(model, data, &q, &v)
+}
+
+/// ∂τ/∂q of `static_torque`, and without forces of `gravity`, (nv, nv); exact, in O(n depth).
+///
+/// q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
+fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out) {
+    condyle::static_torque_derivative(model, data, &q, &f_ext)
+}
+
+/// The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
+/// `CoriolisDerivatives(dq, dv)`, each (nv, nv).
+///
+/// q: nq numbers; v: nv.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
+/// >>> d = condyle.coriolis_derivatives(arm, data, q, v)
+/// >>> np.allclose(d.dv, 2.0 * condyle.coriolis_matrix(arm, data, q, v))  # C v is quadratic in v
+/// True
+fn coriolis_derivatives(model, data; q: Position, v: Tangent; out) {
+    condyle::coriolis_derivatives(model, data, &q, &v)
+}
+}

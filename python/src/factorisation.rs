@@ -1,0 +1,239 @@
+//! Factors of the inertia matrix, and forward dynamics by divide and conquer: the library's types one to one.
+
+use crate::arrays::{Give, matrix, named_tuple, vector};
+use crate::functions::{Argument, Forces, Position, Tangent, regular, rows};
+use crate::model::Model;
+use nalgebra::DMatrix;
+use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+
+/// The verbs that both factors have, beside what makes and shows them.
+macro_rules! factor {
+    ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
+        $(#[$doc])*
+        #[pyclass(module = "condyle")]
+        pub(crate) struct $class {
+            inner: condyle::$class<f64>,
+            size: usize,
+            /// Whether there is a factor.
+            done: bool,
+        }
+
+        impl $class {
+            fn factor(&self) -> PyResult<&condyle::$class<f64>> {
+                let nothing = || PyRuntimeError::new_err("nothing to solve with: call `factorize` first");
+                self.done.then_some(&self.inner).ok_or_else(nothing)
+            }
+        }
+
+        #[pymethods]
+        impl $class {
+            $($own)*
+
+            /// Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+            ///
+            /// If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+            fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
+                let M = matrix("M", M, [self.size, self.size])?.to_matrix();
+                self.inner.factorize(&M);
+                self.done = true;
+                Ok(())
+            }
+
+            /// x with M x = b, as many numbers as M has rows.
+            ///
+            /// b: as many numbers.
+            #[pyo3(signature = (b, out=None))]
+            fn solve<'py>(
+                &self,
+                b: &Bound<'py, PyAny>,
+                out: Option<&Bound<'py, PyAny>>,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                let factor = self.factor()?;
+                let mut x = vector("b", b, self.size)?.to_vec();
+                factor.solve(&mut x);
+                x.give(b.py(), out)
+            }
+
+            /// X with M X = B, column by column.
+            ///
+            /// B: a matrix of as many rows as M has.
+            #[pyo3(signature = (B, out=None))]
+            fn solve_matrix<'py>(
+                &self,
+                B: &Bound<'py, PyAny>,
+                out: Option<&Bound<'py, PyAny>>,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                let factor = self.factor()?;
+                let mut X = rows("B", B, self.size)?.to_matrix();
+                factor.solve_matrix(&mut X);
+                X.give(B.py(), out)
+            }
+
+            /// M⁻¹, both triangles filled.
+            #[pyo3(signature = (out=None))]
+            fn inverse<'py>(
+                &self,
+                py: Python<'py>,
+                out: Option<&Bound<'py, PyAny>>,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                let mut X = DMatrix::zeros(self.size, self.size);
+                self.factor()?.inverse(&mut X);
+                X.give(py, out)
+            }
+        }
+    };
+}
+
+factor! {
+/// M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+///
+/// With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
+/// `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
+/// matrix for branched kinematic trees (2005).
+///
+/// model: the robot whose zeros M has.
+///
+/// >>> quadruped = condyle.robots.quadruped()
+/// >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+/// >>> factor = condyle.Ltdl(quadruped)
+/// >>> factor.factorize(M)
+/// >>> np.allclose(M @ factor.solve(np.ones(18)), 1.0)
+/// True
+/// >>> factor.nonzeros  # the base, and three joints of each leg: not 171
+/// 117
+Ltdl {
+    #[new]
+    fn new(model: &Bound<'_, Model>) -> Self {
+        let model = &model.get().inner;
+        Self { inner: condyle::Ltdl::new(model), size: model.nv(), done: false }
+    }
+
+    /// How many entries of L and D may differ from zero, the ones on L's diagonal not counted.
+    #[getter]
+    fn nonzeros(&self) -> usize {
+        self.inner.nonzeros()
+    }
+
+    /// The coordinates in their order from the root to the tips: they are eliminated last to first.
+    ///
+    /// It is 0, 1, 2, … unless joints share coordinates.
+    #[getter]
+    fn order(&self) -> Vec<usize> {
+        self.inner.order().to_vec()
+    }
+
+    /// Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value).
+    fn row(&self, k: usize) -> PyResult<Vec<(usize, f64)>> {
+        if k >= self.size {
+            return Err(PyIndexError::new_err(format!("k: expected less than {}, found {k}", self.size)));
+        }
+        Ok(self.factor()?.row(k).collect())
+    }
+
+    /// D, in the `order` of the places.
+    #[getter]
+    fn diagonal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.factor()?.diagonal().collect::<Vec<_>>().give(py, None)
+    }
+}
+}
+
+factor! {
+/// M = L Lᵀ of any symmetric positive definite matrix.
+///
+/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
+/// and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
+///
+/// n: the rows of M.
+///
+/// >>> factor = condyle.Cholesky(2)
+/// >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
+/// >>> factor.solve([8.0, 12.0])
+/// array([1., 2.])
+Cholesky {
+    #[new]
+    fn new(n: usize) -> Self {
+        Self { inner: condyle::Cholesky::new(n), size: n, done: false }
+    }
+
+    /// L, lower triangular.
+    #[getter]
+    fn lower<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.factor()?.lower().lower_triangle().give(py, None)
+    }
+}
+}
+
+/// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its scratch.
+///
+/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
+/// a join of two pieces costs some ten times as much as the elimination of a body. On two threads this is faster than
+/// `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. The bits are the same
+/// for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for parallel
+/// O(log(n)) calculation of rigid-body dynamics (1999).
+///
+/// model: the robot; grain: how many bodies a run has at most.
+///
+/// Raises `ModelError` if a joint follows another one (mimic).
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> divided = condyle.DivideConquer(arm, grain=1)
+/// >>> q, v, tau = [0.3] * 7, [0.1] * 7, [1.0] * 7
+/// >>> np.allclose(divided.aba(arm, q, v, tau), condyle.aba(arm, condyle.Data(arm), q, v, tau))
+/// True
+/// >>> divided.size
+/// AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, levels=4)
+#[pyclass(module = "condyle")]
+pub(crate) struct DivideConquer {
+    inner: condyle::DivideConquer<f64>,
+    structure: u64,
+}
+
+#[pymethods]
+impl DivideConquer {
+    #[new]
+    fn new(model: &Bound<'_, Model>, grain: usize) -> PyResult<Self> {
+        let Model { inner, structure } = model.get();
+        let inner = condyle::DivideConquer::new(inner, grain).map_err(crate::exceptions::exception)?;
+        Ok(Self { inner, structure: *structure })
+    }
+
+    /// How much work the assembly is, and how many levels wait for one another, as `AssemblySize`.
+    #[getter]
+    fn size<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let s = self.inner.size();
+        let numbers = (s.bodies, s.runs, s.longest_run, s.joins, s.gathers, s.levels);
+        named_tuple(py, &CLASS, "AssemblySize")?.call1(numbers)
+    }
+
+    /// q̈, nv numbers: those of `aba`, up to rounding, in O(n) work and O(log n + grain) steps.
+    ///
+    /// model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
+    /// f_ext: as for `rnea`.
+    #[pyo3(signature = (model, q, v, tau, f_ext=None, out=None))]
+    fn aba<'py>(
+        &mut self,
+        model: &Bound<'py, Model>,
+        q: &Bound<'py, PyAny>,
+        v: &Bound<'py, PyAny>,
+        tau: &Bound<'py, PyAny>,
+        f_ext: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, Model { inner: model, structure }) = (model.py(), model.get());
+        if *structure != self.structure {
+            return Err(PyValueError::new_err(format!("model: planned for another model, not for '{}'", model.name())));
+        }
+        regular(model)?;
+        let a = {
+            let (q, v) = (Position::read("q", q, model)?, Tangent::read("v", v, model)?);
+            let (tau, f_ext) = (Tangent::read("tau", tau, model)?, Forces::read("f_ext", f_ext, model)?);
+            self.inner.aba(model, &q, &v, &tau, &f_ext)
+        };
+        a.give(py, out)
+    }
+}

@@ -1,0 +1,251 @@
+//! How Python calls the library's functions: what an argument may be, and what all calls have in common.
+//!
+//! `functions!` makes a Python function of a declaration like
+//!
+//! ```text
+//! /// The docstring.
+//! fn rnea(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
+//!     condyle::rnea(model, data, &q, &v, &a, &f_ext)
+//! }
+//! ```
+//!
+//! Each argument is of a kind, a type below that says how it is read; the last expression is what Python gets, an array
+//! or a tuple of arrays, or with `out` what was given as such. The call borrows its `Data` before it looks at any other
+//! argument, so that a second use of the same one, from wherever, is an error; it gives its inputs back before it writes
+//! to `out`, which may be one of them.
+
+use crate::arrays::{Input, matrix, vector};
+use crate::exceptions::ModelError;
+use crate::model::{body_index, frame_index};
+use condyle::{Force, Method, Model, ReferenceFrame};
+use numpy::{Ix1, Ix2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// A kind of argument.
+pub(crate) trait Argument<'a, 'py> {
+    /// What Python gives.
+    type Given;
+    /// What the library takes.
+    type Read;
+    /// Reads the argument of this name of a function of this model.
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read>;
+}
+
+/// A position: nq numbers.
+pub(crate) enum Position {}
+/// A velocity, an acceleration, efforts or a tangent vector: nv numbers.
+pub(crate) enum Tangent {}
+/// Tangent vectors side by side: a matrix of nv rows.
+pub(crate) enum Tangents {}
+/// A force on each body, (nbodies, 6), or None.
+pub(crate) enum Forces {}
+/// The name or number of a frame.
+pub(crate) enum FrameOf {}
+/// The name of a joint or the number of a body.
+pub(crate) enum BodyOf {}
+/// In which axes, and at which point: a word.
+pub(crate) enum Reference {}
+/// How forward dynamics is computed: a word, or None.
+pub(crate) enum MethodOf {}
+/// An input of the dynamics beside q, v, a and τ: a word, or a word with a body or a number.
+pub(crate) enum InputOf {}
+/// A number.
+pub(crate) enum Number {}
+/// A positive speed.
+pub(crate) enum Speed {}
+/// A word, which the function itself understands.
+pub(crate) enum Word {}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for Position {
+    type Given = &'a Bound<'py, PyAny>;
+    type Read = Input<'py, Ix1>;
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+        vector(name, given, model.nq())
+    }
+}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for Tangent {
+    type Given = &'a Bound<'py, PyAny>;
+    type Read = Input<'py, Ix1>;
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+        vector(name, given, model.nv())
+    }
+}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for Tangents {
+    type Given = &'a Bound<'py, PyAny>;
+    type Read = Input<'py, Ix2>;
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+        rows(name, given, model.nv())
+    }
+}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
+    type Given = Option<&'a Bound<'py, PyAny>>;
+    type Read = Vec<Force<f64>>;
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+        let Some(given) = given else { return Ok(Vec::new()) };
+        let rows = matrix(name, given, [model.bodies().len(), 6])?;
+        Ok(rows.as_chunks::<6>().0.iter().map(|&row| row.into()).collect())
+    }
+}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for FrameOf {
+    type Given = &'a Bound<'py, PyAny>;
+    type Read = usize;
+    fn read(_: &str, given: Self::Given, model: &Model) -> PyResult<usize> {
+        frame_index(model, given)
+    }
+}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for BodyOf {
+    type Given = &'a Bound<'py, PyAny>;
+    type Read = usize;
+    fn read(_: &str, given: Self::Given, model: &Model) -> PyResult<usize> {
+        body_index("body: expected a joint's name", model, given, 0)
+    }
+}
+
+impl<'a> Argument<'a, '_> for Reference {
+    type Given = &'a str;
+    type Read = ReferenceFrame;
+    fn read(name: &str, given: &str, _: &Model) -> PyResult<ReferenceFrame> {
+        match given {
+            "local" => Ok(ReferenceFrame::Local),
+            "world" => Ok(ReferenceFrame::World),
+            "local_world_aligned" => Ok(ReferenceFrame::LocalWorldAligned),
+            other => Err(wrong_word(name, "'local', 'world' or 'local_world_aligned'", other)),
+        }
+    }
+}
+
+impl<'a> Argument<'a, '_> for MethodOf {
+    type Given = Option<&'a str>;
+    type Read = Option<Method>;
+    fn read(name: &str, given: Self::Given, _: &Model) -> PyResult<Self::Read> {
+        match given {
+            None => Ok(None),
+            Some("aba") => Ok(Some(Method::ArticulatedBody)),
+            Some("dense") => Ok(Some(Method::Dense)),
+            Some("sparse") => Ok(Some(Method::Sparse)),
+            Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
+        }
+    }
+}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for InputOf {
+    type Given = &'a Bound<'py, PyAny>;
+    type Read = condyle::Input;
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+        use condyle::Input;
+        if let Ok((word, of)) = given.extract::<(String, Bound<'py, PyAny>)>() {
+            let body = || body_index("wrt: expected a joint's name", model, &of, 0);
+            return match word.as_str() {
+                "force" => Ok(Input::Force(body()?)),
+                "inertia" => match body()? {
+                    0 => Err(PyValueError::new_err(format!("{name}: the world has no inertia"))),
+                    body => Ok(Input::Inertia(body)),
+                },
+                "friction" => Ok(Input::Friction { smoothing: positive_speed("smoothing", of.extract()?)? }),
+                other => Err(wrong_word(name, "('force', body), ('inertia', body) or ('friction', smoothing)", other)),
+            };
+        }
+        match given.extract::<String>()?.as_str() {
+            "gravity" => Ok(Input::Gravity),
+            "armature" => Ok(Input::Armature),
+            "damping" => Ok(Input::Damping),
+            other => Err(wrong_word(name, "'gravity', 'armature', 'damping' or a pair", other)),
+        }
+    }
+}
+
+impl Argument<'_, '_> for Number {
+    type Given = f64;
+    type Read = f64;
+    fn read(_: &str, given: f64, _: &Model) -> PyResult<f64> {
+        Ok(given)
+    }
+}
+
+impl Argument<'_, '_> for Speed {
+    type Given = f64;
+    type Read = f64;
+    fn read(name: &str, given: f64, _: &Model) -> PyResult<f64> {
+        positive_speed(name, given)
+    }
+}
+
+impl<'a> Argument<'a, '_> for Word {
+    type Given = &'a str;
+    type Read = &'a str;
+    fn read(_: &str, given: &'a str, _: &Model) -> PyResult<&'a str> {
+        Ok(given)
+    }
+}
+
+/// A number that must be a positive speed.
+pub(crate) fn positive_speed(name: &str, found: f64) -> PyResult<f64> {
+    if found > 0.0 {
+        return Ok(found);
+    }
+    Err(PyValueError::new_err(format!("{name}: expected a positive speed, found {found}")))
+}
+
+/// A matrix of so many rows and any number of columns.
+pub(crate) fn rows<'py>(name: &str, given: &Bound<'py, PyAny>, rows: usize) -> PyResult<Input<'py, Ix2>> {
+    let numpy = given.py().import("numpy")?;
+    let array = numpy.call_method1("asarray", (given,)).unwrap_or_else(|_| given.clone()); // `matrix` says why not
+    let columns = array.cast::<PyUntypedArray>().ok().and_then(|x| x.shape().get(1).copied()).unwrap_or(1);
+    matrix(name, &array, [rows, columns])
+}
+
+/// That a word is none of those that are understood.
+pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
+    PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
+}
+
+/// That the inertia matrix of a robot has an inverse.
+pub(crate) fn regular(model: &Model) -> PyResult<()> {
+    match model.warnings().iter().find(|w| matches!(w, condyle::Warning::Singular { .. })) {
+        None => Ok(()),
+        Some(singular) => Err(ModelError::new_err(singular.to_string())),
+    }
+}
+
+/// Declares functions of a model, and of a `Data` if `data` stands after it; see above.
+macro_rules! functions {
+    ($(
+        $(#[$doc:meta])*
+        fn $name:ident($model:ident $(, $data:ident)?;
+            $($arg:ident: $kind:ident $(= $default:tt)?),* $(; $out:ident)?) $body:block
+    )*) => {$(
+        $(#[$doc])*
+        #[pyfunction]
+        #[pyo3(signature = ($model, $($data,)? $($arg $(= $default)?,)* $($out = None)?))]
+        pub(crate) fn $name<'a, 'py: 'a>(
+            $model: &'a Bound<'py, $crate::model::Model>,
+            $($data: &'a Bound<'py, $crate::data::Data>,)?
+            $($arg: <$crate::functions::$kind as $crate::functions::Argument<'a, 'py>>::Given,)*
+            $($out: Option<&'a Bound<'py, PyAny>>,)?
+        ) -> PyResult<Bound<'py, PyAny>> {
+            use $crate::arrays::Give as _;
+            let (py, robot) = ($model.py(), $model.get());
+            $(
+                let mut scratch = $crate::data::scratch(robot, $data)?;
+                let $data = &mut scratch.inner;
+            )?
+            let $model = &robot.inner;
+            let result = {
+                $(let $arg = <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::read(
+                    stringify!($arg), $arg, $model,
+                )?;)*
+                $body
+            };
+            let out: Option<&Bound<'py, PyAny>> = None;
+            $(let out = out.or($out);)?
+            result.give(py, out)
+        }
+    )*};
+}
+pub(crate) use functions;

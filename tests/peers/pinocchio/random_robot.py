@@ -1,0 +1,164 @@
+"""Random robots made with both libraries' own calls, of every kind of joint that either has.
+
+Pinocchio's universal, spherical ZYX and composite joints are one joint each, if asked for, or several with bodies
+without mass between them, as they are here. q and v are laid out alike.
+"""
+
+import numpy as np
+import pinocchio as pin
+from comparison import Pair
+
+import condyle
+from condyle import BodyId, Inertia, Joint, ModelBuilder
+
+BRANCH = 0.4
+"""How often a body is not on the one before it, but on one of those that carry it."""
+ONE = ("revolute", "continuous", "prismatic", "helical")
+"""Kinds with an axis, which may be x, y, z or any."""
+OTHERS = ("spherical", "planar", "translation", "free_flyer")
+COMPOSITES = ("universal", "spherical_zyx", "composite")
+PARTS = ("revolute", "helical", "prismatic", "continuous")
+"""Of the composite joint."""
+ALIGNED = {
+    "revolute": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
+    "continuous": (pin.JointModelRUBX, pin.JointModelRUBY, pin.JointModelRUBZ),
+    "prismatic": (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),
+    "helical": (pin.JointModelHX, pin.JointModelHY, pin.JointModelHZ),
+}
+UNALIGNED = {
+    "revolute": pin.JointModelRevoluteUnaligned,
+    "prismatic": pin.JointModelPrismaticUnaligned,
+    "helical": pin.JointModelHelicalUnaligned,
+}
+"""Of continuous joints only the URDF parser makes those."""
+FREE = {
+    "spherical": (pin.JointModelSpherical, Joint.spherical),
+    "planar": (pin.JointModelPlanar, Joint.planar),
+    "translation": (pin.JointModelTranslation, Joint.translation),
+    "free_flyer": (pin.JointModelFreeFlyer, Joint.free_flyer),
+}
+
+Part = tuple[pin.JointModel, Joint, pin.SE3]
+"""A joint of both libraries, and where it sits."""
+
+
+class RandomRobot:
+    """A random robot with joints of these kinds, in any order; bodies are added depth first, as both number them."""
+
+    def __init__(self, name: str, seed: int, kinds: tuple[str, ...], composites: bool) -> None:
+        self.rng, self.composites = np.random.default_rng(seed), composites
+        pin.seed(seed)
+        self.theirs, self.builder = pin.Model(), ModelBuilder(name)
+        self.theirs.name = name
+        chains: list[list[int]] = [[0]]
+        path: list[tuple[int, BodyId]] = [(0, condyle.WORLD)]
+        for i, kind in enumerate(self.rng.permutation(kinds)):
+            while len(path) > 1 and self.rng.random() < BRANCH:
+                path.pop()
+            parts = self.parts(kind)
+            path.append(self.add(f"{i} {kind}", parts, *path[-1]))
+            first = chains[-1][-1] + 1
+            bodies = list(range(first, first + len(parts)))
+            chains += [bodies] if composites else [[body] for body in bodies]
+        armature = self.rng.uniform(0, 1, self.theirs.nv)
+        self.pair = Pair(name, self.theirs, self.builder.build(), chains=chains)
+        self.geared = self.pair.with_armature(armature)
+
+    def axis(self) -> np.ndarray:
+        axis = self.rng.standard_normal(3)
+        return axis / np.linalg.norm(axis)
+
+    def part(self, kind: str) -> Part:
+        """A joint with a single axis or without any."""
+        X = pin.SE3.Random()
+        if kind in FREE:
+            theirs, ours = FREE[kind]
+            return theirs(), ours(), X
+        k, pitch = int(self.rng.integers(4)), (float(self.rng.uniform(-0.5, 0.5)),) * (kind == "helical")
+        if k < 3 or kind not in UNALIGNED:
+            return ALIGNED[kind][k % 3](*pitch), getattr(Joint, kind)(np.eye(3)[k % 3], *pitch), X
+        axis = self.axis()
+        return UNALIGNED[kind](axis, *pitch), getattr(Joint, kind)(axis, *pitch), X
+
+    def revolute(self, axis: np.ndarray, X: pin.SE3) -> Part:
+        return pin.JointModelRevoluteUnaligned(axis), Joint.revolute(axis), X
+
+    def parts(self, kind: str) -> list[Part]:
+        """What a joint is made of."""
+        X, here = pin.SE3.Random(), pin.SE3.Identity()
+        if kind == "universal":
+            a, b = self.axis(), self.axis()
+            b = np.cross(a, b) / np.linalg.norm(np.cross(a, b))
+            return [self.revolute(a, X), self.revolute(b, here)]
+        if kind == "spherical_zyx":
+            z, y, x = np.eye(3)[::-1]
+            return [self.revolute(z, X), self.revolute(y, here), self.revolute(x, here)]
+        if kind == "composite":
+            return [self.part(part) for part in PARTS]
+        return [self.part(kind)]
+
+    def add(self, name: str, parts: list[Part], parent: int, on: BodyId) -> tuple[int, BodyId]:
+        """Adds a body with its joint and a frame on it, to both."""
+        inertia, kind = pin.Inertia.Random(), name.split()[1]
+        ours = Inertia.from_com(inertia.mass, inertia.lever, inertia.inertia)
+        if kind == "spherical_zyx":
+            body = self.builder.spherical_zyx(name, on, parts[0][2].homogeneous, ours)
+        elif len(parts) > 1:
+            body = self.builder.chain(name, on, [(our, X.homogeneous) for _, our, X in parts], ours)
+        else:
+            return self.add_one(name, parts[0], inertia, parent, on)
+        if self.composites:
+            joint = self.theirs.addJoint(parent, composite(kind, parts), parts[0][2], name)
+            self.theirs.addJointFrame(joint)
+        else:
+            joint = parent
+            for i, (their, _, X) in enumerate(parts, start=1):
+                joint = self.theirs.addJoint(joint, their, X, name if i == len(parts) else f"{name}#{i}")
+                self.theirs.addJointFrame(joint)
+        self.theirs.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+        self.add_frame(name, joint, body)
+        return joint, body
+
+    def add_one(self, name: str, part: Part, inertia: pin.Inertia, parent: int, on: BodyId) -> tuple[int, BodyId]:
+        """The same of a joint that is one in both libraries, with limits and losses."""
+        their, our, X = part
+        effort, velocity, friction, damping = self.rng.uniform(0, 1, 4)
+        lower, upper = self.rng.uniform(-3, 0), self.rng.uniform(0, 3)
+        each, none = np.ones(our.nv), np.full(our.nq, np.inf)
+        position = (np.array([lower]), np.array([upper])) if our.nq == 1 else (-none, none)
+        limits = (-effort * each, effort * each, -velocity * each, velocity * each, *position)
+        losses = (-friction * each, friction * each, damping * each)
+        joint = self.theirs.addJoint(parent, their, X, name, *limits, *losses)
+        self.theirs.addJointFrame(joint)
+        self.theirs.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+        body = self.builder.body(
+            name,
+            on,
+            our,
+            X.homogeneous,
+            Inertia.from_com(inertia.mass, inertia.lever, inertia.inertia),
+            position=(lower, upper) if our.nq == 1 else None,
+            velocity=velocity,
+            effort=effort,
+            damping=damping,
+            friction=friction,
+        )
+        self.add_frame(name, joint, body)
+        return joint, body
+
+    def add_frame(self, name: str, joint: int, body: BodyId) -> None:
+        X = pin.SE3.Random()
+        self.theirs.addFrame(pin.Frame(f"on {name}", joint, X, pin.FrameType.OP_FRAME))
+        self.builder.frame(f"on {name}", body, X.homogeneous)
+
+
+def composite(kind: str, parts: list[Part]) -> pin.JointModel:
+    """Several joints as one of Pinocchio's; the first one's place is that of the whole."""
+    if kind == "universal":
+        return pin.JointModelUniversal(*(ours.axis for _, ours, _ in parts))
+    if kind == "spherical_zyx":
+        return pin.JointModelSphericalZYX()
+    joint = pin.JointModelComposite()
+    for i, (theirs, _, X) in enumerate(parts):
+        joint.addJoint(theirs, X if i else pin.SE3.Identity())
+    return joint
