@@ -146,7 +146,7 @@ kernel! {
 /// let mut data = Data::new(&arm);
 /// let dV_dq = energy_derivatives(&arm, &mut data, &[0.3; 7], &[0.1; 7]).dV_dq.to_vec();
 /// for (dV, g) in dV_dq.iter().zip(gravity(&arm, &mut data, &[0.3; 7])) {
-///     assert!((dV - g).abs() < 1e-12);
+///     assert!(f64::abs(dV - g) < 1e-12);
 /// }
 /// ```
 ///

@@ -155,7 +155,8 @@ kernel! {
 /// ```
 /// use condyle_dynamics::{Data, robots, static_torque_derivative};
 /// let arm = robots::arm7();
-/// let stiffness = static_torque_derivative(&arm, &mut Data::new(&arm), &[0.3; 7], &[]);
+/// let mut data = Data::new(&arm);
+/// let stiffness = static_torque_derivative(&arm, &mut data, &[0.3; 7], &[]);
 /// assert!((stiffness - stiffness.transpose()).amax() < 1e-12); // gravity has a potential
 /// ```
 ///
