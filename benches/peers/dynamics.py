@@ -3,10 +3,10 @@
 
     python3 benches/peers/dynamics.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
-Pinocchio is compiled for this processor (clang++ -O3 -march=native, or g++), which takes some ten minutes the first time;
-Condyle is a default build. Both run on one core, in turn, round after round: a figure is the median over the rounds of
-each program's median, a ratio the median over the rounds of their quotient. Needs Linux, Rust, Python 3 with venv and a
-C++ compiler; everything else is installed under target/peers.
+Pinocchio is compiled for this processor (clang++ -O3 -march=native, or g++), which takes some ten minutes the first
+time; Condyle is a default build. Both run on one core, in turn, round after round: a figure is the median over the
+rounds of each program's median, a ratio the median over the rounds of their quotient. Needs Linux, Rust, Python 3 with
+venv and a C++ compiler; everything else is installed under target/peers.
 """
 
 import argparse
@@ -63,7 +63,7 @@ def build_pinocchio(python: Path) -> Path:
     prefix = Path(run(python, "-c", purelib).strip()) / "cmeel.prefix"
     include = Path(run(headers, "-c", purelib).strip()) / "cmeel.prefix" / "include"
     compiler = next(c for c in ("clang++-19", "clang++", "g++") if shutil.which(c))
-    flags = ["-std=c++17", "-O3", "-march=native", "-DNDEBUG", "-w", "-DBOOST_MPL_LIMIT_LIST_SIZE=30"]
+    flags = ["-std=c++17", "-march=native", "-DNDEBUG", "-w", "-DBOOST_MPL_LIMIT_LIST_SIZE=30"]
     flags += ["-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30"]
     flags += ["-DBOOST_FUSION_INVOKE_MAX_ARITY=12"]
     for folder in (prefix / "include", prefix / "include/urdfdom", include / "urdfdom_headers", include / "eigen3"):
@@ -73,7 +73,8 @@ def build_pinocchio(python: Path) -> Path:
     for part, target in zip(PARTS, objects, strict=True):
         if not target.exists() or target.stat().st_mtime < source.stat().st_mtime:
             print(f"compiling pinocchio.cpp, part {part} of {PARTS[-1]}, with {compiler} …", file=sys.stderr)
-            run(compiler, *flags, f"-DPART={part}", "-c", source, "-o", target)
+            level = "-O3" if part else "-O1"  # part 0 only reads the model
+            run(compiler, *flags, level, f"-DPART={part}", "-c", source, "-o", target)
     run(compiler, *objects, "-o", program, f"-L{prefix}/lib", f"-Wl,-rpath,{prefix}/lib", "-lboost_serialization")
     return program
 
@@ -144,14 +145,16 @@ def compare(robot: str, python: Path, theirs: Path, ours: Path, rounds: int, cpu
     rows = []
     for name in runs[0][0]:
         peer = [peer.get(name) or mine[BESIDE[name]] for mine, peer in runs]
-        rows.append({
-            "robot": robot,
-            "algorithm": name,
-            "mode": "one call" if name not in BESIDE else f"one call, beside our {BESIDE[name]}",
-            "ours_ns": statistics.median(mine[name] for mine, _ in runs),
-            "peer_ns": statistics.median(peer),
-            "ratio": statistics.median(mine[name] / other for (mine, _), other in zip(runs, peer, strict=True)),
-        })
+        rows.append(
+            {
+                "robot": robot,
+                "algorithm": name,
+                "mode": "one call" if name not in BESIDE else f"one call, beside our {BESIDE[name]}",
+                "ours_ns": statistics.median(mine[name] for mine, _ in runs),
+                "peer_ns": statistics.median(peer),
+                "ratio": statistics.median(mine[name] / other for (mine, _), other in zip(runs, peer, strict=True)),
+            }
+        )
     return rows
 
 
@@ -160,7 +163,9 @@ def table(rows: list[dict]) -> str:
     robots = list(dict.fromkeys(row["robot"] for row in rows))
     lines = ["| ratio (ours in µs) | " + " | ".join(robots) + " |", "| --- |" + " --- |" * len(robots)]
     for name in dict.fromkeys(row["algorithm"] for row in rows):
-        cells = {row["robot"]: f"{row['ratio']:.2f} ({row['ours_ns'] / 1e3:.2f})" for row in rows if row["algorithm"] == name}
+        cells = {
+            row["robot"]: f"{row['ratio']:.2f} ({row['ours_ns'] / 1e3:.2f})" for row in rows if row["algorithm"] == name
+        }
         beside = f" / {BESIDE[name]}" if name in BESIDE else ""
         lines.append(f"| {name}{beside} | " + " | ".join(cells[robot] for robot in robots) + " |")
     return "\n".join(lines)

@@ -1,5 +1,4 @@
 //! Velocities, accelerations and rates of Jacobians, against dual numbers in time.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,6 +1,5 @@
 //! Centre of mass, centroidal momentum, energies, and all terms at once: against dual numbers in time and the other
 //! algorithms.
-#![allow(non_snake_case)]
 
 use crate::common;
 

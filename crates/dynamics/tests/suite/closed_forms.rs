@@ -1,5 +1,4 @@
 //! Worked examples: robots whose equations of motion stand in textbooks, written out.
-#![allow(non_snake_case)]
 
 use crate::common;
 

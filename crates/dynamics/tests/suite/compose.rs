@@ -1,5 +1,4 @@
 //! Models made from models, and ways through the space of positions.
-#![allow(non_snake_case)] // the names of the literature
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! Constrained dynamics and impacts: the constraints hold, with forces of theirs and no others.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! The derivatives of constrained dynamics and of impacts by hand against dual numbers and against differences.
-#![allow(non_snake_case)]
 
 use crate::common;
 

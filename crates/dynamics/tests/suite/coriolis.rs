@@ -1,5 +1,4 @@
 //! The Coriolis matrix, and the efforts that hold a robot still.
-#![allow(non_snake_case)]
 
 use crate::common;
 

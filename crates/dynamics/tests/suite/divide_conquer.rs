@@ -1,5 +1,4 @@
 //! Divide and conquer gives the accelerations of the articulated-body algorithm, in O(log n) steps, whatever the threads.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! The algorithms against Lagrange: everything follows from the energies, and these need nothing but placements.
-#![allow(non_snake_case)]
 
 use crate::common;
 

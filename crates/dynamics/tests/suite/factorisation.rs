@@ -1,5 +1,4 @@
 //! The sparse and the dense factor of M: what they are, what they solve, where they have zeros.
-#![allow(non_snake_case)]
 
 use crate::common;
 

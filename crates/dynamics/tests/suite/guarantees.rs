@@ -1,5 +1,4 @@
 //! What holds for every function: no hidden order, named panics; and what a model promises.
-#![allow(non_snake_case)]
 
 use crate::common;
 

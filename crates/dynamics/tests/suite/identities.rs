@@ -1,5 +1,4 @@
 //! The algorithms against each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia matrix.
-#![allow(non_snake_case)]
 
 use crate::common;
 

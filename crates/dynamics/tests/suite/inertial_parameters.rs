@@ -1,5 +1,4 @@
 //! Which inertias are physical, and the parametrisation in which all are.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! The derivatives with respect to forces, inertial parameters, gravity, armature, damping and friction.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! Jacobians of frames and of the configuration space, against dual numbers.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,5 +1,6 @@
 //! One program for most tests, since each program compiles the generic algorithms again. On their own stand those that
 //! count allocations, look at the environment or choose the instructions to run on.
+#![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]
 mod common;

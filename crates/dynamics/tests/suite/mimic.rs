@@ -1,5 +1,4 @@
 //! Joints that follow others: as Pinocchio has them, around whole turns, and with rotors of their own.
-#![allow(non_snake_case)]
 
 use crate::common;
 

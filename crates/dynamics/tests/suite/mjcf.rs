@@ -1,5 +1,4 @@
 //! From MJCF to a model, against MuJoCo's numbers (data/make_mujoco.py), and whatever else a file can contain.
-#![allow(non_snake_case)]
 
 use condyle_dynamics::{
     Data, Error, FrameKind, Joint, MjcfOptions, Model, Vec3, Warning, crba, forward_kinematics, rnea,

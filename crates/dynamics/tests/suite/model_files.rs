@@ -1,5 +1,4 @@
 //! Models in files, as users may edit them: whatever a file says gives a model that works, or an error that says why not.
-#![allow(non_snake_case)]
 
 use crate::common;
 

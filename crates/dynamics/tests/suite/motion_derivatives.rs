@@ -1,5 +1,4 @@
 //! The derivatives of frames' motion, momentum, energies and static efforts: by hand against dual numbers.
-#![allow(non_snake_case)]
 
 use crate::common;
 

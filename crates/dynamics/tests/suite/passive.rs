@@ -1,5 +1,4 @@
 //! Damping and friction: they take power, they have the slope they say, and nobody adds them unasked.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! Dynamics and energies are linear in the inertial parameters.
-#![allow(non_snake_case)]
 
 use crate::common;
 

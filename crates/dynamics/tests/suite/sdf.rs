@@ -1,5 +1,4 @@
 //! From SDF to a model: the same robot as a URDF, errors, and whatever else a file can contain.
-#![allow(non_snake_case)]
 
 use condyle_dynamics::{
     Data, Error, Joint, Model, SdfOptions, UrdfOptions, Vec3, Warning, crba, forward_kinematics, neutral,

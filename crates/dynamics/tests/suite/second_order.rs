@@ -1,5 +1,4 @@
 //! The second derivatives by hand against hyper-dual numbers, and against each other.
-#![allow(non_snake_case)]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! From a URDF to a model: numbering, fixed joints, conventions, and whatever else a file can contain.
-#![allow(non_snake_case)]
 
 use crate::common;
 
