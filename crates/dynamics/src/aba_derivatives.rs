@@ -36,29 +36,80 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// C = −A B, of square matrices, where column j of B has zeros but in the rows `coupled[j]`; four columns of A at a time,
-/// so that C is loaded and stored a quarter as often.
+/// C = −A B, of square matrices, where column j of B has zeros but in the rows `coupled[j]`.
+///
+/// Four columns with the same rows, as those of one limb have, go together: eight entries of each stay in registers while
+/// their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored a quarter as often.
 #[inline(always)]
 pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>]) {
-    let n = coupled.len();
-    for j in 0..n {
-        let (b, c) = (&B[j * n..(j + 1) * n], &mut C[j * n..(j + 1) * n]);
-        c.fill(S::zero());
-        let (fours, rest) = coupled[j].as_chunks::<4>();
-        for &[k0, k1, k2, k3] in fours {
-            let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
-            let (a2, a3) = (&A[k2 * n..(k2 + 1) * n], &A[k3 * n..(k3 + 1) * n]);
-            let (b0, b1, b2, b3) = (-b[k0], -b[k1], -b[k2], -b[k3]);
-            for i in 0..n {
-                c[i] = a0[i].mul_add(b0, a1[i].mul_add(b1, a2[i].mul_add(b2, a3[i].mul_add(b3, c[i]))));
+    let (n, mut j) = (coupled.len(), 0);
+    while j < n {
+        let rows = &coupled[j];
+        if S::LANES == 1 && j + 4 <= n && coupled[j + 1..j + 4].iter().all(|other| other == rows) {
+            four_columns(A, &B[j * n..(j + 4) * n], &mut C[j * n..(j + 4) * n], rows, n);
+            j += 4;
+        } else {
+            one_column(A, &B[j * n..(j + 1) * n], &mut C[j * n..(j + 1) * n], rows);
+            j += 1;
+        }
+    }
+}
+
+#[inline(always)]
+fn one_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize]) {
+    let n = c.len();
+    c.fill(S::zero());
+    let (fours, rest) = rows.as_chunks::<4>();
+    for &[k0, k1, k2, k3] in fours {
+        let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
+        let (a2, a3) = (&A[k2 * n..(k2 + 1) * n], &A[k3 * n..(k3 + 1) * n]);
+        let (b0, b1, b2, b3) = (-b[k0], -b[k1], -b[k2], -b[k3]);
+        for i in 0..n {
+            c[i] = a3[i].mul_add(b3, a2[i].mul_add(b2, a1[i].mul_add(b1, a0[i].mul_add(b0, c[i]))));
+        }
+    }
+    for &k in rest {
+        let (a, b) = (&A[k * n..(k + 1) * n], -b[k]);
+        for i in 0..n {
+            c[i] = a[i].mul_add(b, c[i]);
+        }
+    }
+}
+
+/// The sums of `one_column`, in the same order, so that the bits are the same.
+#[inline(always)]
+fn four_columns<S: Scalar>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], n: usize) {
+    let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
+    let mut i = 0;
+    while i + 8 <= n {
+        let mut c = [[S::zero(); 8]; 4];
+        for &k in rows {
+            let a = &A[k * n + i..k * n + i + 8];
+            let b = [-b0[k], -b1[k], -b2[k], -b3[k]];
+            for y in 0..4 {
+                for x in 0..8 {
+                    c[y][x] = a[x].mul_add(b[y], c[y][x]);
+                }
             }
         }
-        for &k in rest {
-            let (a, b) = (&A[k * n..(k + 1) * n], -b[k]);
-            for i in 0..n {
-                c[i] = a[i].mul_add(b, c[i]);
+        for y in 0..4 {
+            C[y * n + i..y * n + i + 8].copy_from_slice(&c[y]);
+        }
+        i += 8;
+    }
+    while i < n {
+        let mut c = [S::zero(); 4];
+        for &k in rows {
+            let a = A[k * n + i];
+            let b = [-b0[k], -b1[k], -b2[k], -b3[k]];
+            for y in 0..4 {
+                c[y] = a.mul_add(b[y], c[y]);
             }
         }
+        for y in 0..4 {
+            C[y * n + i] = c[y];
+        }
+        i += 1;
     }
 }
 
