@@ -1,4 +1,4 @@
-"""Reference numbers for tests/suite/mjcf.rs, from MuJoCo 4.0.0: `pip install mujoco==4.0.0`, then `python make_mujoco.py`.
+"""Numbers of MuJoCo 4.0.0 for tests/suite/mjcf.rs: `pip install mujoco==4.0.0`, then `python make_mujoco.py`.
 
 Quaternions stay w first and a free joint's linear velocity in the world's frame: the test converts.
 """
