@@ -12,6 +12,7 @@ use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::layout::{Layout, Single};
+use crate::ltdl::axpy;
 use crate::minv;
 use crate::model::Model;
 use crate::rnea_derivatives;
@@ -49,16 +50,18 @@ pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &
             four_columns(A, &B[j * n..(j + 4) * n], &mut C[j * n..(j + 4) * n], rows, n);
             j += 4;
         } else {
-            one_column(A, &B[j * n..(j + 1) * n], &mut C[j * n..(j + 1) * n], rows);
+            let c = &mut C[j * n..(j + 1) * n];
+            c.fill(S::zero());
+            subtract_column(A, &B[j * n..(j + 1) * n], c, rows);
             j += 1;
         }
     }
 }
 
+/// c −= A b, where b has zeros but in these rows.
 #[inline(always)]
-fn one_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize]) {
+pub(crate) fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize]) {
     let n = c.len();
-    c.fill(S::zero());
     let (fours, rest) = rows.as_chunks::<4>();
     for &[k0, k1, k2, k3] in fours {
         let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
@@ -69,14 +72,11 @@ fn one_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize]) {
         }
     }
     for &k in rest {
-        let (a, b) = (&A[k * n..(k + 1) * n], -b[k]);
-        for i in 0..n {
-            c[i] = a[i].mul_add(b, c[i]);
-        }
+        axpy(-b[k], &A[k * n..(k + 1) * n], c);
     }
 }
 
-/// The sums of `one_column`, in the same order, so that the bits are the same.
+/// The sums of `subtract_column`, in the same order, so that the bits are the same.
 #[inline(always)]
 fn four_columns<S: Scalar>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], n: usize) {
     let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);

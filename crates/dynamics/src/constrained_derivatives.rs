@@ -15,6 +15,7 @@
 //! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier,
 //! Mastalli, Mansard, *Differential dynamic programming for multi-phase rigid contact dynamics* (2018).
 
+use crate::aba_derivatives::subtract_column;
 use crate::constrained_dynamics;
 use crate::constraint::ConstraintKind;
 use crate::constraint_motion::{Columns, Ends};
@@ -50,26 +51,13 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// C −= A B, where column j of B has zeros but in the rows `rows[j]`; four columns of A at a time, so that C is loaded and
-/// stored a quarter as often.
+/// C −= A B, where column j of B has zeros but in the rows `rows[j]`.
 #[inline(always)]
 fn subtract_product<S: Scalar>(A: &DMatrix<S>, B: &DMatrix<S>, C: &mut DMatrix<S>, rows: &[Vec<usize>]) {
     let (n, m) = A.shape();
     let (A, B, C) = (A.as_slice(), B.as_slice(), C.as_mut_slice());
-    for j in 0..rows.len() {
-        let (b, c) = (&B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n]);
-        let (fours, rest) = rows[j].as_chunks::<4>();
-        for &[k0, k1, k2, k3] in fours {
-            let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
-            let (a2, a3) = (&A[k2 * n..(k2 + 1) * n], &A[k3 * n..(k3 + 1) * n]);
-            let (b0, b1, b2, b3) = (-b[k0], -b[k1], -b[k2], -b[k3]);
-            for i in 0..n {
-                c[i] = a0[i].mul_add(b0, a1[i].mul_add(b1, a2[i].mul_add(b2, a3[i].mul_add(b3, c[i]))));
-            }
-        }
-        for &k in rest {
-            axpy(-b[k], &A[k * n..(k + 1) * n], c);
-        }
+    for (j, rows) in rows.iter().enumerate() {
+        subtract_column(A, &B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n], rows);
     }
 }
 

@@ -13,6 +13,7 @@
 
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
+use crate::crba;
 use crate::data::{Data, Size, check, check_forces};
 use crate::kinematics::{World, place};
 use crate::layout::{Layout, Single};
@@ -85,7 +86,7 @@ fn bias<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S],
         let F_i = F[i];
         l.push(F, i, F_i); // F_λ += F_i
     }
-    carry(l, w, IC, M);
+    crba::carry(l, w, IC, M);
 }
 
 /// M alone, for bodies that are placed.
@@ -94,31 +95,7 @@ pub(crate) fn inertia<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
     for i in l.bodies() {
         d.IC[i] = w.oX[i].act(l.inertia(i));
     }
-    carry(l, w, &mut d.IC, &mut d.M);
-}
-
-/// The way back of the composite-rigid-body algorithm.
-#[inline(always)]
-fn carry<L: Layout>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut DMatrix<L::S>) {
-    let M = M.as_mut_slice();
-    M.fill(L::S::zero());
-    for i in l.bodies().rev() {
-        let support = l.support(i);
-        let nv = l.joint(i).nv();
-        for k in 0..nv {
-            let F = IC[i] * w.S[l.slot(i) + k]; // F = Iᶜ S
-            let own = support.len() - nv + k;
-            for &e in &support[..own] {
-                let x = l.at(&w.S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
-                l.add_at(M, e, support[own], x);
-                l.add_at(M, support[own], e, x);
-            }
-            l.add_at(M, support[own], support[own], l.at(&w.S, support[own]).dot(F));
-        }
-        let IC_i = IC[i];
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
-    }
-    l.add_armature(M);
+    crba::carry(l, w, &mut d.IC, &mut d.M);
 }
 
 impl<S: Scalar> ConstraintSet<S> {

@@ -5,7 +5,7 @@
 
 use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
-use crate::kinematics::positions;
+use crate::kinematics::{World, positions};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
@@ -34,14 +34,18 @@ impl<S> Workspace<S> {
 
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, data: &mut Data<L::S>) {
-    let (oX, S) = (&data.world.oX, &data.world.S);
-    let Workspace { IC, M } = &mut data.crba;
+fn pass<L: Layout>(l: &L, w: &World<L::S>, Workspace { IC, M }: &mut Workspace<L::S>) {
+    for i in l.bodies() {
+        IC[i] = w.oX[i].act(l.inertia(i));
+    }
+    carry(l, w, IC, M);
+}
+
+/// M, for the inertias of the bodies, which become those of all that the joints carry.
+#[inline(always)]
+pub(crate) fn carry<L: Layout>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut DMatrix<L::S>) {
     let M = M.as_mut_slice();
     M.fill(L::S::zero());
-    for i in l.bodies() {
-        IC[i] = oX[i].act(l.inertia(i));
-    }
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
@@ -63,7 +67,7 @@ fn pass<L: Layout>(l: &L, data: &mut Data<L::S>) {
 
 kernel! {
     fn run(model, data) {
-        pass(&Single::new(model), data);
+        pass(&Single::new(model), &data.world, &mut data.crba);
     }
 }
 

@@ -86,7 +86,6 @@ macro_rules! kernel {
                     }
                     let Work(model, data, ($($arg,)*)) = self;
                     // SAFETY: S and R are f64, and by contract the processor has the level.
-                    #[cfg(target_arch = "x86_64")]
                     unsafe {
                         let model: &Model<f64> = same(model);
                         avx2(Work(model, fused(data), ($(slice($arg),)*)));

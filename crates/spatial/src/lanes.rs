@@ -7,7 +7,6 @@
 //! alone, so what one lane holds (not-a-numbers included) never reaches another.
 #![allow(unsafe_code)]
 
-use crate::level::Level;
 use crate::scalar::Scalar;
 use crate::sin_cos;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -31,22 +30,20 @@ pub trait Kernel: Sized {
     fn run_fused(self);
 }
 
-/// Runs a kernel with the instructions of [`Level::Avx2`].
+/// Runs a kernel with the instructions of [`Level::Avx2`](crate::level::Level::Avx2).
 ///
 /// # Safety
 /// The processor must have them.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
+#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
 pub unsafe fn avx2(kernel: impl Kernel) {
     kernel.run();
 }
 
-/// Runs a kernel with the instructions of [`Level::Avx512`].
+/// Runs a kernel with the instructions of [`Level::Avx512`](crate::level::Level::Avx512).
 ///
 /// # Safety
 /// The processor must have them.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma"))]
 pub unsafe fn avx512(kernel: impl Kernel) {
     kernel.run();
 }
@@ -98,7 +95,6 @@ impl Neg for Fused {
 impl Scalar for Fused {
     type Mask = bool;
     const LANES: usize = 1;
-    const LEVEL: Level = Level::Avx2;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -186,7 +182,7 @@ macro_rules! masks {
 #[cfg(target_arch = "x86_64")]
 macro_rules! lanes {
     (
-        $float:ident by $n:literal, $level:ident $enter:ident, $vector:ident, $mask:ident, $sin_cos:ident up to $largest:ident;
+        $float:ident by $n:literal, $enter:ident, $vector:ident, $mask:ident, $sin_cos:ident up to $largest:ident;
         $m:ident $set1:ident $loadu:ident $storeu:ident $add:ident $sub:ident $mul:ident $div:ident $fmadd:ident $sqrt:ident
     ) => {
         impl Element<$n> for $float {
@@ -272,7 +268,6 @@ macro_rules! lanes {
         impl Scalar for Lanes<$float, $n> {
             type Mask = $mask;
             const LANES: usize = $n;
-            const LEVEL: Level = Level::$level;
 
             #[inline(always)]
             fn enter(kernel: impl Kernel) {
@@ -351,7 +346,6 @@ macro_rules! lanes {
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::{Element, Kernel, Lanes, avx2, avx512};
-    use crate::level::Level;
     use crate::scalar::Scalar;
     use crate::sin_cos;
     use core::arch::x86_64::*;
@@ -374,7 +368,7 @@ mod x86 {
                     any(mask): $movemask(mask) != 0
                 }
             }
-            lanes! { $float by $n, Avx2 avx2, $vector, $vector, $sin_cos up to $largest; $m $set1 $($p)* }
+            lanes! { $float by $n, avx2, $vector, $vector, $sin_cos up to $largest; $m $set1 $($p)* }
         };
     }
     avx2! {
@@ -404,7 +398,7 @@ mod x86 {
                     any(mask): mask != 0
                 }
             }
-            lanes! { $float by $n, Avx512 avx512, $vector, $mask, $sin_cos up to $largest; $m $set1 $($p)* }
+            lanes! { $float by $n, avx512, $vector, $mask, $sin_cos up to $largest; $m $set1 $($p)* }
         };
     }
     avx512! {

@@ -50,15 +50,6 @@ impl Level {
         }
     }
 
-    /// How many `f64` it computes with at once.
-    pub fn lanes(self) -> usize {
-        match self {
-            Self::Baseline => 1,
-            Self::Avx2 => 4,
-            Self::Avx512 => 8,
-        }
-    }
-
     fn from_number(n: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|&level| level as u8 == n)
     }

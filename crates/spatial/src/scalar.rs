@@ -39,9 +39,6 @@ pub trait Scalar:
     type Mask: Copy;
     /// How many numbers lie side by side in one value.
     const LANES: usize;
-    /// Which instructions it is made of. A number above [`Level::Baseline`] exists only inside functions that are compiled
-    /// for its level.
-    const LEVEL: Level = Level::Baseline;
 
     /// Runs a kernel on this scalar, compiled for its level.
     #[doc(hidden)]
