@@ -356,5 +356,6 @@ fn pass<S: Scalar, R: Constant<S>>(
     }
     constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
     constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
+    id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
     constraints.respond_to_v(&d.P, &id.dtau_dv, &mut d.da_dv);
 }

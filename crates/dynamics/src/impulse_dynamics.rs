@@ -20,7 +20,7 @@ use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, Size, check};
 use crate::kinematics::{World, place};
-use crate::layout::{Layout, Single};
+use crate::layout::{Layout, Pairs, Single};
 use crate::ltdl::axpy;
 use crate::model::Model;
 use crate::rnea_derivatives;
@@ -123,7 +123,7 @@ where
 
 /// The whole algorithm.
 #[inline(always)]
-fn pass<L: Layout>(
+fn pass<L: Pairs>(
     l: &L,
     data: &mut Data<L::S>,
     constraints: &mut ConstraintSet<L::S>,
@@ -235,6 +235,7 @@ pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     }
     constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
     constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
+    id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
     constraints.respond_to_v_before(restitution, &mut d.da_dv);
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ImpulseDerivatives {

@@ -45,11 +45,22 @@ impl Model {
                 column: first,
                 support: self.support.len(),
                 depth: path.len(),
+                level: if i == 0 { 0 } else { self.nodes[body.parent].level + 1 },
+                finished: (0, 0),
                 placement: pXz.inverse() * body.placement * bXz * offset,
                 inertia: bXz.act_inv(body.inertia),
                 reframing,
             });
             self.support.extend(path);
+        }
+        // depth first: a body at whose end no child stands finishes itself, and all ancestors of which it is the last
+        let mut unfinished = Vec::new();
+        for i in 1..self.nodes.len() {
+            unfinished.push(i);
+            let next = self.nodes.get(i + 1).map_or(0, |next| next.level.saturating_sub(1));
+            let first = self.finished.len();
+            self.finished.extend(unfinished.drain(next..).rev());
+            self.nodes[i].finished = (first, self.finished.len());
         }
         // depth first, so a subtree's columns end where its last descendant's do
         for c in (0..self.columns.len()).rev() {

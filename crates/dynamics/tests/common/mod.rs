@@ -153,7 +153,7 @@ impl Tree {
         self.parts.len()
     }
 
-    fn follow(&mut self, follower: usize, leader: usize, ratio: f64, offset: f64) {
+    pub(crate) fn follow(&mut self, follower: usize, leader: usize, ratio: f64, offset: f64) {
         self.parts[follower - 1].mimic = Some((leader, Mimic { ratio, offset }));
     }
 
