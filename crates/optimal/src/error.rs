@@ -65,6 +65,22 @@ pub enum Error {
         what: String,
     },
 
+    /// A contact does not fit the robot, or the contacts before it.
+    #[error("contact `{name}`: {what}")]
+    Contact {
+        /// The contact's name, or that of a number that all contacts share.
+        name: String,
+        /// What does not fit, with the numbers.
+        what: String,
+    },
+
+    /// A robot's drives do not fit it, or it cannot be driven.
+    #[error("actuation: {what}")]
+    Actuation {
+        /// What does not fit, with the numbers.
+        what: String,
+    },
+
     /// A knot's duration must be above zero.
     #[error("a knot of {dt} s: its duration must be above 0")]
     TimeStep {

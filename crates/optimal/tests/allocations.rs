@@ -4,8 +4,11 @@
 mod common;
 
 use common::{HANGING, cartpole, random, random_node, straight};
-use condyle_dynamics::{Se3, Vec3, neutral, robots};
-use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle_dynamics::{Constraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
+use condyle_optimal::robot::{
+    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
+    Integrator, Residual,
+};
 use condyle_optimal::{Fddp, Problem, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -106,4 +109,61 @@ fn a_robots_solve_allocates_nothing() {
         });
         assert_eq!(second, 0, "{}", model.name());
     }
+}
+
+/// A gait of every kind of knot and residual: stance, an impact, and flight by Runge–Kutta.
+#[test]
+fn a_gait_allocates_nothing() {
+    let model = std::sync::Arc::new(robots::quadruped());
+    let mut q = neutral(&model);
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    let x0 = [q, vec![0.0; 18]].concat();
+    let foot = |name: &str| Constraint::point(model.frame(name).unwrap());
+    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, Constraint { kd: 20.0, ..foot(name) }));
+    let cone = FrictionCone::new(0.7);
+    let (lower, upper) = cone.bounds();
+    let contact = || "LF_foot".to_owned();
+    let frame = model.frame("RF_foot").unwrap();
+    let target = Motion::zero();
+    let reference = ReferenceFrame::LocalWorldAligned;
+    let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
+    let standing = || {
+        vec![
+            quadratic("state", 1e-1, Residual::State { reference: x0.clone() }),
+            quadratic("com", 1e0, Residual::CenterOfMass { target: Vec3::new(0.0, 0.0, 0.4) }),
+            quadratic("momentum", 1e-3, Residual::CentroidalMomentum { target: Force::zero() }),
+            quadratic("speed", 1e-3, Residual::FrameVelocity { frame, target, reference }),
+        ]
+    };
+    let driven = || {
+        let effort = Residual::Control { reference: vec![0.0; 12] };
+        let own = [quadratic("effort", 1e-3, effort), quadratic("gravity", 1e-5, Residual::ControlGravity)];
+        [standing(), own.into()].concat()
+    };
+    let grip = Residual::FrictionCone { contact: contact(), cone };
+    let force = Residual::ContactForce { contact: contact(), target: Force::zero() };
+    let pushing = [
+        driven(),
+        vec![Cost::new("grip", 1e-2, grip, Activation::Barrier { lower, upper }), quadratic("force", 1e-6, force)],
+    ]
+    .concat();
+    let landing = [standing(), vec![quadratic("jump", 1e-2, Residual::ImpulseCenterOfMass)]].concat();
+    let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, pushing).unwrap();
+    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, landing).unwrap();
+    let drives = Actuation::joints(&model);
+    let flight = Free::new(model.clone(), drives, driven()).unwrap();
+    let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
+    let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
+    let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 24]].concat();
+    let models: Vec<Box<dyn condyle_optimal::ActionModel>> = vec![Box::new(stance), Box::new(impact), Box::new(flight)];
+    let mut problem = Problem::new(x0.clone(), models, vec![0, 0, 1, 2, 2], Box::new(end)).unwrap();
+    let xs = x0.repeat(6);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 3;
+    solver.solve(&mut problem, &xs, &us).unwrap();
+    let second = allocations(|| {
+        solver.solve(&mut problem, &xs, &us).unwrap();
+    });
+    assert_eq!(second, 0);
+    assert!(solver.solution().trace.iter().any(|i| i.accepted));
 }
