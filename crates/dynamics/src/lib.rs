@@ -30,6 +30,7 @@ mod compose;
 mod configuration;
 mod constrained_derivatives;
 mod constrained_dynamics;
+mod constrained_work;
 mod constraint;
 mod constraint_motion;
 mod constraint_set;
