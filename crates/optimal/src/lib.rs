@@ -12,6 +12,7 @@
 //!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`].
+//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
 //! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖
@@ -70,6 +71,7 @@ mod dense;
 mod error;
 mod fddp;
 mod lq;
+mod lqr;
 mod numdiff;
 mod problem;
 pub mod robot;
@@ -81,6 +83,7 @@ pub use action::ActionModel;
 pub use error::Error;
 pub use fddp::Fddp;
 pub use lq::{LqKnot, LqNode, Sweep, SweepError};
+pub use lqr::Lqr;
 pub use numdiff::NumDiff;
 pub use problem::Problem;
 pub use settings::Settings;

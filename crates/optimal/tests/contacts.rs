@@ -7,7 +7,7 @@ use condyle_dynamics::{
 };
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Contacts, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
-    Integrated, Integrator, Residual, WrenchCone,
+    Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status};
 use nalgebra::DMatrix;
@@ -17,6 +17,8 @@ use std::sync::Arc;
 /// Central differences of a function with values and derivatives of order one are good to about 1e-9 of them; contact
 /// forces are some hundred times larger than their arguments.
 const DIFFERENCES: f64 = 1e-6;
+/// Both solves stop where the cost is expected to fall by less than 1e-9.
+const OPTIMUM: f64 = 1e-7;
 /// A sum of some dozen products in another order.
 const ROUNDING: f64 = 1e-13;
 const DT: f64 = 0.02;
@@ -191,6 +193,59 @@ fn derivatives_of_an_impact_are_those_of_the_action() {
         let action = ImpulseDynamics::new(model.clone(), &contacts, 0.3, 1e-9, costs).unwrap();
         check_derivatives(&format!("impact of the {}", model.name()), action, &model, 0.0, &mut rng);
     }
+}
+
+#[test]
+fn derivatives_of_inverse_dynamics_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(17);
+    for model in [robots::arm7(), robots::quadruped()].map(Arc::new) {
+        let nv = model.nv();
+        let costs = vec![
+            Cost::new(
+                "state",
+                0.3,
+                Residual::State { reference: random_state(&model, &mut rng) },
+                Activation::Quadratic,
+            ),
+            Cost::new("torque", 1e-2, Residual::JointEffort { reference: random(nv, 1.0, &mut rng) }, barrier(nv)),
+            Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
+            Cost::new("change", 0.1, Residual::Control { reference: random(nv, 1.0, &mut rng) }, Activation::Quadratic),
+        ];
+        let action = InverseDynamics::running(model.clone(), DT, costs).unwrap();
+        check_derivatives(&format!("inverse dynamics of {}", model.name()), action, &model, 1.0, &mut rng);
+    }
+}
+
+/// The same reach with torques and with accelerations as controls ends in the same optimum.
+#[test]
+fn inverse_and_forward_dynamics_have_one_optimum() {
+    let arm = Arc::new(robots::arm7());
+    let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    let frame = arm.frame("tool").unwrap();
+    let reach = Residual::FrameTranslation { frame, target: Vec3::new(0.4, 0.2, 0.5) };
+    let effort = || Residual::JointEffort { reference: vec![0.0; 7] };
+    let acceleration = || Residual::JointAcceleration { reference: vec![0.0; 7] };
+    let running = || {
+        vec![
+            Cost::new("rest", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic),
+            Cost::new("effort", 1e-3, effort(), Activation::Quadratic),
+            Cost::new("smooth", 1e-4, acceleration(), Activation::Quadratic),
+        ]
+    };
+    let end =
+        || FreeDynamics::terminal(arm.clone(), vec![Cost::new("reach", 1e2, reach.clone(), Activation::Quadratic)]);
+    let solve = |knot: Box<dyn ActionModel>, us: &[f64]| {
+        let mut problem = Problem::new(x0.clone(), vec![knot], vec![0; 20], Box::new(end().unwrap())).unwrap();
+        let mut solver = Fddp::new(&problem);
+        let solution = solver.solve(&mut problem, &x0.repeat(21), us).unwrap();
+        assert_eq!(solution.status, Status::Converged);
+        solution.cost
+    };
+    let mut forward = FreeDynamics::running(arm.clone(), 0.05, running()).unwrap();
+    let hold = forward.quasi_static(&x0).repeat(20);
+    let by_effort = solve(Box::new(forward), &hold);
+    let by_acceleration = solve(Box::new(InverseDynamics::running(arm.clone(), 0.05, running()).unwrap()), &[0.0; 140]);
+    assert!((by_effort - by_acceleration).abs() < OPTIMUM * by_effort, "{by_effort} and {by_acceleration}");
 }
 
 #[test]

@@ -4,11 +4,17 @@
 mod common;
 
 use common::{Linear, random, random_matrix, random_node};
-use condyle_optimal::{ActionModel, Fddp, LqNode, Problem, Settings, Status, Sweep, SweepError};
+use condyle_optimal::{ActionModel, Fddp, LqNode, Lqr, NumDiff, Problem, Settings, Status, Sweep, SweepError};
 use nalgebra::{DMatrix, DVector};
 
 /// Random problems with entries of size one, whose value functions grow to 1e3 or so over the horizon.
 const RESIDUAL: f64 = 1e-9;
+
+/// A sum of some dozen products in another order.
+const ROUNDING: f64 = 1e-13;
+
+/// Second differences with steps of 1e-4 are good to about 1e-7.
+const DIFFERENCES: f64 = 1e-6;
 
 /// The solution of a random LQ problem, from gains and value functions, satisfies the Karush–Kuhn–Tucker conditions.
 #[test]
@@ -115,4 +121,29 @@ fn fddp_solves_an_lqr_in_one_iteration() {
     assert!((first.cost - second.cost).abs() < RESIDUAL * (1.0 + first.cost.abs()));
     assert!((first.decrease - first.expected_decrease).abs() < RESIDUAL * (1.0 + first.decrease.abs()));
     assert!(solution.gap < 1e-12 && solution.feasible);
+}
+
+/// The action's derivatives, and its cost and next state against the sums written out.
+#[test]
+fn an_lqr_is_its_node() {
+    let mut random = random();
+    let node = random_node(&mut random, 5, 3);
+    let (x, u) = (random_matrix(&mut random, 5, 1), random_matrix(&mut random, 3, 1));
+    let mut action = Lqr::new(node.clone());
+    let mut next = [0.0; 5];
+    let cost = action.calc(0, x.as_slice(), u.as_slice(), &mut next);
+    let expected = &node.A * &x + &node.B * &u + &node.f;
+    assert!(expected.iter().zip(next).all(|(a, b)| (a - b).abs() < ROUNDING));
+    let quadratic = (x.transpose() * &node.Q * &x + u.transpose() * &node.R * &u)[0] / 2.0;
+    let value = quadratic + (x.transpose() * &node.S * &u)[0] + node.q.dot(&x.column(0)) + node.r.dot(&u.column(0));
+    assert!((cost - value).abs() < ROUNDING);
+    let (mut written, mut numeric) = (LqNode::zeros(5, 3), LqNode::zeros(5, 3));
+    action.calc_diff(0, x.as_slice(), u.as_slice(), &mut written);
+    NumDiff(action).calc_diff(0, x.as_slice(), u.as_slice(), &mut numeric);
+    for (a, b) in
+        [(&written.A, &numeric.A), (&written.B, &numeric.B), (&written.Q, &numeric.Q), (&written.S, &numeric.S)]
+    {
+        assert!((a - b).amax() < DIFFERENCES);
+    }
+    assert!((&written.q - &numeric.q).amax() < DIFFERENCES && (&written.r - &numeric.r).amax() < DIFFERENCES);
 }

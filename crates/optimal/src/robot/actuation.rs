@@ -52,6 +52,11 @@ impl Actuation {
         Ok(Self { nv: rows, map: Map::Matrix(S) })
     }
 
+    /// A drive for each coordinate.
+    pub(super) fn all(model: &Model) -> Self {
+        Self { nv: model.nv(), map: Map::After(0) }
+    }
+
     /// No drives.
     pub(super) fn none(model: &Model) -> Self {
         Self { nv: model.nv(), map: Map::After(model.nv()) }

@@ -2,8 +2,8 @@
 //! contact, or hit something.
 //!
 //! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name.
-//! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without. What drives
-//!   a robot is its [`Actuation`]; how a knot steps through its time, its [`Integrator`].
+//! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
+//!   [`InverseDynamics`] the accelerations are the controls. What drives a robot is its [`Actuation`]; how a knot steps through its time, its [`Integrator`].
 //! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
 //!
 //! ```
@@ -51,6 +51,7 @@ mod euler;
 mod free;
 mod impulse;
 mod integrated;
+mod inverse;
 mod quadratic;
 mod residual;
 mod runge_kutta;
@@ -66,4 +67,5 @@ pub use costs::{Cost, Costs};
 pub use free::{Free, FreeDynamics};
 pub use impulse::ImpulseDynamics;
 pub use integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+pub use inverse::{Inverse, InverseDynamics};
 pub use residual::Residual;
