@@ -1950,11 +1950,19 @@ class FreeDynamics:
     model: the robot.
     dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
     costs: a list of `Cost`.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 
     Raises `ProblemError` for a cost that does not fit.
     """
 
-    def __new__(cls, model: Model, dt: float | None, costs: Sequence[Cost]) -> FreeDynamics: ...
+    def __new__(
+        cls,
+        model: Model,
+        dt: float | None,
+        costs: Sequence[Cost],
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> FreeDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The efforts that hold the robot still at the state x, nu numbers."""
 
@@ -1982,15 +1990,18 @@ class Problem:
 
 @final
 class Fddp:
-    """Feasibility-driven differential dynamic programming, with Crocoddyl's rules and constants.
+    """Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+
+    Where controls are bounded, these are those of its box solvers.
 
     problem: what is solved; the solver allocates for its shape once.
-    settings: any of `max_iterations`, `tolerance`, `step_lengths`, `accept`, `accept_ascent`, `flat`,
-        `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
-        `regularisation_decrease_above`, `regularisation_increase_below`.
+    settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
+        any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
+        `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`.
     """
 
-    def __new__(cls, problem: Problem, **settings: float) -> Fddp: ...
+    def __new__(cls, problem: Problem, **settings: float | str) -> Fddp: ...
     def solve(self, xs: ArrayLike, us: ArrayLike) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
 

@@ -146,6 +146,7 @@ impl Cost {
 /// model: the robot.
 /// dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
 /// costs: a list of `Cost`.
+/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 ///
 /// Raises `ProblemError` for a cost that does not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
@@ -154,15 +155,31 @@ pub(crate) struct FreeDynamics(robot::FreeDynamics);
 #[pymethods]
 impl FreeDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs))]
-    fn new(model: &Bound<'_, Model>, dt: Option<f64>, costs: Vec<PyRef<'_, Cost>>) -> PyResult<Self> {
+    #[pyo3(signature = (model, dt, costs, lower=None, upper=None))]
+    fn new(
+        model: &Bound<'_, Model>,
+        dt: Option<f64>,
+        costs: Vec<PyRef<'_, Cost>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
         let model = Arc::new(model.get().inner.clone());
         let costs = costs.iter().map(|c| c.0.clone()).collect();
         let action = match dt {
             Some(dt) => robot::FreeDynamics::running(model, dt, costs),
             None => robot::FreeDynamics::terminal(model, costs),
         };
-        Ok(Self(action.map_err(exception)?))
+        let action = action.map_err(exception)?;
+        if lower.is_none() && upper.is_none() {
+            return Ok(Self(action));
+        }
+        let nu = rust::ActionModel::nu(&action);
+        let bound = |name, given: Option<&Bound<'_, PyAny>>, none: f64| match given {
+            Some(numbers) => Ok(vector(name, numbers, nu)?.to_vec()),
+            None => PyResult::Ok(vec![none; nu]),
+        };
+        let (lower, upper) = (bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?);
+        Ok(Self(action.with_bounds(lower, upper)))
     }
 
     /// The efforts that hold the robot still at the state x, nu numbers.
@@ -214,12 +231,15 @@ impl Problem {
     }
 }
 
-/// Feasibility-driven differential dynamic programming, with Crocoddyl's rules and constants.
+/// Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+///
+/// Where controls are bounded, these are those of its box solvers.
 ///
 /// problem: what is solved; the solver allocates for its shape once.
-/// settings: any of `max_iterations`, `tolerance`, `step_lengths`, `accept`, `accept_ascent`, `flat`,
-///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
-///     `regularisation_decrease_above`, `regularisation_increase_below`.
+/// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
+///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
+///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Fddp {
     problem: Py<Problem>,
@@ -244,7 +264,20 @@ impl Fddp {
                     s.step_lengths = value.extract()?;
                     continue;
                 }
+                "method" => {
+                    s.method = match value.extract::<String>()?.as_str() {
+                        "fddp" => rust::Method::Fddp,
+                        "ddp" => rust::Method::Ddp,
+                        other => {
+                            return Err(PyValueError::new_err(format!(
+                                "method: expected 'fddp' or 'ddp', found '{other}'"
+                            )));
+                        }
+                    };
+                    continue;
+                }
                 "tolerance" => &mut s.tolerance,
+                "tolerance_bounded" => &mut s.tolerance_bounded,
                 "accept" => &mut s.accept,
                 "accept_ascent" => &mut s.accept_ascent,
                 "flat" => &mut s.flat,

@@ -11,7 +11,7 @@
 //! - Around a trajectory the problem is linear and quadratic in the changes δx, δu; each knot is then an [`LqNode`].
 //!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
-//!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`].
+//!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
 //! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖
@@ -66,6 +66,7 @@
 //! ```
 
 mod action;
+mod box_qp;
 mod dense;
 mod error;
 mod fddp;
@@ -74,6 +75,7 @@ mod numdiff;
 mod problem;
 pub mod robot;
 mod rollout;
+mod search;
 mod settings;
 mod solution;
 
@@ -83,5 +85,5 @@ pub use fddp::Fddp;
 pub use lq::{LqKnot, LqNode, Sweep, SweepError};
 pub use numdiff::NumDiff;
 pub use problem::Problem;
-pub use settings::Settings;
+pub use settings::{Method, Settings};
 pub use solution::{Iteration, Solution, Status, Timings};

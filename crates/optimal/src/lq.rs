@@ -1,6 +1,7 @@
 //! The linear-quadratic problem, all that a solver sees of a horizon, and the backward sweep that solves it.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
+use crate::box_qp::BoxQp;
 use crate::dense::{SLACK, add_product_lower, add_scaled_product, eliminate, product_transposed, solve_right};
 use crate::error::assert_length;
 use nalgebra::{DMatrix, DVector};
@@ -14,7 +15,8 @@ pub(crate) const DIVERGED: f64 = 1e30;
 /// minimise   Σₜ ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu    subject to   δx⁺ = A δx + B δu + f
 /// ```
 ///
-/// Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q and q are read.
+/// and to lower ≤ δu ≤ upper. Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q
+/// and q are read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LqNode {
     /// ∂x⁺/∂x, ndx × ndx.
@@ -33,10 +35,14 @@ pub struct LqNode {
     pub q: DVector<f64>,
     /// ∂ℓ/∂u, nu.
     pub r: DVector<f64>,
+    /// Least δu, nu; −∞ for none. Written by the solver.
+    pub lower: DVector<f64>,
+    /// Greatest δu, nu; ∞ for none. Written by the solver.
+    pub upper: DVector<f64>,
 }
 
 impl LqNode {
-    /// A knot of zeros with ndx states and nu controls.
+    /// A knot of zeros with ndx states and nu controls without bounds.
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         Self {
             A: DMatrix::zeros(ndx, ndx),
@@ -47,6 +53,8 @@ impl LqNode {
             R: DMatrix::zeros(nu, nu),
             q: DVector::zeros(ndx),
             r: DVector::zeros(nu),
+            lower: DVector::from_element(nu, f64::NEG_INFINITY),
+            upper: DVector::from_element(nu, f64::INFINITY),
         }
     }
 
@@ -60,12 +68,19 @@ impl LqNode {
         self.r.len()
     }
 
+    /// Whether a control has a bound.
+    fn is_bounded(&self) -> bool {
+        self.lower.iter().chain(&self.upper).any(|bound| bound.is_finite())
+    }
+
     /// Panics with the name of the first field whose shape does not fit q and r.
     #[track_caller]
     fn assert_shapes(&self, ndx: usize, nu: usize) {
         assert_length("q", self.q.len(), ndx);
         assert_length("r", self.r.len(), nu);
         assert_length("f", self.f.len(), ndx);
+        assert_length("lower", self.lower.len(), nu);
+        assert_length("upper", self.upper.len(), nu);
         for (name, matrix, shape) in [
             ("A", &self.A, (ndx, ndx)),
             ("B", &self.B, (ndx, nu)),
@@ -82,15 +97,15 @@ impl LqNode {
 /// V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx + const of the rest of the horizon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LqKnot {
-    /// Feedback gain −Quu⁻¹ Qux, nu × ndx.
+    /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
     pub K: DMatrix<f64>,
-    /// Feed-forward −Quu⁻¹ Qu, nu.
+    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the δu that is best at δx = 0.
     pub k: DVector<f64>,
     /// Gradient of the value function at δx = 0, ndx.
     pub Vx: DVector<f64>,
     /// Hessian of the value function, with the regularisation on its diagonal; ndx × ndx, symmetric.
     pub Vxx: DMatrix<f64>,
-    /// r + Bᵀ(Vx⁺ + Vxx⁺ f), nu.
+    /// r + Bᵀ(Vx⁺ + Vxx⁺ f), nu; zero for a control at its bound.
     pub Qu: DVector<f64>,
     /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
     pub Quu: DMatrix<f64>,
@@ -133,7 +148,13 @@ pub enum SweepError {
 /// ```
 ///
 /// A regularisation ϱ ≥ 0 is added to the diagonals of Quu (before it is factorised) and of Vxx (before it is used by
-/// the knot before), as in Crocoddyl. The cost of a knot is about 2 n²(n + m) + n (n + m)² + m n (n + m) operations
+/// the knot before), as in Crocoddyl.
+///
+/// Where δu is bounded, k solves the quadratic program of its knot by projected Newton steps (Tassa, Mansard, Todorov,
+/// ICRA 2014), and the elimination is that of the controls that are not at a bound. The steps start from minus the k of
+/// the last run, Crocoddyl's choice; it decides nothing but which of two equally good sets of bounds is found.
+///
+/// The cost of a knot is about 2 n²(n + m) + n (n + m)² + m n (n + m) operations
 /// for n = ndx, m = nu. Allocates nothing after [`new`](Self::new).
 ///
 /// # Examples
@@ -165,6 +186,7 @@ pub struct Sweep {
     upper: Vec<f64>,
     /// n zeros.
     zero: Vec<f64>,
+    qp: BoxQp,
 }
 
 /// The stride of W and H with their m + n + 1 rows.
@@ -202,6 +224,14 @@ impl Sweep {
             H: vec![0.0; stride(n, m) * (m + n)],
             upper: vec![0.0; (m + SLACK) * m],
             zero: vec![0.0; n],
+            qp: BoxQp::new(m),
+        }
+    }
+
+    /// Lets the next run start as if it were the first.
+    pub(crate) fn forget(&mut self) {
+        for knot in &mut self.knots {
+            knot.k.fill(0.0);
         }
     }
 
@@ -248,7 +278,7 @@ impl Sweep {
         let (n, m) = (node.ndx(), node.nu());
         let (ld, rows, last) = (stride(n, m), m + n + 1, m + n);
         let (A, B) = (node.A.as_slice(), node.B.as_slice());
-        let Self { knots, P, p, W, H, upper, zero } = self;
+        let Self { knots, P, p, W, H, upper, zero, qp } = self;
         let knot = &mut knots[t];
         // Strides differ from knot to knot with nu; the slack rows must hold zeros, whatever the last knot left there.
         for k in 0..n {
@@ -291,31 +321,52 @@ impl Sweep {
             }
         }
 
+        let failed = |row: usize, pivot: f64| match pivot.is_finite() {
+            true => SweepError::NotPositive { knot: t, row, pivot },
+            false => SweepError::NotFinite { knot: t },
+        };
+        // The controls that are eliminated: those not at a bound.
+        let bounded = node.is_bounded();
+        let free = if bounded {
+            let (lower, upper) = (node.lower.as_slice(), node.upper.as_slice());
+            let start = knot.k.iter().map(|k| -k);
+            qp.solve(&knot.Quu, knot.Qu.as_slice(), lower, upper, start).map_err(|(row, pivot)| failed(row, pivot))?;
+            keep_free(H, ld, rows, m, n, &qp.free);
+            qp.free.len()
+        } else {
+            m
+        };
+        let control = |j: usize| if bounded { qp.free[j] } else { j };
+
         // L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y
-        eliminate(H, ld, rows, m + n, m).map_err(|(row, pivot)| {
-            if pivot.is_finite() {
-                SweepError::NotPositive { knot: t, row, pivot }
-            } else {
-                SweepError::NotFinite { knot: t }
-            }
-        })?;
+        let rows = free + n + 1;
+        eliminate(H, ld, rows, free + n, free).map_err(|(row, pivot)| failed(control(row), pivot))?;
         for j in 0..n {
-            let column = &H[(m + j) * ld..];
-            p[j] = column[last];
+            let column = &H[(free + j) * ld + free..];
+            p[j] = column[n];
             for i in j..n {
-                P[j * (n + SLACK) + i] = column[m + i];
-                P[i * (n + SLACK) + j] = column[m + i];
+                P[j * (n + SLACK) + i] = column[i];
+                P[i * (n + SLACK) + j] = column[i];
             }
         }
 
         // [K k]ᵀ = −[X; yᵀ] L⁻¹
-        solve_right(H, ld, m, rows, m, upper);
-        for j in 0..m {
-            let column = &H[j * ld + m..][..n + 1];
-            for i in 0..n {
-                knot.K[(j, i)] = -column[i];
+        solve_right(H, ld, free, rows, free, upper);
+        if bounded {
+            knot.K.fill(0.0);
+            knot.k.copy_from_slice(&qp.x[..m]);
+            for j in (0..m).filter(|j| qp.free.binary_search(j).is_err()) {
+                knot.Qu[j] = 0.0;
             }
-            knot.k[j] = -column[n];
+        }
+        for j in 0..free {
+            let column = &H[j * ld + free..][..n + 1];
+            for i in 0..n {
+                knot.K[(control(j), i)] = -column[i];
+            }
+            if !bounded {
+                knot.k[j] = -column[n];
+            }
         }
         Ok(())
     }
@@ -336,5 +387,17 @@ impl Sweep {
         } else {
             Err(SweepError::NotFinite { knot: t })
         }
+    }
+}
+
+/// Moves the rows and columns of the `free` ones of m controls to the front of H, and what follows up behind them.
+fn keep_free(H: &mut [f64], stride: usize, rows: usize, m: usize, n: usize, free: &[usize]) {
+    let kept = free.len();
+    for (to, from) in free.iter().copied().chain(m..m + n).enumerate() {
+        for (row, &i) in free.iter().enumerate() {
+            H[to * stride + row] = H[from * stride + i];
+        }
+        H.copy_within(from * stride + m..from * stride + rows, to * stride + kept);
+        H[to * stride + kept + rows - m..(to + 1) * stride].fill(0.0);
     }
 }

@@ -264,6 +264,31 @@ impl Problem {
         self.stages.get(t).map_or(&mut *self.terminal, |&stage| &mut *self.models[stage])
     }
 
+    /// Whether some knot's controls are bounded.
+    ///
+    /// # Errors
+    /// [`Error`] if the bounds of a knot have a wrong length or leave no control.
+    pub(crate) fn check_bounds(&self) -> Result<bool, Error> {
+        let mut bounded = false;
+        for knot in 0..self.horizon() {
+            let Some((lower, upper)) = self.action(knot).bounds(knot) else { continue };
+            let expected = self.shape.nu(knot);
+            for (name, found) in [("lower bounds", lower.len()), ("upper bounds", upper.len())] {
+                if found != expected {
+                    return Err(Error::Dimension { node: knot, name, expected, found });
+                }
+            }
+            for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
+                // false for NaN
+                if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
+                    return Err(Error::Bounds { knot, control, lower, upper });
+                }
+                bounded |= lower.is_finite() || upper.is_finite();
+            }
+        }
+        Ok(bounded)
+    }
+
     /// The largest number of lanes that one of the models uses.
     pub(crate) fn lanes(&self) -> usize {
         self.models.iter().map(|model| model.lanes()).max().unwrap_or(1).max(1)

@@ -3,7 +3,7 @@
 use super::costs::{Cost, Costs};
 use super::state::{groups, state_difference, state_integrate};
 use crate::action::ActionModel;
-use crate::error::Error;
+use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
 use condyle_dynamics::{
     Data, IntegrateArgument, Joint, Model, aba, aba_derivatives, gravity, integrate, integrate_jacobian,
@@ -30,6 +30,8 @@ pub struct FreeDynamics {
     /// Degrees of freedom that no control drives, the first ones.
     passive: usize,
     groups: Vec<Range<usize>>,
+    /// The least and the greatest controls.
+    bounds: Option<[Vec<f64>; 2]>,
     tau: Vec<f64>,
     /// v Δt + q̈ Δt².
     dq: Vec<f64>,
@@ -71,12 +73,25 @@ impl FreeDynamics {
             dt,
             passive,
             groups: groups(&model),
+            bounds: None,
             tau: vec![0.0; nv],
             dq: vec![0.0; nv],
             transport: DMatrix::zeros(nv, nv),
             exp: DMatrix::zeros(nv, nv),
             model,
         })
+    }
+
+    /// The same with bounds on the controls, infinite where there is none.
+    ///
+    /// # Panics
+    /// If there are not nu numbers of each.
+    #[must_use]
+    pub fn with_bounds(mut self, lower: Vec<f64>, upper: Vec<f64>) -> Self {
+        assert_length("lower", lower.len(), self.nu());
+        assert_length("upper", upper.len(), self.nu());
+        self.bounds = Some([lower, upper]);
+        self
     }
 
     /// The robot.
@@ -116,6 +131,10 @@ impl ActionModel for FreeDynamics {
 
     fn nu(&self) -> usize {
         if self.dt.is_some() { self.model.nv() - self.passive } else { 0 }
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
