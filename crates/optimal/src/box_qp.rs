@@ -1,7 +1,9 @@
 //! Quadratic programs with bounds, by projected Newton steps.
 #![allow(non_snake_case)] // the names of the literature
 
-use crate::dense::{SLACK, dot, eliminate, solve_right};
+use crate::dense::{SLACK, dot};
+use crate::factor::{eliminate, solve_right};
+use crate::vector::Vector;
 use nalgebra::DMatrix;
 
 /// Newton steps by Crocoddyl's rule, and as many by the careful one.
@@ -60,7 +62,8 @@ impl BoxQp {
     ///
     /// # Errors
     /// The variable and the pivot, if H is not positive definite on the free variables.
-    pub(crate) fn solve(
+    #[inline(always)]
+    pub(crate) fn solve<V: Vector, const NR: usize>(
         &mut self,
         H: &DMatrix<f64>,
         q: &[f64],
@@ -86,7 +89,7 @@ impl BoxQp {
                     self.free.push(i);
                 }
             }
-            self.newton_step(H)?;
+            self.newton_step::<V, NR>(H)?;
             let slope = self.free.iter().fold(0.0, |largest: f64, &i| largest.max(self.gradient[i].abs()));
             self.line_search(H, q, lower, upper, n >= STEPS);
             if slope <= GRADIENT {
@@ -97,7 +100,8 @@ impl BoxQp {
     }
 
     /// Δx_f = −H_ff⁻¹ g_f,   Δx = 0 for the clamped.
-    fn newton_step(&mut self, H: &DMatrix<f64>) -> Result<(), (usize, f64)> {
+    #[inline(always)]
+    fn newton_step<V: Vector, const NR: usize>(&mut self, H: &DMatrix<f64>) -> Result<(), (usize, f64)> {
         let Self { free, gradient, step, H: work, upper, .. } = self;
         let (count, stride) = (free.len(), free.len() + 1 + SLACK);
         for (column, &j) in free.iter().enumerate() {
@@ -108,8 +112,8 @@ impl BoxQp {
             column[count] = gradient[j];
             column[count + 1..].fill(0.0);
         }
-        eliminate(work, stride, count + 1, count, count).map_err(|(row, pivot)| (free[row], pivot))?;
-        solve_right(work, stride, count, count + 1, count, upper);
+        eliminate::<V, NR>(work, stride, count + 1, count, count).map_err(|(row, pivot)| (free[row], pivot))?;
+        solve_right::<V, NR>(work, stride, count, count + 1, count, upper);
         step.fill(0.0);
         for (column, &j) in free.iter().enumerate() {
             step[j] = -work[column * stride + count];
@@ -150,13 +154,14 @@ fn objective(H: &DMatrix<f64>, q: &[f64], x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vector::Pair;
 
     /// The problems have entries of size one; the last Newton step is exact on the set it finds.
     const KKT: f64 = 1e-10;
 
     fn solve(H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64]) -> Result<BoxQp, (usize, f64)> {
         let mut qp = BoxQp::new(q.len());
-        qp.solve(H, q, lower, upper, std::iter::repeat_n(0.0, q.len()))?;
+        qp.solve::<Pair, 4>(H, q, lower, upper, std::iter::repeat_n(0.0, q.len()))?;
         Ok(qp)
     }
 

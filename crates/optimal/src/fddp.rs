@@ -3,12 +3,13 @@
 
 use crate::dense::max_abs;
 use crate::error::Error;
-use crate::lq::{LqNode, Sweep, SweepError};
+use crate::lq::LqNode;
 use crate::problem::{Problem, Shape};
 use crate::rollout::Trials;
 use crate::search::Search;
 use crate::settings::{Method, Settings};
 use crate::solution::{Iteration, Solution, Status, Timings};
+use crate::sweep::{Sweep, SweepError};
 use std::time::Instant;
 
 /// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`Method`](crate::Method)), with the rules and constants of Crocoddyl

@@ -236,6 +236,9 @@ impl Problem {
         let horizon = self.horizon();
         self.assert_trajectory(xs, us);
         assert_length("nodes", nodes.len(), horizon + 1);
+        for node in &mut *nodes {
+            node.structure.set_dense(); // the action says if it is not
+        }
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
             let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);

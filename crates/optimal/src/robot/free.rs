@@ -192,6 +192,12 @@ impl ActionModel for FreeDynamics {
         for k in (0..nv).filter(|&k| !in_group(k)) {
             node.A[(k, k)] += 1.0;
         }
+        let blocks = node.structure.set_euler(dt, &self.groups);
+        for (block, group) in blocks.iter_mut().zip(&self.groups) {
+            let (start, size) = ((group.start, group.start), (group.len(), group.len()));
+            block.T.copy_from(&self.transport.view(start, size));
+            block.E.copy_from(&self.exp.view(start, size));
+        }
         for group in &self.groups {
             apply_block(&self.exp, group, &mut node.A);
             apply_block(&self.exp, group, &mut node.B);

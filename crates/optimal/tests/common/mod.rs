@@ -1,9 +1,11 @@
 //! Actions without a robot, for the tests.
 #![allow(dead_code)] // each test file uses some of them
+#![allow(non_snake_case)] // A, B, T, E
 
 use condyle_optimal::{ActionModel, LqNode, Problem};
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt, SeedableRng, rngs::StdRng};
+use std::ops::Range;
 
 pub(crate) fn random() -> StdRng {
     StdRng::seed_from_u64(7)
@@ -27,6 +29,25 @@ pub(crate) fn random_node(random: &mut impl Rng, ndx: usize, nu: usize) -> LqNod
     node.R.copy_from(&hessian.view((ndx, ndx), (nu, nu)));
     node.q = random_matrix(random, ndx, 1).column(0).into_owned();
     node.r = random_matrix(random, nu, 1).column(0).into_owned();
+    node
+}
+
+/// As [`random_node`], with the A and B of semi-implicit Euler: nv numbers for q and for v, T and E the identity but for
+/// random blocks over `blocks`.
+pub(crate) fn random_euler_node(random: &mut impl Rng, nv: usize, nu: usize, blocks: &[Range<usize>]) -> LqNode {
+    let (mut node, dt) = (random_node(random, 2 * nv, nu), 0.05);
+    let (mut T, mut E) = (DMatrix::identity(nv, nv), DMatrix::identity(nv, nv));
+    for (block, range) in node.structure.set_euler(dt, blocks).iter_mut().zip(blocks) {
+        block.T = random_matrix(random, range.len(), range.len());
+        block.E = random_matrix(random, range.len(), range.len());
+        T.view_mut((range.start, range.start), block.T.shape()).copy_from(&block.T);
+        E.view_mut((range.start, range.start), block.E.shape()).copy_from(&block.E);
+    }
+    let mut upper = &E * node.A.rows(nv, nv) * dt;
+    upper += T.resize_horizontally(2 * nv, 0.0);
+    node.A.rows_mut(0, nv).copy_from(&upper);
+    let upper = &E * node.B.rows(nv, nv) * dt;
+    node.B.rows_mut(0, nv).copy_from(&upper);
     node
 }
 
