@@ -2105,6 +2105,7 @@ class FreeDynamics:
     costs: a list of `Cost`.
     actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 
     Raises `ProblemError` for a cost or drives that do not fit.
     """
@@ -2116,6 +2117,8 @@ class FreeDynamics:
         costs: Sequence[Cost],
         actuation: ArrayLike | None = None,
         integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
     ) -> FreeDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The efforts that hold the robot still at the state x, nu numbers."""
@@ -2129,7 +2132,7 @@ class ContactDynamics:
     dt: Δt in seconds.
     costs: a list of `Cost`.
     damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-    actuation, integrator: as of `FreeDynamics`.
+    actuation, integrator, lower, upper: as of `FreeDynamics`.
 
     Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
 
@@ -2148,6 +2151,8 @@ class ContactDynamics:
         damping: float = 0.0,
         actuation: ArrayLike | None = None,
         integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
     ) -> ContactDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The smallest controls and forces that hold the robot still at the state x: nu controls of them."""
@@ -2184,6 +2189,7 @@ class Action:
     calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
     calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
         q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 
     >>> from condyle.optimal import Action, Fddp, Problem
     >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
@@ -2199,6 +2205,8 @@ class Action:
         nu: int,
         calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
         calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
     ) -> Action: ...
 
 @final
@@ -2241,15 +2249,18 @@ class Problem:
 
 @final
 class Fddp:
-    """Feasibility-driven differential dynamic programming, with Crocoddyl's rules and constants.
+    """Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+
+    Where controls are bounded, these are those of its box solvers.
 
     problem: what is solved; the solver allocates for its shape once.
-    settings: any of `max_iterations`, `tolerance`, `step_lengths`, `accept`, `accept_ascent`, `flat`,
-        `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
-        `regularisation_decrease_above`, `regularisation_increase_below`.
+    settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
+        any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
+        `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`.
     """
 
-    def __new__(cls, problem: Problem, **settings: float) -> Fddp: ...
+    def __new__(cls, problem: Problem, **settings: float | str) -> Fddp: ...
     def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
 

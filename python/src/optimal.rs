@@ -162,12 +162,15 @@ impl Problem {
     }
 }
 
-/// Feasibility-driven differential dynamic programming, with Crocoddyl's rules and constants.
+/// Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+///
+/// Where controls are bounded, these are those of its box solvers.
 ///
 /// problem: what is solved; the solver allocates for its shape once.
-/// settings: any of `max_iterations`, `tolerance`, `step_lengths`, `accept`, `accept_ascent`, `flat`,
-///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
-///     `regularisation_decrease_above`, `regularisation_increase_below`.
+/// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
+///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
+///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Fddp {
     problem: Py<Problem>,
@@ -192,7 +195,20 @@ impl Fddp {
                     s.step_lengths = value.extract()?;
                     continue;
                 }
+                "method" => {
+                    s.method = match value.extract::<String>()?.as_str() {
+                        "fddp" => rust::Method::Fddp,
+                        "ddp" => rust::Method::Ddp,
+                        other => {
+                            return Err(PyValueError::new_err(format!(
+                                "method: expected 'fddp' or 'ddp', found '{other}'"
+                            )));
+                        }
+                    };
+                    continue;
+                }
                 "tolerance" => &mut s.tolerance,
+                "tolerance_bounded" => &mut s.tolerance_bounded,
                 "accept" => &mut s.accept,
                 "accept_ascent" => &mut s.accept_ascent,
                 "flat" => &mut s.flat,

@@ -26,7 +26,7 @@ pub enum Error {
     Dimension {
         /// The knot; the horizon itself for the terminal one.
         node: usize,
-        /// `nx`, `ndx` or `nu`.
+        /// `nx`, `ndx`, `nu`, or which bounds.
         name: &'static str,
         /// What the problem or the solver needs.
         expected: usize,
@@ -54,6 +54,19 @@ pub enum Error {
         index: usize,
         /// The entry.
         value: f64,
+    },
+
+    /// No control satisfies the bounds of a knot.
+    #[error("knot {knot}: control {control} must be at least {lower} and at most {upper}")]
+    Bounds {
+        /// The knot.
+        knot: usize,
+        /// The entry of its control.
+        control: usize,
+        /// Its least value.
+        lower: f64,
+        /// Its greatest value.
+        upper: f64,
     },
 
     /// A term of a robot's cost does not fit the robot.

@@ -1,17 +1,21 @@
-//! Feasibility-driven differential dynamic programming.
+//! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use crate::dense::{add_scaled_product, dot, max_abs};
+use crate::dense::max_abs;
 use crate::error::Error;
-use crate::lq::{LqNode, Sweep, SweepError};
+use crate::lq::LqNode;
 use crate::problem::{Problem, Shape};
-use crate::rollout::{Nominal, Trials};
-use crate::settings::Settings;
+use crate::rollout::Trials;
+use crate::search::Search;
+use crate::settings::{Method, Settings};
 use crate::solution::{Iteration, Solution, Status, Timings};
+use crate::sweep::{Sweep, SweepError};
 use std::time::Instant;
 
-/// FDDP (Mastalli et al., ICRA 2020), with the rules and constants of Crocoddyl 3.2, so that both make the same
-/// iterates.
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`Method`](crate::Method)), with the rules and constants of Crocoddyl
+/// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
+/// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
+/// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
 ///
 /// The warm start may have gaps f, places where the trajectory does not satisfy the dynamics. One iteration is
 ///
@@ -67,23 +71,23 @@ pub struct Fddp {
     /// May be changed between solves.
     pub settings: Settings,
     nodes: Vec<LqNode>,
-    sweep: Sweep,
-    trials: Trials,
+    pub(crate) sweep: Sweep,
+    pub(crate) trials: Trials,
     /// The step lengths, 1, ½, ¼, ….
-    steps: Vec<f64>,
+    pub(crate) steps: Vec<f64>,
     /// The iterate is in here.
-    solution: Solution,
+    pub(crate) solution: Solution,
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
-    next: Vec<f64>,
+    pub(crate) next: Vec<f64>,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
-    gaps: Vec<f64>,
+    pub(crate) gaps: Vec<f64>,
     /// Vxx f, (N + 1)·ndx.
-    curved_gaps: Vec<f64>,
+    pub(crate) curved_gaps: Vec<f64>,
     /// xₜ ⊖ a trial's xₜ.
-    dx: Vec<f64>,
+    pub(crate) dx: Vec<f64>,
     /// Expected improvement without the part that depends on the trial: dg, dq.
-    expected: [f64; 2],
+    pub(crate) expected: [f64; 2],
 }
 
 /// What carries over from one iteration to the next.
@@ -92,17 +96,7 @@ struct Progress {
     feasible: bool,
     /// Whether the iterate before the last accepted step was feasible.
     was_feasible: bool,
-}
-
-/// The outcome of a line search: of the trial it accepted or else of the last that stayed finite.
-#[derive(Clone, Copy, Default)]
-struct Search {
-    step: f64,
-    d1: f64,
-    d2: f64,
-    decrease: f64,
-    expected_decrease: f64,
-    accepted: bool,
+    tolerance: f64,
 }
 
 impl Fddp {
@@ -151,6 +145,7 @@ impl Fddp {
         check_shape(self.solution.shape(), problem.shape())?;
         Error::check("xs", xs, self.solution.xs.len())?;
         Error::check("us", us, self.solution.us.len())?;
+        let tolerance = if problem.check_bounds()? { self.settings.tolerance_bounded } else { self.settings.tolerance };
 
         self.solution.xs.copy_from_slice(xs);
         self.solution.us.copy_from_slice(us);
@@ -160,7 +155,8 @@ impl Fddp {
         self.steps.clear();
         self.steps.extend((0..self.settings.step_lengths).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
         let start = self.settings.regularisation_start;
-        let mut progress = Progress { regularisation: start, feasible: false, was_feasible: false };
+        let mut progress = Progress { regularisation: start, feasible: false, was_feasible: false, tolerance };
+        self.sweep.forget();
         let status = self.iterate(problem, &mut progress, &mut observer);
         self.finish(problem, &progress, status);
         self.solution.timings.total = begin.elapsed();
@@ -200,7 +196,7 @@ impl Fddp {
             search = self.line_search(problem, now.feasible, search);
             if search.accepted {
                 now.was_feasible = now.feasible;
-                now.feasible |= search.step == 1.0;
+                now.feasible |= search.step == 1.0 || self.settings.method == Method::Ddp;
             }
             if search.step > self.settings.regularisation_decrease_above {
                 now.regularisation = self.decreased(now.regularisation);
@@ -228,7 +224,7 @@ impl Fddp {
             if now.regularisation == self.settings.regularisation_max {
                 return Status::RegularisationLimit;
             }
-            if now.was_feasible && stop < self.settings.tolerance {
+            if now.was_feasible && stop < now.tolerance {
                 return Status::Converged;
             }
         }
@@ -253,7 +249,7 @@ impl Fddp {
         max_abs(&self.gaps)
     }
 
-    /// The LQ problem at the iterate; the gaps are in it until the first full step.
+    /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on.
     fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
         problem.calc_diff(&self.solution.xs, &self.solution.us, &mut self.nodes);
@@ -261,6 +257,18 @@ impl Fddp {
             match self.gaps.get(self.solution.shape().dx(t + 1)) {
                 Some(gap) if !feasible => node.f.as_mut_slice().copy_from_slice(gap),
                 _ => node.f.fill(0.0),
+            }
+            match problem.action(t).bounds(t) {
+                Some((lower, upper)) if feasible => {
+                    for (i, u) in self.solution.us[self.solution.shape().u(t)].iter().enumerate() {
+                        node.lower[i] = lower[i] - u;
+                        node.upper[i] = upper[i] - u;
+                    }
+                }
+                _ => {
+                    node.lower.fill(f64::NEG_INFINITY);
+                    node.upper.fill(f64::INFINITY);
+                }
             }
         }
         self.solution.timings.calc_diff += clock.elapsed();
@@ -271,88 +279,6 @@ impl Fddp {
         let result = self.sweep.run(&self.nodes, regularisation);
         self.solution.timings.sweep += clock.elapsed();
         result
-    }
-
-    /// dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  Quu k = −Qu, so the first sums are opposite.
-    fn expect(&mut self, feasible: bool) {
-        let (mut dg, mut dq) = (0.0, 0.0);
-        for (t, knot) in self.sweep.knots().iter().enumerate() {
-            let descent = -dot(knot.Qu.as_slice(), knot.k.as_slice());
-            dg += descent;
-            dq -= descent;
-            if !feasible {
-                let place = self.solution.shape().dx(t);
-                let (f, curved) = (&self.gaps[place.clone()], &mut self.curved_gaps[place]);
-                curved.fill(0.0);
-                add_scaled_product(curved, 1.0, knot.Vxx.as_slice(), f); // Vxx f
-                let curvature = dot(f, curved);
-                dg -= dot(knot.Vx.as_slice(), f) + curvature;
-                dq += curvature;
-            }
-        }
-        self.expected = [dg, dq];
-    }
-
-    /// dv = −Σ fᵀVxx (x ⊖ x_trial): what the trial's distance from the iterate adds while there are gaps.
-    fn expect_of_trial(&mut self, problem: &Problem, i: usize) -> f64 {
-        let shape = self.solution.shape();
-        let mut dv = 0.0;
-        for t in 0..=shape.horizon() {
-            problem.action(t).difference(self.trials.x(i, t), &self.solution.xs[shape.x(t)], &mut self.dx);
-            dv -= dot(&self.curved_gaps[shape.dx(t)], &self.dx);
-        }
-        dv
-    }
-
-    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate.
-    ///
-    /// A trial that leaves all bounds keeps the expectation of the trial before it, that of `last` at first.
-    fn line_search(&mut self, problem: &mut Problem, feasible: bool, last: Search) -> Search {
-        let mut search = Search { accepted: false, ..last };
-        let (mut tried, count) = (0, self.steps.len());
-        while tried < count {
-            let width = if tried == 0 { 1 } else { self.trials.width().min(count - tried) };
-            self.roll_out(problem, feasible, tried, width);
-            for i in 0..width {
-                search.step = self.steps[tried + i];
-                let Some(cost) = self.trials.cost(i) else { continue };
-                // d₁ = dg + dv,   d₂ = dq − 2 dv,   expected decrease α (d₁ + ½ α d₂)
-                let dv = if feasible { 0.0 } else { self.expect_of_trial(problem, i) };
-                search.d1 = self.expected[0] + dv;
-                search.d2 = self.expected[1] - 2.0 * dv;
-                search.expected_decrease = search.step * (search.d1 + 0.5 * search.step * search.d2);
-                search.decrease = self.solution.cost - cost;
-                if self.accepts(&search, feasible) {
-                    let Solution { xs, us, .. } = &mut self.solution;
-                    self.trials.copy_to(i, xs, us, &mut self.next);
-                    self.solution.cost = cost;
-                    search.accepted = true;
-                    return search;
-                }
-            }
-            tried += width;
-        }
-        search
-    }
-
-    /// The trials `from`, `from` + 1, … of the line search, side by side.
-    fn roll_out(&mut self, problem: &mut Problem, feasible: bool, from: usize, width: usize) {
-        let clock = Instant::now();
-        let gaps = (!feasible).then_some(self.gaps.as_slice());
-        let Solution { xs, us, .. } = &self.solution;
-        let nominal = Nominal { xs, us, gaps, knots: self.sweep.knots() };
-        self.trials.run(problem, &nominal, &self.steps[from..from + width]);
-        self.solution.timings.rollout += clock.elapsed();
-    }
-
-    /// Whether the step lowers the cost enough, or, while there are gaps, raises it little enough.
-    fn accepts(&self, search: &Search, feasible: bool) -> bool {
-        let Search { d1, decrease, expected_decrease, .. } = *search;
-        if expected_decrease >= 0.0 {
-            d1.abs() < self.settings.flat || decrease > self.settings.accept * expected_decrease
-        } else {
-            !feasible && decrease > self.settings.accept_ascent * expected_decrease
-        }
     }
 
     fn increased(&self, regularisation: f64) -> f64 {

@@ -4,7 +4,7 @@
 use crate::action::ActionModel;
 use crate::lq::LqNode;
 
-/// x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu: of an [`LqNode`], which names them.
+/// x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper: of an [`LqNode`], which names them.
 ///
 /// Without controls it is a terminal action. Crocoddyl's `ActionModelLQR`.
 ///
@@ -36,6 +36,8 @@ impl Lqr {
             ("S", node.S.shape(), (n, m)),
             ("R", node.R.shape(), (m, m)),
             ("f", node.f.shape(), (n, 1)),
+            ("lower", node.lower.shape(), (m, 1)),
+            ("upper", node.upper.shape(), (m, 1)),
         ] {
             assert!(found == expected, "`{name}` has shape {found:?}, expected {expected:?}");
         }
@@ -68,8 +70,12 @@ impl ActionModel for Lqr {
         self.0.nu()
     }
 
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        Some((self.0.lower.as_slice(), self.0.upper.as_slice()))
+    }
+
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
-        let LqNode { A, B, f, Q, S, R, q, r } = &self.0;
+        let LqNode { A, B, f, Q, S, R, q, r, .. } = &self.0;
         next.copy_from_slice(f.as_slice());
         add_product(next, A.as_slice(), x); // A x + B u + f
         add_product(next, B.as_slice(), u);

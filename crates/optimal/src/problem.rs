@@ -236,6 +236,9 @@ impl Problem {
         let horizon = self.horizon();
         self.assert_trajectory(xs, us);
         assert_length("nodes", nodes.len(), horizon + 1);
+        for node in &mut *nodes {
+            node.structure.set_dense(); // the action says if it is not
+        }
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
             let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);
@@ -262,6 +265,31 @@ impl Problem {
     /// As [`action`](Self::action), to compute with.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         self.stages.get(t).map_or(&mut *self.terminal, |&stage| &mut *self.models[stage])
+    }
+
+    /// Whether some knot's controls are bounded.
+    ///
+    /// # Errors
+    /// [`Error`] if the bounds of a knot have a wrong length or leave no control.
+    pub(crate) fn check_bounds(&self) -> Result<bool, Error> {
+        let mut bounded = false;
+        for knot in 0..self.horizon() {
+            let Some((lower, upper)) = self.action(knot).bounds(knot) else { continue };
+            let expected = self.shape.nu(knot);
+            for (name, found) in [("lower bounds", lower.len()), ("upper bounds", upper.len())] {
+                if found != expected {
+                    return Err(Error::Dimension { node: knot, name, expected, found });
+                }
+            }
+            for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
+                // false for NaN
+                if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
+                    return Err(Error::Bounds { knot, control, lower, upper });
+                }
+                bounded |= lower.is_finite() || upper.is_finite();
+            }
+        }
+        Ok(bounded)
     }
 
     /// The largest number of lanes that one of the models uses.

@@ -3,13 +3,13 @@
 
 mod common;
 
-use common::{HANGING, cartpole, random, random_node, straight};
+use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
 use condyle_dynamics::{Constraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
     Integrator, Residual,
 };
-use condyle_optimal::{Fddp, Problem, Sweep};
+use condyle_optimal::{Fddp, Method, Problem, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -71,6 +71,21 @@ fn a_solve_allocates_nothing() {
             solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
         });
         assert_eq!((iterations, first, second), (34, 2, 0));
+    }
+}
+
+#[test]
+fn a_bounded_solve_allocates_nothing() {
+    for method in [Method::Ddp, Method::Fddp] {
+        let mut problem = limited_cartpole(&HANGING, 50, 4, Some([vec![-8.0], vec![6.0]]));
+        let xs = straight(problem.x0(), problem.x0(), 50);
+        let mut solver = Fddp::new(&problem);
+        solver.settings.method = method;
+        solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+        let second = allocations(|| {
+            solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+        });
+        assert_eq!(second, 0, "{method:?}");
     }
 }
 

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Linear, random, random_matrix, random_node};
+use common::{Linear, random, random_euler_node, random_matrix, random_node};
 use condyle_optimal::{ActionModel, Fddp, LqNode, Lqr, NumDiff, Problem, Settings, Status, Sweep, SweepError};
 use nalgebra::{DMatrix, DVector};
 
@@ -77,6 +77,56 @@ fn regularised_step_is_the_textbook_one() {
     for (found, expected) in [(&knot.k, &k), (&knot.Vx, &Vx), (&knot.Qu, &Qu)] {
         assert!((found - expected).amax() < RESIDUAL, "{found} {expected}");
     }
+}
+
+/// Whether it knows the form of A and B or not, a sweep finds the same, at knots of all sizes.
+#[test]
+fn the_form_of_euler_steps_changes_nothing() {
+    let mut random = random();
+    let root = 0..6;
+    let humanoid = std::slice::from_ref(&root);
+    let several = [1..4, 6..9, 10..16];
+    for (nv, nus, blocks) in [
+        (1, vec![1; 3], &[][..]),
+        (2, vec![1, 0, 2], &[]),
+        (4, vec![3, 0, 4], &[]),
+        (7, vec![7; 5], &[]),
+        (9, vec![9; 4], &[]),
+        (12, vec![3; 4], &[]),
+        (18, vec![12; 4], humanoid),
+        (17, vec![5, 17, 0, 1], &several),
+        (38, vec![32; 3], humanoid),
+    ] {
+        let mut nodes: Vec<LqNode> = nus.iter().map(|&nu| random_euler_node(&mut random, nv, nu, blocks)).collect();
+        nodes.push(random_node(&mut random, 2 * nv, 0));
+        let mut structured = Sweep::new(&nodes);
+        structured.run(&nodes, 1e-3).unwrap();
+        for node in &mut nodes {
+            node.structure.set_dense();
+        }
+        let mut dense = Sweep::new(&nodes);
+        dense.run(&nodes, 1e-3).unwrap();
+        for (t, (a, b)) in structured.knots().iter().zip(dense.knots()).enumerate() {
+            for (name, a, b) in [("K", &a.K, &b.K), ("Vxx", &a.Vxx, &b.Vxx), ("Quu", &a.Quu, &b.Quu)] {
+                let scale = 1.0 + b.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+                let error = (a - b).iter().fold(0.0, |largest: f64, x| largest.max(x.abs())) / scale;
+                assert!(error < RESIDUAL, "nv {nv}, knot {t}: {name} differs by {error:e}");
+            }
+            for (name, a, b) in [("k", &a.k, &b.k), ("Vx", &a.Vx, &b.Vx), ("Qu", &a.Qu, &b.Qu)] {
+                let scale = 1.0 + b.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+                let error = (a - b).iter().fold(0.0, |largest: f64, x| largest.max(x.abs())) / scale;
+                assert!(error < RESIDUAL, "nv {nv}, knot {t}: {name} differs by {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "`structure` is that of x = (q, v), but ndx is 3")]
+fn the_form_of_euler_steps_needs_as_many_velocities() {
+    let mut nodes = [LqNode::zeros(3, 1), LqNode::zeros(3, 0)];
+    nodes[0].structure.set_euler(0.1, &[]);
+    Sweep::new(&nodes);
 }
 
 #[test]

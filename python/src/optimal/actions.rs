@@ -101,6 +101,34 @@ fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Ve
     contacts.iter().map(contact).collect()
 }
 
+/// Bounds on nu controls, if there are any.
+fn bounds(
+    nu: usize,
+    lower: Option<&Bound<'_, PyAny>>,
+    upper: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<[Vec<f64>; 2]>> {
+    let bound = |name, given: Option<&Bound<'_, PyAny>>, none: f64| match given {
+        Some(numbers) => Ok(vector(name, numbers, nu)?.to_vec()),
+        None => PyResult::Ok(vec![none; nu]),
+    };
+    if lower.is_none() && upper.is_none() {
+        return Ok(None);
+    }
+    Ok(Some([bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?]))
+}
+
+/// A knot with bounds on its controls.
+fn bounded<M: robot::ContinuousModel>(
+    knot: robot::Integrated<M>,
+    lower: Option<&Bound<'_, PyAny>>,
+    upper: Option<&Bound<'_, PyAny>>,
+) -> PyResult<robot::Integrated<M>> {
+    Ok(match bounds(knot.nu(), lower, upper)? {
+        Some([lower, upper]) => knot.with_bounds(lower, upper),
+        None => knot,
+    })
+}
+
 /// A knot of a robot that moves freely under its joints' efforts.
 ///
 /// q̈ = aba(q, v, S u); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is
@@ -111,6 +139,7 @@ fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Ve
 /// costs: a list of `Cost`.
 /// actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
+/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 ///
 /// Raises `ProblemError` for a cost or drives that do not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
@@ -119,13 +148,15 @@ pub(crate) struct FreeDynamics(pub(super) robot::FreeDynamics);
 #[pymethods]
 impl FreeDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs, actuation=None, integrator="semi_implicit_euler"))]
+    #[pyo3(signature = (model, dt, costs, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
     fn new(
         model: &Bound<'_, Robot>,
         dt: Option<f64>,
         costs: Vec<PyRef<'_, Cost>>,
         actuation: Option<&Bound<'_, PyAny>>,
         integrator: &str,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
         let drives = self::actuation(&model, actuation)?;
@@ -136,7 +167,7 @@ impl FreeDynamics {
             }
             None => robot::FreeDynamics::terminal(model, costs),
         };
-        Ok(Self(action.map_err(exception)?))
+        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
     }
 
     /// The efforts that hold the robot still at the state x, nu numbers.
@@ -154,7 +185,7 @@ impl FreeDynamics {
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`.
 /// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-/// actuation, integrator: as of `FreeDynamics`.
+/// actuation, integrator, lower, upper: as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
 ///
@@ -168,7 +199,7 @@ pub(crate) struct ContactDynamics(pub(super) robot::ContactDynamics);
 #[pymethods]
 impl ContactDynamics {
     #[new]
-    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, actuation=None, integrator="semi_implicit_euler"))]
+    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
     fn new(
         model: &Bound<'_, Robot>,
         contacts: &Bound<'_, PyDict>,
@@ -177,12 +208,14 @@ impl ContactDynamics {
         damping: f64,
         actuation: Option<&Bound<'_, PyAny>>,
         integrator: &str,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
         let (drives, contacts) = (self::actuation(&model, actuation)?, self::contacts(&model, contacts)?);
         let action = robot::Contacts::new(model, drives, &contacts, damping, terms(&costs))
             .and_then(|inner| robot::ContactDynamics::new(inner, integrator, dt));
-        Ok(Self(action.map_err(exception)?))
+        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
     }
 
     /// The smallest controls and forces that hold the robot still at the state x: nu controls of them.
@@ -231,6 +264,7 @@ impl ImpulseDynamics {
 /// calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
 /// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
 ///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 ///
 /// >>> from condyle.optimal import Action, Fddp, Problem
 /// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
@@ -244,14 +278,22 @@ pub(crate) struct Action {
     nu: usize,
     calc: Py<PyAny>,
     calc_diff: Option<Py<PyAny>>,
+    bounds: Option<[Vec<f64>; 2]>,
 }
 
 #[pymethods]
 impl Action {
     #[new]
-    #[pyo3(signature = (nx, nu, calc, calc_diff=None))]
-    fn new(nx: usize, nu: usize, calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> Self {
-        Self { nx, nu, calc, calc_diff }
+    #[pyo3(signature = (nx, nu, calc, calc_diff=None, lower=None, upper=None))]
+    fn new(
+        nx: usize,
+        nu: usize,
+        calc: Py<PyAny>,
+        calc_diff: Option<Py<PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        Ok(Self { nx, nu, calc, calc_diff, bounds: bounds(nu, lower, upper)? })
     }
 }
 
@@ -262,6 +304,7 @@ impl Action {
             nu: self.nu,
             calc: self.calc.clone_ref(py),
             calc_diff: self.calc_diff.as_ref().map(|f| f.clone_ref(py)),
+            bounds: self.bounds.clone(),
             fault: Fault::default(),
         }
     }
@@ -273,6 +316,7 @@ struct Own {
     nu: usize,
     calc: Py<PyAny>,
     calc_diff: Option<Py<PyAny>>,
+    bounds: Option<[Vec<f64>; 2]>,
     fault: Fault,
 }
 
@@ -341,6 +385,10 @@ impl ActionModel for Own {
 
     fn nu(&self) -> usize {
         self.nu
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {

@@ -64,11 +64,15 @@ pub(super) fn calc_diff<M: ContinuousModel>(
         (from..group.start).for_each(|k| A[k * (2 * nv + 1)] += 1.0);
         from = group.end;
     }
+    let blocks = node.structure.set_euler(dt, model.groups());
     if model.groups().is_empty() {
         return;
     }
     model.integrate_jacobians(dq, transport, exp);
-    for group in model.groups() {
+    for (group, block) in model.groups().iter().zip(blocks) {
+        let (start, size) = ((group.start, group.start), (group.len(), group.len()));
+        block.T.copy_from(&transport.view(start, size));
+        block.E.copy_from(&exp.view(start, size));
         apply_block(exp, group, &mut node.A);
         apply_block(exp, group, &mut node.B);
         for c in group.clone() {

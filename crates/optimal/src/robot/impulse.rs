@@ -109,7 +109,8 @@ impl ActionModel for ImpulseDynamics {
         (0..nv).for_each(|k| change[k] = d.v[k] - v[k]);
         let scene = Scene { x, u, a: change, tau: &[], lambda: d.lambda };
         robot.schedule.calc_diff(t, &scene, &ImpulseSlopes { d }, 1.0, node);
-        // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v]
+        // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v]: that of an Euler step that takes no time
+        node.structure.set_euler(0.0, &[]);
         node.A.view_mut((0, 0), (nv, nv)).fill_with_identity();
         node.A.view_mut((0, nv), (nv, nv)).fill(0.0);
         node.A.view_mut((nv, 0), (nv, nv)).copy_from(d.dv_dq);

@@ -4,6 +4,7 @@ use super::euler;
 use super::runge_kutta::RungeKutta;
 use crate::Error;
 use crate::action::ActionModel;
+use crate::error::assert_length;
 use crate::lq::LqNode;
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -61,7 +62,8 @@ pub trait ContinuousModel: Send + 'static {
     /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the node, which are overwritten.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_>;
 
-    /// The coordinates of each group of positions that is no vector space: elsewhere q ⊕ δ is a sum. None by default.
+    /// The coordinates of each group of positions that is no vector space, at most six a group: elsewhere q ⊕ δ is a sum.
+    /// None by default.
     fn groups(&self) -> &[Range<usize>] {
         &[]
     }
@@ -118,6 +120,8 @@ pub struct Integrated<M> {
     /// Δt; none at a terminal knot.
     dt: Option<f64>,
     method: Method,
+    /// The least and the greatest controls.
+    bounds: Option<[Vec<f64>; 2]>,
     /// v Δt + a Δt².
     pub(super) dq: Vec<f64>,
     /// ∂(q ⊕ dq)/∂q and ∂(q ⊕ dq)/∂dq.
@@ -165,7 +169,19 @@ impl<M: ContinuousModel> Integrated<M> {
             _ => Method::RungeKutta(Box::new(RungeKutta::new(stages, nq, nv, nu))),
         };
         let square = DMatrix::zeros(nv, nv);
-        Self { inner: model, dt, method, dq: vec![0.0; nv], transport: square.clone(), exp: square }
+        Self { inner: model, dt, method, bounds: None, dq: vec![0.0; nv], transport: square.clone(), exp: square }
+    }
+
+    /// The same with bounds on the controls, infinite where there is none.
+    ///
+    /// # Panics
+    /// If there are not nu numbers of each.
+    #[must_use]
+    pub fn with_bounds(mut self, lower: Vec<f64>, upper: Vec<f64>) -> Self {
+        assert_length("lower", lower.len(), self.inner.nu());
+        assert_length("upper", upper.len(), self.inner.nu());
+        self.bounds = Some([lower, upper]);
+        self
     }
 
     /// What is integrated.
@@ -190,6 +206,10 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
 
     fn nu(&self) -> usize {
         self.inner.nu()
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
