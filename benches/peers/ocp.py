@@ -26,8 +26,14 @@ from ocp_theirs import Theirs
 
 COST = 1e-6
 """How near the costs of an iteration must be, relatively: Crocoddyl repeats its own when perturbed by 1e-12."""
-CHAOTIC = {"arm_kinova_cold": 3, "arm_kinova_box": 1, "talos_manip_100": 0, "talos_taichi": 0}
-"""Problems of which Crocoddyl does not repeat its own trace, and how many leading iterations it does."""
+CHAOTIC = {
+    ("arm_kinova_cold", "fddp"): 3,
+    ("arm_kinova_box", "boxfddp"): 1,
+    ("talos_manip_100", "fddp"): 0,
+    ("talos_taichi", "fddp"): 0,
+    ("talos_taichi", "boxfddp"): 0,
+}
+"""Problems and solvers of which Crocoddyl does not repeat its own trace, and how many leading iterations it does."""
 OPTIMUM = 1e-6
 """How near the final costs must be, relatively."""
 
@@ -48,17 +54,18 @@ def agreeing(ours, theirs):
     return n if same.all() else int(np.argmin(same))
 
 
-def compare(spec, robot):
-    """Both solves of a problem, and what there is to say of them."""
-    theirs, result = Theirs(spec, robot), {"name": spec["name"], "solver": spec["solvers"][0]}
-    ours = Ours(spec, robot)
+def compare(spec, robot, solver):
+    """Both solves of a problem with one of its solvers, and what there is to say of them."""
+    theirs, result = Theirs(spec, robot, solver), {"name": spec["name"], "solver": solver}
+    ours = Ours(spec, robot, solver)
     xs, us = theirs.warm_start()
     a, b = ours.solve(xs, us), theirs.solve(xs, us)
     same = agreeing(a.rows, b.rows)
-    asked = CHAOTIC.get(spec["name"], len(b.rows))
+    case = (spec["name"], solver)
+    asked = CHAOTIC.get(case, len(b.rows))
     optimum = abs(a.cost - b.cost) / max(abs(b.cost), 1e-300)
     good = same >= min(asked, len(b.rows)) and optimum <= OPTIMUM
-    if spec["name"] not in CHAOTIC:
+    if case not in CHAOTIC:
         good &= len(a.rows) == len(b.rows)
     result |= {
         "iterations": [len(a.rows), len(b.rows)],
@@ -88,9 +95,44 @@ def time_both(ours, theirs, start, iterations, trials, rounds):
     }
 
 
+def line(result):
+    """A result as a line of text."""
+    case = f"{result['name']} {result['solver']}"
+    if "not_run" in result:
+        return f"{case:34} not run: {result['not_run']}"
+    verdict = "same" if result["good"] else "DIFFERENT"
+    same = f"{result['same']:3} of {result['iterations']} iterations"
+    text = f"{case:34} {verdict:9} {same}, optimum {result['optimum']:.1e}"
+    for phase, t in result.get("time", {}).items():
+        text += f"  {phase} {t['ours']:.3f}/{t['theirs']:.3f} = {t['ratio']:.3f}"
+    return text
+
+
+def run(spec, robot, solver, options):
+    """Compares both solves of a problem, and their times, and prints it; says whether they are the same."""
+    show = json.dumps if options.json else line
+    try:
+        result, ours, theirs, a, b, start = compare(spec, robot, solver)
+    except NotRunError as missing:
+        print(show({"name": spec["name"], "solver": solver, "not_run": str(missing)}), flush=True)
+        return True
+    if options.rounds and len(a.rows) == len(b.rows):
+        trials = int(sum(round(-math.log2(step)) + 1 for step in b.rows[:, 1]))
+        result["time"] = time_both(ours, theirs, start, len(b.rows), trials, options.rounds)
+    print(show(result), flush=True)
+    if options.trace:
+        for k in range(max(len(a.rows), len(b.rows))):
+            for solve in (a, b):
+                if k < len(solve.rows):
+                    cost, step, regularisation, stop = solve.rows[k]
+                    print(f"  {k:3} cost {cost:.12e} step {step:.4f} reg {regularisation:.0e} stop {stop:.3e}")
+    return result["good"]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--problems", type=Path, help="a folder of problems")
+    parser.add_argument("--solver", help="one of fddp, ddp, boxfddp, boxddp; all that a problem names unless given")
     parser.add_argument("--json", action="store_true", help="a line of JSON for each problem")
     parser.add_argument("--trace", action="store_true", help="show the iterations of both")
     parser.add_argument("--rounds", type=int, default=5, help="how often both are timed; 0 for not at all")
@@ -103,34 +145,9 @@ def main():
     good = True
     for name in options.names or problems:
         spec, robot = PROBLEMS[name]() if options.problems is None else load(options.problems, name)
-        try:
-            result, ours, theirs, a, b, start = compare(spec, robot)
-        except NotRunError as missing:
-            print(
-                json.dumps({"name": name, "not_run": str(missing)}) if options.json else f"{name:24} not run: {missing}"
-            )
-            continue
-        good &= result["good"]
-        if options.rounds:
-            trials = int(sum(round(-math.log2(step)) + 1 for step in b.rows[:, 1]))
-            iterations = len(b.rows)
-            if len(a.rows) == iterations:
-                result["time"] = time_both(ours, theirs, start, iterations, trials, options.rounds)
-        if options.json:
-            print(json.dumps(result), flush=True)
-        else:
-            verdict = "same" if result["good"] else "DIFFERENT"
-            same = f"{result['same']:3} of {result['iterations']} iterations"
-            line = f"{name:24} {verdict:9} {same}, optimum {result['optimum']:.1e}"
-            for phase, t in result.get("time", {}).items():
-                line += f"  {phase} {t['ours']:.3f}/{t['theirs']:.3f} = {t['ratio']:.3f}"
-            print(line, flush=True)
-        if options.trace:
-            for k in range(max(len(a.rows), len(b.rows))):
-                for solve in (a, b):
-                    if k < len(solve.rows):
-                        cost, step, regularisation, stop = solve.rows[k]
-                        print(f"  {k:3} cost {cost:.12e} step {step:.4f} reg {regularisation:.0e} stop {stop:.3e}")
+        for solver in spec["solvers"]:
+            if options.solver in (None, solver):
+                good &= run(spec, robot, solver, options)
     sys.exit(not good)
 
 

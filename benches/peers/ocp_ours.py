@@ -4,13 +4,10 @@ import time
 
 import numpy as np
 from ocp_actions import Cartpole, DoublePendulum, unicycle
-from ocp_robots import FRAMES, NotRunError, Solve, actuation_matrix, bounds, homogeneous, our_robot
+from ocp_robots import FRAMES, Solve, actuation_matrix, bounds, homogeneous, our_robot
 
 import condyle
 from condyle import optimal
-
-OURS = {"fddp": "Fddp", "ddp": "Ddp", "boxfddp": "BoxFddp", "boxddp": "BoxDdp"}
-"""What solves where Crocoddyl has the solver of this name."""
 
 
 def our_activation(activation, residual):
@@ -59,7 +56,7 @@ def our_contact(contact, gains):
     return condyle.Constraint(contact["frame"], kind, reference=axes, kp=gains[0], kd=gains[1], placement=placement)
 
 
-def our_action(stage, model, spec, terminal):
+def our_action(stage, model, spec, terminal, bounded):
     kind = stage["kind"]
     if kind == "unicycle":
         return unicycle(stage)[terminal]
@@ -80,33 +77,32 @@ def our_action(stage, model, spec, terminal):
     if terminal:
         return optimal.FreeDynamics(model, None, costs)
     actuation = actuation_matrix(spec, model.nv)
+    limits = {}
+    if bounded and "u_lb" in stage:
+        limits = {"lower": bounds(stage["u_lb"], -np.inf), "upper": bounds(stage["u_ub"], np.inf)}
     if stage["dynamics"]["type"] == "free_fwd":
-        return optimal.FreeDynamics(model, stage["dt"], costs, actuation)
-    return optimal.ContactDynamics(model, contacts, stage["dt"], costs, stage["dynamics"]["damping"], actuation)
+        return optimal.FreeDynamics(model, stage["dt"], costs, actuation, **limits)
+    damping = stage["dynamics"]["damping"]
+    return optimal.ContactDynamics(model, contacts, stage["dt"], costs, damping, actuation, **limits)
 
 
 class Ours:
-    """A problem of a JSON in Condyle."""
+    """A problem of a JSON in Condyle, for what Crocoddyl's solver of some name does."""
 
-    def __init__(self, spec, robot):
-        self.spec = spec
+    def __init__(self, spec, robot, solver):
+        bounded = solver.startswith("box")
         model = our_robot(robot) if robot else None
         used = sorted(set(spec["stages"]))
-        models = [our_action(spec["stage_models"][k], model, spec, False) for k in used]
+        models = [our_action(spec["stage_models"][k], model, spec, False, bounded) for k in used]
         stages = [used.index(k) for k in spec["stages"]]
-        terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, True)
-        solver = getattr(optimal, OURS[spec["solvers"][0]], None)
-        if solver is None:
-            raise NotRunError(f"Condyle has no {OURS[spec['solvers'][0]]}")
+        terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, True, bounded)
         self.problem = optimal.Problem(spec["x0"], models, stages, terminal)
-        settings = {"max_iterations": spec["maxiter"]}
+        settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
         if spec["init_reg"] is not None:
             settings["regularisation_start"] = spec["init_reg"]
         if spec["th_stop"] is not None:
-            settings["tolerance"] = spec["th_stop"]
-        if any("u_lb" in stage for stage in spec["stage_models"]):
-            raise NotRunError("Condyle's actions have no bounds")
-        self.solver = solver(self.problem, **settings)
+            settings["tolerance"] = settings["tolerance_bounded"] = spec["th_stop"]
+        self.solver = optimal.Fddp(self.problem, **settings)
 
     def solve(self, xs, us):
         if len({len(u) for u in us}) == 1:

@@ -104,12 +104,12 @@ def problem(name, robot, actuation, x0, knots, terminal, **more):
     } | more
 
 
-def free(dt, costs):
-    return {"kind": "euler", "dt": dt, "dynamics": {"type": "free_fwd"}, "costs": costs}
+def free(dt, costs, **bounds):
+    return {"kind": "euler", "dt": dt, "dynamics": {"type": "free_fwd"}, "costs": costs} | bounds
 
 
-def reach():
-    """A panda reaches for a pose."""
+def reach(name="reach", share=None):
+    """A panda reaches for a pose, with this share of its greatest efforts."""
     model = load("panda").model
     q0, data = model.referenceConfigurations["default"], model.createData()
     pin.framesForwardKinematics(model, data, q0)
@@ -121,10 +121,12 @@ def reach():
     rest = partial(cost, residual="state", ref=plain(x0))
     running = [pose("pose", 1.0), rest("rest", 1e-2), cost("effort", 1e-4, "control", ref=[0.0] * nv)]
     stop = rest("stop", 1e-1, activation=weighted(np.repeat([0.0, 1.0], nv)))
-    knots = [free(0.02, running)] * 40
-    return problem("reach", "panda", {"type": "full"}, x0, knots, free(0.02, [pose("pose", 1e3), stop])), robot_json(
-        "panda", model
-    )
+    bounds, solvers = {}, ["fddp", "ddp"]
+    if share is not None:
+        greatest = share * model.effortLimit
+        bounds, solvers = {"u_lb": plain(-greatest), "u_ub": plain(greatest)}, ["boxfddp", "boxddp"]
+    knots, end = [free(0.02, running, **bounds)] * 40, free(0.02, [pose("pose", 1e3), stop])
+    return problem(name, "panda", {"type": "full"}, x0, knots, end, solvers=solvers), robot_json("panda", model)
 
 
 def hover():
@@ -242,6 +244,7 @@ def walk(name="walk", robot="talos_legs", knots=10):
 
 PROBLEMS = {
     "reach": reach,
+    "weak_reach": partial(reach, "weak_reach", 0.4),
     "hover": hover,
     "trot": trot,
     "walk": walk,

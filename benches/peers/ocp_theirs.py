@@ -73,10 +73,10 @@ class TheirDrives(crocoddyl.ActuationModelAbstract):
 
 
 class Theirs:
-    """A problem of a JSON in Crocoddyl."""
+    """A problem of a JSON in Crocoddyl, for its solver of some name."""
 
-    def __init__(self, spec, robot):
-        self.spec, self.kept = spec, []
+    def __init__(self, spec, robot, solver):
+        self.spec, self.name, self.kept = spec, solver, []
         if robot:
             self.model = their_robot(robot)
             overrides = spec["robot_overrides"]
@@ -205,7 +205,7 @@ class Theirs:
         return xs, [np.zeros(m.nu) for m in problem.runningModels]
 
     def solver(self):
-        solver = THEIRS[self.spec["solvers"][0]](self.problem)
+        solver = THEIRS[self.name](self.problem)
         if self.spec["th_stop"] is not None:
             solver.th_stop = self.spec["th_stop"]
         return solver

@@ -3,6 +3,7 @@
 They are those of `benches/peers/ocp_problems.py`, and the files of a folder, which CONDYLE_PROBLEMS can name.
 """
 
+import json
 import os
 import sys
 from pathlib import Path
@@ -20,16 +21,20 @@ from ocp_robots import NotRunError  # noqa: E402
 FOLDER = Path(os.environ.get("CONDYLE_PROBLEMS", ROOT.parent / "shared" / "peers" / "crocoddyl" / "problems"))
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
-def test_same_trace(name):
-    result = ocp.compare(*PROBLEMS[name]())[0]
+CASES = [(name, solver) for name in PROBLEMS for solver in PROBLEMS[name]()[0]["solvers"]]
+FILES = [(p.stem, solver) for p in sorted(FOLDER.glob("*.json")) for solver in json.loads(p.read_text())["solvers"]]
+
+
+@pytest.mark.parametrize(("name", "solver"), CASES)
+def test_same_trace(name, solver):
+    result = ocp.compare(*PROBLEMS[name](), solver)[0]
     assert result["good"], result
 
 
-@pytest.mark.parametrize("name", sorted(p.stem for p in FOLDER.glob("*.json")))
-def test_same_trace_of_a_file(name):
+@pytest.mark.parametrize(("name", "solver"), FILES)
+def test_same_trace_of_a_file(name, solver):
     try:
-        result = ocp.compare(*ocp.load(FOLDER, name))[0]
+        result = ocp.compare(*ocp.load(FOLDER, name), solver)[0]
     except NotRunError as missing:
         pytest.skip(str(missing))
     assert result["good"], result
