@@ -222,6 +222,15 @@ impl Problem {
         Ok(lock("problem", &self.0)?.horizon())
     }
 
+    /// Sets the initial state, nx numbers, as an MPC does before each solve.
+    ///
+    /// Raises `ProblemError` for a number that is not finite.
+    fn set_x0(&self, x0: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut problem = lock("problem", &self.0)?;
+        let x0 = vector("x0", x0, problem.nx())?;
+        problem.set_x0(&x0).map_err(exception)
+    }
+
     /// The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
     fn rollout<'py>(&self, py: Python<'py>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut problem = lock("problem", &self.0)?;
@@ -239,7 +248,8 @@ impl Problem {
 /// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
 ///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
 ///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`.
+///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
+///     `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit").
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Fddp {
     problem: Py<Problem>,
@@ -276,6 +286,15 @@ impl Fddp {
                     };
                     continue;
                 }
+                "time_budget" => {
+                    let seconds: Option<f64> = value.extract()?;
+                    let duration = |s| std::time::Duration::try_from_secs_f64(s);
+                    let duration = seconds.map(duration).transpose().map_err(|_| {
+                        PyValueError::new_err(format!("time_budget: expected at least 0 seconds, found {seconds:?}"))
+                    })?;
+                    s.time_budget = duration;
+                    continue;
+                }
                 "tolerance" => &mut s.tolerance,
                 "tolerance_bounded" => &mut s.tolerance_bounded,
                 "accept" => &mut s.accept,
@@ -303,56 +322,86 @@ impl Fddp {
     fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut problem = lock("problem", &self.problem.get().0)?;
         let mut solver = lock("solver", &self.solver)?;
-        let (horizon, nx, ndx, nu) = (problem.horizon(), problem.nx(), problem.ndx(), problem.nu(0));
-        let xs = matrix("xs", xs, [horizon + 1, nx])?.to_vec();
-        let us = matrix("us", us, [horizon, nu])?.to_vec();
+        let xs = matrix("xs", xs, [problem.horizon() + 1, problem.nx()])?.to_vec();
+        let us = matrix("us", us, [problem.horizon(), problem.nu(0)])?.to_vec();
         let (problem, solver) = (&mut *problem, &mut *solver);
         py.detach(|| solver.solve(problem, &xs, &us).map(|_| ())).map_err(exception)?;
-        let s = solver.solution();
-        let gains = output(py, None, &[horizon, nu, ndx], |out| {
-            for (t, K) in s.K.iter().enumerate() {
-                for r in 0..nu {
-                    for c in 0..ndx {
-                        out[(t * nu + r) * ndx + c] = K[(r, c)];
-                    }
+        give(py, problem, solver.solution())
+    }
+
+    /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+    ///
+    /// Raises `ProblemError` as `solve`.
+    fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mut problem = lock("problem", &self.problem.get().0)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let (problem, solver) = (&mut *problem, &mut *solver);
+        py.detach(|| solver.resume(problem).map(|_| ())).map_err(exception)?;
+        give(py, problem, solver.solution())
+    }
+
+    /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
+    ///
+    /// `resume` then starts from there. Knot t becomes knot t − 1; the last one is served by a model of the problem.
+    ///
+    /// last: the index of that model.
+    ///
+    /// Raises `ProblemError` if there is no such model.
+    fn shift(&self, last: usize) -> PyResult<()> {
+        let mut problem = lock("problem", &self.problem.get().0)?;
+        let mut solver = lock("solver", &self.solver)?;
+        problem.shift(last).map_err(exception)?;
+        solver.shift(&mut problem).map_err(exception)
+    }
+}
+
+/// A solution as Python sees it.
+fn give<'py>(py: Python<'py>, problem: &rust::Problem, s: &rust::Solution) -> PyResult<Bound<'py, PyAny>> {
+    let (horizon, nx, ndx, nu) = (problem.horizon(), problem.nx(), problem.ndx(), problem.nu(0));
+    let gains = output(py, None, &[horizon, nu, ndx], |out| {
+        for (t, K) in s.K.iter().enumerate() {
+            for r in 0..nu {
+                for c in 0..ndx {
+                    out[(t * nu + r) * ndx + c] = K[(r, c)];
                 }
             }
-        })?;
-        let k: Vec<f64> = s.k.iter().flat_map(|k| k.iter().copied()).collect();
-        static ITERATION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        static SOLUTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let iteration = named_tuple(py, &ITERATION, "Iteration")?;
-        let record = |i: &rust::Iteration| {
-            iteration.call1((
-                i.iteration,
-                i.cost,
-                i.gap,
-                i.stop,
-                i.step,
-                i.regularisation,
-                i.d1,
-                i.d2,
-                i.feasible,
-                i.accepted,
-            ))
-        };
-        let trace = s.trace.iter().map(record).collect::<PyResult<Vec<_>>>()?;
-        let status = match s.status {
-            rust::Status::Converged => "converged",
-            rust::Status::MaxIterations => "max_iterations",
-            rust::Status::RegularisationLimit => "regularisation_limit",
-            _ => "not_finite",
-        };
-        named_tuple(py, &SOLUTION, "Solution")?.call1((
-            output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
-            output(py, None, &[horizon, nu], |out| out.copy_from_slice(&s.us))?,
-            gains,
-            output(py, None, &[horizon, nu], |out| out.copy_from_slice(&k))?,
-            s.cost,
-            s.gap,
-            s.feasible,
-            status,
-            trace,
+        }
+    })?;
+    let k: Vec<f64> = s.k.iter().flat_map(|k| k.iter().copied()).collect();
+    static ITERATION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    static SOLUTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let iteration = named_tuple(py, &ITERATION, "Iteration")?;
+    let record = |i: &rust::Iteration| {
+        iteration.call1((
+            i.iteration,
+            i.cost,
+            i.gap,
+            i.stop,
+            i.step,
+            i.regularisation,
+            i.d1,
+            i.d2,
+            i.feasible,
+            i.accepted,
         ))
-    }
+    };
+    let trace = s.trace.iter().map(record).collect::<PyResult<Vec<_>>>()?;
+    let status = match s.status {
+        rust::Status::Converged => "converged",
+        rust::Status::MaxIterations => "max_iterations",
+        rust::Status::TimeLimit => "time_limit",
+        rust::Status::RegularisationLimit => "regularisation_limit",
+        _ => "not_finite",
+    };
+    named_tuple(py, &SOLUTION, "Solution")?.call1((
+        output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
+        output(py, None, &[horizon, nu], |out| out.copy_from_slice(&s.us))?,
+        gains,
+        output(py, None, &[horizon, nu], |out| out.copy_from_slice(&k))?,
+        s.cost,
+        s.gap,
+        s.feasible,
+        status,
+        trace,
+    ))
 }

@@ -67,6 +67,7 @@
 
 mod action;
 mod box_qp;
+mod clock;
 mod dense;
 mod error;
 mod euler;
