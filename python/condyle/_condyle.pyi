@@ -2233,7 +2233,10 @@ class Problem:
         """The number of knots before the terminal one, N."""
 
     def set_x0(self, x0: ArrayLike) -> None:
-        """Sets the initial state, as an MPC does before each solve."""
+        """Sets the initial state, nx numbers, as an MPC does before each solve.
+
+        Raises `ProblemError` for a number that is not finite.
+        """
 
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
@@ -2257,10 +2260,11 @@ class Fddp:
     settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
         any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
         `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`.
+        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
+        `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit").
     """
 
-    def __new__(cls, problem: Problem, **settings: float | str) -> Fddp: ...
+    def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
     def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
 
@@ -2269,4 +2273,18 @@ class Fddp:
 
         Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises. How the solve
         ended is the solution's status.
+        """
+    def resume(self) -> Solution:
+        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+
+        Raises `ProblemError` as `solve`.
+        """
+    def shift(self, last: int) -> None:
+        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
+
+        `resume` then starts from there. Knot t becomes knot t − 1; the last one is served by a model of the problem.
+
+        last: the index of that model.
+
+        Raises `ProblemError` if there is no such model.
         """

@@ -420,7 +420,7 @@ class Solution(NamedTuple):
     """Largest gap of the trajectory."""
     feasible: bool
     """Whether the trajectory satisfies the dynamics."""
-    status: Literal["converged", "max_iterations", "regularisation_limit", "not_finite"]
+    status: Literal["converged", "max_iterations", "time_limit", "regularisation_limit", "not_finite"]
     """How the solve ended."""
     trace: list[Iteration]
     """A record per iteration."""

@@ -125,9 +125,13 @@ impl Problem {
         Ok(lock("problem", &self.inner)?.horizon())
     }
 
-    /// Sets the initial state, as an MPC does before each solve.
+    /// Sets the initial state, nx numbers, as an MPC does before each solve.
+    ///
+    /// Raises `ProblemError` for a number that is not finite.
     fn set_x0(&self, x0: &Bound<'_, PyAny>) -> PyResult<()> {
-        lock("problem", &self.inner)?.set_x0(&numbers("x0", x0)?).map_err(exception)
+        let mut problem = lock("problem", &self.inner)?;
+        let x0 = vector("x0", x0, problem.nx())?;
+        problem.set_x0(&x0).map_err(exception)
     }
 
     /// Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
@@ -170,7 +174,8 @@ impl Problem {
 /// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
 ///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
 ///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`.
+///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
+///     `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit").
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Fddp {
     problem: Py<Problem>,
@@ -207,6 +212,15 @@ impl Fddp {
                     };
                     continue;
                 }
+                "time_budget" => {
+                    let seconds: Option<f64> = value.extract()?;
+                    let duration = |s| std::time::Duration::try_from_secs_f64(s);
+                    let duration = seconds.map(duration).transpose().map_err(|_| {
+                        PyValueError::new_err(format!("time_budget: expected at least 0 seconds, found {seconds:?}"))
+                    })?;
+                    s.time_budget = duration;
+                    continue;
+                }
                 "tolerance" => &mut s.tolerance,
                 "tolerance_bounded" => &mut s.tolerance_bounded,
                 "accept" => &mut s.accept,
@@ -235,52 +249,84 @@ impl Fddp {
     fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut problem = lock("problem", &self.problem.get().inner)?;
         let mut solver = lock("solver", &self.solver)?;
-        let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
-        let xs = matrix("xs", xs, [horizon + 1, nx])?.to_vec();
+        let xs = matrix("xs", xs, [problem.horizon() + 1, problem.nx()])?.to_vec();
         let us = controls(&problem, us)?;
         let (problem, solver) = (&mut *problem, &mut *solver);
         py.detach(|| solver.solve(problem, &xs, &us).map(|_| ())).map_err(exception)?;
         self.problem.get().raise()?;
-        let s = solver.solution();
-        static ITERATION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        static TIMINGS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        static SOLUTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let iteration = named_tuple(py, &ITERATION, "Iteration")?;
-        let record = |i: &rust::Iteration| {
-            iteration.call1((
-                i.iteration,
-                i.cost,
-                i.gap,
-                i.stop,
-                i.step,
-                i.regularisation,
-                i.d1,
-                i.d2,
-                i.feasible,
-                i.accepted,
-            ))
-        };
-        let trace = s.trace.iter().map(record).collect::<PyResult<Vec<_>>>()?;
-        let status = match s.status {
-            rust::Status::Converged => "converged",
-            rust::Status::MaxIterations => "max_iterations",
-            rust::Status::RegularisationLimit => "regularisation_limit",
-            _ => "not_finite",
-        };
-        let t = &s.timings;
-        let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
-        let timings = named_tuple(py, &TIMINGS, "Timings")?.call1(PyTuple::new(py, timings)?)?;
-        named_tuple(py, &SOLUTION, "Solution")?.call1((
-            output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
-            by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.u(t)))?,
-            by_knot(py, problem, &[ndx], |t, out| row_major(&s.K[t], out))?,
-            by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.k[t].as_slice()))?,
-            s.cost,
-            s.gap,
-            s.feasible,
-            status,
-            trace,
-            timings,
-        ))
+        give(py, problem, solver.solution())
     }
+
+    /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+    ///
+    /// Raises `ProblemError` as `solve`.
+    fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let (problem, solver) = (&mut *problem, &mut *solver);
+        py.detach(|| solver.resume(problem).map(|_| ())).map_err(exception)?;
+        self.problem.get().raise()?;
+        give(py, problem, solver.solution())
+    }
+
+    /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
+    ///
+    /// `resume` then starts from there. Knot t becomes knot t − 1; the last one is served by a model of the problem.
+    ///
+    /// last: the index of that model.
+    ///
+    /// Raises `ProblemError` if there is no such model.
+    fn shift(&self, last: usize) -> PyResult<()> {
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let mut solver = lock("solver", &self.solver)?;
+        problem.shift(last).map_err(exception)?;
+        solver.shift(&mut problem).map_err(exception)?;
+        self.problem.get().raise()
+    }
+}
+
+/// A solution as Python sees it.
+fn give<'py>(py: Python<'py>, problem: &rust::Problem, s: &rust::Solution) -> PyResult<Bound<'py, PyAny>> {
+    let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
+    static ITERATION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    static TIMINGS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    static SOLUTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let iteration = named_tuple(py, &ITERATION, "Iteration")?;
+    let record = |i: &rust::Iteration| {
+        iteration.call1((
+            i.iteration,
+            i.cost,
+            i.gap,
+            i.stop,
+            i.step,
+            i.regularisation,
+            i.d1,
+            i.d2,
+            i.feasible,
+            i.accepted,
+        ))
+    };
+    let trace = s.trace.iter().map(record).collect::<PyResult<Vec<_>>>()?;
+    let status = match s.status {
+        rust::Status::Converged => "converged",
+        rust::Status::MaxIterations => "max_iterations",
+        rust::Status::TimeLimit => "time_limit",
+        rust::Status::RegularisationLimit => "regularisation_limit",
+        _ => "not_finite",
+    };
+    let t = &s.timings;
+    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
+    let timings = named_tuple(py, &TIMINGS, "Timings")?.call1(PyTuple::new(py, timings)?)?;
+    named_tuple(py, &SOLUTION, "Solution")?.call1((
+        output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
+        by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.u(t)))?,
+        by_knot(py, problem, &[ndx], |t, out| row_major(&s.K[t], out))?,
+        by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.k[t].as_slice()))?,
+        s.cost,
+        s.gap,
+        s.feasible,
+        status,
+        trace,
+        timings,
+    ))
 }

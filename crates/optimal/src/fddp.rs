@@ -1,6 +1,7 @@
 //! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
+use crate::clock::{Clock, Phase};
 use crate::dense::max_abs;
 use crate::error::Error;
 use crate::lq::LqNode;
@@ -88,6 +89,7 @@ pub struct Fddp {
     pub(crate) dx: Vec<f64>,
     /// Expected improvement without the part that depends on the trial: dg, dq.
     pub(crate) expected: [f64; 2],
+    pub(crate) clock: Clock,
 }
 
 /// What carries over from one iteration to the next.
@@ -97,6 +99,8 @@ struct Progress {
     /// Whether the iterate before the last accepted step was feasible.
     was_feasible: bool,
     tolerance: f64,
+    /// Whether there are gains of this solve.
+    swept: bool,
 }
 
 impl Fddp {
@@ -117,6 +121,7 @@ impl Fddp {
             curved_gaps: vec![0.0; (horizon + 1) * shape.ndx],
             dx: vec![0.0; shape.ndx],
             expected: [0.0; 2],
+            clock: Clock::default(),
         }
     }
 
@@ -138,29 +143,93 @@ impl Fddp {
         problem: &mut Problem,
         xs: &[f64],
         us: &[f64],
+        observer: impl FnMut(&Iteration),
+    ) -> Result<&Solution, Error> {
+        check_shape(self.solution.shape(), problem.shape())?;
+        Error::check("xs", xs, self.solution.xs.len())?;
+        Error::check("us", us, self.solution.us.len())?;
+        self.solution.xs.copy_from_slice(xs);
+        self.solution.us.copy_from_slice(us);
+        self.resume_with(problem, observer)
+    }
+
+    /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
+    /// [`shift`](Self::shift), for the next horizon.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
+        self.resume_with(problem, |_| ())
+    }
+
+    /// As [`resume`](Self::resume), and shows each iteration to `observer` as it ends.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume_with(
+        &mut self,
+        problem: &mut Problem,
         mut observer: impl FnMut(&Iteration),
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
         self.settings.check()?;
         check_shape(self.solution.shape(), problem.shape())?;
-        Error::check("xs", xs, self.solution.xs.len())?;
-        Error::check("us", us, self.solution.us.len())?;
-        let tolerance = if problem.check_bounds()? { self.settings.tolerance_bounded } else { self.settings.tolerance };
+        let bounded = problem.check_bounds()?;
+        let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
 
-        self.solution.xs.copy_from_slice(xs);
-        self.solution.us.copy_from_slice(us);
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
         self.solution.trace.reserve(self.settings.max_iterations);
         self.steps.clear();
         self.steps.extend((0..self.settings.step_lengths).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
         let start = self.settings.regularisation_start;
-        let mut progress = Progress { regularisation: start, feasible: false, was_feasible: false, tolerance };
+        let mut progress =
+            Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
         self.sweep.forget();
+        self.clock.start(begin, self.settings.time_budget);
         let status = self.iterate(problem, &mut progress, &mut observer);
         self.finish(problem, &progress, status);
         self.solution.timings.total = begin.elapsed();
         Ok(&self.solution)
+    }
+
+    /// Makes the solution a warm start for a problem that was [shifted](Problem::shift) by a knot since: states, controls
+    /// and gains move one knot to the front, the last control stays (where the number of controls changes, it is zero),
+    /// and the last state follows from it. Allocates nothing unless numbers of controls differ along the horizon.
+    ///
+    /// # Errors
+    /// [`Error`] if the problem is not the one solved before, shifted once.
+    pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
+        let (old, new) = (self.solution.shape(), problem.shape());
+        let (horizon, ndx) = (new.horizon(), new.ndx);
+        if old.horizon() != horizon {
+            return Err(Error::Length { name: "stages", expected: old.horizon(), found: horizon });
+        }
+        for t in 0..horizon - 1 {
+            if old.nu(t + 1) != new.nu(t) {
+                return Err(Error::Dimension { node: t, name: "nu", expected: old.nu(t + 1), found: new.nu(t) });
+            }
+        }
+        for (name, expected, found) in [("nx", old.nx, new.nx), ("ndx", old.ndx, new.ndx)] {
+            if expected != found {
+                return Err(Error::Dimension { node: 0, name, expected, found });
+            }
+        }
+        self.solution.shift(new);
+        if (0..horizon).any(|t| self.nodes[t].nu() != new.nu(t)) {
+            self.nodes[..horizon].rotate_left(1);
+            self.nodes[horizon - 1] = LqNode::zeros(ndx, new.nu(horizon - 1));
+            self.sweep = Sweep::new(&self.nodes);
+        }
+        self.trials.reshape(problem);
+        // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
+        let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
+        let next = &mut self.next[..end.len()];
+        problem.action_mut(horizon - 1).calc(horizon - 1, &self.solution.xs[x], &self.solution.us[u], next);
+        if next.iter().all(|x| x.is_finite()) {
+            self.solution.xs[end].copy_from_slice(next);
+        }
+        Ok(())
     }
 
     /// The result of the last solve.
@@ -181,7 +250,13 @@ impl Fddp {
                 gap = self.update_gaps(problem);
             }
             if search.accepted || iteration == 0 {
+                if !self.clock.allows(Phase::CalcDiff) {
+                    return Status::TimeLimit;
+                }
                 self.calc_diff(problem, now.feasible);
+            }
+            if !self.clock.allows(Phase::Sweep) {
+                return Status::TimeLimit;
             }
             while let Err(error) = self.sweep(now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
@@ -191,9 +266,16 @@ impl Fddp {
                         SweepError::NotFinite { .. } => Status::NotFinite,
                     };
                 }
+                if !self.clock.allows(Phase::Sweep) {
+                    return Status::TimeLimit;
+                }
             }
+            now.swept = true;
             self.expect(now.feasible);
             search = self.line_search(problem, now.feasible, search);
+            if search.out_of_time {
+                return Status::TimeLimit;
+            }
             if search.accepted {
                 now.was_feasible = now.feasible;
                 now.feasible |= search.step == 1.0 || self.settings.method == Method::Ddp;
@@ -271,13 +353,13 @@ impl Fddp {
                 }
             }
         }
-        self.solution.timings.calc_diff += clock.elapsed();
+        self.solution.timings.calc_diff += self.clock.ran(Phase::CalcDiff, clock);
     }
 
     fn sweep(&mut self, regularisation: f64) -> Result<(), SweepError> {
         let clock = Instant::now();
         let result = self.sweep.run(&self.nodes, regularisation);
-        self.solution.timings.sweep += clock.elapsed();
+        self.solution.timings.sweep += self.clock.ran(Phase::Sweep, clock);
         result
     }
 
@@ -298,6 +380,9 @@ impl Fddp {
         solution.feasible = now.feasible;
         solution.regularisation = now.regularisation;
         solution.status = status;
+        if !now.swept {
+            return; // the gains of the solve before, shifted or not
+        }
         for ((K, k), knot) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.knots()) {
             K.copy_from(&knot.K);
             k.copy_from(&knot.k);

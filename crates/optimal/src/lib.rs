@@ -68,6 +68,7 @@
 
 mod action;
 mod box_qp;
+mod clock;
 mod dense;
 mod error;
 mod euler;

@@ -117,3 +117,17 @@ pub struct LqKnot {
     /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
     pub Quu: DMatrix<f64>,
 }
+
+impl LqKnot {
+    /// A knot of zeros with ndx states and nu controls.
+    pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
+        Self {
+            K: DMatrix::zeros(nu, ndx),
+            k: DVector::zeros(nu),
+            Vx: DVector::zeros(ndx),
+            Vxx: DMatrix::zeros(ndx, ndx),
+            Qu: DVector::zeros(nu),
+            Quu: DMatrix::zeros(nu, nu),
+        }
+    }
+}

@@ -57,6 +57,12 @@ impl Trials {
         }
     }
 
+    /// Makes room for a problem of which only the numbers of controls changed.
+    pub(crate) fn reshape(&mut self, problem: &Problem) {
+        self.shape.clone_from(problem.shape());
+        self.us.resize(self.shape.offsets[self.shape.horizon()] * self.width, 0.0);
+    }
+
     /// The number of trials that fit.
     pub(crate) fn width(&self) -> usize {
         self.width

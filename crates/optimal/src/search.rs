@@ -1,5 +1,6 @@
 //! The line search of differential dynamic programming: what a step should gain, and whether it does.
 
+use crate::clock::Phase;
 use crate::dense::{add_scaled_product, dot};
 use crate::fddp::Fddp;
 use crate::problem::Problem;
@@ -17,6 +18,8 @@ pub(crate) struct Search {
     pub(crate) decrease: f64,
     pub(crate) expected_decrease: f64,
     pub(crate) accepted: bool,
+    /// There was no time for another trial.
+    pub(crate) out_of_time: bool,
 }
 
 impl Fddp {
@@ -67,6 +70,10 @@ impl Fddp {
         let (mut tried, count) = (0, self.steps.len());
         while tried < count {
             let width = if tried == 0 { 1 } else { self.trials.width().min(count - tried) };
+            if !self.clock.allows(Phase::Rollout) {
+                search.out_of_time = true;
+                return search;
+            }
             self.roll_out(problem, gaps, tried, width);
             for i in 0..width {
                 search.step = self.steps[tried + i];
@@ -97,7 +104,7 @@ impl Fddp {
         let Solution { xs, us, .. } = &self.solution;
         let nominal = Nominal { xs, us, gaps, knots: self.sweep.knots() };
         self.trials.run(problem, &nominal, &self.steps[from..from + width]);
-        self.solution.timings.rollout += clock.elapsed();
+        self.solution.timings.rollout += self.clock.ran(Phase::Rollout, clock);
     }
 
     /// Whether the step lowers the cost enough; or, while there are gaps, raises it little enough (FDDP), or is expected

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
+use std::time::Duration;
 
 /// Which search for an optimum a solve is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -23,12 +24,15 @@ pub enum Method {
 pub struct Settings {
     /// How gaps are closed and which steps are accepted.
     pub method: Method,
-    /// Iterations after which a solve stops.
+    /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
     pub tolerance: f64,
     /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
     pub tolerance_bounded: f64,
+    /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
+    /// as the last of its kind. `None` for no limit.
+    pub time_budget: Option<Duration>,
     /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
     pub step_lengths: usize,
     /// A step is accepted if the cost falls by more than this times the expected decrease.
@@ -59,6 +63,7 @@ impl Default for Settings {
             max_iterations: 100,
             tolerance: 1e-9,
             tolerance_bounded: 5e-5,
+            time_budget: None,
             step_lengths: 10,
             accept: 0.1,
             accept_ascent: 2.0,

@@ -8,7 +8,6 @@ use crate::euler::Euler;
 use crate::factor::{eliminate, solve_right};
 use crate::lq::{DIVERGED, LqKnot, LqNode};
 use crate::vector::{Dense, Vector, at_level};
-use nalgebra::{DMatrix, DVector};
 
 /// Why a sweep stopped before the first knot.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -124,14 +123,7 @@ impl Sweep {
         let m = nodes.iter().map(LqNode::nu).max().unwrap_or(0);
         let knots = nodes.iter().map(|node| {
             node.assert_shapes(n, node.nu());
-            LqKnot {
-                K: DMatrix::zeros(node.nu(), n),
-                k: DVector::zeros(node.nu()),
-                Vx: DVector::zeros(n),
-                Vxx: DMatrix::zeros(n, n),
-                Qu: DVector::zeros(node.nu()),
-                Quu: DMatrix::zeros(node.nu(), node.nu()),
-            }
+            LqKnot::zeros(n, node.nu())
         });
         let work = Work {
             P: vec![0.0; (n + SLACK) * n],

@@ -90,6 +90,23 @@ fn a_bounded_solve_allocates_nothing() {
 }
 
 #[test]
+fn a_step_of_a_closed_loop_allocates_nothing() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let xs = straight(problem.x0(), problem.x0(), 50);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 3;
+    solver.settings.time_budget = Some(std::time::Duration::from_secs(10));
+    solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+    let count = allocations(|| {
+        problem.shift(0).unwrap();
+        solver.shift(&mut problem).unwrap();
+        problem.set_x0(&[0.1, 3.1, 0.0, 0.0]).unwrap();
+        solver.resume(&mut problem).unwrap();
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
 fn a_robots_solve_allocates_nothing() {
     for model in [robots::arm7(), robots::quadruped()].map(std::sync::Arc::new) {
         let x0 = [neutral(&model), vec![0.0; model.nv()]].concat();

@@ -278,8 +278,13 @@ pub(crate) fn cartpole(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
     limited_cartpole(x0, horizon, lanes, None)
 }
 
+/// A knot of the swing-up.
+pub(crate) fn cartpole_action() -> Cartpole {
+    Cartpole { nu: 1, lanes: 1, weights: [1.0, 0.1, 0.1, 0.1, 0.3] }
+}
+
 pub(crate) fn limited_cartpole(x0: &[f64], horizon: usize, lanes: usize, bounds: Option<[Vec<f64>; 2]>) -> Problem {
-    let running = Cartpole { nu: 1, lanes, weights: [1.0, 0.1, 0.1, 0.1, 0.3] };
+    let running = Cartpole { lanes, ..cartpole_action() };
     let terminal = Cartpole { nu: 0, lanes, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
     horizon_of(x0, horizon, running, bounds, terminal)
 }
