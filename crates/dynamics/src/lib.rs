@@ -72,6 +72,7 @@ mod sdf;
 pub mod simulation;
 mod soundness;
 mod statics;
+mod ties;
 mod two_handles;
 mod urdf;
 mod xml;
