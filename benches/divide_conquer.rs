@@ -55,7 +55,7 @@ fn divide_conquer(c: &mut Criterion) {
         });
         let n = model.bodies().len() - 1;
         for grain in [1, n.div_ceil(8), n.div_ceil(2)] {
-            let mut divided = DivideConquer::new(&model, grain).expect("no joint follows another");
+            let mut divided = DivideConquer::new(&model, grain);
             for (threads, pool) in THREADS.into_iter().zip(&pools) {
                 group.bench_function(BenchmarkId::new(format!("grain {grain}"), format!("{threads} threads")), |b| {
                     pool.install(|| b.iter(|| _ = black_box(divided.aba(&model, black_box(&q), &v, &tau, &[]))));

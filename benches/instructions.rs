@@ -1,9 +1,7 @@
 //! How many instructions an algorithm takes, for `instructions.py`, which runs this under callgrind and knows the functions
 //! by their names. A thousandth more or less can be told there, where times differ by a tenth from run to run.
 
-use condyle::{
-    Batch, Data, Model, aba, aba_derivatives, crba, minv, random_configuration, rnea, rnea_derivatives, robots,
-};
+use condyle::{Batch, Data, Model, random_configuration, robots};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
@@ -59,12 +57,12 @@ macro_rules! measured {
     };
 }
 measured! {
-    rnea(m, d, q, v, x) rnea(m, d, q, v, x, &[]);
-    aba(m, d, q, v, x) aba(m, d, q, v, x, &[]);
-    crba(m, d, q, _v, _x) crba(m, d, q);
-    minv(m, d, q, _v, _x) minv(m, d, q);
-    rnea_derivatives(m, d, q, v, x) rnea_derivatives(m, d, q, v, x, &[]);
-    aba_derivatives(m, d, q, v, x) aba_derivatives(m, d, q, v, x, &[]);
+    rnea(m, d, q, v, x) condyle::rnea(m, d, q, v, x, &[]);
+    aba(m, d, q, v, x) condyle::aba(m, d, q, v, x, &[]);
+    crba(m, d, q, _v, _x) condyle::crba(m, d, q);
+    minv(m, d, q, _v, _x) condyle::minv(m, d, q);
+    rnea_derivatives(m, d, q, v, x) condyle::rnea_derivatives(m, d, q, v, x, &[]);
+    aba_derivatives(m, d, q, v, x) condyle::aba_derivatives(m, d, q, v, x, &[]);
 }
 
 fn main() {

@@ -38,16 +38,20 @@ __all__ = [
     "HUMANOID",
     "QUADRUPED",
     "WORLD",
+    "Action",
     "Activation",
     "BodyId",
     "Cholesky",
     "ConstraintSet",
+    "ContactDynamics",
     "Cost",
     "Data",
     "DivideConquer",
     "Error",
     "Fddp",
     "FreeDynamics",
+    "FrictionCone",
+    "ImpulseDynamics",
     "Joint",
     "Ltdl",
     "Model",
@@ -58,6 +62,7 @@ __all__ = [
     "Problem",
     "ProblemError",
     "Simulation",
+    "WrenchCone",
     "__version__",
     "_model_from_bytes",
     "aba",
@@ -145,6 +150,7 @@ _RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translatio
 _Joints: TypeAlias = Sequence[tuple[Joint, ArrayLike | None]]
 _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
+_Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
 _Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
 _Reference: TypeAlias = Literal["local", "world", "local_world_aligned"]
 _Input: TypeAlias = (
@@ -152,6 +158,8 @@ _Input: TypeAlias = (
     | tuple[Literal["force", "inertia"], str | int]
     | tuple[Literal["friction"], float]
 )
+_Action: TypeAlias = FreeDynamics | ContactDynamics | ImpulseDynamics | Action
+_Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
 _RneaOut: TypeAlias = RneaDerivatives | tuple[_Array, _Array, _Array]
 _AbaOut: TypeAlias = AbaDerivatives | tuple[_Array, _Array, _Array, _Array]
 _MapOut: TypeAlias = CentroidalMap | tuple[_Array, _Array, _Array, _Array]
@@ -1556,14 +1564,13 @@ class DivideConquer:
     """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its scratch.
 
     The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-    a join of two pieces costs some ten times as much as the elimination of a body. On two threads this is faster than
-    `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. The bits are the same
-    for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for parallel
-    O(log(n)) calculation of rigid-body dynamics (1999).
+    a join of two pieces costs some six times as much as the elimination of a body. On two threads this is faster than
+    `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. With joints that share
+    coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
+    The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
+    algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 
     model: the robot; grain: how many bodies a run has at most.
-
-    Raises `ModelError` if a joint follows another one (mimic).
 
     >>> arm = condyle.robots.arm7()
     >>> divided = condyle.DivideConquer(arm, grain=1)
@@ -1905,6 +1912,64 @@ class Activation:
     def barrier(lower: ArrayLike, upper: ArrayLike) -> Activation:
         """½ Σ (excess of rᵢ over its bounds)²; infinite bounds are none."""
 
+    @staticmethod
+    def weighted_barrier(lower: ArrayLike, upper: ArrayLike, w: ArrayLike) -> Activation:
+        """½ Σ wᵢ (excess of rᵢ over its bounds)²; Crocoddyl has the square of wᵢ in its value."""
+
+    @staticmethod
+    def smooth1(epsilon: float = 1.0) -> Activation:
+        """Σ √(ε + rᵢ²): nearly Σ |rᵢ|."""
+
+    @staticmethod
+    def smooth2(epsilon: float = 1.0) -> Activation:
+        """√(ε + ‖r‖²): nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least eigenvalue of the
+        exact one.
+        """
+
+@final
+class FrictionCone:
+    """Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: lower ≤ A f ≤ upper.
+
+    mu: μ; facets: the pyramid's sides; inner: whether it lies inside of the cone; rotation: the surface's axes (its
+    normal is z) along the contact's, (3, 3); least, greatest: of the normal force (N).
+
+    >>> condyle.optimal.FrictionCone(0.5).rows()[0]
+    array([ 1. ,  0. , -0.5])
+    """
+
+    def __new__(
+        cls,
+        mu: float,
+        facets: int = 4,
+        inner: bool = False,
+        rotation: ArrayLike | None = None,
+        least: float = 0.0,
+        greatest: float = float("inf"),
+    ) -> FrictionCone: ...
+    def rows(self) -> _Array:
+        """A, (facets + 1, 3)."""
+
+    def bounds(self) -> tuple[_Array, _Array]:
+        """The least and greatest values of A f."""
+
+@final
+class WrenchCone:
+    """Friction, the centre of pressure within a rectangle, and the yaw moment: lower ≤ A w ≤ upper.
+
+    friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
+
+    >>> from condyle.optimal import FrictionCone, WrenchCone
+    >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
+    (17, 6)
+    """
+
+    def __new__(cls, friction: FrictionCone, size: tuple[float, float] | Sequence[float]) -> WrenchCone: ...
+    def rows(self) -> _Array:
+        """A, (facets + 13, 6)."""
+
+    def bounds(self) -> tuple[_Array, _Array]:
+        """The least and greatest values of A w."""
+
 @final
 class Cost:
     """A term of a cost: weight times an activation of a residual. The activation is quadratic unless given.
@@ -1920,6 +1985,30 @@ class Cost:
     @staticmethod
     def control(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
         """r = u − reference, nu numbers."""
+
+    @staticmethod
+    def control_gravity(name: str, weight: float, activation: Activation | None = None) -> Cost:
+        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
+
+    @staticmethod
+    def joint_effort(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
+        """r = τ − reference, the efforts of all joints, nv numbers."""
+
+    @staticmethod
+    def joint_acceleration(
+        name: str, weight: float, reference: ArrayLike, activation: Activation | None = None
+    ) -> Cost:
+        """r = q̈ − reference, nv numbers."""
+
+    @staticmethod
+    def center_of_mass(name: str, weight: float, target: ArrayLike, activation: Activation | None = None) -> Cost:
+        """r = c − target, 3 numbers in the world, of the centre of mass."""
+
+    @staticmethod
+    def centroidal_momentum(
+        name: str, weight: float, target: ArrayLike | None = None, activation: Activation | None = None
+    ) -> Cost:
+        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
 
     @staticmethod
     def frame_placement(
@@ -1943,62 +2032,261 @@ class Cost:
     ) -> Cost:
         """r = p − target, 3 numbers in the world, of the origin of a frame of the model."""
 
+    @staticmethod
+    def frame_rotation(
+        name: str,
+        weight: float,
+        model: Model,
+        frame: str | int,
+        target: ArrayLike,
+        activation: Activation | None = None,
+    ) -> Cost:
+        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
+
+    @staticmethod
+    def frame_velocity(
+        name: str,
+        weight: float,
+        model: Model,
+        frame: str | int,
+        target: ArrayLike | None = None,
+        reference: _Reference = "local",
+        activation: Activation | None = None,
+    ) -> Cost:
+        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
+        'local_world_aligned'.
+        """
+
+    @staticmethod
+    def contact_force(
+        name: str, weight: float, contact: str, target: ArrayLike | None = None, activation: Activation | None = None
+    ) -> Cost:
+        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
+
+    @staticmethod
+    def friction_cone(
+        name: str, weight: float, contact: str, cone: FrictionCone, activation: Activation | None = None
+    ) -> Cost:
+        """r = A f of a contact's force, and by default the barrier of the cone's bounds."""
+
+    @staticmethod
+    def wrench_cone(
+        name: str, weight: float, contact: str, cone: WrenchCone, activation: Activation | None = None
+    ) -> Cost:
+        """r = A w of a rigid contact's wrench, and by default the barrier of the cone's bounds."""
+
+    @staticmethod
+    def center_of_pressure(
+        name: str,
+        weight: float,
+        contact: str,
+        size: tuple[float, float] | Sequence[float],
+        rotation: ArrayLike | None = None,
+        activation: Activation | None = None,
+    ) -> Cost:
+        """Four numbers of a rigid contact that are not above 0 while the centre of pressure is inside a rectangle, and
+        by default the barrier above 0.
+
+        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
+        (3, 3).
+        """
+
+    @staticmethod
+    def impulse_center_of_mass(name: str, weight: float, activation: Activation | None = None) -> Cost:
+        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass."""
+
 @final
 class FreeDynamics:
-    """A knot of a robot that moves freely under its joints' efforts, by semi-implicit Euler.
+    """A knot of a robot that moves freely under its joints' efforts.
 
-    q̈ = aba(q, v, τ), v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is x = (q, v), the
-    controls are the efforts of all joints but a free-flyer at the root.
+    q̈ = aba(q, v, S u); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is
+    x = (q, v).
 
     model: the robot.
     dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
     costs: a list of `Cost`.
+    actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
+    integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 
-    Raises `ProblemError` for a cost that does not fit.
+    Raises `ProblemError` for a cost or drives that do not fit.
     """
 
-    def __new__(cls, model: Model, dt: float | None, costs: Sequence[Cost]) -> FreeDynamics: ...
+    def __new__(
+        cls,
+        model: Model,
+        dt: float | None,
+        costs: Sequence[Cost],
+        actuation: ArrayLike | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> FreeDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The efforts that hold the robot still at the state x, nu numbers."""
+
+@final
+class ContactDynamics:
+    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
+
+    model: the robot.
+    contacts: a dict of `Constraint`s by name; residuals call them by these names. May be empty.
+    dt: Δt in seconds.
+    costs: a list of `Cost`.
+    damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
+    actuation, integrator, lower, upper: as of `FreeDynamics`.
+
+    Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
+
+    >>> from condyle.optimal import ContactDynamics
+    >>> quadruped = condyle.robots.quadruped()
+    >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
+    >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        contacts: dict[str, Constraint],
+        dt: float,
+        costs: Sequence[Cost],
+        damping: float = 0.0,
+        actuation: ArrayLike | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> ContactDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """The smallest controls and forces that hold the robot still at the state x: nu controls of them."""
+
+@final
+class ImpulseDynamics:
+    """A knot at which contacts set in: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w a(r).
+
+    There are no controls.
+
+    model: the robot.
+    contacts: a dict of `Constraint`s by name.
+    costs: a list of `Cost`; they look at the state before the impact.
+    restitution: ε, 0 to 1.
+    damping: μ (1/kg).
+
+    Raises `ProblemError` as `ContactDynamics` does.
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        contacts: dict[str, Constraint],
+        costs: Sequence[Cost],
+        restitution: float = 0.0,
+        damping: float = 0.0,
+    ) -> ImpulseDynamics: ...
+
+@final
+class Action:
+    """An action written in Python.
+
+    nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
+    calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
+        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+
+    >>> from condyle.optimal import Action, Fddp, Problem
+    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
+    >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+    >>> problem = Problem([1.0], [knot], [0] * 30, end)
+    >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
+    0.809017
+    """
+
+    def __new__(
+        cls,
+        nx: int,
+        nu: int,
+        calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
+        calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Action: ...
 
 @final
 class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `Action`.
     stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
-    terminal: the `FreeDynamics` of the end.
+    terminal: the model of the end, without controls.
 
     Raises `ProblemError` if they do not fit together.
     """
 
     def __new__(
-        cls, x0: ArrayLike, models: Sequence[FreeDynamics], stages: Sequence[int], terminal: FreeDynamics
+        cls,
+        x0: ArrayLike,
+        models: Sequence[_Action],
+        stages: Sequence[int],
+        terminal: _Action,
     ) -> Problem: ...
     @property
     def horizon(self) -> int:
         """The number of knots before the terminal one, N."""
 
-    def rollout(self, us: ArrayLike) -> _Array:
-        """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx)."""
+    def set_x0(self, x0: ArrayLike) -> None:
+        """Sets the initial state, nx numbers, as an MPC does before each solve.
+
+        Raises `ProblemError` for a number that is not finite.
+        """
+
+    def set_weight(self, name: str, weight: float) -> None:
+        """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
+
+        Raises `KeyError` if there is no such term.
+        """
+
+    def rollout(self, us: _Controls) -> _Array:
+        """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
+
+        us: (N, nu), or a list of N arrays where knots differ in nu.
+        """
 
 @final
 class Fddp:
-    """Feasibility-driven differential dynamic programming, with Crocoddyl's rules and constants.
+    """Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+
+    Where controls are bounded, these are those of its box solvers.
 
     problem: what is solved; the solver allocates for its shape once.
-    settings: any of `max_iterations`, `tolerance`, `step_lengths`, `accept`, `accept_ascent`, `flat`,
-        `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
-        `regularisation_decrease_above`, `regularisation_increase_below`.
+    settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
+        any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
+        `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
+        `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit").
     """
 
-    def __new__(cls, problem: Problem, **settings: float) -> Fddp: ...
-    def solve(self, xs: ArrayLike, us: ArrayLike) -> Solution:
+    def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
+    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
-        us: controls, (N, nu).
+        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
 
-        Raises `ProblemError` for numbers or settings that make no sense. How the solve ended is the solution's status.
+        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises. How the solve
+        ended is the solution's status.
+        """
+    def resume(self) -> Solution:
+        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+
+        Raises `ProblemError` as `solve`.
+        """
+    def shift(self, last: int) -> None:
+        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
+
+        `resume` then starts from there. Knot t becomes knot t − 1; the last one is served by a model of the problem.
+
+        last: the index of that model.
+
+        Raises `ProblemError` if there is no such model.
         """

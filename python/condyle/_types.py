@@ -385,16 +385,34 @@ class Iteration(NamedTuple):
     """Whether a step was accepted; if not, the iterate is as before."""
 
 
+class Timings(NamedTuple):
+    """Where the time of a solve went (s)."""
+
+    calc: float
+    """Dynamics and cost of the warm start."""
+    calc_diff: float
+    """Derivatives."""
+    sweep: float
+    """Backward sweeps, repeated ones included."""
+    rollout: float
+    """Trial rollouts of the line searches, accepted or not."""
+    total: float
+    """The whole solve."""
+
+
 class Solution(NamedTuple):
-    """The result of a solve: the best iterate, whatever the status says."""
+    """The result of a solve: the best iterate, whatever the status says.
+
+    Where knots differ in nu, what belongs to controls is a list of N arrays instead of one array.
+    """
 
     xs: NDArray[np.float64]
     """States, (N + 1, nx)."""
-    us: NDArray[np.float64]
+    us: NDArray[np.float64] | list[NDArray[np.float64]]
     """Controls, (N, nu)."""
-    K: NDArray[np.float64]
+    K: NDArray[np.float64] | list[NDArray[np.float64]]
     """Feedback gains of the last sweep, (N, nu, ndx): u + K (x ⊖ x̄) is the control near the trajectory."""
-    k: NDArray[np.float64]
+    k: NDArray[np.float64] | list[NDArray[np.float64]]
     """Feed-forward of the last sweep, (N, nu)."""
     cost: float
     """Cost of the trajectory."""
@@ -402,10 +420,12 @@ class Solution(NamedTuple):
     """Largest gap of the trajectory."""
     feasible: bool
     """Whether the trajectory satisfies the dynamics."""
-    status: Literal["converged", "max_iterations", "regularisation_limit", "not_finite"]
+    status: Literal["converged", "max_iterations", "time_limit", "regularisation_limit", "not_finite"]
     """How the solve ended."""
     trace: list[Iteration]
     """A record per iteration."""
+    timings: Timings
+    """Where the time went."""
 
 
 class Control(NamedTuple):

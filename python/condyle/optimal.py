@@ -15,7 +15,34 @@
 The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are Crocoddyl's.
 """
 
-from ._condyle import Activation, Cost, Fddp, FreeDynamics, Problem, ProblemError
-from ._types import Iteration, Solution
+from ._condyle import (
+    Action,
+    Activation,
+    ContactDynamics,
+    Cost,
+    Fddp,
+    FreeDynamics,
+    FrictionCone,
+    ImpulseDynamics,
+    Problem,
+    ProblemError,
+    WrenchCone,
+)
+from ._types import Iteration, Solution, Timings
 
-__all__ = ["Activation", "Cost", "Fddp", "FreeDynamics", "Iteration", "Problem", "ProblemError", "Solution"]
+__all__ = [
+    "Action",
+    "Activation",
+    "ContactDynamics",
+    "Cost",
+    "Fddp",
+    "FreeDynamics",
+    "FrictionCone",
+    "ImpulseDynamics",
+    "Iteration",
+    "Problem",
+    "ProblemError",
+    "Solution",
+    "Timings",
+    "WrenchCone",
+]

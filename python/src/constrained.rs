@@ -37,7 +37,7 @@ results! {
 }
 
 /// A `Constraint` of `condyle._types`.
-fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::Constraint> {
+pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::Constraint> {
     let optional = |name: &str| given.getattr(name).map(|x| (!x.is_none()).then_some(x));
     let frame = frame_index(model, &given.getattr("frame")?)?;
     let mut constraint = match given.getattr("kind")?.extract()? {

@@ -170,14 +170,13 @@ Cholesky {
 /// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its scratch.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-/// a join of two pieces costs some ten times as much as the elimination of a body. On two threads this is faster than
-/// `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. The bits are the same
-/// for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for parallel
-/// O(log(n)) calculation of rigid-body dynamics (1999).
+/// a join of two pieces costs some six times as much as the elimination of a body. On two threads this is faster than
+/// `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. With joints that share
+/// coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
+/// The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
+/// algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 ///
 /// model: the robot; grain: how many bodies a run has at most.
-///
-/// Raises `ModelError` if a joint follows another one (mimic).
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> divided = condyle.DivideConquer(arm, grain=1)
@@ -195,10 +194,9 @@ pub(crate) struct DivideConquer {
 #[pymethods]
 impl DivideConquer {
     #[new]
-    fn new(model: &Bound<'_, Model>, grain: usize) -> PyResult<Self> {
+    fn new(model: &Bound<'_, Model>, grain: usize) -> Self {
         let Model { inner, structure } = model.get();
-        let inner = condyle::DivideConquer::new(inner, grain).map_err(crate::exceptions::exception)?;
-        Ok(Self { inner, structure: *structure })
+        Self { inner: condyle::DivideConquer::new(inner, grain), structure: *structure }
     }
 
     /// How much work the assembly is, and how many levels wait for one another, as `AssemblySize`.

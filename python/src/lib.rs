@@ -83,7 +83,10 @@ mod _condyle {
     #[pymodule_export]
     use model::Model;
     #[pymodule_export]
-    use optimal::{Activation, Cost, Fddp, FreeDynamics, Problem};
+    use optimal::{
+        Action, Activation, ContactDynamics, Cost, Fddp, FreeDynamics, FrictionCone, ImpulseDynamics, Problem,
+        WrenchCone,
+    };
     #[pymodule_export]
     use regressors::{
         joint_torque_regressor, kinetic_energy_regressor, passive_torque, passive_torque_derivative,

@@ -93,8 +93,13 @@ def test_divide_and_conquer_refuses(quadruped: Robot) -> None:
     singular = condyle.Model.from_urdf_str(PENDULUM)
     with pytest.raises(condyle.ModelError, match="singular$"):
         condyle.DivideConquer(singular, 1).aba(singular, [0, 0], [0, 0], [0, 0])
-    with pytest.raises(condyle.ModelError, match="`finger`"):
-        condyle.DivideConquer(condyle.Model.from_urdf_str(PENDULUM, mimic=True), 1)
+
+
+def test_divide_and_conquer_with_followers() -> None:
+    model = condyle.Model.from_urdf_str(PENDULUM, mimic=True)
+    assert model.nv == 1
+    expected = condyle.aba(model, condyle.Data(model), [0.3], [0.2], [1.0])
+    np.testing.assert_allclose(condyle.DivideConquer(model, 1).aba(model, [0.3], [0.2], [1.0]), expected, **SOLVED)
 
 
 @pytest.mark.parametrize("method", [None, "aba", "dense", "sparse"])

@@ -15,8 +15,9 @@
 //! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier,
 //! Mastalli, Mansard, *Differential dynamic programming for multi-phase rigid contact dynamics* (2018).
 
-use crate::aba_derivatives::subtract_column;
+use crate::aba_derivatives::{minus_product, subtract_column};
 use crate::constrained_dynamics;
+use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint::ConstraintKind;
 use crate::constraint_motion::{Columns, Ends};
 use crate::constraint_set::{ConstraintSet, Proximal};
@@ -209,8 +210,7 @@ struct Equations<'e, S> {
 impl<S: Scalar> Equations<'_, S> {
     #[inline(always)]
     fn solve(self, da: &mut DMatrix<S>, dlambda: &mut DMatrix<S>) {
-        da.fill(S::zero());
-        subtract_product(self.P, self.r, da, self.coupled); // −P r − J̄ c
+        minus_product(self.P.as_slice(), self.r.as_slice(), da.as_mut_slice(), self.coupled); // −P r − J̄ c
         subtract_product(self.Jbar, self.c, da, self.touching);
         let rows = self.c.nrows();
         for j in 0..self.coupled.len() {
@@ -310,7 +310,7 @@ pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     check("v", v.len(), model.nv);
     check("tau", tau.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
-    pass(model, data, constraints, q, v, tau, f_ext);
+    constrained_work::run(Derivatives, model, data, constraints, Inputs { q, v, tau, f_ext });
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ConstrainedDerivatives {
         a: &data.constrained_dynamics.qdd,
@@ -324,6 +324,20 @@ pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
         dlambda_dv: &c.dlambda_dv,
         dlambda_dtau: &c.dlambda_dtau,
         inertia: &c.delassus.inverse,
+    }
+}
+
+struct Derivatives;
+
+impl Algorithm for Derivatives {
+    #[inline(always)]
+    fn run<S: Scalar, R: Constant<S>>(
+        model: &Model<R>,
+        data: &mut Data<S>,
+        constraints: &mut ConstraintSet<S>,
+        Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
+    ) {
+        pass(model, data, constraints, q, v, tau, f_ext);
     }
 }
 

@@ -11,6 +11,7 @@
 //! Source: Udwadia and Kalaba, *A new perspective on constrained motion* (1992); Carpentier, Budhiraja, Mansard, *Proximal
 //! and sparse resolution of constrained dynamic equations* (2021).
 
+use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::crba;
@@ -225,12 +226,26 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     check("v", v.len(), model.nv);
     check("tau", tau.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
-    pass(&Single::new(model), data, constraints, q, v, tau, f_ext);
+    constrained_work::run(Forward, model, data, constraints, Inputs { q, v, tau, f_ext });
     Constrained {
         a: &data.constrained_dynamics.qdd,
         lambda: &constraints.lambda,
         residual: constraints.residual(),
         redundant: constraints.delassus.redundant,
+    }
+}
+
+struct Forward;
+
+impl Algorithm for Forward {
+    #[inline(always)]
+    fn run<S: Scalar, R: Constant<S>>(
+        model: &Model<R>,
+        data: &mut Data<S>,
+        constraints: &mut ConstraintSet<S>,
+        Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
+    ) {
+        pass(&Single::new(model), data, constraints, q, v, tau, f_ext);
     }
 }
 

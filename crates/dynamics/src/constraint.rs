@@ -26,6 +26,7 @@ impl ConstraintKind {
 
 /// Where a constraint wants its frame to be and how it should move there.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Target<S> {
     /// The wanted pose of the frame in the other frame (the world for a contact); of a point, the translation alone.
     pub placement: Se3<S>,

@@ -128,6 +128,7 @@ fn common(a: &[usize], b: &[usize]) -> Vec<[usize; 3]> {
 ///
 /// [`constrained_dynamics`]: crate::constrained_dynamics()
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct ConstraintSet<S> {
     /// How redundant constraints share their forces; may be changed between calls.
     pub proximal: Proximal,

@@ -14,6 +14,7 @@ use nalgebra::DMatrix;
 const ROUNDINGS: f64 = 1e3;
 
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(crate) struct Delassus<S> {
     /// J L⁻¹, and that times D⁻¹, on the places of each constraint. Shape: entries of all rows. Written by: `factorize`.
     Y: Vec<S>,

@@ -5,15 +5,15 @@
 //! at a joint, each half again, and so on (`assembly.rs`); two pieces that are known at their handles make one that is
 //! (`two_handles.rs`), and from the whole the accelerations and forces at the cuts follow, down to each joint. Positions
 //! and velocities are found the same way, so no pass waits for a chain of bodies. All joints may have armature and any
-//! number of degrees of freedom.
+//! number of degrees of freedom. Joints that share a coordinate are set free, and tied again afterwards (`ties.rs`).
 
 use crate::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::data::{check, check_forces};
-use crate::error::Error;
 use crate::joint::Joint;
 use crate::layout::{Layout, Single};
 use crate::model::Model;
 use crate::parts::{Body, Dof, Part};
+use crate::ties::Ties;
 use crate::two_handles::TwoHandles;
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Motion, Scalar, Se3, Vec3};
 
@@ -23,7 +23,8 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// chain of n bodies ⌈log₂ n⌉ + 1 levels. A join of two pieces costs some six times as much as the elimination of a body,
 /// a body of a run between two handles half as much again as one in [`aba`](crate::aba()). So on few processors the runs
 /// must be long (n over the number of threads). On two threads this is faster than `aba` from some 200 bodies on, and on
-/// one never (`benches/divide_conquer.rs`).
+/// one never (`benches/divide_conquer.rs`). With joints that share coordinates (mimic) the passes run once for the robot
+/// with all joints free, and once more for each of those joints.
 ///
 /// Runs in the pool of rayon in which it is called, else in the global one, with the same bits for any number of
 /// threads. All memory is allocated by [`new`](Self::new), but for what rayon allocates by itself.
@@ -33,36 +34,33 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// use condyle_dynamics::{Data, DivideConquer, aba, robots};
 /// let arm = robots::arm7();
 /// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
-/// let mut divided = DivideConquer::new(&arm, 1)?;
+/// let mut divided = DivideConquer::new(&arm, 1);
 /// let a = divided.aba(&arm, &q, &v, &tau, &[]);
 /// let mut data = Data::new(&arm);
 /// let same = aba(&arm, &mut data, &q, &v, &tau, &[]);
 /// assert!(a.iter().zip(same).all(|(a, b)| f64::abs(a - b) < 1e-9));
-/// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct DivideConquer<S> {
+    /// Of the tree that it was planned for.
+    tree: u64,
     assembly: Assembly,
     /// In the order of the assembly. Shape: moving bodies.
     bodies: Vec<Body<S>>,
-    /// In the order of the assembly. Shape: nv.
+    /// In the order of the assembly. Shape: degrees of freedom of all joints.
     dofs: Vec<Dof<S>>,
     /// Shape: pieces. Written by: `relate`, `assemble`.
     handles: Vec<TwoHandles<S>>,
+    ties: Ties<S>,
+    /// Zeros. Shape: nv. Written by: nobody.
+    zero: Vec<S>,
     /// Joint accelerations. Shape: nv. Written by: `aba`.
     qdd: Vec<S>,
 }
 
 impl<S: Scalar> DivideConquer<S> {
     /// Plans the assembly of a model from runs of at most `grain` bodies (0 counts as 1), and allocates everything.
-    ///
-    /// # Errors
-    /// [`Error::Body`] if a joint follows another one (mimic): the pieces on both sides would not be independent.
-    pub fn new<R>(model: &Model<R>, grain: usize) -> Result<Self, Error> {
-        if let Some(body) = model.bodies.iter().find(|b| b.mimic.is_some()) {
-            let what = "its joint follows another one, so a robot cannot be cut there".to_owned();
-            return Err(Error::Body { body: body.name.clone(), what });
-        }
+    pub fn new<R: Constant<S>>(model: &Model<R>, grain: usize) -> Self {
         let assembly = Assembly::new(model, grain.max(1));
         let body = Body {
             X: Se3::identity(),
@@ -73,14 +71,25 @@ impl<S: Scalar> DivideConquer<S> {
             pA: Force::zero(),
             a: Motion::zero(),
         };
-        let dof = Dof { S: Motion::zero(), U: Force::zero(), D_inv: S::zero(), u: S::zero(), qdd: S::zero() };
-        Ok(Self {
+        let dof = Dof {
+            tau: S::zero(),
+            rotor: S::zero(),
+            S: Motion::zero(),
+            U: Force::zero(),
+            D_inv: S::zero(),
+            u: S::zero(),
+            qdd: S::zero(),
+        };
+        Self {
+            tree: model.tree,
             bodies: vec![body; assembly.links.len()],
-            dofs: vec![dof; model.nv],
+            dofs: vec![dof; model.columns.len()],
             handles: vec![TwoHandles::nothing(); assembly.pieces.len()],
+            ties: Ties::new(model, &assembly.links),
+            zero: vec![S::zero(); model.nv],
             qdd: vec![S::zero(); model.nv],
             assembly,
-        })
+        }
     }
 
     /// How much work the assembly is, and how many levels wait for one another.
@@ -92,47 +101,52 @@ impl<S: Scalar> DivideConquer<S> {
     /// and O(log n + grain) steps.
     ///
     /// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame, or empty for none. Returns nv numbers.
-    /// Allocates nothing, but for what rayon does by itself.
+    /// Allocates nothing, but for what rayon does by itself. If z joints share coordinates (mimic), in 1 + z times the work
+    /// and steps, and O(n z + z³) for the ties.
     ///
     /// # Panics
-    /// If an argument has the wrong length, `model` is not of the size of the one that was planned for, or M is singular
+    /// If an argument has the wrong length, `model` is not of the tree of the one that was planned for, or M is singular
     /// ([`Model::singular_joints`]).
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes.len(), self.bodies.len() + 1);
-        assert!(bodies == planned && model.nv == self.qdd.len(), "model: planned for {planned} bodies, found {bodies}");
+        let other = if bodies == planned { " in another tree" } else { "" };
+        assert!(model.tree == self.tree, "model: planned for {planned} bodies, found {bodies}{other}");
         model.check_regular();
         check("q", q.len(), model.nq);
         check("v", v.len(), model.nv);
         check("tau", tau.len(), model.nv);
         check_forces(f_ext.len(), bodies);
         let l = Single::<S, R>::new(model);
-        let parallel = self.assembly.pieces.len() > 1 && rayon::current_num_threads() > 1;
-        let job = Job { l: &l, q, qd: v, tau, f_ext, parallel };
-        if parallel {
-            rayon::scope(|_| self.passes(&job)); // enters the pool once, not three times
-        } else {
-            self.passes(&job);
-        }
-        let mut dofs = self.dofs.iter();
+        let mut dofs = self.dofs.iter_mut();
         for link in &self.assembly.links {
             let node = &model.nodes[link.body];
-            for (qdd, dof) in self.qdd[node.idx_v..][..node.joint.nv()].iter_mut().zip(&mut dofs) {
-                *qdd = dof.qdd;
+            for (k, dof) in dofs.by_ref().take(node.joint.nv()).enumerate() {
+                let leads = node.mimic.is_none(); // efforts and armature of a shared coordinate act at its leader
+                dof.tau = if leads { tau[node.idx_v + k] } else { S::zero() };
+                dof.rotor = if leads { l.armature(link.body, k) } else { S::zero() };
             }
         }
-        &self.qdd
-    }
-
-    fn passes<L: Layout<S = S> + Sync>(&mut self, job: &Job<'_, L>) {
-        let Self { assembly, bodies, dofs, handles, .. } = self;
-        if assembly.pieces.is_empty() {
-            return;
+        self.ties.prepare(model);
+        let world = Motion::new(l.minus_gravity(), Vec3::zero());
+        let parallel = self.assembly.pieces.len() > 1 && rayon::current_num_threads() > 1;
+        let Self { assembly, bodies, dofs, handles, ties, zero, qdd, .. } = self;
+        let all = Part { pieces: &assembly.pieces, links: &assembly.links, bodies, dofs, handles };
+        let job = Job { l: &l, q, qd: v, f_ext, world, parallel };
+        if parallel {
+            rayon::scope(|_| job.run(all, ties, zero)); // enters the pool once, not three times
+        } else {
+            job.run(all, ties, zero);
         }
-        let world = Motion::new(job.l.minus_gravity(), Vec3::zero());
-        let mut all = Part { pieces: &assembly.pieces, links: &assembly.links, bodies, dofs, handles };
-        job.relate(all.again());
-        job.assemble(all.again(), Se3::identity(), Motion::zero());
-        job.accelerate(all, world, None);
+        let mut dofs = dofs.iter();
+        for link in &assembly.links {
+            let node = &model.nodes[link.body];
+            for (k, dof) in dofs.by_ref().take(node.joint.nv()).enumerate() {
+                if node.mimic.is_none() {
+                    qdd[node.idx_v + k] = dof.qdd;
+                }
+            }
+        }
+        qdd
     }
 }
 
@@ -141,12 +155,44 @@ struct Job<'d, L: Layout> {
     l: &'d L,
     q: &'d [L::S],
     qd: &'d [L::S],
-    tau: &'d [L::S],
     f_ext: &'d [Force<L::S>],
+    /// The acceleration of the world.
+    world: Motion<L::S>,
     parallel: bool,
 }
 
 impl<L: Layout + Sync> Job<'_, L> {
+    /// The whole algorithm, for degrees of freedom that know their efforts and armature.
+    fn run(&self, mut all: Part<'_, L::S>, ties: &mut Ties<L::S>, zero: &[L::S]) {
+        ties.add_rotors(all.dofs);
+        self.passes(all.again());
+        if ties.len() == 0 {
+            return;
+        }
+        ties.keep_free(all.dofs);
+        let at_rest =
+            Job { l: self.l, q: self.q, qd: zero, f_ext: &[], world: Motion::zero(), parallel: self.parallel };
+        all.dofs.iter_mut().for_each(|dof| dof.tau = L::S::zero());
+        for z in 0..ties.len() {
+            let dof = ties.dof(z);
+            all.dofs[dof].tau = L::S::one();
+            at_rest.passes(all.again());
+            all.dofs[dof].tau = L::S::zero();
+            ties.keep_response(z, all.dofs);
+        }
+        ties.solve(all.dofs);
+    }
+
+    /// The accelerations of all degrees of freedom, each on its own.
+    fn passes(&self, mut all: Part<'_, L::S>) {
+        if all.pieces.is_empty() {
+            return;
+        }
+        self.relate(all.again());
+        self.assemble(all.again(), Se3::identity(), Motion::zero());
+        self.accelerate(all, self.world, None);
+    }
+
     /// Two halves of the work, at the same time if there are threads for it.
     #[inline(always)]
     fn both(&self, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
@@ -274,13 +320,12 @@ impl<L: Layout + Sync> Job<'_, L> {
         dofs: &mut [Dof<L::S>],
         handle: &mut TwoHandles<L::S>,
     ) -> (ArticulatedInertia<L::S>, Force<L::S>) {
-        let (l, i) = (self.l, link.body);
+        let nv = self.l.joint(link.body).nv();
         let (mut Ia, mut pa) = (body.IA, body.pA);
-        for k in (0..l.joint(i).nv()).rev() {
-            let dof = &mut dofs[k];
+        for dof in dofs[..nv].iter_mut().rev() {
             dof.U = Ia * dof.S; // U = Iᴬ S
-            dof.D_inv = (dof.S.dot(dof.U) + l.armature(i, k)).recip(); // D = Sᵀ U
-            dof.u = l.load(self.tau, i, k) - dof.S.dot(pa); // u = τ − Sᵀ pᴬ
+            dof.D_inv = (dof.S.dot(dof.U) + dof.rotor).recip(); // D = Sᵀ U + armature
+            dof.u = dof.tau - dof.S.dot(pa); // u = τ − Sᵀ pᴬ
             let x = dof.D_inv * dof.u;
             if link.spine {
                 handle.extend(dof.S, dof.U, dof.D_inv, x);

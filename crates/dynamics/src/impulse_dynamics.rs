@@ -16,6 +16,7 @@
 //! ```
 
 use crate::constrained_dynamics::inertia;
+use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, Size, check};
@@ -100,7 +101,8 @@ pub fn impulse_dynamics<'d, S: Scalar, R: Constant<S>>(
     restitution: S,
 ) -> Impulse<'d, S> {
     checks(model, data, constraints, q, v);
-    pass(&Single::new(model), data, constraints, q, v, restitution);
+    let inputs = Inputs { q, v, tau: &[restitution], f_ext: &[] };
+    constrained_work::run(Impact, model, data, constraints, inputs);
     Impulse {
         v: &data.impulse_dynamics.v_after,
         lambda: &constraints.lambda,
@@ -119,6 +121,52 @@ where
     model.check_regular();
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
+}
+
+struct Impact;
+
+impl Algorithm for Impact {
+    #[inline(always)]
+    fn run<S: Scalar, R: Constant<S>>(
+        model: &Model<R>,
+        data: &mut Data<S>,
+        constraints: &mut ConstraintSet<S>,
+        Inputs { q, v, tau, .. }: Inputs<'_, S>,
+    ) {
+        pass(&Single::new(model), data, constraints, q, v, tau[0]);
+    }
+}
+
+struct ImpactDerivatives;
+
+impl Algorithm for ImpactDerivatives {
+    #[inline(always)]
+    fn run<S: Scalar, R: Constant<S>>(
+        model: &Model<R>,
+        data: &mut Data<S>,
+        constraints: &mut ConstraintSet<S>,
+        Inputs { q, v, tau, .. }: Inputs<'_, S>,
+    ) {
+        let restitution = tau[0];
+        let l = Single::new(model);
+        pass(&l, data, constraints, q, v, restitution);
+        let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
+        let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
+        constraints.load(model, world, &[], &mut d.forces);
+        rnea_derivatives::pass(&l, world, id, &out.zero, change, &d.forces, Vec3::zero()); // ∂(M Δ − Jᵀ Λ)/∂q
+        constraints.add_turning(world, &mut id.dtau_dq);
+        spread(&l, world, out);
+        constraints.dgamma_dq.fill(S::zero());
+        for (plan, target) in constraints.plans.iter().zip(&constraints.targets) {
+            let ends = Ends::new(plan, target, world, &out.velocity, &out.velocity);
+            let value = &constraints.error[plan.row..plan.row + plan.rows()];
+            ends.velocity_derivative(plan, &world.S, &out.Psid, value, &mut constraints.dgamma_dq);
+        }
+        constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
+        constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
+        id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
+        constraints.respond_to_v_before(restitution, &mut d.da_dv);
+    }
 }
 
 /// The whole algorithm.
@@ -219,24 +267,8 @@ pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     restitution: S,
 ) -> ImpulseDerivatives<'d, S> {
     checks(model, data, constraints, q, v);
-    let l = Single::new(model);
-    pass(&l, data, constraints, q, v, restitution);
-    let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
-    let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
-    constraints.load(model, world, &[], &mut d.forces);
-    rnea_derivatives::pass(&l, world, id, &out.zero, change, &d.forces, Vec3::zero()); // ∂(M Δ − Jᵀ Λ)/∂q
-    constraints.add_turning(world, &mut id.dtau_dq);
-    spread(&l, world, out);
-    constraints.dgamma_dq.fill(S::zero());
-    for (plan, target) in constraints.plans.iter().zip(&constraints.targets) {
-        let ends = Ends::new(plan, target, world, &out.velocity, &out.velocity);
-        let value = &constraints.error[plan.row..plan.row + plan.rows()];
-        ends.velocity_derivative(plan, &world.S, &out.Psid, value, &mut constraints.dgamma_dq);
-    }
-    constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
-    constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
-    id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
-    constraints.respond_to_v_before(restitution, &mut d.da_dv);
+    let inputs = Inputs { q, v, tau: &[restitution], f_ext: &[] };
+    constrained_work::run(ImpactDerivatives, model, data, constraints, inputs);
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ImpulseDerivatives {
         v: &data.impulse_dynamics.v_after,

@@ -27,6 +27,10 @@ pub(crate) struct Body<S> {
 /// What is computed of a degree of freedom; along the world's axes, at the origin of the piece.
 #[derive(Clone, Debug)]
 pub(crate) struct Dof<S> {
+    /// Effort. Written by: `aba` and `run`.
+    pub tau: S,
+    /// Armature, and in a robot whose joints were set free the rotor of `ties.rs`. Written by: `aba` and `add_rotors`.
+    pub rotor: S,
     /// Written by: `place`.
     pub S: Motion<S>,
     /// U = Iᴬ S. Written by: `eliminate`.

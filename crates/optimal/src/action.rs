@@ -74,6 +74,13 @@ pub trait ActionModel: Any + Send {
         1
     }
 
+    /// The least and the greatest controls of knot t, nu numbers each, infinite where there is none; `None` if no control
+    /// is bounded. They must not change during a solve.
+    fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
+        let _ = t;
+        None
+    }
+
     /// x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64;
 

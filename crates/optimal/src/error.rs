@@ -26,7 +26,7 @@ pub enum Error {
     Dimension {
         /// The knot; the horizon itself for the terminal one.
         node: usize,
-        /// `nx`, `ndx` or `nu`.
+        /// `nx`, `ndx`, `nu`, or which bounds.
         name: &'static str,
         /// What the problem or the solver needs.
         expected: usize,
@@ -56,11 +56,40 @@ pub enum Error {
         value: f64,
     },
 
+    /// No control satisfies the bounds of a knot.
+    #[error("knot {knot}: control {control} must be at least {lower} and at most {upper}")]
+    Bounds {
+        /// The knot.
+        knot: usize,
+        /// The entry of its control.
+        control: usize,
+        /// Its least value.
+        lower: f64,
+        /// Its greatest value.
+        upper: f64,
+    },
+
     /// A term of a robot's cost does not fit the robot.
     #[error("cost `{name}`: {what}")]
     Cost {
         /// The term's name.
         name: String,
+        /// What does not fit, with the numbers.
+        what: String,
+    },
+
+    /// A contact does not fit the robot, or the contacts before it.
+    #[error("contact `{name}`: {what}")]
+    Contact {
+        /// The contact's name, or that of a number that all contacts share.
+        name: String,
+        /// What does not fit, with the numbers.
+        what: String,
+    },
+
+    /// A robot's drives do not fit it, or it cannot be driven.
+    #[error("actuation: {what}")]
+    Actuation {
         /// What does not fit, with the numbers.
         what: String,
     },

@@ -1,17 +1,22 @@
-//! Feasibility-driven differential dynamic programming.
+//! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use crate::dense::{add_scaled_product, dot, max_abs};
+use crate::clock::{Clock, Phase};
+use crate::dense::max_abs;
 use crate::error::Error;
-use crate::lq::{LqNode, Sweep, SweepError};
+use crate::lq::LqNode;
 use crate::problem::{Problem, Shape};
-use crate::rollout::{Nominal, Trials};
-use crate::settings::Settings;
+use crate::rollout::Trials;
+use crate::search::Search;
+use crate::settings::{Method, Settings};
 use crate::solution::{Iteration, Solution, Status, Timings};
+use crate::sweep::{Sweep, SweepError};
 use std::time::Instant;
 
-/// FDDP (Mastalli et al., ICRA 2020), with the rules and constants of Crocoddyl 3.2, so that both make the same
-/// iterates.
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`Method`](crate::Method)), with the rules and constants of Crocoddyl
+/// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
+/// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
+/// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
 ///
 /// The warm start may have gaps f, places where the trajectory does not satisfy the dynamics. One iteration is
 ///
@@ -67,23 +72,24 @@ pub struct Fddp {
     /// May be changed between solves.
     pub settings: Settings,
     nodes: Vec<LqNode>,
-    sweep: Sweep,
-    trials: Trials,
+    pub(crate) sweep: Sweep,
+    pub(crate) trials: Trials,
     /// The step lengths, 1, ½, ¼, ….
-    steps: Vec<f64>,
+    pub(crate) steps: Vec<f64>,
     /// The iterate is in here.
-    solution: Solution,
+    pub(crate) solution: Solution,
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
-    next: Vec<f64>,
+    pub(crate) next: Vec<f64>,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
-    gaps: Vec<f64>,
+    pub(crate) gaps: Vec<f64>,
     /// Vxx f, (N + 1)·ndx.
-    curved_gaps: Vec<f64>,
+    pub(crate) curved_gaps: Vec<f64>,
     /// xₜ ⊖ a trial's xₜ.
-    dx: Vec<f64>,
+    pub(crate) dx: Vec<f64>,
     /// Expected improvement without the part that depends on the trial: dg, dq.
-    expected: [f64; 2],
+    pub(crate) expected: [f64; 2],
+    pub(crate) clock: Clock,
 }
 
 /// What carries over from one iteration to the next.
@@ -92,17 +98,9 @@ struct Progress {
     feasible: bool,
     /// Whether the iterate before the last accepted step was feasible.
     was_feasible: bool,
-}
-
-/// The outcome of a line search: of the trial it accepted or else of the last that stayed finite.
-#[derive(Clone, Copy, Default)]
-struct Search {
-    step: f64,
-    d1: f64,
-    d2: f64,
-    decrease: f64,
-    expected_decrease: f64,
-    accepted: bool,
+    tolerance: f64,
+    /// Whether there are gains of this solve.
+    swept: bool,
 }
 
 impl Fddp {
@@ -123,6 +121,7 @@ impl Fddp {
             curved_gaps: vec![0.0; (horizon + 1) * shape.ndx],
             dx: vec![0.0; shape.ndx],
             expected: [0.0; 2],
+            clock: Clock::default(),
         }
     }
 
@@ -144,27 +143,93 @@ impl Fddp {
         problem: &mut Problem,
         xs: &[f64],
         us: &[f64],
+        observer: impl FnMut(&Iteration),
+    ) -> Result<&Solution, Error> {
+        check_shape(self.solution.shape(), problem.shape())?;
+        Error::check("xs", xs, self.solution.xs.len())?;
+        Error::check("us", us, self.solution.us.len())?;
+        self.solution.xs.copy_from_slice(xs);
+        self.solution.us.copy_from_slice(us);
+        self.resume_with(problem, observer)
+    }
+
+    /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
+    /// [`shift`](Self::shift), for the next horizon.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
+        self.resume_with(problem, |_| ())
+    }
+
+    /// As [`resume`](Self::resume), and shows each iteration to `observer` as it ends.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume_with(
+        &mut self,
+        problem: &mut Problem,
         mut observer: impl FnMut(&Iteration),
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
         self.settings.check()?;
         check_shape(self.solution.shape(), problem.shape())?;
-        Error::check("xs", xs, self.solution.xs.len())?;
-        Error::check("us", us, self.solution.us.len())?;
+        let bounded = problem.check_bounds()?;
+        let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
 
-        self.solution.xs.copy_from_slice(xs);
-        self.solution.us.copy_from_slice(us);
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
         self.solution.trace.reserve(self.settings.max_iterations);
         self.steps.clear();
         self.steps.extend((0..self.settings.step_lengths).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
         let start = self.settings.regularisation_start;
-        let mut progress = Progress { regularisation: start, feasible: false, was_feasible: false };
+        let mut progress =
+            Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
+        self.sweep.forget();
+        self.clock.start(begin, self.settings.time_budget);
         let status = self.iterate(problem, &mut progress, &mut observer);
         self.finish(problem, &progress, status);
         self.solution.timings.total = begin.elapsed();
         Ok(&self.solution)
+    }
+
+    /// Makes the solution a warm start for a problem that was [shifted](Problem::shift) by a knot since: states, controls
+    /// and gains move one knot to the front, the last control stays (where the number of controls changes, it is zero),
+    /// and the last state follows from it. Allocates nothing unless numbers of controls differ along the horizon.
+    ///
+    /// # Errors
+    /// [`Error`] if the problem is not the one solved before, shifted once.
+    pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
+        let (old, new) = (self.solution.shape(), problem.shape());
+        let (horizon, ndx) = (new.horizon(), new.ndx);
+        if old.horizon() != horizon {
+            return Err(Error::Length { name: "stages", expected: old.horizon(), found: horizon });
+        }
+        for t in 0..horizon - 1 {
+            if old.nu(t + 1) != new.nu(t) {
+                return Err(Error::Dimension { node: t, name: "nu", expected: old.nu(t + 1), found: new.nu(t) });
+            }
+        }
+        for (name, expected, found) in [("nx", old.nx, new.nx), ("ndx", old.ndx, new.ndx)] {
+            if expected != found {
+                return Err(Error::Dimension { node: 0, name, expected, found });
+            }
+        }
+        self.solution.shift(new);
+        if (0..horizon).any(|t| self.nodes[t].nu() != new.nu(t)) {
+            self.nodes[..horizon].rotate_left(1);
+            self.nodes[horizon - 1] = LqNode::zeros(ndx, new.nu(horizon - 1));
+            self.sweep = Sweep::new(&self.nodes);
+        }
+        self.trials.reshape(problem);
+        // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
+        let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
+        let next = &mut self.next[..end.len()];
+        problem.action_mut(horizon - 1).calc(horizon - 1, &self.solution.xs[x], &self.solution.us[u], next);
+        if next.iter().all(|x| x.is_finite()) {
+            self.solution.xs[end].copy_from_slice(next);
+        }
+        Ok(())
     }
 
     /// The result of the last solve.
@@ -185,7 +250,13 @@ impl Fddp {
                 gap = self.update_gaps(problem);
             }
             if search.accepted || iteration == 0 {
+                if !self.clock.allows(Phase::CalcDiff) {
+                    return Status::TimeLimit;
+                }
                 self.calc_diff(problem, now.feasible);
+            }
+            if !self.clock.allows(Phase::Sweep) {
+                return Status::TimeLimit;
             }
             while let Err(error) = self.sweep(now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
@@ -195,12 +266,19 @@ impl Fddp {
                         SweepError::NotFinite { .. } => Status::NotFinite,
                     };
                 }
+                if !self.clock.allows(Phase::Sweep) {
+                    return Status::TimeLimit;
+                }
             }
+            now.swept = true;
             self.expect(now.feasible);
             search = self.line_search(problem, now.feasible, search);
+            if search.out_of_time {
+                return Status::TimeLimit;
+            }
             if search.accepted {
                 now.was_feasible = now.feasible;
-                now.feasible |= search.step == 1.0;
+                now.feasible |= search.step == 1.0 || self.settings.method == Method::Ddp;
             }
             if search.step > self.settings.regularisation_decrease_above {
                 now.regularisation = self.decreased(now.regularisation);
@@ -228,7 +306,7 @@ impl Fddp {
             if now.regularisation == self.settings.regularisation_max {
                 return Status::RegularisationLimit;
             }
-            if now.was_feasible && stop < self.settings.tolerance {
+            if now.was_feasible && stop < now.tolerance {
                 return Status::Converged;
             }
         }
@@ -253,7 +331,7 @@ impl Fddp {
         max_abs(&self.gaps)
     }
 
-    /// The LQ problem at the iterate; the gaps are in it until the first full step.
+    /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on.
     fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
         problem.calc_diff(&self.solution.xs, &self.solution.us, &mut self.nodes);
@@ -262,97 +340,27 @@ impl Fddp {
                 Some(gap) if !feasible => node.f.as_mut_slice().copy_from_slice(gap),
                 _ => node.f.fill(0.0),
             }
+            match problem.action(t).bounds(t) {
+                Some((lower, upper)) if feasible => {
+                    for (i, u) in self.solution.us[self.solution.shape().u(t)].iter().enumerate() {
+                        node.lower[i] = lower[i] - u;
+                        node.upper[i] = upper[i] - u;
+                    }
+                }
+                _ => {
+                    node.lower.fill(f64::NEG_INFINITY);
+                    node.upper.fill(f64::INFINITY);
+                }
+            }
         }
-        self.solution.timings.calc_diff += clock.elapsed();
+        self.solution.timings.calc_diff += self.clock.ran(Phase::CalcDiff, clock);
     }
 
     fn sweep(&mut self, regularisation: f64) -> Result<(), SweepError> {
         let clock = Instant::now();
         let result = self.sweep.run(&self.nodes, regularisation);
-        self.solution.timings.sweep += clock.elapsed();
+        self.solution.timings.sweep += self.clock.ran(Phase::Sweep, clock);
         result
-    }
-
-    /// dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  Quu k = −Qu, so the first sums are opposite.
-    fn expect(&mut self, feasible: bool) {
-        let (mut dg, mut dq) = (0.0, 0.0);
-        for (t, knot) in self.sweep.knots().iter().enumerate() {
-            let descent = -dot(knot.Qu.as_slice(), knot.k.as_slice());
-            dg += descent;
-            dq -= descent;
-            if !feasible {
-                let place = self.solution.shape().dx(t);
-                let (f, curved) = (&self.gaps[place.clone()], &mut self.curved_gaps[place]);
-                curved.fill(0.0);
-                add_scaled_product(curved, 1.0, knot.Vxx.as_slice(), f); // Vxx f
-                let curvature = dot(f, curved);
-                dg -= dot(knot.Vx.as_slice(), f) + curvature;
-                dq += curvature;
-            }
-        }
-        self.expected = [dg, dq];
-    }
-
-    /// dv = −Σ fᵀVxx (x ⊖ x_trial): what the trial's distance from the iterate adds while there are gaps.
-    fn expect_of_trial(&mut self, problem: &Problem, i: usize) -> f64 {
-        let shape = self.solution.shape();
-        let mut dv = 0.0;
-        for t in 0..=shape.horizon() {
-            problem.action(t).difference(self.trials.x(i, t), &self.solution.xs[shape.x(t)], &mut self.dx);
-            dv -= dot(&self.curved_gaps[shape.dx(t)], &self.dx);
-        }
-        dv
-    }
-
-    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate.
-    ///
-    /// A trial that leaves all bounds keeps the expectation of the trial before it, that of `last` at first.
-    fn line_search(&mut self, problem: &mut Problem, feasible: bool, last: Search) -> Search {
-        let mut search = Search { accepted: false, ..last };
-        let (mut tried, count) = (0, self.steps.len());
-        while tried < count {
-            let width = if tried == 0 { 1 } else { self.trials.width().min(count - tried) };
-            self.roll_out(problem, feasible, tried, width);
-            for i in 0..width {
-                search.step = self.steps[tried + i];
-                let Some(cost) = self.trials.cost(i) else { continue };
-                // d₁ = dg + dv,   d₂ = dq − 2 dv,   expected decrease α (d₁ + ½ α d₂)
-                let dv = if feasible { 0.0 } else { self.expect_of_trial(problem, i) };
-                search.d1 = self.expected[0] + dv;
-                search.d2 = self.expected[1] - 2.0 * dv;
-                search.expected_decrease = search.step * (search.d1 + 0.5 * search.step * search.d2);
-                search.decrease = self.solution.cost - cost;
-                if self.accepts(&search, feasible) {
-                    let Solution { xs, us, .. } = &mut self.solution;
-                    self.trials.copy_to(i, xs, us, &mut self.next);
-                    self.solution.cost = cost;
-                    search.accepted = true;
-                    return search;
-                }
-            }
-            tried += width;
-        }
-        search
-    }
-
-    /// The trials `from`, `from` + 1, … of the line search, side by side.
-    fn roll_out(&mut self, problem: &mut Problem, feasible: bool, from: usize, width: usize) {
-        let clock = Instant::now();
-        let gaps = (!feasible).then_some(self.gaps.as_slice());
-        let Solution { xs, us, .. } = &self.solution;
-        let nominal = Nominal { xs, us, gaps, knots: self.sweep.knots() };
-        self.trials.run(problem, &nominal, &self.steps[from..from + width]);
-        self.solution.timings.rollout += clock.elapsed();
-    }
-
-    /// Whether the step lowers the cost enough, or, while there are gaps, raises it little enough.
-    fn accepts(&self, search: &Search, feasible: bool) -> bool {
-        let Search { d1, decrease, expected_decrease, .. } = *search;
-        if expected_decrease >= 0.0 {
-            d1.abs() < self.settings.flat || decrease > self.settings.accept * expected_decrease
-        } else {
-            !feasible && decrease > self.settings.accept_ascent * expected_decrease
-        }
     }
 
     fn increased(&self, regularisation: f64) -> f64 {
@@ -372,6 +380,9 @@ impl Fddp {
         solution.feasible = now.feasible;
         solution.regularisation = now.regularisation;
         solution.status = status;
+        if !now.swept {
+            return; // the gains of the solve before, shifted or not
+        }
         for ((K, k), knot) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.knots()) {
             K.copy_from(&knot.K);
             k.copy_from(&knot.k);

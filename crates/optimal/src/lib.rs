@@ -11,7 +11,8 @@
 //! - Around a trajectory the problem is linear and quadratic in the changes δx, δu; each knot is then an [`LqNode`].
 //!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
-//!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`].
+//!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
+//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
 //! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖
@@ -66,22 +67,34 @@
 //! ```
 
 mod action;
+mod box_qp;
+mod clock;
 mod dense;
 mod error;
+mod euler;
+mod factor;
 mod fddp;
 mod lq;
+mod lqr;
 mod numdiff;
 mod problem;
 pub mod robot;
 mod rollout;
+mod search;
 mod settings;
 mod solution;
+mod structure;
+mod sweep;
+mod vector;
 
 pub use action::ActionModel;
 pub use error::Error;
 pub use fddp::Fddp;
-pub use lq::{LqKnot, LqNode, Sweep, SweepError};
+pub use lq::{LqKnot, LqNode};
+pub use lqr::Lqr;
 pub use numdiff::NumDiff;
 pub use problem::Problem;
-pub use settings::Settings;
+pub use settings::{Method, Settings};
 pub use solution::{Iteration, Solution, Status, Timings};
+pub use structure::{EulerBlock, Structure};
+pub use sweep::{Sweep, SweepError};

@@ -3,6 +3,7 @@
 use crate::action::ActionModel;
 use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
+use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::ops::Range;
 
@@ -61,12 +62,24 @@ pub struct Problem {
 }
 
 /// The dimensions of a horizon: what trajectories and workspaces are allocated by.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Shape {
     pub(crate) nx: usize,
     pub(crate) ndx: usize,
     /// Where uₜ starts in the flat controls; N + 1 entries, the last is their length.
     pub(crate) offsets: Vec<usize>,
+}
+
+impl Clone for Shape {
+    fn clone(&self) -> Self {
+        Self { nx: self.nx, ndx: self.ndx, offsets: self.offsets.clone() }
+    }
+
+    /// Allocates nothing for a horizon of the same length.
+    fn clone_from(&mut self, other: &Self) {
+        (self.nx, self.ndx) = (other.nx, other.ndx);
+        self.offsets.clone_from(&other.offsets);
+    }
 }
 
 impl Shape {
@@ -110,7 +123,6 @@ impl Problem {
             return Err(Error::EmptyHorizon);
         }
         let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
-        let (mut offsets, mut runs) = (vec![0], Vec::<(usize, Range<usize>)>::new());
         for (knot, &index) in stages.iter().enumerate() {
             let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
             for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
@@ -118,18 +130,54 @@ impl Problem {
                     return Err(Error::Dimension { node: knot, name, expected, found });
                 }
             }
-            offsets.push(offsets[knot] + model.nu());
-            match runs.last_mut() {
-                Some((last, knots)) if *last == index => knots.end = knot + 1,
-                _ => runs.push((index, knot..knot + 1)),
-            }
         }
         if terminal.nu() != 0 {
             return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
         }
         Error::check("x0", &x0, nx)?;
-        let shape = Shape { nx, ndx, offsets };
-        Ok(Self { x0, models, stages, terminal, shape, runs, knots: (0..=horizon).collect(), unread: vec![0.0; nx] })
+        let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
+        let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
+        let mut problem = Self { x0, models, stages, terminal, shape, runs, knots, unread: vec![0.0; nx] };
+        problem.arrange();
+        Ok(problem)
+    }
+
+    /// Where the controls lie and which knots make a run, from the stages.
+    fn arrange(&mut self) {
+        let Self { models, stages, shape: Shape { offsets, .. }, runs, .. } = self;
+        runs.clear();
+        offsets.clear();
+        offsets.push(0);
+        for (knot, &index) in stages.iter().enumerate() {
+            offsets.push(offsets[knot] + models[index].nu());
+            match runs.last_mut() {
+                Some((last, knots)) if *last == index => knots.end = knot + 1,
+                _ => runs.push((index, knot..knot + 1)),
+            }
+        }
+    }
+
+    /// Moves the horizon on by a knot, as an MPC does after each step: knot t becomes knot t − 1, and the last one is
+    /// served by the model `last`. The models are told their knots by these new numbers. Allocates nothing.
+    ///
+    /// The solver's trajectory moves along with [`Fddp::shift`](crate::Fddp::shift).
+    ///
+    /// # Errors
+    /// [`Error::UnknownModel`] if there is no such model; the problem then stays as it is.
+    pub fn shift(&mut self, last: usize) -> Result<(), Error> {
+        let horizon = self.horizon();
+        if last >= self.models.len() {
+            return Err(Error::UnknownModel { knot: horizon - 1, index: last, models: self.models.len() });
+        }
+        self.stages.rotate_left(1);
+        self.stages[horizon - 1] = last;
+        self.arrange();
+        Ok(())
+    }
+
+    /// For each knot the index of its model.
+    pub fn stages(&self) -> &[usize] {
+        &self.stages
     }
 
     /// The number of knots before the terminal one, N.
@@ -236,6 +284,9 @@ impl Problem {
         let horizon = self.horizon();
         self.assert_trajectory(xs, us);
         assert_length("nodes", nodes.len(), horizon + 1);
+        for node in &mut *nodes {
+            node.structure.set_dense(); // the action says if it is not
+        }
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
             let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);
@@ -262,6 +313,31 @@ impl Problem {
     /// As [`action`](Self::action), to compute with.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         self.stages.get(t).map_or(&mut *self.terminal, |&stage| &mut *self.models[stage])
+    }
+
+    /// Whether some knot's controls are bounded.
+    ///
+    /// # Errors
+    /// [`Error`] if the bounds of a knot have a wrong length or leave no control.
+    pub(crate) fn check_bounds(&self) -> Result<bool, Error> {
+        let mut bounded = false;
+        for knot in 0..self.horizon() {
+            let Some((lower, upper)) = self.action(knot).bounds(knot) else { continue };
+            let expected = self.shape.nu(knot);
+            for (name, found) in [("lower bounds", lower.len()), ("upper bounds", upper.len())] {
+                if found != expected {
+                    return Err(Error::Dimension { node: knot, name, expected, found });
+                }
+            }
+            for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
+                // false for NaN
+                if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
+                    return Err(Error::Bounds { knot, control, lower, upper });
+                }
+                bounded |= lower.is_finite() || upper.is_finite();
+            }
+        }
+        Ok(bounded)
     }
 
     /// The largest number of lanes that one of the models uses.

@@ -57,6 +57,12 @@ impl Trials {
         }
     }
 
+    /// Makes room for a problem of which only the numbers of controls changed.
+    pub(crate) fn reshape(&mut self, problem: &Problem) {
+        self.shape.clone_from(problem.shape());
+        self.us.resize(self.shape.offsets[self.shape.horizon()] * self.width, 0.0);
+    }
+
     /// The number of trials that fit.
     pub(crate) fn width(&self) -> usize {
         self.width
@@ -65,6 +71,8 @@ impl Trials {
     /// Rolls out one trial per step length α:
     ///
     /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
+    ///
+    /// with uₜ moved into its bounds.
     pub(crate) fn run(&mut self, problem: &mut Problem, nominal: &Nominal, steps: &[f64]) {
         let Self { shape, xs, us, next, costs, failed, knot_costs, knot, dx, unread, .. } = self;
         let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
@@ -99,6 +107,12 @@ impl Trials {
                 let gains = &nominal.knots[t];
                 add_scaled_product(u, step, gains.k.as_slice(), &[1.0]);
                 add_scaled_product(u, 1.0, gains.K.as_slice(), dx);
+                if let Some((lower, upper)) = action.bounds(t) {
+                    for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
+                        *u = if *u < *lower { *lower } else { *u }; // a NaN stays one
+                        *u = if *u > *upper { *upper } else { *u };
+                    }
+                }
             }
             knot[..count].fill(t);
             let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };

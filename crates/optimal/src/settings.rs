@@ -2,15 +2,37 @@
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// Which search for an optimum a solve is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Method {
+    /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`: every trial is a plain rollout from x̂₀,
+    /// so that the first step accepted closes the gaps of a warm start at once, at whatever cost.
+    Ddp,
+    /// Feasibility-driven differential dynamic programming (Mastalli et al., ICRA 2020), Crocoddyl's `SolverFDDP`: a
+    /// trial of length α keeps the part 1 − α of each gap.
+    #[default]
+    Fddp,
+}
 
 /// The settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// Iterations after which a solve stops.
+    /// How gaps are closed and which steps are accepted.
+    pub method: Method,
+    /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
     pub tolerance: f64,
+    /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
+    pub tolerance_bounded: f64,
+    /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
+    /// as the last of its kind. `None` for no limit.
+    pub time_budget: Option<Duration>,
     /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
     pub step_lengths: usize,
     /// A step is accepted if the cost falls by more than this times the expected decrease.
@@ -37,8 +59,11 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            method: Method::Fddp,
             max_iterations: 100,
             tolerance: 1e-9,
+            tolerance_bounded: 5e-5,
+            time_budget: None,
             step_lengths: 10,
             accept: 0.1,
             accept_ascent: 2.0,
@@ -62,6 +87,7 @@ impl Settings {
         let steps = self.step_lengths as f64;
         for (name, value, good, allowed) in [
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
+            ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
             ("step_lengths", steps, (1..=60).contains(&self.step_lengths), "from 1 to 60"),
             ("accept", self.accept, from_zero(self.accept), "at least 0"),
             ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),

@@ -3,17 +3,20 @@
 
 use crate::problem::{Problem, Shape};
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// How a solve ended. Whatever it says, the [`Solution`] holds the best iterate found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Status {
     /// The iterate has no gaps and the expected decrease of its cost is below the tolerance.
     Converged,
     /// The allowed iterations are spent.
     MaxIterations,
+    /// The time allowed is over, or what is left of it is too short to go on.
+    TimeLimit,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
     /// Cost, dynamics or derivatives of the iterate are infinite or NaN, so that no direction can be computed. States
@@ -22,7 +25,7 @@ pub enum Status {
 }
 
 /// What happened in one iteration.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iteration {
     /// Its number, from 0.
     pub iteration: usize,
@@ -51,7 +54,7 @@ pub struct Iteration {
 }
 
 /// Where the time of a solve went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Timings {
     /// Dynamics and cost of the warm start.
     pub calc: Duration,
@@ -66,7 +69,7 @@ pub struct Timings {
 }
 
 /// The result of a solve.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Solution {
     /// States x₀ … x_N, flat: (N + 1)·nx.
     pub xs: Vec<f64>,
@@ -129,6 +132,30 @@ impl Solution {
     pub fn u(&self, t: usize) -> &[f64] {
         assert!(t < self.shape.horizon(), "`t` is {t}, but there are {} controls", self.shape.horizon());
         &self.us[self.shape.u(t)]
+    }
+
+    /// Drops the first knot, and makes room at the end for one with the shape that `shape` has there: a copy of the last
+    /// state and, where it fits, the last control; the gains there are zero.
+    pub(crate) fn shift(&mut self, shape: &Shape) {
+        let (nx, last, ndx) = (shape.nx, shape.horizon() - 1, shape.ndx);
+        self.xs.copy_within(nx.., 0);
+        let (first, nu) = (self.shape.nu(0), shape.nu(last));
+        let fits = self.shape.nu(last) == nu;
+        self.us.copy_within(first.., 0);
+        let kept = self.us.len() - first;
+        self.us.resize(kept + nu, 0.0);
+        match fits && nu <= kept {
+            true => self.us.copy_within(kept - nu..kept, kept),
+            false => self.us[kept..].fill(0.0),
+        }
+        self.K.rotate_left(1);
+        self.k.rotate_left(1);
+        if self.k[last].len() != nu {
+            (self.K[last], self.k[last]) = (DMatrix::zeros(nu, ndx), DVector::zeros(nu));
+        }
+        self.K[last].fill(0.0);
+        self.k[last].fill(0.0);
+        self.shape.clone_from(shape);
     }
 
     pub(crate) fn shape(&self) -> &Shape {

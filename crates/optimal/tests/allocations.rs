@@ -3,10 +3,13 @@
 
 mod common;
 
-use common::{HANGING, cartpole, random, random_node, straight};
-use condyle_dynamics::{Se3, Vec3, neutral, robots};
-use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
-use condyle_optimal::{Fddp, Problem, Sweep};
+use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
+use condyle_dynamics::{Constraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
+use condyle_optimal::robot::{
+    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
+    Integrator, Residual,
+};
+use condyle_optimal::{Fddp, Method, Problem, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -72,6 +75,38 @@ fn a_solve_allocates_nothing() {
 }
 
 #[test]
+fn a_bounded_solve_allocates_nothing() {
+    for method in [Method::Ddp, Method::Fddp] {
+        let mut problem = limited_cartpole(&HANGING, 50, 4, Some([vec![-8.0], vec![6.0]]));
+        let xs = straight(problem.x0(), problem.x0(), 50);
+        let mut solver = Fddp::new(&problem);
+        solver.settings.method = method;
+        solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+        let second = allocations(|| {
+            solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+        });
+        assert_eq!(second, 0, "{method:?}");
+    }
+}
+
+#[test]
+fn a_step_of_a_closed_loop_allocates_nothing() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let xs = straight(problem.x0(), problem.x0(), 50);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 3;
+    solver.settings.time_budget = Some(std::time::Duration::from_secs(10));
+    solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+    let count = allocations(|| {
+        problem.shift(0).unwrap();
+        solver.shift(&mut problem).unwrap();
+        problem.set_x0(&[0.1, 3.1, 0.0, 0.0]).unwrap();
+        solver.resume(&mut problem).unwrap();
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
 fn a_robots_solve_allocates_nothing() {
     for model in [robots::arm7(), robots::quadruped()].map(std::sync::Arc::new) {
         let x0 = [neutral(&model), vec![0.0; model.nv()]].concat();
@@ -106,4 +141,61 @@ fn a_robots_solve_allocates_nothing() {
         });
         assert_eq!(second, 0, "{}", model.name());
     }
+}
+
+/// A gait of every kind of knot and residual: stance, an impact, and flight by Runge–Kutta.
+#[test]
+fn a_gait_allocates_nothing() {
+    let model = std::sync::Arc::new(robots::quadruped());
+    let mut q = neutral(&model);
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    let x0 = [q, vec![0.0; 18]].concat();
+    let foot = |name: &str| Constraint::point(model.frame(name).unwrap());
+    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, Constraint { kd: 20.0, ..foot(name) }));
+    let cone = FrictionCone::new(0.7);
+    let (lower, upper) = cone.bounds();
+    let contact = || "LF_foot".to_owned();
+    let frame = model.frame("RF_foot").unwrap();
+    let target = Motion::zero();
+    let reference = ReferenceFrame::LocalWorldAligned;
+    let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
+    let standing = || {
+        vec![
+            quadratic("state", 1e-1, Residual::State { reference: x0.clone() }),
+            quadratic("com", 1e0, Residual::CenterOfMass { target: Vec3::new(0.0, 0.0, 0.4) }),
+            quadratic("momentum", 1e-3, Residual::CentroidalMomentum { target: Force::zero() }),
+            quadratic("speed", 1e-3, Residual::FrameVelocity { frame, target, reference }),
+        ]
+    };
+    let driven = || {
+        let effort = Residual::Control { reference: vec![0.0; 12] };
+        let own = [quadratic("effort", 1e-3, effort), quadratic("gravity", 1e-5, Residual::ControlGravity)];
+        [standing(), own.into()].concat()
+    };
+    let grip = Residual::FrictionCone { contact: contact(), cone };
+    let force = Residual::ContactForce { contact: contact(), target: Force::zero() };
+    let pushing = [
+        driven(),
+        vec![Cost::new("grip", 1e-2, grip, Activation::Barrier { lower, upper }), quadratic("force", 1e-6, force)],
+    ]
+    .concat();
+    let landing = [standing(), vec![quadratic("jump", 1e-2, Residual::ImpulseCenterOfMass)]].concat();
+    let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, pushing).unwrap();
+    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, landing).unwrap();
+    let drives = Actuation::joints(&model);
+    let flight = Free::new(model.clone(), drives, driven()).unwrap();
+    let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
+    let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
+    let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 24]].concat();
+    let models: Vec<Box<dyn condyle_optimal::ActionModel>> = vec![Box::new(stance), Box::new(impact), Box::new(flight)];
+    let mut problem = Problem::new(x0.clone(), models, vec![0, 0, 1, 2, 2], Box::new(end)).unwrap();
+    let xs = x0.repeat(6);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 3;
+    solver.solve(&mut problem, &xs, &us).unwrap();
+    let second = allocations(|| {
+        solver.solve(&mut problem, &xs, &us).unwrap();
+    });
+    assert_eq!(second, 0);
+    assert!(solver.solution().trace.iter().any(|i| i.accepted));
 }

@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::{cartpole, straight, unicycle};
-use condyle_optimal::{Fddp, Problem, Status};
+use common::{limited_cartpole, limited_unicycle, straight};
+use condyle_optimal::{Fddp, Method, Problem, Status};
 use serde_json::Value;
 
 /// Relative. Two implementations that round differently drift apart by about the condition of the problem times 1e-16;
@@ -28,16 +28,21 @@ fn close(a: f64, b: f64, tolerance: f64) -> bool {
     (a - b).abs() <= tolerance * (1.0 + b.abs())
 }
 
+/// Makes a problem from x̂₀, horizon, lanes and bounds of the controls.
+type Build = fn(&[f64], usize, usize, Option<[Vec<f64>; 2]>) -> Problem;
+
 /// Solves `name` with line searches of `lanes` step lengths at a time, and compares everything.
-fn compare(name: &str, build: fn(&[f64], usize, usize) -> Problem, lanes: usize) {
+fn compare(name: &str, build: Build, lanes: usize) {
     let data: Value = serde_json::from_str(include_str!("data/crocoddyl.json")).unwrap();
     let reference = &data["problems"][name];
     let (x0, horizon) = (numbers(&reference["x0"]), reference["horizon"].as_u64().unwrap() as usize);
-    let mut problem = build(&x0, horizon, lanes);
+    let bounds = reference["bounds"].as_array().map(|b| [numbers(&b[0]), numbers(&b[1])]);
+    let mut problem = build(&x0, horizon, lanes, bounds);
     let xs = straight(&x0, &numbers(&reference["last_guess"]), horizon);
     let us = vec![0.0; problem.control_range(horizon).end];
 
     let mut solver = Fddp::new(&problem);
+    solver.settings.method = if reference["method"] == "ddp" { Method::Ddp } else { Method::Fddp };
     solver.settings.max_iterations = reference["max_iterations"].as_u64().unwrap() as usize;
     solver.settings.regularisation_start = reference["regularisation"].as_f64().unwrap();
     let solution = solver.solve(&mut problem, &xs, &us).unwrap();
@@ -76,30 +81,30 @@ fn compare(name: &str, build: fn(&[f64], usize, usize) -> Problem, lanes: usize)
 
 #[test]
 fn unicycle_20() {
-    compare("unicycle_20", unicycle, 1);
+    compare("unicycle_20", limited_unicycle, 1);
 }
 
 #[test]
 fn unicycle_200() {
-    compare("unicycle_200", unicycle, 1);
+    compare("unicycle_200", limited_unicycle, 1);
 }
 
 #[test]
 fn unicycle_with_gaps() {
-    compare("unicycle_gaps", unicycle, 1);
+    compare("unicycle_gaps", limited_unicycle, 1);
 }
 
 #[test]
 fn cartpole_swingup() {
     for lanes in [1, 4, 8] {
-        compare("cartpole_swingup", cartpole, lanes);
+        compare("cartpole_swingup", limited_cartpole, lanes);
     }
 }
 
 #[test]
 fn cartpole_with_gaps() {
     for lanes in [1, 4] {
-        compare("cartpole_gaps", cartpole, lanes);
+        compare("cartpole_gaps", limited_cartpole, lanes);
     }
 }
 
@@ -107,11 +112,35 @@ fn cartpole_with_gaps() {
 #[test]
 fn cartpole_spinning() {
     for lanes in [1, 8] {
-        compare("cartpole_spinning", cartpole, lanes);
+        compare("cartpole_spinning", limited_cartpole, lanes);
     }
 }
 
 #[test]
 fn cartpole_with_a_large_regularisation() {
-    compare("cartpole_regularised", cartpole, 4);
+    compare("cartpole_regularised", limited_cartpole, 4);
+}
+
+#[test]
+fn ddp() {
+    compare("unicycle_ddp", limited_unicycle, 1);
+    compare("cartpole_ddp", limited_cartpole, 1);
+    for lanes in [1, 4] {
+        compare("cartpole_ddp_falling", limited_cartpole, lanes);
+    }
+}
+
+#[test]
+fn box_fddp() {
+    compare("unicycle_box_fddp", limited_unicycle, 1);
+    compare("unicycle_box_gaps", limited_unicycle, 1);
+    for lanes in [1, 4, 8] {
+        compare("cartpole_box_fddp", limited_cartpole, lanes);
+    }
+}
+
+#[test]
+fn box_ddp() {
+    compare("unicycle_box_ddp", limited_unicycle, 1);
+    compare("cartpole_box_ddp", limited_cartpole, 4);
 }

@@ -3,12 +3,18 @@
 
 mod common;
 
-use common::{Linear, random, random_matrix, random_node};
-use condyle_optimal::{ActionModel, Fddp, LqNode, Problem, Settings, Status, Sweep, SweepError};
+use common::{Linear, random, random_euler_node, random_matrix, random_node};
+use condyle_optimal::{ActionModel, Fddp, LqNode, Lqr, NumDiff, Problem, Settings, Status, Sweep, SweepError};
 use nalgebra::{DMatrix, DVector};
 
 /// Random problems with entries of size one, whose value functions grow to 1e3 or so over the horizon.
 const RESIDUAL: f64 = 1e-9;
+
+/// A sum of some dozen products in another order.
+const ROUNDING: f64 = 1e-13;
+
+/// Second differences with steps of 1e-4 are good to about 1e-7.
+const DIFFERENCES: f64 = 1e-6;
 
 /// The solution of a random LQ problem, from gains and value functions, satisfies the Karush–Kuhn–Tucker conditions.
 #[test]
@@ -73,6 +79,56 @@ fn regularised_step_is_the_textbook_one() {
     }
 }
 
+/// Whether it knows the form of A and B or not, a sweep finds the same, at knots of all sizes.
+#[test]
+fn the_form_of_euler_steps_changes_nothing() {
+    let mut random = random();
+    let root = 0..6;
+    let humanoid = std::slice::from_ref(&root);
+    let several = [1..4, 6..9, 10..16];
+    for (nv, nus, blocks) in [
+        (1, vec![1; 3], &[][..]),
+        (2, vec![1, 0, 2], &[]),
+        (4, vec![3, 0, 4], &[]),
+        (7, vec![7; 5], &[]),
+        (9, vec![9; 4], &[]),
+        (12, vec![3; 4], &[]),
+        (18, vec![12; 4], humanoid),
+        (17, vec![5, 17, 0, 1], &several),
+        (38, vec![32; 3], humanoid),
+    ] {
+        let mut nodes: Vec<LqNode> = nus.iter().map(|&nu| random_euler_node(&mut random, nv, nu, blocks)).collect();
+        nodes.push(random_node(&mut random, 2 * nv, 0));
+        let mut structured = Sweep::new(&nodes);
+        structured.run(&nodes, 1e-3).unwrap();
+        for node in &mut nodes {
+            node.structure.set_dense();
+        }
+        let mut dense = Sweep::new(&nodes);
+        dense.run(&nodes, 1e-3).unwrap();
+        for (t, (a, b)) in structured.knots().iter().zip(dense.knots()).enumerate() {
+            for (name, a, b) in [("K", &a.K, &b.K), ("Vxx", &a.Vxx, &b.Vxx), ("Quu", &a.Quu, &b.Quu)] {
+                let scale = 1.0 + b.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+                let error = (a - b).iter().fold(0.0, |largest: f64, x| largest.max(x.abs())) / scale;
+                assert!(error < RESIDUAL, "nv {nv}, knot {t}: {name} differs by {error:e}");
+            }
+            for (name, a, b) in [("k", &a.k, &b.k), ("Vx", &a.Vx, &b.Vx), ("Qu", &a.Qu, &b.Qu)] {
+                let scale = 1.0 + b.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+                let error = (a - b).iter().fold(0.0, |largest: f64, x| largest.max(x.abs())) / scale;
+                assert!(error < RESIDUAL, "nv {nv}, knot {t}: {name} differs by {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "`structure` is that of x = (q, v), but ndx is 3")]
+fn the_form_of_euler_steps_needs_as_many_velocities() {
+    let mut nodes = [LqNode::zeros(3, 1), LqNode::zeros(3, 0)];
+    nodes[0].structure.set_euler(0.1, &[]);
+    Sweep::new(&nodes);
+}
+
 #[test]
 fn sweep_names_the_knot_that_is_not_convex() {
     let mut random = random();
@@ -115,4 +171,29 @@ fn fddp_solves_an_lqr_in_one_iteration() {
     assert!((first.cost - second.cost).abs() < RESIDUAL * (1.0 + first.cost.abs()));
     assert!((first.decrease - first.expected_decrease).abs() < RESIDUAL * (1.0 + first.decrease.abs()));
     assert!(solution.gap < 1e-12 && solution.feasible);
+}
+
+/// The action's derivatives, and its cost and next state against the sums written out.
+#[test]
+fn an_lqr_is_its_node() {
+    let mut random = random();
+    let node = random_node(&mut random, 5, 3);
+    let (x, u) = (random_matrix(&mut random, 5, 1), random_matrix(&mut random, 3, 1));
+    let mut action = Lqr::new(node.clone());
+    let mut next = [0.0; 5];
+    let cost = action.calc(0, x.as_slice(), u.as_slice(), &mut next);
+    let expected = &node.A * &x + &node.B * &u + &node.f;
+    assert!(expected.iter().zip(next).all(|(a, b)| (a - b).abs() < ROUNDING));
+    let quadratic = (x.transpose() * &node.Q * &x + u.transpose() * &node.R * &u)[0] / 2.0;
+    let value = quadratic + (x.transpose() * &node.S * &u)[0] + node.q.dot(&x.column(0)) + node.r.dot(&u.column(0));
+    assert!((cost - value).abs() < ROUNDING);
+    let (mut written, mut numeric) = (LqNode::zeros(5, 3), LqNode::zeros(5, 3));
+    action.calc_diff(0, x.as_slice(), u.as_slice(), &mut written);
+    NumDiff(action).calc_diff(0, x.as_slice(), u.as_slice(), &mut numeric);
+    for (a, b) in
+        [(&written.A, &numeric.A), (&written.B, &numeric.B), (&written.Q, &numeric.Q), (&written.S, &numeric.S)]
+    {
+        assert!((a - b).amax() < DIFFERENCES);
+    }
+    assert!((&written.q - &numeric.q).amax() < DIFFERENCES && (&written.r - &numeric.r).amax() < DIFFERENCES);
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Cartpole, Circle, HANGING, Unicycle, cartpole, straight, unicycle};
+use common::{Cartpole, Circle, HANGING, Unicycle, cartpole, limited_cartpole, limited_unicycle, straight, unicycle};
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Settings, Status};
 
 /// The accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
@@ -247,4 +247,70 @@ fn a_model_can_be_changed_between_solves() {
     assert!(problem.model_mut::<Cartpole>(0).is_none() && problem.model_mut::<Unicycle>(1).is_none());
     problem.model_mut::<Unicycle>(0).unwrap().lanes = 4;
     assert_eq!(problem.terminal_mut::<Unicycle>().unwrap().nu, 0);
+}
+
+#[test]
+fn bounds_that_leave_no_control_are_refused_by_knot_and_number() {
+    let solve = |lower: &[f64], upper: &[f64]| {
+        let mut problem = limited_unicycle(&[1.0, 0.0, 0.0], 5, 1, Some([lower.to_vec(), upper.to_vec()]));
+        let mut solver = Fddp::new(&problem);
+        solver.solve(&mut problem, &[0.0; 18], &[0.0; 10]).map(|solution| solution.status)
+    };
+    let error = |lower: &[f64], upper: &[f64]| solve(lower, upper).unwrap_err().to_string();
+    assert_eq!(error(&[0.0, 2.0], &[1.0, 1.0]), "knot 0: control 1 must be at least 2 and at most 1");
+    assert_eq!(error(&[f64::NAN, 0.0], &[1.0, 1.0]), "knot 0: control 0 must be at least NaN and at most 1");
+    let infinite = f64::INFINITY;
+    assert_eq!(error(&[infinite, 0.0], &[infinite, 1.0]), "knot 0: control 0 must be at least inf and at most inf");
+    assert_eq!(error(&[0.0], &[1.0, 1.0]), "node 0: expected lower bounds = 2, found 1");
+    assert_eq!(error(&[0.0, 0.0], &[1.0; 3]), "node 0: expected upper bounds = 2, found 3");
+    assert_eq!(solve(&[0.25, -0.5], &[0.25, 0.5]), Ok(Status::Converged)); // one control is as good as none
+}
+
+/// Without any finite number, bounds change nothing; a bound on one side only binds.
+#[test]
+fn a_bound_may_be_on_one_side() {
+    let infinite = f64::INFINITY;
+    let solve = |bounds: Option<[Vec<f64>; 2]>| {
+        let mut problem = limited_cartpole(&HANGING, 50, 1, bounds);
+        let xs = straight(problem.x0(), problem.x0(), 50);
+        let mut solver = Fddp::new(&problem);
+        solver.settings.max_iterations = 300;
+        solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone()
+    };
+    let free = solve(None);
+    let same = solve(Some([vec![-infinite], vec![infinite]]));
+    assert!(free.xs == same.xs && free.trace == same.trace);
+    let least = free.us.iter().fold(infinite, |least, u| least.min(*u));
+    let bounded = solve(Some([vec![0.8 * least], vec![infinite]]));
+    assert_eq!(bounded.status, Status::Converged);
+    assert!(bounded.us.iter().all(|u| *u >= 0.8 * least) && bounded.us.contains(&(0.8 * least)));
+    assert!(bounded.cost > free.cost);
+    // At a bound there is no feedback.
+    let t = bounded.us.iter().position(|u| *u == 0.8 * least).unwrap();
+    assert!(bounded.K[t].amax() == 0.0);
+}
+
+/// The multipliers of a bounded optimum, checked without the solver: ∂J/∂u along the trajectory, from the adjoint
+/// recursion λ = q + Aᵀλ⁺, is zero where a control is free and pushes against the bound where it is not.
+#[test]
+fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
+    let bounds = [vec![-8.0], vec![6.0]];
+    let mut problem = limited_cartpole(&HANGING, 50, 1, Some(bounds));
+    let xs = straight(problem.x0(), problem.x0(), 50);
+    let mut solver = Fddp::new(&problem);
+    (solver.settings.max_iterations, solver.settings.tolerance_bounded) = (300, 1e-12);
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone();
+    let mut nodes = problem.nodes();
+    problem.calc_diff(&solution.xs, &solution.us, &mut nodes);
+    let mut adjoint = nodes[50].q.clone();
+    let mut at_bounds = 0;
+    for t in (0..50).rev() {
+        let slope = nodes[t].r[0] + nodes[t].B.column(0).dot(&adjoint);
+        adjoint = &nodes[t].q + nodes[t].A.transpose() * &adjoint;
+        let u = solution.u(t)[0];
+        at_bounds += usize::from(u == -8.0 || u == 6.0);
+        let projected = u - (u - slope).clamp(-8.0, 6.0);
+        assert!(projected.abs() < 1e-4, "knot {t}: u = {u}, ∂J/∂u = {slope:e}");
+    }
+    assert!(at_bounds > 3, "{at_bounds}");
 }

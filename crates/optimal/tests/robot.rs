@@ -3,12 +3,14 @@
 
 use condyle_dynamics::{Act, Data, Model, Se3, Vec3, forward_kinematics, integrate, neutral, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
-use condyle_optimal::{ActionModel, Error, LqNode, NumDiff};
+use condyle_optimal::{ActionModel, Error, LqNode, NumDiff, Sweep};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
 /// Central differences of a function with values and derivatives of order one are good to about 1e-9 of them.
 const DIFFERENCES: f64 = 1e-6;
+/// Two orders of the same sums, through a factorisation.
+const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
 fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
@@ -83,6 +85,41 @@ fn derivatives_are_those_of_the_action() {
             ] {
                 let error = largest_difference(a, b);
                 assert!(error < DIFFERENCES, "{}: {name} is off by {error:e}", model.name());
+            }
+        }
+    }
+}
+
+/// What an action says of the form of A and B is true: the sweep finds the same without knowing it.
+#[test]
+fn derivatives_have_the_form_of_euler_steps() {
+    let mut rng = StdRng::seed_from_u64(8);
+    for model in [robots::quadruped(), robots::humanoid()].map(Arc::new) {
+        let nu = model.nv() - 6;
+        let costs = all_costs(&model, nu, &mut rng).into_iter().filter(|c| c.weight > 0.0).collect();
+        let mut action = FreeDynamics::running(model.clone(), DT, costs).unwrap();
+        let ndx = action.ndx();
+        let mut nodes = vec![LqNode::zeros(ndx, nu); 3];
+        nodes.push(LqNode::zeros(ndx, 0));
+        nodes[3].Q.fill_with_identity();
+        for node in &mut nodes[..3] {
+            let (x, u) = (random_state(&model, &mut rng), random(nu, 5.0, &mut rng));
+            action.calc_diff(0, &x, &u, node);
+            node.R.fill_diagonal(1.0);
+            node.Q += nalgebra::DMatrix::identity(ndx, ndx);
+        }
+        let mut sweep = Sweep::new(&nodes);
+        sweep.run(&nodes, 1e-6).unwrap();
+        let structured = sweep.knots().to_vec();
+        assert!(nodes[0].structure != condyle_optimal::Structure::default());
+        for node in &mut nodes {
+            node.structure.set_dense();
+        }
+        sweep.run(&nodes, 1e-6).unwrap();
+        for (a, b) in structured.iter().zip(sweep.knots()) {
+            for (name, a, b) in [("K", a.K.as_slice(), b.K.as_slice()), ("Vxx", a.Vxx.as_slice(), b.Vxx.as_slice())] {
+                let error = largest_difference(a, b);
+                assert!(error < SAME, "{}: {name} is off by {error:e}", model.name());
             }
         }
     }

@@ -23,7 +23,18 @@ NV = len(SPEC["q0"])
 ONLY_VELOCITY = np.r_[np.zeros(NV), np.ones(NV)]
 
 
-def solve_theirs(xs, us, **settings):
+SOLVERS = {
+    "fddp": crocoddyl.SolverFDDP,
+    "ddp": crocoddyl.SolverDDP,
+    "box fddp": crocoddyl.SolverBoxFDDP,
+    "box ddp": crocoddyl.SolverBoxDDP,
+}
+# Efforts that the reach would like to exceed, on both sides, and that hold the arm up.
+LOWER = np.array([-1.5, -22.0, -8.0, -5.0, -5.0, -5.0, -0.5, -0.5, -0.5])
+UPPER = np.array([9.0, 7.5, 21.0, 22.0, 4.0, 2.5, 0.5, 0.5, 0.5])
+
+
+def solve_theirs(xs, us, solver="fddp", **settings):
     """Crocoddyl's solution, and what it said of each iteration: cost, step length, regularisation, feasibility."""
     state = crocoddyl.StateMultibody(pin.buildModelFromUrdf(URDF))
     actuation = crocoddyl.ActuationModelFull(state)
@@ -36,7 +47,10 @@ def solve_theirs(xs, us, **settings):
             activations = () if activation is None else (activation,)
             costs.addCost(name, crocoddyl.CostModelResidual(state, *activations, residual), weight)
         dynamics = crocoddyl.DifferentialActionModelFreeFwdDynamics(state, actuation, costs)
-        return crocoddyl.IntegratedActionModelEuler(dynamics, dt)
+        action = crocoddyl.IntegratedActionModelEuler(dynamics, dt)
+        if solver.startswith("box"):
+            action.u_lb, action.u_ub = LOWER, UPPER
+        return action
 
     run, end = SPEC["running"], SPEC["terminal"]
     rest = crocoddyl.ResidualModelState(state, X0)
@@ -47,14 +61,14 @@ def solve_theirs(xs, us, **settings):
     )
     weighted = crocoddyl.ActivationModelWeightedQuad(ONLY_VELOCITY)
     terminal = model(0.0, [("pose", end["pose"], pose, None), ("velocity", end["velocity"], rest, weighted)])
-    solver = crocoddyl.SolverFDDP(crocoddyl.ShootingProblem(X0, [running] * SPEC["knots"], terminal))
+    solver = SOLVERS[solver](crocoddyl.ShootingProblem(X0, [running] * SPEC["knots"], terminal))
     solver.setCallbacks([log := crocoddyl.CallbackLogger()])
     maxiter = settings.get("max_iterations", 100)
     solver.solve(list(xs), list(us), maxiter, False, settings.get("regularisation_start", np.nan))
     return solver, log
 
 
-def our_problem():
+def our_problem(bounded=False):
     model = condyle.Model.from_urdf(URDF)
     run, end = SPEC["running"], SPEC["terminal"]
 
@@ -65,6 +79,7 @@ def our_problem():
         model,
         SPEC["dt"],
         [pose(run["pose"]), Cost.state("state", run["state"], X0), Cost.control("u", run["control"], np.zeros(NV))],
+        *((LOWER, UPPER) if bounded else ()),
     )
     velocity = Cost.state("velocity", end["velocity"], X0, Activation.weighted(ONLY_VELOCITY))
     terminal = FreeDynamics(model, None, [pose(end["pose"]), velocity])
@@ -82,12 +97,16 @@ def warm_start(kind):
     return xs, us
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("kind", ["standing", "gaps", "gap at the start"])
-def test_whole_trace(kind):
+def test_whole_trace(kind, solver):
     xs, us = warm_start(kind)
-    _, problem = our_problem()
-    ours = Fddp(problem).solve(xs, us)
-    theirs, log = solve_theirs(xs, us)
+    _, problem = our_problem(solver.startswith("box"))
+    ours = Fddp(problem, method=solver.split()[-1]).solve(xs, us)
+    theirs, log = solve_theirs(xs, us, solver)
+    if solver.startswith("box"):
+        assert np.any(ours.us == UPPER) and np.any(ours.us == LOWER)
+        assert np.all((ours.us >= LOWER) & (ours.us <= UPPER))
     assert ours.status == "converged" and len(ours.trace) == theirs.iter + 1
     np.testing.assert_allclose([i.cost for i in ours.trace], np.array(log.costs), rtol=COST)
     np.testing.assert_array_equal([i.step for i in ours.trace], np.array(log.steps))

@@ -90,6 +90,10 @@ class Projection:
         # M q̈ + h = τ and what follows from it, M ∂q̈/∂· = −∂τ/∂·, M M⁻¹ = 1
         dtau_dq, dtau_dv, _ = derivatives(d.a)
         pair.expect("mimic: rnea of aba", rnea(d.a), tau)
+        for grain in checks.GRAINS:
+            divided = condyle.DivideConquer(self.ours, grain).aba(self.ours, q, v, tau, f_ext)
+            solved = np.linalg.solve(M, tau - rnea(np.zeros(self.ours.nv)))
+            pair.expect(f"mimic: DivideConquer.aba, grain {grain}", divided, solved)
         pair.expect("mimic: M times da_dq", M @ d.da_dq, -dtau_dq)
         pair.expect("mimic: M times da_dv", M @ d.da_dv, -dtau_dv)
         pair.expect("mimic: M times minv", M @ d.da_dtau, np.eye(self.ours.nv))

@@ -1,7 +1,6 @@
 //! Every function that a control loop calls, in one table: what holds for all of them is tested over it.
 //!
-//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not among them: rayon allocates when threads meet, and robots
-//! with mimic joints are refused.
+//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not among them: rayon allocates when threads meet.
 
 use super::{State, lift, lift_forces};
 use condyle_dynamics::inertial_parameters::{self, from_log_cholesky, log_cholesky_jacobian};

@@ -4,7 +4,7 @@ use crate::common;
 
 use common::{State, Worst, all_models, lift, lift_forces, random_inertia, random_pose, rng};
 use condyle_dynamics::{
-    BodyId, Data, DivideConquer, Error, Inertia, Joint, JointOptions, Mat3, Model, ModelBuilder, Scalar, Se3, Sym3,
+    BodyId, Data, DivideConquer, Inertia, Joint, JointOptions, Mat3, Mimic, Model, ModelBuilder, Scalar, Se3, Sym3,
     Vec3, WORLD, aba, robots,
 };
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -47,16 +47,12 @@ fn shapes(n: usize, floating: bool) -> [Model; 4] {
     ]
 }
 
-fn without_mimics(trees: u64) -> Vec<Model> {
-    all_models(trees).into_iter().filter(|m| m.bodies().iter().all(|b| b.mimic.is_none())).collect()
-}
-
 fn check(worst: &mut Worst, model: &Model, seed: u64) {
     let State { q, v, tau, f_ext, .. } = State::random(model, &mut rng(seed));
     let mut data = Data::new(model);
     let n = model.bodies().len() - 1;
     for grain in [1, 2, 5, n.div_ceil(2), n] {
-        let mut divided = DivideConquer::new(model, grain).expect("no joint follows another");
+        let mut divided = DivideConquer::new(model, grain);
         for f_ext in [&f_ext[..], &[]] {
             let expected = aba(model, &mut data, &q, &v, &tau, f_ext);
             worst.see(model, divided.aba(model, &q, &v, &tau, f_ext), expected);
@@ -67,7 +63,7 @@ fn check(worst: &mut Worst, model: &Model, seed: u64) {
 #[test]
 fn every_joint_type() {
     let mut worst = Worst::new("divide and conquer on robots and random trees", INVERTED);
-    for (seed, model) in without_mimics(TREES).iter().enumerate() {
+    for (seed, model) in all_models(TREES).iter().enumerate() {
         check(&mut worst, model, seed as u64);
     }
 }
@@ -121,7 +117,7 @@ fn bodies_without_mass() {
         }
         let model = builder.build().expect("a chain is well-formed");
         check(&mut worst, &model, n);
-        let size = DivideConquer::<f64>::new(&model, 1).expect("no joint follows another").size();
+        let size = DivideConquer::<f64>::new(&model, 1).size();
         assert_eq!(size.longest_run, 3, "a massless body, a point mass, and the one below");
     }
 }
@@ -160,17 +156,71 @@ fn fingers() {
     }
 }
 
+/// A chain of n hinges, every third of which follows one of two others, and of which some have no inertia of their own.
+fn chain_with_followers(n: usize, massless: impl Fn(usize) -> bool) -> Model {
+    let rng = &mut rng(n as u64);
+    let mut builder = ModelBuilder::new("chain");
+    let mut ids: Vec<BodyId> = vec![WORLD];
+    for i in 1..=n {
+        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
+        let inertia = if massless(i) { Inertia::zero() } else { random_inertia(rng) };
+        ids.push(builder.body(&format!("b{i}"), ids[i - 1], Joint::Revolute { axis }, random_pose(rng), inertia));
+    }
+    for i in (3..=n).step_by(3) {
+        builder.mimic(ids[i], ids[1 + i % 2], Mimic { ratio: 0.5 + 0.1 * i as f64, offset: 0.2 });
+    }
+    builder.build().expect("a chain is well-formed")
+}
+
+#[test]
+fn chains_with_followers() {
+    let mut worst = Worst::new("divide and conquer on chains with followers", INVERTED);
+    for n in [3, 4, 7, 20, 50, 100] {
+        check(&mut worst, &chain_with_followers(n, |_| false), n as u64);
+        check(&mut worst, &chain_with_followers(n, |i| i % 3 == 0), n as u64); // what follows is without mass
+        check(&mut worst, &chain_with_followers(n, |i| i < 3), n as u64); // what leads is
+    }
+}
+
+/// Nothing resists joint after joint but through the ties: a follower without mass at each tip, and a wheel that could
+/// turn against the arm without mass that carries it, were it not geared to the other one.
+#[test]
+fn followers_without_inertia() {
+    let axis = Vec3::new(0.0, 0.0, 1.0);
+    let hinge = Joint::Revolute { axis };
+    let ball = Inertia::from_com(1.0, Vec3::new(0.3, 0.0, 0.0), Sym3::diagonal(0.1));
+    let wheel = Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(0.1));
+    let at = |x: f64| Se3::new(Mat3::identity(), Vec3::new(x, 0.0, 0.0));
+    let mut worst = Worst::new("divide and conquer with followers without inertia", INVERTED);
+    for ratio in [-2.0, 0.01, 1.0, 50.0] {
+        let mut builder = ModelBuilder::new("differential");
+        let leader = builder.body("leader", WORLD, hinge, at(0.0), ball);
+        let tip = builder.body("tip", leader, hinge, at(1.0), Inertia::zero());
+        let slide = builder.body("slide", tip, Joint::Prismatic { axis }, at(0.1), Inertia::zero());
+        let arm = builder.body("arm", WORLD, hinge, at(0.0), Inertia::zero());
+        let geared = builder.body("geared", arm, hinge, at(0.0), wheel);
+        for follower in [tip, slide, geared] {
+            builder.mimic(follower, leader, Mimic { ratio, offset: 0.1 });
+        }
+        let model = builder.build().expect("a differential is well-formed");
+        assert!(model.singular_joints().is_empty());
+        for seed in 0..20 {
+            check(&mut worst, &model, seed);
+        }
+    }
+}
+
 /// Tangents, by the same source.
 #[test]
 fn on_dual_numbers() {
     let mut worst = Worst::new("derivatives by divide and conquer", INVERTED);
-    for (seed, model) in without_mimics(4).iter().enumerate() {
+    for (seed, model) in all_models(4).iter().enumerate() {
         let State { q, v, a, tau, f_ext } = State::random(model, &mut rng(seed as u64));
         let q = common::moved(model, &lift(&q), &common::dual(&vec![0.0; a.len()], &a));
         let (v, tau, f_ext): (Vec<Dual64>, Vec<Dual64>, _) = (lift(&v), lift(&tau), lift_forces(&f_ext));
         let expected = common::eps(aba(model, &mut Data::new(model), &q, &v, &tau, &f_ext));
         for grain in [1, 4] {
-            let mut divided = DivideConquer::new(model, grain).expect("no joint follows another");
+            let mut divided = DivideConquer::new(model, grain);
             worst.see(model, &common::eps(divided.aba(model, &q, &v, &tau, &f_ext)), &expected);
         }
     }
@@ -183,11 +233,12 @@ fn same_bits_for_any_number_of_threads() {
         .into_iter()
         .map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started"))
         .collect();
-    let models = without_mimics(4).into_iter().chain(shapes(90, true)).chain([chain(300)]);
+    let models =
+        all_models(4).into_iter().chain(shapes(90, true)).chain([chain(300), chain_with_followers(60, |i| i % 3 == 0)]);
     for (seed, model) in models.enumerate() {
         let State { q, v, tau, f_ext, .. } = State::random(&model, &mut rng(seed as u64));
         for grain in [1, 7] {
-            let mut divided = DivideConquer::new(&model, grain).expect("no joint follows another");
+            let mut divided = DivideConquer::new(&model, grain);
             let expected = pools[0].install(|| divided.aba(&model, &q, &v, &tau, &f_ext).to_vec());
             for pool in &pools {
                 for _ in 0..5 {
@@ -205,17 +256,17 @@ fn same_bits_for_any_number_of_threads() {
 fn levels() {
     let log2 = |n: usize| n.next_power_of_two().ilog2() as usize;
     for n in [1, 2, 3, 4, 5, 8, 31, 32, 33, 300, 1000] {
-        let size = DivideConquer::<f64>::new(&chain(n), 1).expect("no joint follows another").size();
+        let size = DivideConquer::<f64>::new(&chain(n), 1).size();
         assert_eq!((size.levels, size.joins, size.runs, size.longest_run), (1 + log2(n), n - 1, n, 1));
         for model in shapes(n, false) {
-            let size = DivideConquer::<f64>::new(&model, 1).expect("no joint follows another").size();
+            let size = DivideConquer::<f64>::new(&model, 1).size();
             assert!(size.levels <= 3 + 2 * log2(n), "{size:?} on {n} bodies");
             assert_eq!(size.bodies, n);
             for grain in [4, 30] {
-                let size = DivideConquer::<f64>::new(&model, grain).expect("no joint follows another").size();
+                let size = DivideConquer::<f64>::new(&model, grain).size();
                 assert!(size.longest_run <= grain, "{size:?}");
             }
-            let size = DivideConquer::<f64>::new(&model, n).expect("no joint follows another").size();
+            let size = DivideConquer::<f64>::new(&model, n).size();
             assert_eq!((size.levels, size.runs, size.longest_run), (1, 1, n));
         }
     }
@@ -327,7 +378,7 @@ fn steps_grow_with_the_logarithm() {
         let [q, v, tau]: [Vec<Counted>; 3] = [&q, &v, &tau].map(|x| lift(x));
         let mut data = Data::new(&model);
         let recursive = counted(|| aba(&model, &mut data, &q, &v, &tau, &[]));
-        let mut divided = DivideConquer::new(&model, 1).expect("no joint follows another");
+        let mut divided = DivideConquer::new(&model, 1);
         let divided = pool.install(|| counted(|| divided.aba(&model, &q, &v, &tau, &[])));
         println!("{n:5} {:12} {:7} {:12} {:7}", recursive.0, recursive.1, divided.0, divided.1);
         rows.push((recursive, divided));
@@ -345,30 +396,22 @@ fn steps_grow_with_the_logarithm() {
 }
 
 #[test]
-fn joints_that_follow_are_refused() {
-    let model = common::Tree::random_with_mimics(&mut rng(1)).build();
-    let error = DivideConquer::<f64>::new(&model, 1).expect_err("a joint follows another");
-    assert!(matches!(error, Error::Body { .. }), "{error}");
-    assert!(error.to_string().contains("follows another"), "{error}");
-}
-
-#[test]
 fn a_robot_of_nothing() {
     let model = ModelBuilder::new("nothing").build().expect("nothing is well-formed");
-    assert!(DivideConquer::<f64>::new(&model, 1).expect("no joint").aba(&model, &[], &[], &[], &[]).is_empty());
+    assert!(DivideConquer::<f64>::new(&model, 1).aba(&model, &[], &[], &[], &[]).is_empty());
 }
 
 #[test]
 #[should_panic(expected = "v: expected 7 numbers, found 0")]
 fn wrong_velocity() {
     let arm = robots::arm7();
-    DivideConquer::new(&arm, 1).unwrap().aba(&arm, &[0.0; 7], &[], &[0.0; 7], &[]);
+    DivideConquer::new(&arm, 1).aba(&arm, &[0.0; 7], &[], &[0.0; 7], &[]);
 }
 
 #[test]
 #[should_panic(expected = "model: planned for 8 bodies, found 14")]
 fn wrong_model() {
     let quadruped = robots::quadruped();
-    let mut divided = DivideConquer::new(&robots::arm7(), 1).unwrap();
+    let mut divided = DivideConquer::new(&robots::arm7(), 1);
     divided.aba(&quadruped, &condyle_dynamics::neutral(&quadruped), &[0.0; 18], &[0.0; 18], &[]);
 }

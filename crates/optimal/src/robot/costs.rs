@@ -1,85 +1,25 @@
 //! Costs of a robot's state and control: weighted sums of activations of residuals.
 
+use super::activation::Activation;
+use super::quadratic::{Filled, add_diagonal, add_positions, add_row, mirror};
+use super::residual::Residual;
 use super::state::{groups, state_difference};
+use super::watch::{Needs, Offer, Scene, Scratch, Signal, Slopes, Watch, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
 use condyle_dynamics::{
-    Data, DifferenceArgument, Model, Motion, Quaternion, ReferenceFrame, Se3, Vec3, difference_jacobian,
-    forward_kinematics, lie,
+    DifferenceArgument, Model, Motion, Placements, Quaternion, ReferenceFrame, Vec3, Velocities, difference_jacobian,
+    lie,
 };
 use core::ops::Range;
-use nalgebra::DMatrix;
 use std::sync::Arc;
-
-/// What a cost looks at: a vector r(x, u) that should be small.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Residual {
-    /// x ⊖ x_ref, 2 nv numbers.
-    State {
-        /// x_ref = (q, v).
-        reference: Vec<f64>,
-    },
-    /// u − u_ref, nu numbers; zero at a terminal knot.
-    Control {
-        /// u_ref.
-        reference: Vec<f64>,
-    },
-    /// log(refXo oXf), the twist from the target to the frame, in the target's frame: 6 numbers, linear first.
-    FramePlacement {
-        /// The frame.
-        frame: usize,
-        /// Its wanted pose in the world.
-        target: Se3<f64>,
-    },
-    /// p − p_ref, 3 numbers, in the world.
-    FrameTranslation {
-        /// The frame.
-        frame: usize,
-        /// The wanted position of its origin in the world (m).
-        target: Vec3<f64>,
-    },
-}
-
-/// How much a residual costs.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Activation {
-    /// ½ Σ rᵢ².
-    Quadratic,
-    /// ½ Σ wᵢ rᵢ².
-    Weighted(
-        /// w, a number for each entry of the residual.
-        Vec<f64>,
-    ),
-    /// ½ Σ (excess of rᵢ over its bounds)²: nothing inside them.
-    Barrier {
-        /// Least values; −∞ for none.
-        lower: Vec<f64>,
-        /// Greatest values; ∞ for none.
-        upper: Vec<f64>,
-    },
-}
-
-impl Activation {
-    /// Value, first and second derivative of the i-th entry's part.
-    #[inline]
-    fn at(&self, i: usize, r: f64) -> (f64, f64, f64) {
-        match self {
-            Self::Quadratic => (0.5 * r * r, r, 1.0),
-            Self::Weighted(w) => (0.5 * w[i] * r * r, w[i] * r, w[i]),
-            Self::Barrier { lower, upper } => {
-                let excess = (r - lower[i]).min(0.0) + (r - upper[i]).max(0.0);
-                (0.5 * excess * excess, excess, f64::from(u8::from(excess != 0.0)))
-            }
-        }
-    }
-}
 
 /// A term w · a(r(x, u)) of a cost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
     /// How it is called.
     pub name: String,
-    /// w.
+    /// w; a term whose weight is 0 is not computed.
     pub weight: f64,
     /// r.
     pub residual: Residual,
@@ -94,81 +34,69 @@ impl Cost {
     }
 }
 
-/// A sum of terms, with the scratch to compute it.
+/// A sum of terms, called by their names.
 ///
-/// Derivatives are exact; second derivatives are Gauss–Newton's, w (∂r)ᵀ a″ ∂r.
+/// Derivatives are exact; second derivatives are Gauss–Newton's, w (∂r)ᵀ a″ ∂r. Kinematics that several terms look at
+/// are computed once for a knot, and only where a Jacobian is not zero is anything added.
 #[derive(Clone, Debug)]
 pub struct Costs {
     model: Arc<Model>,
+    offer: Offer,
     terms: Vec<Cost>,
+    plans: Vec<Plan>,
     groups: Vec<Range<usize>>,
-    data: Data<f64>,
-    /// The residual.
-    r: Vec<f64>,
-    /// Its Jacobian with respect to q, of frames.
-    J: DMatrix<f64>,
-    /// The Jacobian of the difference of configurations.
-    D: DMatrix<f64>,
+    /// All coordinates.
+    all: Vec<usize>,
+}
+
+/// A term as it is computed.
+#[derive(Clone, Debug)]
+struct Plan {
+    /// How many numbers its residual has.
+    n: usize,
+    /// The coordinates that move its frame, in order.
+    columns: Vec<usize>,
+    /// Where its contact's rows stand in λ.
+    rows: Range<usize>,
+    /// W of a residual W f.
+    W: Vec<f64>,
+}
+
+impl Plan {
+    fn new(model: &Model, offer: &Offer, term: &Cost) -> Result<Self, Error> {
+        let wrong = |what: String| Error::Cost { name: term.name.clone(), what };
+        let n = term.residual.check(model, offer).map_err(wrong)?;
+        if !term.weight.is_finite() {
+            return Err(wrong(format!("its weight is {}", term.weight)));
+        }
+        if let Some(what) = term.activation.wrong(n) {
+            return Err(wrong(what));
+        }
+        let mut columns = Vec::new();
+        let mut body = term.residual.frame().map_or(0, |frame| model.frames()[frame].body);
+        while body > 0 {
+            let joint = &model.bodies()[body];
+            columns.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
+            body = joint.parent;
+        }
+        columns.sort_unstable();
+        columns.dedup();
+        let rows = term.residual.contact().map_or(Ok(0..0), |name| offer.contact(name)).map_err(wrong)?;
+        Ok(Self { n, columns, W: term.residual.force_rows(rows.len()), rows })
+    }
 }
 
 impl Costs {
-    /// The sum of some terms for a robot with nu controls.
-    ///
-    /// # Errors
-    /// [`Error::Cost`] if a frame does not exist, or a reference, weight or bound has a wrong length or is not a
-    /// number.
-    pub fn new(model: Arc<Model>, nu: usize, terms: Vec<Cost>) -> Result<Self, Error> {
-        let (nx, nv) = (model.nq() + model.nv(), model.nv());
-        for term in &terms {
-            let wrong = |what: String| Err(Error::Cost { name: term.name.clone(), what });
-            let length = |name: &str, numbers: &[f64], expected: usize| match numbers.len() == expected {
-                true if numbers.iter().any(|x| x.is_nan()) => wrong(format!("its {name} holds a NaN")),
-                true => Ok(()),
-                false => wrong(format!("its {name} has {} numbers, expected {expected}", numbers.len())),
-            };
-            let nr = match &term.residual {
-                Residual::State { reference } => {
-                    length("reference", reference, nx)?;
-                    2 * nv
-                }
-                Residual::Control { reference } => {
-                    length("reference", reference, nu)?;
-                    nu
-                }
-                Residual::FramePlacement { frame, target } => {
-                    let p = target.translation.to_array();
-                    let R = target.rotation.columns().map(|c| c.to_array()).concat();
-                    length("target", &[&p[..], &R].concat(), 12)?;
-                    frame_exists(&model, *frame, &wrong)?;
-                    6
-                }
-                Residual::FrameTranslation { frame, target } => {
-                    length("target", &target.to_array(), 3)?;
-                    frame_exists(&model, *frame, &wrong)?;
-                    3
-                }
-            };
-            if !term.weight.is_finite() {
-                wrong(format!("its weight is {}", term.weight))?;
-            }
-            match &term.activation {
-                Activation::Quadratic => {}
-                Activation::Weighted(w) => length("weighting", w, nr)?,
-                Activation::Barrier { lower, upper } => {
-                    length("lower bound", lower, nr)?;
-                    length("upper bound", upper, nr)?;
-                }
+    /// The sum of some terms for a robot whose dynamics offer some signals.
+    pub(super) fn new(model: Arc<Model>, offer: Offer, terms: Vec<Cost>) -> Result<Self, Error> {
+        for (k, term) in terms.iter().enumerate() {
+            if terms[..k].iter().any(|t| t.name == term.name) {
+                let what = "another term has this name".to_owned();
+                return Err(Error::Cost { name: term.name.clone(), what });
             }
         }
-        Ok(Self {
-            groups: groups(&model),
-            data: Data::new(&model),
-            r: vec![0.0; (2 * nv).max(6)],
-            J: DMatrix::zeros(6, nv),
-            D: DMatrix::zeros(nv, nv),
-            model,
-            terms,
-        })
+        let plans = terms.iter().map(|term| Plan::new(&model, &offer, term)).collect::<Result<_, _>>()?;
+        Ok(Self { groups: groups(&model), all: (0..model.nv()).collect(), model, offer, terms, plans })
     }
 
     /// The terms.
@@ -182,140 +110,253 @@ impl Costs {
         term.map(|t| t.weight = weight).is_some()
     }
 
-    /// Σ w a(r(x, u)); u is empty at a terminal knot.
-    pub fn calc(&mut self, x: &[f64], u: &[f64]) -> f64 {
+    /// Changes what the term called `name` looks at, between solves: its target, for example. Allocates.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] if there is no such term, the residual does not fit the robot, or it has another number of
+    /// entries than the one before.
+    pub fn set_residual(&mut self, name: &str, residual: Residual) -> Result<(), Error> {
+        let wrong = |what: &str| Error::Cost { name: name.to_owned(), what: what.to_owned() };
+        let k = self.terms.iter().position(|t| t.name == name).ok_or_else(|| wrong("there is no such term"))?;
+        let term = Cost { residual, ..self.terms[k].clone() };
+        let plan = Plan::new(&self.model, &self.offer, &term)?;
+        if plan.n != self.plans[k].n || Self::needs_of(&term) != Self::needs_of(&self.terms[k]) {
+            return Err(wrong("its residual is of another kind than before"));
+        }
+        (self.terms[k], self.plans[k]) = (term, plan);
+        Ok(())
+    }
+
+    /// The most numbers that one of its residuals has.
+    pub(super) fn longest(&self) -> usize {
+        self.plans.iter().map(|plan| plan.n).max().unwrap_or(0)
+    }
+
+    fn needs_of(term: &Cost) -> Needs {
+        let mut needs = Needs::default();
+        match term.residual {
+            Residual::ControlGravity => needs.surplus = true,
+            Residual::CenterOfMass { .. } => (needs.com, needs.placements) = (true, true),
+            Residual::CentroidalMomentum { .. } => (needs.momentum, needs.velocities) = (true, true),
+            Residual::FrameVelocity { .. } => needs.velocities = true,
+            Residual::ImpulseCenterOfMass => needs.impulse_com = true,
+            _ => needs.placements = term.residual.frame().is_some(),
+        }
+        needs
+    }
+
+    /// What its residuals look at, whatever their weights.
+    pub(super) fn needs(&self) -> Needs {
+        self.terms.iter().map(Self::needs_of).fold(Needs::default(), |a, b| a | b)
+    }
+
+    /// Σ w a(r(x, u)).
+    pub(super) fn calc(&self, watch: &mut Watch, scene: &Scene<'_>) -> f64 {
+        let (placements, velocities, s) = watch.look(&self.model, self.needs(), scene, false);
         let mut sum = 0.0;
-        for term in 0..self.terms.len() {
-            let nr = self.residual(term, x, u);
-            let Cost { weight, activation, .. } = &self.terms[term];
-            for i in 0..nr {
-                sum += weight * activation.at(i, self.r[i]).0;
-            }
+        for (term, plan) in self.terms.iter().zip(&self.plans).filter(|(term, _)| term.weight != 0.0) {
+            self.residual(term, plan, scene, placements, velocities, s);
+            sum += term.weight * term.activation.value(&s.r[..plan.n]);
         }
         sum
     }
 
-    /// Writes gradient and Hessian of `scale` · Σ w a(r(x, u)) into q, r, Q, S, R of the node; u is empty at a terminal
-    /// knot.
-    pub fn calc_diff(&mut self, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) {
+    /// Writes gradient and Hessian of `scale` · Σ w a(r(x, u)) into q, r, Q, S, R of the node.
+    pub(super) fn calc_diff(
+        &self,
+        watch: &mut Watch,
+        scene: &Scene<'_>,
+        slopes: &dyn Slopes,
+        scale: f64,
+        node: &mut LqNode,
+    ) {
         node.q.fill(0.0);
         node.r.fill(0.0);
         node.Q.fill(0.0);
         node.S.fill(0.0);
         node.R.fill(0.0);
-        for term in 0..self.terms.len() {
-            let nr = self.residual(term, x, u);
-            let weight = scale * self.terms[term].weight;
-            match self.terms[term].residual {
-                Residual::State { .. } => self.add_state(term, weight, node),
+        let (placements, velocities, s) = watch.look(&self.model, self.needs(), scene, true);
+        let (nv, mut filled) = (self.model.nv(), Filled::Diagonal);
+        for (term, plan) in self.terms.iter().zip(&self.plans).filter(|(term, _)| term.weight != 0.0) {
+            self.residual(term, plan, scene, placements, velocities, s);
+            let n = plan.n;
+            term.activation.derivatives(&s.r[..n], &mut s.d, &mut s.dd);
+            let weight = scale * term.weight;
+            s.d[..n].iter_mut().chain(&mut s.dd[..n]).for_each(|d| *d *= weight);
+            match &term.residual {
+                Residual::State { .. } => self.add_state(s, node),
                 Residual::Control { .. } => {
-                    for i in 0..nr {
-                        let (_, d, dd) = self.terms[term].activation.at(i, self.r[i]);
-                        node.r[i] += weight * d;
-                        node.R[(i, i)] += weight * dd;
-                    }
+                    add_diagonal(node.r.as_mut_slice(), node.R.as_mut_slice(), 0..n, &s.d, &s.dd);
                 }
-                Residual::FramePlacement { frame, .. } | Residual::FrameTranslation { frame, .. } => {
-                    self.add_frame(term, frame, x, weight, node);
+                Residual::CenterOfMass { .. } => {
+                    add_positions(node, &s.com[0], &self.all, &s.d[..n], &s.dd[..n]);
+                    filled = filled.max(Filled::Positions);
+                }
+                Residual::FramePlacement { .. }
+                | Residual::FrameTranslation { .. }
+                | Residual::FrameRotation { .. } => {
+                    self.frame_jacobian(term, placements, s);
+                    add_positions(node, &s.J, &plan.columns, &s.d[..n], &s.dd[..n]);
+                    filled = filled.max(Filled::Positions);
+                }
+                residual => {
+                    if let (Residual::FrameVelocity { frame, reference, .. }, Some(motion)) = (residual, velocities) {
+                        motion.frame_velocity_derivative(*frame, *reference, &mut s.J);
+                        motion.frame_jacobian(*frame, *reference, &mut s.Jv);
+                    }
+                    for i in 0..n {
+                        let (d, dd) = (s.d[i], s.dd[i]);
+                        if d == 0.0 && dd == 0.0 {
+                            continue; // a cone's row that is not active
+                        }
+                        add_slope_row(residual, plan, i, slopes, nv, s);
+                        add_row(node, &s.g, d, dd);
+                        filled = Filled::All;
+                    }
                 }
             }
         }
+        mirror(node, nv, filled);
     }
 
-    /// r of one term, in `self.r`; returns how many numbers it has.
-    fn residual(&mut self, term: usize, x: &[f64], u: &[f64]) -> usize {
-        let (nq, nv) = (self.model.nq(), self.model.nv());
-        match &self.terms[term].residual {
-            Residual::State { reference } => {
-                state_difference(&self.model, reference, x, &mut self.r[..2 * nv]); // x ⊖ x_ref
-                2 * nv
+    /// r of one term, in `s.r`.
+    fn residual(
+        &self,
+        term: &Cost,
+        plan: &Plan,
+        scene: &Scene<'_>,
+        placements: Option<Placements<'_, f64>>,
+        velocities: Option<Velocities<'_, f64>>,
+        s: &mut Scratch,
+    ) {
+        let r = &mut s.r[..plan.n];
+        let minus = |r: &mut [f64], a: &[f64], b: &[f64]| (0..r.len()).for_each(|i| r[i] = a[i] - b[i]);
+        match (&term.residual, placements) {
+            (Residual::State { reference }, _) => state_difference(&self.model, reference, scene.x, r), // x ⊖ x_ref
+            (Residual::Control { reference }, _) => minus(r, scene.u, reference),
+            (Residual::ControlGravity, _) => r.copy_from_slice(&s.surplus),
+            (Residual::JointEffort { reference }, _) => minus(r, scene.tau, reference),
+            (Residual::JointAcceleration { reference }, _) => minus(r, scene.a, reference),
+            (Residual::ImpulseCenterOfMass, _) => r.copy_from_slice(&s.com_change),
+            (Residual::ContactForce { target, .. }, _) => {
+                minus(r, &scene.lambda[plan.rows.clone()], &target.to_array());
             }
-            Residual::Control { reference } => {
-                for ((r, u), reference) in self.r.iter_mut().zip(u).zip(reference) {
-                    *r = u - reference;
+            (Residual::FrictionCone { .. } | Residual::WrenchCone { .. } | Residual::CenterOfPressure { .. }, _) => {
+                let f = &scene.lambda[plan.rows.clone()];
+                for (r, row) in r.iter_mut().zip(plan.W.chunks_exact(f.len())) {
+                    *r = row.iter().zip(f).map(|(w, f)| w * f).sum(); // W f
                 }
-                u.len()
             }
-            Residual::FramePlacement { frame, target } => {
-                let oXf = forward_kinematics(&self.model, &mut self.data, &x[..nq]).frame(*frame);
-                let X = target.inverse() * oXf;
-                let r = lie::log6(Quaternion::from_rotation(X.rotation), X.translation); // log(refXo oXf)
-                self.r[..6].copy_from_slice(&r.to_array());
-                6
+            (Residual::CenterOfMass { target }, Some(placed)) => {
+                r.copy_from_slice(&(placed.com() - *target).to_array());
             }
-            Residual::FrameTranslation { frame, target } => {
-                let oXf = forward_kinematics(&self.model, &mut self.data, &x[..nq]).frame(*frame);
-                self.r[..3].copy_from_slice(&(oXf.translation - *target).to_array());
-                3
+            (Residual::FramePlacement { frame, target }, Some(placed)) => {
+                let X = target.inverse() * placed.frame(*frame);
+                let log = lie::log6(Quaternion::from_rotation(X.rotation), X.translation); // log(refXo oXf)
+                r.copy_from_slice(&log.to_array());
             }
+            (Residual::FrameTranslation { frame, target }, Some(placed)) => {
+                r.copy_from_slice(&(placed.frame(*frame).translation - *target).to_array());
+            }
+            (Residual::FrameRotation { frame, target }, Some(placed)) => {
+                let R = target.transpose() * placed.frame(*frame).rotation;
+                r.copy_from_slice(&lie::log3(Quaternion::from_rotation(R)).to_array()); // log(R_refᵀ R)
+            }
+            (Residual::FrameVelocity { frame, target, reference }, _) => {
+                let motion = velocities.expect("velocities are computed where a residual needs them");
+                r.copy_from_slice(&(motion.frame_velocity(*frame, *reference) - *target).to_array());
+            }
+            (Residual::CentroidalMomentum { target }, _) => {
+                let motion = velocities.expect("velocities are computed where a residual needs them");
+                r.copy_from_slice(&(motion.centroidal_momentum() - *target).to_array());
+            }
+            (_, None) => unreachable!("placements are computed where a residual needs them"),
         }
     }
 
     /// Gradient and Hessian of a state's term: ∂r/∂x is the identity but for the groups' blocks of q.
-    fn add_state(&mut self, term: usize, weight: f64, node: &mut LqNode) {
+    fn add_state(&self, s: &mut Scratch, node: &mut LqNode) {
         let nv = self.model.nv();
-        let activation = &self.terms[term].activation;
-        let in_group = |i: usize| self.groups.iter().any(|g| g.contains(&i));
-        for i in (0..2 * nv).filter(|&i| !in_group(i)) {
-            let (_, d, dd) = activation.at(i, self.r[i]);
-            node.q[i] += weight * d;
-            node.Q[(i, i)] += weight * dd;
+        let mut from = 0;
+        for group in self.groups.iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
+            add_diagonal(node.q.as_mut_slice(), node.Q.as_mut_slice(), from..group.start, &s.d, &s.dd);
+            from = group.end;
         }
         if self.groups.is_empty() {
             return;
         }
-        difference_jacobian(&self.model, &self.r[..nv], DifferenceArgument::To, &mut self.D);
+        difference_jacobian(&self.model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
         for group in &self.groups {
             for i in group.clone() {
-                let (_, d, dd) = activation.at(i, self.r[i]);
                 for a in group.clone() {
-                    let da = weight * self.D[(i, a)];
-                    node.q[a] += da * d; // Dᵀ a′
+                    node.q[a] += s.D[(i, a)] * s.d[i]; // Dᵀ a′
+                    let da = s.D[(i, a)] * s.dd[i];
                     for b in group.clone() {
-                        node.Q[(a, b)] += da * dd * self.D[(i, b)]; // Dᵀ a″ D
+                        node.Q[(b, a)] += da * s.D[(i, b)]; // Dᵀ a″ D
                     }
                 }
             }
         }
     }
 
-    /// Gradient and Hessian of a frame's term, whose r was just computed: ∂r/∂q from the frame's Jacobian.
-    fn add_frame(&mut self, term: usize, frame: usize, x: &[f64], weight: f64, node: &mut LqNode) {
-        let (nq, nv) = (self.model.nq(), self.model.nv());
-        let placements = forward_kinematics(&self.model, &mut self.data, &x[..nq]);
-        let Cost { residual, activation, .. } = &self.terms[term];
-        let nr = match residual {
-            Residual::FramePlacement { .. } => {
-                placements.frame_jacobian(frame, ReferenceFrame::Local, &mut self.J);
-                let r = [self.r[0], self.r[1], self.r[2], self.r[3], self.r[4], self.r[5]];
-                let Jlog = lie::jlog6(Motion::from(r));
-                for mut column in self.J.column_iter_mut() {
+    /// ∂r/∂q of a frame's term, whose r was just computed, in `s.J`.
+    fn frame_jacobian(&self, term: &Cost, placements: Option<Placements<'_, f64>>, s: &mut Scratch) {
+        let placed = placements.expect("placements are computed where a residual needs them");
+        let J = &mut s.J;
+        match term.residual {
+            Residual::FramePlacement { frame, .. } => {
+                placed.frame_jacobian(frame, ReferenceFrame::Local, J);
+                let Jlog = lie::jlog6(Motion::from([s.r[0], s.r[1], s.r[2], s.r[3], s.r[4], s.r[5]]));
+                for column in J.as_mut_slice().chunks_exact_mut(6) {
                     let m = [column[0], column[1], column[2], column[3], column[4], column[5]];
-                    column.as_mut_slice().copy_from_slice(&(Jlog * Motion::from(m)).to_array()); // Jlog J
-                }
-                6
-            }
-            _ => {
-                placements.frame_jacobian(frame, ReferenceFrame::LocalWorldAligned, &mut self.J);
-                3
-            }
-        };
-        for i in 0..nr {
-            let (_, d, dd) = activation.at(i, self.r[i]);
-            for a in 0..nv {
-                let da = weight * self.J[(i, a)];
-                node.q[a] += da * d; // Jᵀ a′
-                for b in 0..nv {
-                    node.Q[(b, a)] += da * dd * self.J[(i, b)]; // Jᵀ a″ J
+                    column.copy_from_slice(&(Jlog * Motion::from(m)).to_array()); // Jlog J
                 }
             }
+            Residual::FrameRotation { frame, .. } => {
+                placed.frame_jacobian(frame, ReferenceFrame::Local, J);
+                let Jlog = lie::jlog3(Vec3::new(s.r[0], s.r[1], s.r[2]));
+                for column in J.as_mut_slice().chunks_exact_mut(6) {
+                    let turned = Jlog * Vec3::new(column[3], column[4], column[5]);
+                    column[..3].copy_from_slice(&turned.to_array());
+                }
+            }
+            Residual::FrameTranslation { frame, .. } => {
+                placed.frame_jacobian(frame, ReferenceFrame::LocalWorldAligned, J);
+            }
+            _ => unreachable!("not a frame's pose"),
         }
     }
 }
 
-fn frame_exists(model: &Model, frame: usize, wrong: &impl Fn(String) -> Result<(), Error>) -> Result<(), Error> {
-    match model.frames().len() {
-        frames if frame >= frames => wrong(format!("there is no frame {frame}; the robot has {frames}")),
-        _ => Ok(()),
+/// Row i of ∂r/∂(q, v, u) of a residual that depends on more than q, in `s.g`.
+fn add_slope_row(residual: &Residual, plan: &Plan, i: usize, slopes: &dyn Slopes, nv: usize, s: &mut Scratch) {
+    let Scratch { g, J, Jv, momentum, com, surplus_slopes, .. } = s;
+    g.fill(0.0);
+    match residual {
+        Residual::FrameVelocity { .. } => {
+            add_matrix_row(J, i, 1.0, &mut g[..nv]);
+            add_matrix_row(Jv, i, 1.0, &mut g[nv..2 * nv]);
+        }
+        Residual::CentroidalMomentum { .. } => {
+            add_matrix_row(&momentum[0], i, 1.0, &mut g[..nv]);
+            add_matrix_row(&momentum[1], i, 1.0, &mut g[nv..2 * nv]);
+        }
+        Residual::ControlGravity => {
+            add_matrix_row(&surplus_slopes[0], i, 1.0, &mut g[..nv]);
+            add_matrix_row(&surplus_slopes[1], i, 1.0, &mut g[nv..2 * nv]);
+            (0..nv).for_each(|k| slopes.add_row(Signal::Acceleration, k, surplus_slopes[2][(i, k)], g)); // M ∂q̈
+        }
+        Residual::ImpulseCenterOfMass => {
+            add_matrix_row(&com[1], i, 1.0, &mut g[..nv]);
+            (0..nv).for_each(|k| slopes.add_row(Signal::Acceleration, k, com[0][(i, k)], g)); // J_c ∂(v⁺ − v)
+        }
+        Residual::JointEffort { .. } => slopes.add_row(Signal::Effort, i, 1.0, g),
+        Residual::JointAcceleration { .. } => slopes.add_row(Signal::Acceleration, i, 1.0, g),
+        _ => {
+            let rows = plan.rows.len();
+            for (k, w) in plan.W[i * rows..(i + 1) * rows].iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                slopes.add_row(Signal::Force, plan.rows.start + k, *w, g); // W ∂λ
+            }
+        }
     }
 }

@@ -1,53 +1,88 @@
-//! The action of a robot that touches nothing: forward dynamics, one step of time, costs.
+//! The dynamics of a robot that touches nothing.
 
-use super::costs::{Cost, Costs};
-use super::state::{groups, state_difference, state_integrate};
-use crate::action::ActionModel;
-use crate::error::Error;
+use super::actuation::Actuation;
+use super::common::{Robot, robot_knot};
+use super::costs::Cost;
+use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+use super::watch::{NoSlopes, Offer, Scene, Signal, Slopes, add_matrix_row};
+use crate::Error;
 use crate::lq::LqNode;
-use condyle_dynamics::{
-    Data, IntegrateArgument, Joint, Model, aba, aba_derivatives, gravity, integrate, integrate_jacobian,
-};
+use condyle_dynamics::{AbaDerivatives, Data, Model, aba, aba_derivatives, difference, gravity, integrate};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// A knot of a robot that moves freely under its joints' efforts, by semi-implicit Euler:
+/// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
+#[derive(Clone, Debug)]
+pub struct Free {
+    pub(super) robot: Robot,
+    data: Data<f64>,
+    /// Whether this is the end of a horizon, where nothing moves.
+    still: bool,
+    /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
+    da_du: Vec<f64>,
+    /// Zeros, at the end of a horizon. Shape: nv × nv.
+    zeros: DMatrix<f64>,
+}
+
+/// A knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
 ///
 /// ```text
-/// q̈ = aba(q, v, τ),   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
+/// q̈ = aba(q, v, S u),   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// The state is x = (q, v); the controls are the efforts τ of all joints but a free-flyer at the root, which nothing
-/// drives. A terminal knot has no controls and no Δt: ℓ = Σ w a(r). These are Crocoddyl's rules.
-#[derive(Clone, Debug)]
-pub struct FreeDynamics {
-    model: Arc<Model>,
-    data: Data<f64>,
-    costs: Costs,
-    /// Δt; none at a terminal knot.
-    dt: Option<f64>,
-    /// Degrees of freedom that no control drives, the first ones.
-    passive: usize,
-    groups: Vec<Range<usize>>,
-    tau: Vec<f64>,
-    /// v Δt + q̈ Δt².
-    dq: Vec<f64>,
-    /// ∂(q ⊕ dq)/∂q and ∂(q ⊕ dq)/∂dq.
-    transport: DMatrix<f64>,
-    exp: DMatrix<f64>,
+/// The state is x = (q, v). A terminal knot has no controls and no Δt: ℓ = Σ w a(r). These are Crocoddyl's rules.
+///
+/// ```
+/// use condyle_dynamics::robots;
+/// use condyle_optimal::ActionModel;
+/// use condyle_optimal::robot::{Actuation, FreeDynamics, Integrator};
+/// use std::sync::Arc;
+/// let quadruped = Arc::new(robots::quadruped());
+/// let mut fall = FreeDynamics::running(quadruped.clone(), 0.1, vec![])?;
+/// let (mut x, mut next) = (condyle_dynamics::neutral(&quadruped), vec![0.0; 37]);
+/// x.extend([0.0; 18]);
+/// fall.calc(0, &x, &[0.0; 12], &mut next);
+/// assert!((next[2] + 9.81 * 0.01).abs() < 1e-12); // −g Δt²
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+pub type FreeDynamics = Integrated<Free>;
+
+impl Free {
+    /// Of a robot with some drives.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for drives of another robot, or a robot with
+    /// joints that move no mass.
+    pub fn new(model: Arc<Model>, actuation: Actuation, costs: Vec<Cost>) -> Result<Self, Error> {
+        let offer = Offer { nu: actuation.nu(), effort: true, ..Offer::default() };
+        let free = Self::make(model, actuation, offer, costs)?;
+        free.robot.check_regular()?;
+        Ok(free)
+    }
+
+    fn make(model: Arc<Model>, actuation: Actuation, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
+        let (nv, still) = (model.nv(), !offer.effort);
+        Ok(Self {
+            data: Data::new(&model),
+            da_du: actuation.scratch(),
+            robot: Robot::new(model, actuation, offer, costs)?,
+            still,
+            zeros: DMatrix::zeros(nv, nv),
+        })
+    }
 }
 
 impl FreeDynamics {
-    /// A knot of Δt seconds.
+    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other
+    /// drives or integrators see [`Free::new`] and [`Integrated::new`].
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0.
+    /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0, [`Error::Actuation`] for
+    /// a robot with joints that move no mass.
     pub fn running(model: Arc<Model>, dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::TimeStep { dt });
-        }
-        Self::new(model, Some(dt), costs)
+        let actuation = Actuation::joints(&model);
+        Self::new(Free::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
     }
 
     /// The knot after the last one. Terms of the control must have an empty reference: there is none.
@@ -55,153 +90,99 @@ impl FreeDynamics {
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.
     pub fn terminal(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
-        Self::new(model, None, costs)
+        let none = Actuation::none(&model);
+        Ok(Self::end(Free::make(model, none, Offer::default(), costs)?))
     }
 
-    fn new(model: Arc<Model>, dt: Option<f64>, costs: Vec<Cost>) -> Result<Self, Error> {
-        let nv = model.nv();
-        let passive = match model.bodies().get(1) {
-            Some(root) if root.joint == Joint::FreeFlyer => 6,
-            _ => 0,
-        };
-        let nu = if dt.is_some() { nv - passive } else { 0 };
-        Ok(Self {
-            data: Data::new(&model),
-            costs: Costs::new(model.clone(), nu, costs)?,
-            dt,
-            passive,
-            groups: groups(&model),
-            tau: vec![0.0; nv],
-            dq: vec![0.0; nv],
-            transport: DMatrix::zeros(nv, nv),
-            exp: DMatrix::zeros(nv, nv),
-            model,
-        })
-    }
-
-    /// The robot.
-    pub fn model(&self) -> &Arc<Model> {
-        &self.model
-    }
-
-    /// The costs, to change their weights between solves.
-    pub fn costs_mut(&mut self) -> &mut Costs {
-        &mut self.costs
-    }
-
-    /// The efforts that hold the robot still at a state, of the joints that are driven: u = g(q).
+    /// The efforts that hold the robot still at a state, u = S⁺ g(q): the smallest ones that come nearest to it. Allocates.
     ///
     /// # Panics
     /// If `x` has not nq + nv numbers.
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        assert!(x.len() == self.nx(), "x: expected {} numbers, found {}", self.nx(), x.len());
-        gravity(&self.model, &mut self.data, &x[..self.model.nq()])[self.passive..].to_vec()
-    }
-
-    /// τ = (0, u).
-    fn set_tau(&mut self, u: &[f64]) {
-        self.tau[..self.passive].fill(0.0);
-        self.tau[self.passive..].copy_from_slice(u);
+        let Free { robot, data, .. } = &mut self.inner;
+        let (nq, nx) = (robot.model.nq(), robot.model.nq() + robot.model.nv());
+        assert!(x.len() == nx, "x: expected {nx} numbers, found {}", x.len());
+        robot.actuation.hold(gravity(&robot.model, data, &x[..nq]), &DMatrix::zeros(0, robot.model.nv()))
     }
 }
 
-impl ActionModel for FreeDynamics {
-    fn nx(&self) -> usize {
-        self.model.nq() + self.model.nv()
+robot_knot!(FreeDynamics, inner);
+
+impl ContinuousModel for Free {
+    fn nq(&self) -> usize {
+        self.robot.model.nq()
     }
 
-    fn ndx(&self) -> usize {
-        2 * self.model.nv()
+    fn nv(&self) -> usize {
+        self.robot.model.nv()
     }
 
     fn nu(&self) -> usize {
-        if self.dt.is_some() { self.model.nv() - self.passive } else { 0 }
+        self.robot.actuation.nu()
     }
 
-    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
-        let cost = self.costs.calc(x, u);
-        let Some(dt) = self.dt else { return cost };
-        self.set_tau(u);
-        let (q, v) = x.split_at(self.model.nq());
-        let (q_next, v_next) = next.split_at_mut(q.len());
-        let a = aba(&self.model, &mut self.data, q, v, &self.tau, &[]);
-        for k in 0..v.len() {
-            v_next[k] = v[k] + a[k] * dt; // v⁺ = v + q̈ Δt
-            self.dq[k] = v[k] * dt + a[k] * dt * dt; // v Δt + q̈ Δt²
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
+        let Self { robot, data, .. } = self;
+        if self.still {
+            let scene = Scene { x, u, a: &[], tau: &[], lambda: &[] };
+            return (&[], robot.schedule.calc(t, &scene));
         }
-        integrate(&self.model, q, &self.dq, q_next);
-        dt * cost
+        robot.actuation.effort(u, &mut robot.tau); // τ = S u
+        let (q, v) = x.split_at(robot.model.nq());
+        let a = aba(&robot.model, data, q, v, &robot.tau, &[]);
+        let scene = Scene { x, u, a, tau: &robot.tau, lambda: &[] };
+        (a, robot.schedule.calc(t, &scene))
     }
 
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.costs.calc_diff(x, u, self.dt.unwrap_or(1.0), node);
-        let Some(dt) = self.dt else { return };
-        self.set_tau(u);
-        let (nv, nu, passive) = (self.model.nv(), u.len(), self.passive);
-        let (q, v) = x.split_at(self.model.nq());
-        let d = aba_derivatives(&self.model, &mut self.data, q, v, &self.tau, &[]);
-        for k in 0..nv {
-            self.dq[k] = v[k] * dt + d.a[k] * dt * dt;
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_> {
+        let Self { robot, data, zeros, .. } = self;
+        if self.still {
+            let scene = Scene { x, u, a: &[], tau: &[], lambda: &[] };
+            robot.schedule.calc_diff(t, &scene, &NoSlopes, scale, node);
+            return Derivatives { a: &[], da_dq: zeros, da_dv: zeros, da_du: &[] };
         }
-        // A = [T + E ∂q̈/∂q Δt², E (1 Δt + ∂q̈/∂v Δt²); ∂q̈/∂q Δt, 1 + ∂q̈/∂v Δt],  B = [E M⁻¹ Δt²; M⁻¹ Δt],
-        // with T = ∂(q ⊕ dq)/∂q and E = ∂(q ⊕ dq)/∂dq, the identity but for the groups' blocks
-        for (columns, da) in [(0, d.da_dq), (nv, d.da_dv)] {
-            for c in 0..nv {
-                for r in 0..nv {
-                    let x = da[(r, c)] * dt;
-                    node.A[(nv + r, columns + c)] = x;
-                    node.A[(r, columns + c)] = x * dt;
-                }
-            }
-        }
-        for k in 0..nv {
-            node.A[(k, nv + k)] += dt;
-            node.A[(nv + k, nv + k)] += 1.0;
-        }
-        for c in 0..nu {
-            for r in 0..nv {
-                let x = d.da_dtau[(r, passive + c)] * dt;
-                node.B[(nv + r, c)] = x;
-                node.B[(r, c)] = x * dt;
-            }
-        }
-        if !self.groups.is_empty() {
-            integrate_jacobian(&self.model, &self.dq, IntegrateArgument::Velocity, &mut self.exp);
-            integrate_jacobian(&self.model, &self.dq, IntegrateArgument::Position, &mut self.transport);
-        }
-        let in_group = |k: usize| self.groups.iter().any(|g| g.contains(&k));
-        for k in (0..nv).filter(|&k| !in_group(k)) {
-            node.A[(k, k)] += 1.0;
-        }
-        for group in &self.groups {
-            apply_block(&self.exp, group, &mut node.A);
-            apply_block(&self.exp, group, &mut node.B);
-            for c in group.clone() {
-                for r in group.clone() {
-                    node.A[(r, c)] += self.transport[(r, c)];
-                }
-            }
-        }
+        robot.actuation.effort(u, &mut robot.tau);
+        let (q, v) = x.split_at(robot.model.nq());
+        let d = aba_derivatives(&robot.model, data, q, v, &robot.tau, &[]);
+        let scene = Scene { x, u, a: d.a, tau: &robot.tau, lambda: &[] };
+        robot.schedule.calc_diff(t, &scene, &FreeSlopes { d, actuation: &robot.actuation }, scale, node);
+        let da_du = robot.actuation.columns(d.da_dtau, &mut self.da_du); // M⁻¹ S
+        Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
     }
 
-    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
-        state_integrate(&self.model, x, dx, out);
+    fn groups(&self) -> &[Range<usize>] {
+        &self.robot.groups
     }
 
-    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
-        state_difference(&self.model, x0, x1, out);
+    fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
+        integrate(&self.robot.model, q, dq, out);
+    }
+
+    fn difference(&self, q0: &[f64], q1: &[f64], out: &mut [f64]) {
+        difference(&self.robot.model, q0, q1, out);
+    }
+
+    fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
+        self.robot.integrate_jacobians(dq, by_q, by_dq);
     }
 }
 
-/// The rows of a group times its block of E, in place.
-fn apply_block(E: &DMatrix<f64>, group: &Range<usize>, X: &mut DMatrix<f64>) {
-    let mut rows = [0.0; 6];
-    for mut column in X.column_iter_mut() {
-        for (k, r) in group.clone().enumerate() {
-            rows[k] = group.clone().map(|c| E[(r, c)] * column[c]).sum();
-        }
-        for (k, r) in group.clone().enumerate() {
-            column[r] = rows[k];
+struct FreeSlopes<'a> {
+    d: AbaDerivatives<'a, f64>,
+    actuation: &'a Actuation,
+}
+
+impl Slopes for FreeSlopes<'_> {
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]) {
+        let nv = self.d.a.len();
+        match signal {
+            Signal::Acceleration => {
+                add_matrix_row(self.d.da_dq, row, c, &mut g[..nv]);
+                add_matrix_row(self.d.da_dv, row, c, &mut g[nv..2 * nv]);
+                self.actuation.add_product_row(self.d.da_dtau, row, c, &mut g[2 * nv..]);
+            }
+            Signal::Effort => self.actuation.add_row(row, c, &mut g[2 * nv..]),
+            Signal::Force => {}
         }
     }
 }

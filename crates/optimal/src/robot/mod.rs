@@ -1,4 +1,10 @@
-//! Robots as optimal control problems: the state x = (q, v), costs, and the action of a robot that moves freely.
+//! Robots as optimal control problems: the state x = (q, v), costs, and the actions of robots that move freely, are in
+//! contact, or hit something.
+//!
+//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name.
+//! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
+//!   [`InverseDynamics`] the accelerations are the controls. What drives a robot is its [`Actuation`]; how a knot steps through its time, its [`Integrator`].
+//! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
 //!
 //! ```
 //! use condyle_dynamics::robots;
@@ -34,9 +40,32 @@
 //! ```
 #![allow(non_snake_case)] // the names of the literature
 
+mod activation;
+mod actuation;
+mod common;
+mod cones;
+mod contact;
+mod contacts;
 mod costs;
+mod euler;
 mod free;
+mod impulse;
+mod integrated;
+mod inverse;
+mod quadratic;
+mod residual;
+mod runge_kutta;
 mod state;
+mod watch;
 
-pub use costs::{Activation, Cost, Costs, Residual};
-pub use free::FreeDynamics;
+pub use activation::Activation;
+pub use actuation::Actuation;
+pub use cones::{FrictionCone, WrenchCone};
+pub use contact::Contact;
+pub use contacts::{ContactDynamics, Contacts};
+pub use costs::{Cost, Costs};
+pub use free::{Free, FreeDynamics};
+pub use impulse::ImpulseDynamics;
+pub use integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+pub use inverse::{Inverse, InverseDynamics};
+pub use residual::Residual;

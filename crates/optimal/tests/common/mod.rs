@@ -1,9 +1,11 @@
 //! Actions without a robot, for the tests.
 #![allow(dead_code)] // each test file uses some of them
+#![allow(non_snake_case)] // A, B, T, E
 
 use condyle_optimal::{ActionModel, LqNode, Problem};
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt, SeedableRng, rngs::StdRng};
+use std::ops::Range;
 
 pub(crate) fn random() -> StdRng {
     StdRng::seed_from_u64(7)
@@ -27,6 +29,25 @@ pub(crate) fn random_node(random: &mut impl Rng, ndx: usize, nu: usize) -> LqNod
     node.R.copy_from(&hessian.view((ndx, ndx), (nu, nu)));
     node.q = random_matrix(random, ndx, 1).column(0).into_owned();
     node.r = random_matrix(random, nu, 1).column(0).into_owned();
+    node
+}
+
+/// As [`random_node`], with the A and B of semi-implicit Euler: nv numbers for q and for v, T and E the identity but for
+/// random blocks over `blocks`.
+pub(crate) fn random_euler_node(random: &mut impl Rng, nv: usize, nu: usize, blocks: &[Range<usize>]) -> LqNode {
+    let (mut node, dt) = (random_node(random, 2 * nv, nu), 0.05);
+    let (mut T, mut E) = (DMatrix::identity(nv, nv), DMatrix::identity(nv, nv));
+    for (block, range) in node.structure.set_euler(dt, blocks).iter_mut().zip(blocks) {
+        block.T = random_matrix(random, range.len(), range.len());
+        block.E = random_matrix(random, range.len(), range.len());
+        T.view_mut((range.start, range.start), block.T.shape()).copy_from(&block.T);
+        E.view_mut((range.start, range.start), block.E.shape()).copy_from(&block.E);
+    }
+    let mut upper = &E * node.A.rows(nv, nv) * dt;
+    upper += T.resize_horizontally(2 * nv, 0.0);
+    node.A.rows_mut(0, nv).copy_from(&upper);
+    let upper = &E * node.B.rows(nv, nv) * dt;
+    node.B.rows_mut(0, nv).copy_from(&upper);
     node
 }
 
@@ -106,9 +127,55 @@ impl ActionModel for Unicycle {
     }
 }
 
+/// An action whose controls are bounded, by the same numbers at every knot.
+pub(crate) struct Limited<A> {
+    pub(crate) action: A,
+    pub(crate) lower: Vec<f64>,
+    pub(crate) upper: Vec<f64>,
+}
+
+impl<A: ActionModel> ActionModel for Limited<A> {
+    fn nx(&self) -> usize {
+        self.action.nx()
+    }
+    fn nu(&self) -> usize {
+        self.action.nu()
+    }
+    fn lanes(&self) -> usize {
+        self.action.lanes()
+    }
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        Some((&self.lower, &self.upper))
+    }
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.action.calc(t, x, u, next)
+    }
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.action.calc_diff(t, x, u, node);
+    }
+}
+
+/// A horizon of knots that are all the same.
+fn horizon_of<A: ActionModel>(
+    x0: &[f64],
+    horizon: usize,
+    action: A,
+    bounds: Option<[Vec<f64>; 2]>,
+    terminal: A,
+) -> Problem {
+    let running: Box<dyn ActionModel> = match bounds {
+        Some([lower, upper]) => Box::new(Limited { action, lower, upper }),
+        None => Box::new(action),
+    };
+    Problem::new(x0.to_vec(), vec![running], vec![0; horizon], Box::new(terminal)).unwrap()
+}
+
+pub(crate) fn limited_unicycle(x0: &[f64], horizon: usize, lanes: usize, bounds: Option<[Vec<f64>; 2]>) -> Problem {
+    horizon_of(x0, horizon, Unicycle { nu: 2, lanes }, bounds, Unicycle { nu: 0, lanes })
+}
+
 pub(crate) fn unicycle(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
-    let models: Vec<Box<dyn ActionModel>> = vec![Box::new(Unicycle { nu: 2, lanes })];
-    Problem::new(x0.to_vec(), models, vec![0; horizon], Box::new(Unicycle { nu: 0, lanes })).unwrap()
+    limited_unicycle(x0, horizon, lanes, None)
 }
 
 /// A pole on a cart, θ = 0 upright, x = (y, θ, ẏ, θ̇), u = (f): semi-implicit Euler steps of Δt = 0.03 s.
@@ -208,9 +275,18 @@ impl ActionModel for Cartpole {
 pub(crate) const HANGING: [f64; 4] = [0.0, 3.14, 0.0, 0.0];
 
 pub(crate) fn cartpole(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
-    let running = Cartpole { nu: 1, lanes, weights: [1.0, 0.1, 0.1, 0.1, 0.3] };
+    limited_cartpole(x0, horizon, lanes, None)
+}
+
+/// A knot of the swing-up.
+pub(crate) fn cartpole_action() -> Cartpole {
+    Cartpole { nu: 1, lanes: 1, weights: [1.0, 0.1, 0.1, 0.1, 0.3] }
+}
+
+pub(crate) fn limited_cartpole(x0: &[f64], horizon: usize, lanes: usize, bounds: Option<[Vec<f64>; 2]>) -> Problem {
+    let running = Cartpole { lanes, ..cartpole_action() };
     let terminal = Cartpole { nu: 0, lanes, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
-    Problem::new(x0.to_vec(), vec![Box::new(running)], vec![0; horizon], Box::new(terminal)).unwrap()
+    horizon_of(x0, horizon, running, bounds, terminal)
 }
 
 /// `horizon` + 1 states on the straight line from `first` to `last`, flat.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes crocoddyl.json beside this file: what SolverFDDP does on small problems, iteration by iteration.
+"""Writes crocoddyl.json beside this file: what each solver does on small problems, iteration by iteration.
 
     pip install crocoddyl==3.2.1 pin==4.0.0 && python make_crocoddyl.py
 
@@ -57,23 +57,36 @@ class Trace(crocoddyl.CallbackAbstract):
         self.rows.append([float(v) for v in row])
 
 
-def unicycle():
+SOLVERS = {
+    "fddp": crocoddyl.SolverFDDP,
+    "ddp": crocoddyl.SolverDDP,
+    "box fddp": crocoddyl.SolverBoxFDDP,
+    "box ddp": crocoddyl.SolverBoxDDP,
+}
+
+
+def unicycle(bounds=None):
     m = crocoddyl.ActionModelUnicycle()
     m.dt, m.costWeights = 0.1, np.array([10.0, 1.0])
+    if bounds is not None:
+        m.u_lb, m.u_ub = (np.array(b) for b in bounds)
     return m
 
 
-def solve(x0, running, terminal, n, guess, max_iterations, regularisation=1e-9):
+def solve(x0, running, terminal, n, guess, max_iterations, regularisation=1e-9, solver="fddp"):
+    bounds = [running.u_lb.tolist(), running.u_ub.tolist()] if solver.startswith("box") else None
+    name = solver
     x0 = np.array(x0)
     problem = crocoddyl.ShootingProblem(x0, [running] * n, terminal)
     end = x0 if guess is None else np.array(guess)
     xs = [x0 + (end - x0) * (t / n) for t in range(n + 1)]
     us = [np.zeros(running.nu)] * n
-    solver, trace = crocoddyl.SolverFDDP(problem), Trace()
+    solver, trace = SOLVERS[solver](problem), Trace()
     solver.setCallbacks([trace])
     converged = solver.solve(xs, us, max_iterations, False, regularisation)
     return {
         "x0": x0.tolist(), "horizon": n, "last_guess": end.tolist(), "max_iterations": max_iterations, "regularisation": regularisation,
+        "method": name.split()[-1], "bounds": bounds,
         "converged": bool(converged), "K0": np.asarray(solver.K[0]).tolist(), "u0": np.asarray(solver.us[0]).tolist(),
         "x_last": np.asarray(solver.xs[n]).tolist(), "trace": trace.rows,
     }  # fmt: skip
@@ -84,6 +97,9 @@ def main():
     keep = Cartpole([1.0, 0.1, 0.1, 0.1, 0.3]), Cartpole([100.0, 10.0, 10.0, 10.0, 0.0])
     running, terminal = (crocoddyl.IntegratedActionModelEuler(m, 0.03) for m in keep)
     hanging = [0.0, 3.14, 0.0, 0.0]
+    slow = unicycle(([-0.5, -1.0], [3.0, 1.5]))
+    weak = crocoddyl.IntegratedActionModelEuler(keep[0], 0.03)
+    weak.u_lb, weak.u_ub = np.array([-8.0]), np.array([6.0])
     problems = {
         "unicycle_20": solve([-1.0, -1.0, 1.0], u, u, 20, None, 100),
         "unicycle_200": solve([-1.0, -1.0, 1.0], u, u, 200, None, 100),
@@ -92,6 +108,14 @@ def main():
         "cartpole_gaps": solve(hanging, running, terminal, 50, [1.0, 0.0, 2.0, 0.0], 300),
         "cartpole_spinning": solve(hanging, running, terminal, 50, [-5.0, 9.0, 0.0, 30.0], 8),
         "cartpole_regularised": solve(hanging, running, terminal, 50, None, 300, 10.0),
+        "unicycle_ddp": solve([-1.0, -1.0, 1.0], u, u, 50, [3.0, 2.0, -2.0], 100, solver="ddp"),
+        "cartpole_ddp": solve([0.0, 0.3, 0.0, 0.0], running, terminal, 50, None, 100, solver="ddp"),
+        "cartpole_ddp_falling": solve(hanging, running, terminal, 50, None, 12, solver="ddp"),
+        "unicycle_box_fddp": solve([-1.0, -1.0, 1.0], slow, slow, 50, None, 100, solver="box fddp"),
+        "unicycle_box_gaps": solve([-1.0, -1.0, 1.0], slow, slow, 50, [3.0, 2.0, -2.0], 100, solver="box fddp"),
+        "unicycle_box_ddp": solve([-1.0, -1.0, 1.0], slow, slow, 50, [3.0, 2.0, -2.0], 100, solver="box ddp"),
+        "cartpole_box_fddp": solve(hanging, weak, terminal, 50, None, 300, solver="box fddp"),
+        "cartpole_box_ddp": solve(hanging, weak, terminal, 50, None, 300, solver="box ddp"),
     }
     out = {"crocoddyl": crocoddyl.__version__, "columns": Trace.COLUMNS, "problems": problems}
     pathlib.Path(__file__).with_name("crocoddyl.json").write_text(json.dumps(out, indent=None) + "\n")

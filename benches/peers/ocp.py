@@ -1,0 +1,155 @@
+#!/usr/bin/env python3
+"""Solves optimal control problems with Condyle and with Crocoddyl 3.2, and compares every iteration and the time.
+
+    .venv/crocoddyl/bin/python benches/peers/ocp.py [OPTION ...] [NAME ...]
+
+Each problem is built in both libraries from the same JSON: problems of a folder (with the robots in its `robots`), or
+else those that `ocp_problems.py` makes. Compared are the costs of all iterations (to 1e-6 of each), their step lengths
+and regularisations, and the optimum; the stopping value, which loses its digits near the optimum, is only shown. Both
+are timed in turn, round after round, on one core: figures are medians of milliseconds in an iteration, for the whole
+solve and for its phases. Needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment, which `./test` makes.
+"""
+
+import argparse
+import json
+import math
+import os
+import statistics
+import sys
+from pathlib import Path
+
+import numpy as np
+from ocp_ours import Ours
+from ocp_problems import PROBLEMS
+from ocp_robots import NotRunError
+from ocp_theirs import Theirs
+
+COST = 1e-6
+"""How near the costs of an iteration must be, relatively: Crocoddyl repeats its own when perturbed by 1e-12."""
+CHAOTIC = {
+    ("arm_kinova_cold", "fddp"): 3,
+    ("arm_kinova_box", "boxfddp"): 1,
+    ("talos_manip_100", "fddp"): 0,
+    ("talos_taichi", "fddp"): 0,
+    ("talos_taichi", "boxfddp"): 0,
+}
+"""Problems and solvers of which Crocoddyl does not repeat its own trace, and how many leading iterations it does."""
+OPTIMUM = 1e-6
+"""How near the final costs must be, relatively."""
+
+
+def load(folder, name):
+    """A problem's JSON and its robot's, None without a robot."""
+    spec = json.loads((folder / f"{name}.json").read_text())
+    robot = spec["robot"] and json.loads((folder / "robots" / f"{spec['robot']}.json").read_text())
+    return spec, robot
+
+
+def agreeing(ours, theirs):
+    """How many leading iterations have the same step and regularisation, and costs within `COST`."""
+    n = min(len(ours), len(theirs))
+    a, b = ours[:n], theirs[:n]
+    near = np.abs(a[:, 0] - b[:, 0]) <= COST * np.maximum(np.abs(b[:, 0]), 1e-12)
+    same = near & (a[:, 1] == b[:, 1]) & np.isclose(a[:, 2], b[:, 2], rtol=1e-9, atol=0.0)
+    return n if same.all() else int(np.argmin(same))
+
+
+def compare(spec, robot, solver):
+    """Both solves of a problem with one of its solvers, and what there is to say of them."""
+    theirs, result = Theirs(spec, robot, solver), {"name": spec["name"], "solver": solver}
+    ours = Ours(spec, robot, solver)
+    xs, us = theirs.warm_start()
+    a, b = ours.solve(xs, us), theirs.solve(xs, us)
+    same = agreeing(a.rows, b.rows)
+    case = (spec["name"], solver)
+    asked = CHAOTIC.get(case, len(b.rows))
+    optimum = abs(a.cost - b.cost) / max(abs(b.cost), 1e-300)
+    good = same >= min(asked, len(b.rows)) and optimum <= OPTIMUM
+    if case not in CHAOTIC:
+        good &= len(a.rows) == len(b.rows)
+    result |= {
+        "iterations": [len(a.rows), len(b.rows)],
+        "same": same,
+        "cost": [a.cost, b.cost],
+        "optimum": optimum,
+        "good": bool(good),
+    }
+    return result, ours, theirs, a, b, (xs, us)
+
+
+def time_both(ours, theirs, start, iterations, trials, rounds):
+    """Medians over the rounds of milliseconds in an iteration, of both and of their quotient."""
+    names = ("total", "derivatives", "sweep", "rollout")
+    rows = []
+    for _ in range(rounds):
+        a = ours.solve(*start).phases
+        b = theirs.time(*start, iterations, trials)
+        rows.append({n: (1e3 * a[n] / iterations, 1e3 * b[n] / iterations) for n in names})
+    return {
+        n: {
+            "ours": statistics.median(r[n][0] for r in rows),
+            "theirs": statistics.median(r[n][1] for r in rows),
+            "ratio": statistics.median(r[n][0] / r[n][1] for r in rows),
+        }
+        for n in names
+    }
+
+
+def line(result):
+    """A result as a line of text."""
+    case = f"{result['name']} {result['solver']}"
+    if "not_run" in result:
+        return f"{case:34} not run: {result['not_run']}"
+    verdict = "same" if result["good"] else "DIFFERENT"
+    same = f"{result['same']:3} of {result['iterations']} iterations"
+    text = f"{case:34} {verdict:9} {same}, optimum {result['optimum']:.1e}"
+    for phase, t in result.get("time", {}).items():
+        text += f"  {phase} {t['ours']:.3f}/{t['theirs']:.3f} = {t['ratio']:.3f}"
+    return text
+
+
+def run(spec, robot, solver, options):
+    """Compares both solves of a problem, and their times, and prints it; says whether they are the same."""
+    show = json.dumps if options.json else line
+    try:
+        result, ours, theirs, a, b, start = compare(spec, robot, solver)
+    except NotRunError as missing:
+        print(show({"name": spec["name"], "solver": solver, "not_run": str(missing)}), flush=True)
+        return True
+    if options.rounds and len(a.rows) == len(b.rows):
+        trials = int(sum(round(-math.log2(step)) + 1 for step in b.rows[:, 1]))
+        result["time"] = time_both(ours, theirs, start, len(b.rows), trials, options.rounds)
+    print(show(result), flush=True)
+    if options.trace:
+        for k in range(max(len(a.rows), len(b.rows))):
+            for solve in (a, b):
+                if k < len(solve.rows):
+                    cost, step, regularisation, stop = solve.rows[k]
+                    print(f"  {k:3} cost {cost:.12e} step {step:.4f} reg {regularisation:.0e} stop {stop:.3e}")
+    return result["good"]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--problems", type=Path, help="a folder of problems")
+    parser.add_argument("--solver", help="one of fddp, ddp, boxfddp, boxddp; all that a problem names unless given")
+    parser.add_argument("--json", action="store_true", help="a line of JSON for each problem")
+    parser.add_argument("--trace", action="store_true", help="show the iterations of both")
+    parser.add_argument("--rounds", type=int, default=5, help="how often both are timed; 0 for not at all")
+    parser.add_argument("--cpu", type=int, help="the core to run on")
+    parser.add_argument("names", nargs="*")
+    options = parser.parse_args()
+    if options.cpu is not None:
+        os.sched_setaffinity(0, {options.cpu})
+    problems = PROBLEMS if options.problems is None else sorted(p.stem for p in options.problems.glob("*.json"))
+    good = True
+    for name in options.names or problems:
+        spec, robot = PROBLEMS[name]() if options.problems is None else load(options.problems, name)
+        for solver in spec["solvers"]:
+            if options.solver in (None, solver):
+                good &= run(spec, robot, solver, options)
+    sys.exit(not good)
+
+
+if __name__ == "__main__":
+    main()

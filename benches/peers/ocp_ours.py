@@ -1,0 +1,116 @@
+"""Optimal control problems, from their JSON, in Condyle."""
+
+import time
+
+import numpy as np
+from ocp_actions import Cartpole, DoublePendulum, unicycle
+from ocp_robots import FRAMES, Solve, actuation_matrix, bounds, homogeneous, our_robot
+
+import condyle
+from condyle import optimal
+
+
+def our_activation(activation, residual):
+    kind = activation["type"]
+    if kind == "quad":
+        return None
+    if kind == "weighted_quad":
+        return optimal.Activation.weighted(activation["w"])
+    if kind == "quadratic_barrier":
+        return optimal.Activation.barrier(bounds(activation["lb"], -np.inf), bounds(activation["ub"], np.inf))
+    assert kind == "cone_barrier", kind
+    return None  # what a cone's residual has unless told otherwise
+
+
+def our_cost(cost, model, terminal, contacts):
+    """A `Cost`, or None for one that a terminal knot has not."""
+    residual, name, weight = cost["residual"], cost["name"], cost["weight"]
+    kind, activation = residual["type"], our_activation(cost["activation"], residual)
+    if terminal and kind in ("control", "friction_cone", "wrench_cone"):
+        return None
+    if kind == "state":
+        return optimal.Cost.state(name, weight, residual["ref"], activation)
+    if kind == "control":
+        return optimal.Cost.control(name, weight, residual["ref"], activation)
+    if kind == "frame_placement":
+        return optimal.Cost.frame_placement(name, weight, model, residual["frame"], homogeneous(residual), activation)
+    if kind == "frame_translation":
+        return optimal.Cost.frame_translation(name, weight, model, residual["frame"], residual["p"], activation)
+    if kind == "com":
+        return optimal.Cost.center_of_mass(name, weight, residual["p"], activation)
+    cone = optimal.FrictionCone(residual["mu"], residual["nf"], residual["inner"])
+    contact = contacts[residual["frame"]]
+    if kind == "friction_cone":
+        return optimal.Cost.friction_cone(name, weight, contact, cone, activation)
+    assert kind == "wrench_cone", kind
+    return optimal.Cost.wrench_cone(name, weight, contact, optimal.WrenchCone(cone, residual["box"]), activation)
+
+
+def our_contact(contact, gains):
+    """A `Constraint` of a contact's or an impulse's JSON."""
+    placement = np.eye(4)
+    if "ref" in contact:
+        placement[:3, 3] = contact["ref"]["p"]
+        placement[:3, :3] = contact["ref"].get("R", np.eye(3))
+    kind, axes = {3: "point", 6: "rigid"}[contact["dim"]], FRAMES[contact["frame_type"]][1]
+    return condyle.Constraint(contact["frame"], kind, reference=axes, kp=gains[0], kd=gains[1], placement=placement)
+
+
+def our_action(stage, model, spec, terminal, bounded):
+    kind = stage["kind"]
+    if kind == "unicycle":
+        return unicycle(stage)[terminal]
+    if kind == "cartpole":
+        return Cartpole(stage).actions()[terminal]
+    if any(cost["residual"]["type"] == "double_pendulum" for cost in stage["costs"]):
+        return DoublePendulum(model, stage).actions()[terminal]
+    listed = stage["impulses"] if kind == "impulse" else stage["dynamics"].get("contacts", [])
+    names = {contact["frame"]: contact.get("name", contact["frame"]) for contact in listed}
+    costs = [our_cost(cost, model, terminal, names) for cost in stage["costs"]]
+    costs = [cost for cost in costs if cost is not None]
+    contacts = {
+        names[contact["frame"]]: our_contact(contact, (contact.get("kp", 0.0), contact.get("kd", 0.0)))
+        for contact in listed
+    }
+    if kind == "impulse":
+        return optimal.ImpulseDynamics(model, contacts, costs, stage["restitution"], stage["damping"])
+    if terminal:
+        return optimal.FreeDynamics(model, None, costs)
+    actuation = actuation_matrix(spec, model.nv)
+    limits = {}
+    if bounded and "u_lb" in stage:
+        limits = {"lower": bounds(stage["u_lb"], -np.inf), "upper": bounds(stage["u_ub"], np.inf)}
+    if stage["dynamics"]["type"] == "free_fwd":
+        return optimal.FreeDynamics(model, stage["dt"], costs, actuation, **limits)
+    damping = stage["dynamics"]["damping"]
+    return optimal.ContactDynamics(model, contacts, stage["dt"], costs, damping, actuation, **limits)
+
+
+class Ours:
+    """A problem of a JSON in Condyle, for what Crocoddyl's solver of some name does."""
+
+    def __init__(self, spec, robot, solver):
+        bounded = solver.startswith("box")
+        model = our_robot(robot) if robot else None
+        used = sorted(set(spec["stages"]))
+        models = [our_action(spec["stage_models"][k], model, spec, False, bounded) for k in used]
+        stages = [used.index(k) for k in spec["stages"]]
+        terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, True, bounded)
+        self.problem = optimal.Problem(spec["x0"], models, stages, terminal)
+        settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
+        if spec["init_reg"] is not None:
+            settings["regularisation_start"] = spec["init_reg"]
+        if spec["th_stop"] is not None:
+            settings["tolerance"] = settings["tolerance_bounded"] = spec["th_stop"]
+        self.solver = optimal.Fddp(self.problem, **settings)
+
+    def solve(self, xs, us):
+        if len({len(u) for u in us}) == 1:
+            us = np.array(us)
+        begin = time.perf_counter()
+        s = self.solver.solve(np.array(xs), us)
+        total = time.perf_counter() - begin
+        rows = np.array([(i.cost, i.step, i.regularisation, i.stop) for i in s.trace])
+        t = s.timings
+        phases = {"total": total, "derivatives": t.calc_diff, "sweep": t.sweep, "rollout": t.rollout}
+        return Solve(rows, s.cost, s.xs, phases)

@@ -1,0 +1,108 @@
+//! The linear dynamics and quadratic cost of the textbook, as an action.
+#![allow(non_snake_case)] // the names of the literature
+
+use crate::action::ActionModel;
+use crate::lq::LqNode;
+
+/// x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper: of an [`LqNode`], which names them.
+///
+/// Without controls it is a terminal action. Crocoddyl's `ActionModelLQR`.
+///
+/// ```
+/// use condyle_optimal::{Fddp, LqNode, Lqr, Problem};
+///
+/// // x⁺ = x + u, ℓ = ½ (x² + u²): one step solves it.
+/// let (mut knot, mut end) = (LqNode::zeros(1, 1), LqNode::zeros(1, 0));
+/// (knot.A[0], knot.B[0], knot.Q[0], knot.R[0], end.Q[0]) = (1.0, 1.0, 1.0, 1.0, 1.0);
+/// let mut problem = Problem::new(vec![1.0], vec![Box::new(Lqr::new(knot))], vec![0; 30], Box::new(Lqr::new(end)))?;
+/// let solution = Fddp::new(&problem).solve(&mut problem, &[0.0; 31], &[0.0; 30])?.clone();
+/// assert!((solution.u(0)[0] + 0.618_034).abs() < 1e-6);
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lqr(LqNode);
+
+impl Lqr {
+    /// The action of a node.
+    ///
+    /// # Panics
+    /// If the shapes of the node's matrices do not fit each other.
+    pub fn new(node: LqNode) -> Self {
+        let (n, m) = (node.ndx(), node.nu());
+        for (name, found, expected) in [
+            ("A", node.A.shape(), (n, n)),
+            ("B", node.B.shape(), (n, m)),
+            ("Q", node.Q.shape(), (n, n)),
+            ("S", node.S.shape(), (n, m)),
+            ("R", node.R.shape(), (m, m)),
+            ("f", node.f.shape(), (n, 1)),
+            ("lower", node.lower.shape(), (m, 1)),
+            ("upper", node.upper.shape(), (m, 1)),
+        ] {
+            assert!(found == expected, "`{name}` has shape {found:?}, expected {expected:?}");
+        }
+        Self(node)
+    }
+}
+
+/// y += X z, for a matrix of as many columns as z has numbers.
+fn add_product(y: &mut [f64], X: &[f64], z: &[f64]) {
+    for (column, z) in X.chunks_exact(y.len()).zip(z) {
+        y.iter_mut().zip(column).for_each(|(y, x)| *y += x * z);
+    }
+}
+
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+/// xᵀ X z.
+fn product(x: &[f64], X: &[f64], z: &[f64]) -> f64 {
+    X.chunks_exact(x.len().max(1)).zip(z).map(|(column, z)| dot(x, column) * z).sum()
+}
+
+impl ActionModel for Lqr {
+    fn nx(&self) -> usize {
+        self.0.ndx()
+    }
+
+    fn nu(&self) -> usize {
+        self.0.nu()
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        Some((self.0.lower.as_slice(), self.0.upper.as_slice()))
+    }
+
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let LqNode { A, B, f, Q, S, R, q, r, .. } = &self.0;
+        next.copy_from_slice(f.as_slice());
+        add_product(next, A.as_slice(), x); // A x + B u + f
+        add_product(next, B.as_slice(), u);
+        let quadratic = 0.5 * product(x, Q.as_slice(), x) + 0.5 * product(u, R.as_slice(), u);
+        quadratic + product(x, S.as_slice(), u) + dot(q.as_slice(), x) + dot(r.as_slice(), u)
+    }
+
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        let own = &self.0;
+        for (to, from) in [
+            (&mut node.A, &own.A),
+            (&mut node.B, &own.B),
+            (&mut node.Q, &own.Q),
+            (&mut node.S, &own.S),
+            (&mut node.R, &own.R),
+        ] {
+            to.copy_from(from);
+        }
+        node.q.copy_from(&own.q);
+        node.r.copy_from(&own.r);
+        add_product(node.q.as_mut_slice(), own.Q.as_slice(), x); // q + Q x + S u
+        add_product(node.q.as_mut_slice(), own.S.as_slice(), u);
+        if !u.is_empty() {
+            add_product(node.r.as_mut_slice(), own.R.as_slice(), u); // r + R u + Sᵀ x
+            for (r, column) in node.r.iter_mut().zip(own.S.as_slice().chunks_exact(x.len())) {
+                *r += dot(column, x);
+            }
+        }
+    }
+}

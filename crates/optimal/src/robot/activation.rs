@@ -1,0 +1,155 @@
+//! Activations: how much a residual costs.
+
+/// How much a residual r costs: a(r).
+///
+/// ```
+/// use condyle_optimal::robot::Activation;
+/// let barrier = Activation::Barrier { lower: vec![-1.0, -1.0], upper: vec![1.0, f64::INFINITY] };
+/// assert_eq!(barrier.value(&[3.0, 3.0]), 2.0); // ½ (3 − 1)², and nothing for the second
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum Activation {
+    /// ½ Σ rᵢ².
+    Quadratic,
+    /// ½ Σ wᵢ rᵢ².
+    Weighted(
+        /// w, a number for each entry of the residual.
+        Vec<f64>,
+    ),
+    /// ½ Σ (excess of rᵢ over its bounds)²: nothing inside them.
+    Barrier {
+        /// Least values; −∞ for none.
+        lower: Vec<f64>,
+        /// Greatest values; ∞ for none.
+        upper: Vec<f64>,
+    },
+    /// ½ Σ wᵢ (excess of rᵢ over its bounds)². (Crocoddyl has the square of wᵢ in its value.)
+    WeightedBarrier {
+        /// Least values; −∞ for none.
+        lower: Vec<f64>,
+        /// Greatest values; ∞ for none.
+        upper: Vec<f64>,
+        /// w.
+        weights: Vec<f64>,
+    },
+    /// Σ √(ε + rᵢ²): nearly Σ |rᵢ|.
+    Smooth1 {
+        /// ε, above 0; 1 in Crocoddyl unless given.
+        epsilon: f64,
+    },
+    /// √(ε + ‖r‖²): nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least eigenvalue of the exact
+    /// one (for ε = 1 as in Crocoddyl).
+    Smooth2 {
+        /// ε, above 0; 1 in Crocoddyl unless given.
+        epsilon: f64,
+    },
+}
+
+/// How far r is beyond its bounds, with its sign.
+#[inline(always)]
+fn excess(r: f64, lower: f64, upper: f64) -> f64 {
+    (r - lower).min(0.0) + (r - upper).max(0.0)
+}
+
+impl Activation {
+    /// a(r).
+    ///
+    /// # Panics
+    /// If a weight or bound for an entry of r is missing.
+    pub fn value(&self, r: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        match self {
+            Self::Quadratic => r.iter().for_each(|r| sum += 0.5 * r * r),
+            Self::Weighted(w) => (0..r.len()).for_each(|i| sum += 0.5 * w[i] * r[i] * r[i]),
+            Self::Barrier { lower, upper } => {
+                for i in 0..r.len() {
+                    let e = excess(r[i], lower[i], upper[i]);
+                    sum += 0.5 * e * e;
+                }
+            }
+            Self::WeightedBarrier { lower, upper, weights } => {
+                for i in 0..r.len() {
+                    let e = excess(r[i], lower[i], upper[i]);
+                    sum += 0.5 * weights[i] * e * e;
+                }
+            }
+            Self::Smooth1 { epsilon } => r.iter().for_each(|r| sum += (epsilon + r * r).sqrt()),
+            Self::Smooth2 { epsilon } => sum = (epsilon + square(r)).sqrt(),
+        }
+        sum
+    }
+
+    /// a′ᵢ and a″ᵢ, the gradient and the diagonal of the Hessian.
+    pub(super) fn derivatives(&self, r: &[f64], d: &mut [f64], dd: &mut [f64]) {
+        let (d, dd) = (&mut d[..r.len()], &mut dd[..r.len()]);
+        match self {
+            Self::Quadratic => {
+                d.copy_from_slice(r);
+                dd.fill(1.0);
+            }
+            Self::Weighted(w) => {
+                for i in 0..r.len() {
+                    (d[i], dd[i]) = (w[i] * r[i], w[i]);
+                }
+            }
+            Self::Barrier { lower, upper } => {
+                for i in 0..r.len() {
+                    let e = excess(r[i], lower[i], upper[i]);
+                    (d[i], dd[i]) = (e, f64::from(u8::from(e != 0.0)));
+                }
+            }
+            Self::WeightedBarrier { lower, upper, weights } => {
+                for i in 0..r.len() {
+                    let e = excess(r[i], lower[i], upper[i]);
+                    (d[i], dd[i]) = (weights[i] * e, weights[i] * f64::from(u8::from(e != 0.0)));
+                }
+            }
+            Self::Smooth1 { epsilon } => {
+                for i in 0..r.len() {
+                    let a = (epsilon + r[i] * r[i]).sqrt();
+                    (d[i], dd[i]) = (r[i] / a, epsilon / (a * a * a));
+                }
+            }
+            Self::Smooth2 { epsilon } => {
+                let a = (epsilon + square(r)).sqrt();
+                for i in 0..r.len() {
+                    d[i] = r[i] / a;
+                }
+                dd.fill(epsilon / (a * a * a));
+            }
+        }
+    }
+
+    /// What does not fit a residual of n numbers.
+    pub(super) fn wrong(&self, n: usize) -> Option<String> {
+        let length = |name: &str, numbers: &[f64]| match numbers.len() == n {
+            true if numbers.iter().any(|x| x.is_nan()) => Some(format!("its {name} holds a NaN")),
+            true => None,
+            false => Some(format!("its {name} has {} numbers, expected {n}", numbers.len())),
+        };
+        let ordered = |lower: &[f64], upper: &[f64]| {
+            let i = lower.iter().zip(upper).position(|(l, u)| l > u)?;
+            Some(format!("its bounds of entry {i} exclude each other: {} and {}", lower[i], upper[i]))
+        };
+        let bounds = |lower: &[f64], upper: &[f64]| {
+            let lengths = length("lower bound", lower).or_else(|| length("upper bound", upper));
+            lengths.or_else(|| ordered(lower, upper))
+        };
+        match self {
+            Self::Quadratic => None,
+            Self::Weighted(w) => length("weighting", w),
+            Self::Barrier { lower, upper } => bounds(lower, upper),
+            Self::WeightedBarrier { lower, upper, weights } => {
+                bounds(lower, upper).or_else(|| length("weighting", weights))
+            }
+            Self::Smooth1 { epsilon } | Self::Smooth2 { epsilon } => {
+                let wrong = !(*epsilon > 0.0 && epsilon.is_finite());
+                wrong.then(|| format!("its ε is {epsilon}, but it must be above 0"))
+            }
+        }
+    }
+}
+
+fn square(r: &[f64]) -> f64 {
+    r.iter().map(|r| r * r).sum()
+}

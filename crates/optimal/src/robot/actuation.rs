@@ -1,0 +1,160 @@
+//! Actuation: what efforts of the joints the controls make.
+
+use crate::Error;
+use condyle_dynamics::{Joint, Model};
+use nalgebra::{DMatrix, DVector};
+
+/// τ = S u: how the controls drive the joints.
+///
+/// ```
+/// use condyle_dynamics::robots;
+/// use condyle_optimal::robot::Actuation;
+/// let quadruped = robots::quadruped();
+/// assert_eq!(Actuation::joints(&quadruped).nu(), 12); // its trunk is driven by nothing
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Actuation {
+    nv: usize,
+    map: Map,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Map {
+    /// S = [0; 1]: all coordinates but the first ones, each by one control.
+    After(usize),
+    /// Any S, nv × nu.
+    Matrix(DMatrix<f64>),
+}
+
+impl Actuation {
+    /// Every joint is driven by controls of its own, but for a free-flyer at the root, which nothing drives.
+    pub fn joints(model: &Model) -> Self {
+        let passive = match model.bodies().get(1) {
+            Some(root) if root.joint == Joint::FreeFlyer => 6,
+            _ => 0,
+        };
+        Self { nv: model.nv(), map: Map::After(passive) }
+    }
+
+    /// Any linear map S, nv × nu: rotors, tendons, joints without motors.
+    ///
+    /// # Errors
+    /// [`Error::Actuation`] if S has not nv rows or a number in it is not finite.
+    pub fn matrix(model: &Model, S: DMatrix<f64>) -> Result<Self, Error> {
+        let (rows, columns) = S.shape();
+        if rows != model.nv() {
+            let what = format!("its map is {rows} × {columns}, expected {} rows", model.nv());
+            return Err(Error::Actuation { what });
+        }
+        if S.iter().any(|x| !x.is_finite()) {
+            return Err(Error::Actuation { what: "its map holds a number that is not finite".to_owned() });
+        }
+        Ok(Self { nv: rows, map: Map::Matrix(S) })
+    }
+
+    /// A drive for each coordinate.
+    pub(super) fn all(model: &Model) -> Self {
+        Self { nv: model.nv(), map: Map::After(0) }
+    }
+
+    /// No drives.
+    pub(super) fn none(model: &Model) -> Self {
+        Self { nv: model.nv(), map: Map::After(model.nv()) }
+    }
+
+    /// The number of controls.
+    pub fn nu(&self) -> usize {
+        match &self.map {
+            Map::After(passive) => self.nv - passive,
+            Map::Matrix(S) => S.ncols(),
+        }
+    }
+
+    /// The number of coordinates, nv.
+    pub(super) fn nv(&self) -> usize {
+        self.nv
+    }
+
+    /// τ = S u.
+    pub(super) fn effort(&self, u: &[f64], tau: &mut [f64]) {
+        tau.fill(0.0);
+        match &self.map {
+            Map::After(passive) => tau[*passive..].copy_from_slice(u),
+            Map::Matrix(S) => {
+                for (column, u) in S.as_slice().chunks_exact(self.nv).zip(u) {
+                    tau.iter_mut().zip(column).for_each(|(tau, s)| *tau += s * u);
+                }
+            }
+        }
+    }
+
+    /// g_u += c S_row: the gradient of the effort of one coordinate, times c.
+    pub(super) fn add_row(&self, row: usize, c: f64, g_u: &mut [f64]) {
+        match &self.map {
+            Map::After(passive) if row < *passive => {}
+            Map::After(passive) => g_u[row - passive] += c,
+            Map::Matrix(S) => (0..S.ncols()).for_each(|j| g_u[j] += c * S[(row, j)]),
+        }
+    }
+
+    /// g_u += c Σ X[row, i] S_i for the row of a matrix with nv columns, X = ∂y/∂τ.
+    pub(super) fn add_product_row(&self, X: &DMatrix<f64>, row: usize, c: f64, g_u: &mut [f64]) {
+        let (rows, X) = (X.nrows(), X.as_slice());
+        match &self.map {
+            Map::After(passive) => {
+                for (g, column) in g_u.iter_mut().zip(X[passive * rows..].chunks_exact(rows)) {
+                    *g += c * column[row];
+                }
+            }
+            Map::Matrix(S) => {
+                for (g, s) in g_u.iter_mut().zip(S.as_slice().chunks_exact(self.nv)) {
+                    let product: f64 = s.iter().zip(X.chunks_exact(rows)).map(|(s, column)| s * column[row]).sum();
+                    *g += c * product;
+                }
+            }
+        }
+    }
+
+    /// X S, rows × nu, column after column, of a matrix X with nv columns; in `scratch` unless S selects.
+    pub(super) fn columns<'a>(&self, X: &'a DMatrix<f64>, scratch: &'a mut [f64]) -> &'a [f64] {
+        let (rows, X) = (X.nrows(), X.as_slice());
+        match &self.map {
+            Map::After(passive) => &X[passive * rows..],
+            Map::Matrix(S) => {
+                scratch.fill(0.0);
+                for (out, s) in scratch.chunks_exact_mut(rows).zip(S.as_slice().chunks_exact(self.nv)) {
+                    for (column, s) in X.chunks_exact(rows).zip(s).filter(|(_, s)| **s != 0.0) {
+                        out.iter_mut().zip(column).for_each(|(out, x)| *out += s * x);
+                    }
+                }
+                scratch
+            }
+        }
+    }
+
+    /// How many numbers `columns` needs for nv rows.
+    pub(super) fn scratch(&self) -> Vec<f64> {
+        match &self.map {
+            Map::After(_) => Vec::new(),
+            Map::Matrix(S) => vec![0.0; S.len()],
+        }
+    }
+
+    /// u of the smallest (u, λ) that comes nearest to S u + Jᵀλ = τ.
+    pub(super) fn hold(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
+        let nu = self.nu();
+        let mut map = DMatrix::zeros(self.nv, nu + J.nrows());
+        for j in 0..nu {
+            match &self.map {
+                Map::After(passive) => map[(passive + j, j)] = 1.0,
+                Map::Matrix(S) => map.column_mut(j).copy_from(&S.column(j)),
+            }
+        }
+        map.columns_mut(nu, J.nrows()).copy_from(&J.transpose());
+        let singular = map.svd(true, true);
+        let least = f64::EPSILON * self.nv.max(nu + J.nrows()) as f64 * singular.singular_values.max();
+        let tau = DVector::from_column_slice(tau);
+        let both = singular.solve(&tau, least).expect("both factors were asked for");
+        both.as_slice()[..nu].to_vec()
+    }
+}

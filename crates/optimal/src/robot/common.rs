@@ -1,0 +1,156 @@
+//! What all dynamics of a robot have: its model, its drives, and the costs of its knots.
+
+use super::actuation::Actuation;
+use super::costs::{Cost, Costs};
+use super::state::groups;
+use super::watch::{Needs, Offer, Scene, Slopes, Watch};
+use crate::Error;
+use crate::lq::LqNode;
+use condyle_dynamics::{IntegrateArgument, Model, integrate_jacobian};
+use core::ops::Range;
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+#[derive(Clone, Debug)]
+pub(super) struct Robot {
+    pub model: Arc<Model>,
+    pub actuation: Actuation,
+    pub groups: Vec<Range<usize>>,
+    /// The efforts of all joints.
+    pub tau: Vec<f64>,
+    pub schedule: Schedule,
+}
+
+impl Robot {
+    pub(super) fn new(model: Arc<Model>, actuation: Actuation, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
+        if actuation.nv() != model.nv() {
+            let what = format!("it drives {} coordinates, the robot has {}", actuation.nv(), model.nv());
+            return Err(Error::Actuation { what });
+        }
+        Ok(Self {
+            schedule: Schedule::new(model.clone(), offer, costs)?,
+            groups: groups(&model),
+            tau: vec![0.0; model.nv()],
+            actuation,
+            model,
+        })
+    }
+
+    /// Refuses a robot of which forward dynamics has no solution.
+    pub(super) fn check_regular(&self) -> Result<(), Error> {
+        match self.model.singular_joints() {
+            [] => Ok(()),
+            joints => {
+                let what =
+                    format!("nothing with a mass moves with the joints {joints:?}: their accelerations are undefined");
+                Err(Error::Actuation { what })
+            }
+        }
+    }
+
+    /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
+    pub(super) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
+        integrate_jacobian(&self.model, dq, IntegrateArgument::Position, by_q);
+        integrate_jacobian(&self.model, dq, IntegrateArgument::Velocity, by_dq);
+    }
+}
+
+/// Which costs serve which knot.
+#[derive(Clone, Debug)]
+pub(super) struct Schedule {
+    model: Arc<Model>,
+    offer: Offer,
+    /// The costs of all knots, then those of knots with costs of their own.
+    variants: Vec<Costs>,
+    /// Which of them serves a knot; beyond its end the first.
+    of: Vec<usize>,
+    watch: Watch,
+}
+
+impl Schedule {
+    fn new(model: Arc<Model>, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
+        let costs = Costs::new(model.clone(), offer.clone(), costs)?;
+        let watch = Watch::new(&model, offer.nu, costs.longest(), costs.needs());
+        Ok(Self { variants: vec![costs], of: Vec::new(), watch, offer, model })
+    }
+
+    fn index(&self, t: usize) -> usize {
+        self.of.get(t).copied().unwrap_or(0)
+    }
+
+    /// The costs of knot t, or those of all knots without costs of their own.
+    pub(super) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
+        let k = t.map_or(0, |t| self.index(t));
+        &mut self.variants[k]
+    }
+
+    /// Gives knot t costs of its own.
+    pub(super) fn set(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
+        let costs = Costs::new(self.model.clone(), self.offer.clone(), costs)?;
+        if t >= self.of.len() {
+            self.of.resize(t + 1, 0);
+        }
+        match self.of[t] {
+            0 => {
+                self.of[t] = self.variants.len();
+                self.variants.push(costs);
+            }
+            k => self.variants[k] = costs,
+        }
+        let longest = self.variants.iter().map(Costs::longest).max().unwrap_or(0);
+        let needs = self.variants.iter().map(Costs::needs).fold(Needs::default(), |a, b| a | b);
+        self.watch.resize(longest, needs);
+        Ok(())
+    }
+
+    /// ℓ at knot t.
+    pub(super) fn calc(&mut self, t: usize, scene: &Scene<'_>) -> f64 {
+        let k = self.index(t);
+        self.variants[k].calc(&mut self.watch, scene)
+    }
+
+    /// The derivatives of `scale` · ℓ at knot t.
+    pub(super) fn calc_diff(
+        &mut self,
+        t: usize,
+        scene: &Scene<'_>,
+        slopes: &dyn Slopes,
+        scale: f64,
+        node: &mut LqNode,
+    ) {
+        let k = self.index(t);
+        self.variants[k].calc_diff(&mut self.watch, scene, slopes, scale, node);
+    }
+}
+
+/// The methods that a robot's knots share: their model and their costs.
+macro_rules! robot_knot {
+    ($knot:ty $(, $inner:ident)?) => {
+        impl $knot {
+            /// The robot.
+            pub fn model(&self) -> &std::sync::Arc<condyle_dynamics::Model> {
+                &self$(.$inner)?.robot.model
+            }
+
+            /// The costs of all knots that have none of their own, to change weights and targets between solves.
+            pub fn costs_mut(&mut self) -> &mut super::Costs {
+                self$(.$inner)?.robot.schedule.costs_mut(None)
+            }
+
+            /// The costs of knot t.
+            pub fn costs_at_mut(&mut self, t: usize) -> &mut super::Costs {
+                self$(.$inner)?.robot.schedule.costs_mut(Some(t))
+            }
+
+            /// Gives knot t of the horizon costs of its own, so that one action serves knots that differ in their
+            /// targets. Allocates.
+            ///
+            /// # Errors
+            /// [`Error::Cost`](crate::Error::Cost) for a term that does not fit.
+            pub fn set_costs(&mut self, t: usize, costs: Vec<super::Cost>) -> Result<(), crate::Error> {
+                self$(.$inner)?.robot.schedule.set(t, costs)
+            }
+        }
+    };
+}
+pub(super) use robot_knot;

@@ -1,0 +1,134 @@
+//! Friction cones, wrench cones and the support of the centre of pressure, as rows of inequalities.
+//!
+//! A contact's force is along the axes of the contact's rows; a cone's rotation R turns the surface's axes (its normal is
+//! z) into those. Rows are in Crocoddyl's order, so that its residuals are the same numbers.
+
+use condyle_dynamics::{Mat3, Vec3};
+
+/// Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: rows A with lower ≤ A f ≤ upper.
+///
+/// ```
+/// use condyle_optimal::robot::FrictionCone;
+/// let cone = FrictionCone::new(0.5);
+/// let rows = cone.rows();
+/// assert_eq!(rows.len(), 5); // ±x, ±y, and the normal force
+/// assert_eq!(rows[0], [1.0, 0.0, -0.5]); // f_x ≤ 0.5 f_z
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrictionCone {
+    /// R: the surface's axes along the contact's.
+    pub rotation: Mat3<f64>,
+    /// μ.
+    pub mu: f64,
+    /// How many sides the pyramid has; even.
+    pub facets: usize,
+    /// Whether the pyramid lies inside of the cone, or around it.
+    pub inner: bool,
+    /// Least normal force (N).
+    pub least: f64,
+    /// Greatest normal force (N).
+    pub greatest: f64,
+}
+
+/// Friction, the centre of pressure within a rectangle, and the yaw moment of a rectangle of friction: rows A with
+/// lower ≤ A w ≤ upper for the wrench w, force first.
+///
+/// Source: Caron, Pham, Nakamura, *Stability of surface contacts for humanoid robots* (2015).
+///
+/// ```
+/// use condyle_dynamics::Mat3;
+/// use condyle_optimal::robot::{FrictionCone, WrenchCone};
+/// let cone = WrenchCone { friction: FrictionCone::new(0.7), size: [0.2, 0.1] };
+/// assert_eq!(cone.rows().len(), 17);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrenchCone {
+    /// What the force must obey.
+    pub friction: FrictionCone,
+    /// The rectangle's sides along the surface's x and y (m).
+    pub size: [f64; 2],
+}
+
+impl FrictionCone {
+    /// A pyramid of four sides around the cone on a surface whose normal is z, for any normal force that pushes.
+    pub fn new(mu: f64) -> Self {
+        Self { rotation: Mat3::identity(), mu, facets: 4, inner: false, least: 0.0, greatest: f64::INFINITY }
+    }
+
+    /// μ of the pyramid.
+    fn slope(&self) -> f64 {
+        let half = core::f64::consts::PI / self.facets as f64;
+        if self.inner { self.mu * half.cos() } else { self.mu }
+    }
+
+    /// A: a row for each side of the pyramid, and the normal.
+    pub fn rows(&self) -> Vec<[f64; 3]> {
+        let mut rows = Vec::new();
+        for side in 0..self.facets / 2 {
+            let angle = 2.0 * core::f64::consts::PI * side as f64 / self.facets as f64;
+            for sign in [1.0, -1.0] {
+                let along = Vec3::new(sign * angle.cos(), sign * angle.sin(), -self.slope());
+                rows.push((self.rotation * along).to_array()); // ±t − μ n
+            }
+        }
+        rows.push((self.rotation * Vec3::new(0.0, 0.0, 1.0)).to_array());
+        rows
+    }
+
+    /// The least and greatest values of A f.
+    pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
+        let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; self.facets], vec![0.0; self.facets]);
+        lower.push(self.least);
+        upper.push(self.greatest);
+        (lower, upper)
+    }
+
+    /// What makes no sense.
+    pub(super) fn wrong(&self) -> Option<String> {
+        let rotation = self.rotation.columns().map(Vec3::to_array).concat();
+        if !(self.mu >= 0.0 && self.mu.is_finite()) {
+            return Some(format!("its friction is {}, but it must be at least 0", self.mu));
+        }
+        if self.facets < 4 || self.facets % 2 == 1 {
+            return Some(format!("its cone has {} sides, but they must be even and at least 4", self.facets));
+        }
+        rotation.iter().any(|x| !x.is_finite()).then(|| "its cone's rotation is not finite".to_owned())
+    }
+}
+
+/// The four rows that keep the centre of pressure within a rectangle: |τ_x| ≤ ½ size_y f_z, |τ_y| ≤ ½ size_x f_z.
+pub(super) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6]; 4] {
+    let [x, y, z] = R.columns();
+    [(width, x), (width, -x), (length, y), (length, -y)].map(|(side, axis)| {
+        let ([a, b, c], [d, e, f]) = (z.scale(-0.5 * side).to_array(), axis.to_array());
+        [a, b, c, d, e, f]
+    })
+}
+
+impl WrenchCone {
+    /// A: the rows of the friction cone, four of the centre of pressure, eight of the yaw moment.
+    pub fn rows(&self) -> Vec<[f64; 6]> {
+        let (R, mu) = (self.friction.rotation, self.friction.slope());
+        let mut rows: Vec<_> = self.friction.rows().iter().map(|&[a, b, c]| [a, b, c, 0.0, 0.0, 0.0]).collect();
+        rows.extend(pressure_rows(R, self.size));
+        let [length, width] = self.size.map(|side| 0.5 * side);
+        for turn in [-1.0, 1.0] {
+            for (sx, sy) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+                // |w f_x ∓ μ τ_x| + |l f_y ∓ μ τ_y| ± τ_z ≤ μ (l + w) f_z
+                let force = R * Vec3::new(sx * width, sy * length, -mu * (length + width));
+                let moment = R * Vec3::new(turn * sx * mu, turn * sy * mu, turn);
+                let ([a, b, c], [d, e, f]) = (force.to_array(), moment.to_array());
+                rows.push([a, b, c, d, e, f]);
+            }
+        }
+        rows
+    }
+
+    /// The least and greatest values of A w.
+    pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
+        let (mut lower, mut upper) = self.friction.bounds();
+        lower.extend([f64::NEG_INFINITY; 12]);
+        upper.extend([0.0; 12]);
+        (lower, upper)
+    }
+}

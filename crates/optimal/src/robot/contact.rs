@@ -1,0 +1,92 @@
+//! Contacts of a knot, by name, and what makes a set of them singular.
+
+use super::watch::Offer;
+use crate::Error;
+use condyle_dynamics::{Constraint, ConstraintKind, ConstraintSet, Model, Proximal};
+
+/// A contact of a frame with the world, and the name by which residuals call it.
+///
+/// The constraint says which frame, whether its origin ([`Constraint::point`]) or all of it ([`Constraint::rigid`]) is
+/// held, along which axes its rows and its force are, and the gains of its stabilisation. Crocoddyl's `ContactModel3D` and
+/// `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is `LocalWorldAligned` here.
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ReferenceFrame, robots};
+/// use condyle_optimal::robot::Contact;
+/// let quadruped = robots::quadruped();
+/// let foot = Constraint::point(quadruped.frame("LF_foot")?);
+/// let contact = Contact::new("left front", Constraint { kd: 50.0, reference: ReferenceFrame::LocalWorldAligned, ..foot });
+/// assert_eq!(contact.constraint.kind.rows(), 3);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contact {
+    /// How it is called.
+    pub name: String,
+    /// What is held.
+    pub constraint: Constraint,
+}
+
+impl Contact {
+    /// A contact called `name`.
+    pub fn new(name: &str, constraint: Constraint) -> Self {
+        Self { name: name.to_owned(), constraint }
+    }
+}
+
+/// The constraints of some contacts, with the damping μ of J M⁻¹ Jᵀ + μ 1.
+pub(super) fn constraint_set(model: &Model, contacts: &[Contact], damping: f64) -> Result<ConstraintSet<f64>, Error> {
+    if !(damping >= 0.0 && damping.is_finite()) {
+        return Err(Error::Contact { name: "damping".to_owned(), what: format!("μ is {damping}, not at least 0") });
+    }
+    for (k, contact) in contacts.iter().enumerate() {
+        let wrong = |what: String| Err(Error::Contact { name: contact.name.clone(), what });
+        let (before, c) = (&contacts[..k], &contact.constraint);
+        if before.iter().any(|other| other.name == contact.name) {
+            return wrong("another contact has this name".to_owned());
+        }
+        let Some(frame) = model.frames().get(c.frame) else {
+            return wrong(format!("there is no frame {}; the robot has {}", c.frame, model.frames().len()));
+        };
+        if c.other.is_some() {
+            continue; // a loop
+        }
+        // Two contacts on one body are singular: even two points leave only five rows of six that say something, and
+        // points on a line never hold the turn about it. Damping shares the forces.
+        let same = |other: &&Contact| {
+            other.constraint.other.is_none()
+                && model.frames().get(other.constraint.frame).is_some_and(|f| f.body == frame.body)
+        };
+        if let Some(twin) = before.iter().find(same).filter(|_| damping == 0.0) {
+            let what = format!(
+                "it is on body `{}`, as contact `{}`: together they are singular without damping",
+                model.bodies()[frame.body].name,
+                twin.name
+            );
+            return wrong(what);
+        }
+    }
+    let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
+    let mut set = ConstraintSet::new(model, &constraints).map_err(|error| match error {
+        condyle_dynamics::Error::Constraint { constraint, what } => {
+            Error::Contact { name: contacts[constraint].name.clone(), what }
+        }
+        other => Error::Contact { name: String::new(), what: other.to_string() },
+    })?;
+    set.proximal = Proximal { mu: damping, iterations: 1 };
+    Ok(set)
+}
+
+/// What contacts add to the offer of a knot's dynamics.
+pub(super) fn offer(offer: Offer, contacts: &[Contact]) -> Offer {
+    let mut row = 0;
+    let rows = contacts.iter().map(|contact| {
+        let rows = match contact.constraint.kind {
+            ConstraintKind::Point => 3,
+            ConstraintKind::Rigid => 6,
+        };
+        row += rows;
+        (contact.name.clone(), row - rows..row)
+    });
+    Offer { contacts: rows.collect(), ..offer }
+}

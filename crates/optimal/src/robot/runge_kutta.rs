@@ -1,0 +1,194 @@
+//! Runge–Kutta methods with constant controls, as Crocoddyl's `IntegratedActionModelRK`.
+//!
+//! ```text
+//! y₀ = x,   kᵢ = (vᵢ, a(yᵢ, u)),   yᵢ₊₁ = x ⊕ cᵢ₊₁ Δt kᵢ,   x⁺ = x ⊕ Δt Σ bᵢ kᵢ,   cost = Δt Σ bᵢ ℓ(yᵢ, u)
+//! ```
+//!
+//! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), section II.1.
+
+use super::euler::apply_block;
+use super::integrated::{ContinuousModel, Derivatives};
+use crate::lq::LqNode;
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+pub(super) struct RungeKutta {
+    /// Where the stages are in the step, and their weights.
+    c: &'static [f64],
+    b: &'static [f64],
+    /// y of a stage. Shape: nq + nv.
+    y: Vec<f64>,
+    /// k of a stage, the step to the next one, and Σ b k. Shape: 2 nv.
+    k: Vec<f64>,
+    dx: Vec<f64>,
+    sum: Vec<f64>,
+    /// ∂y/∂(x, u), ∂k/∂(x, u), ∂(Σ b k)/∂(x, u). Shape: 2 nv × (2 nv + nu).
+    dy: DMatrix<f64>,
+    dk: DMatrix<f64>,
+    dsum: DMatrix<f64>,
+    /// The cost at a stage.
+    stage: LqNode,
+    /// Products with the stage's Hessian. Shape: (2 nv + nu) × (2 nv + nu) and 2 nv × (2 nv + nu).
+    H: DMatrix<f64>,
+    W: DMatrix<f64>,
+}
+
+impl RungeKutta {
+    pub(super) fn new(stages: usize, nq: usize, nv: usize, nu: usize) -> Self {
+        let (c, b): (&[f64], &[f64]) = match stages {
+            2 => (&[0.0, 0.5], &[0.0, 1.0]),
+            3 => (&[0.0, 1.0 / 3.0, 2.0 / 3.0], &[0.25, 0.0, 0.75]),
+            _ => (&[0.0, 0.5, 0.5, 1.0], &[1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]),
+        };
+        let (n, wide) = (2 * nv, DMatrix::zeros(2 * nv, 2 * nv + nu));
+        Self {
+            c,
+            b,
+            y: vec![0.0; nq + nv],
+            k: vec![0.0; n],
+            dx: vec![0.0; n],
+            sum: vec![0.0; n],
+            dy: wide.clone(),
+            dk: wide.clone(),
+            dsum: wide.clone(),
+            stage: LqNode::zeros(n, nu),
+            H: DMatrix::zeros(n + nu, n + nu),
+            W: wide,
+        }
+    }
+
+    /// x ⊕ c Δt k, in `self.y`, with the step in `self.dx`.
+    fn advance<M: ContinuousModel>(&mut self, model: &M, x: &[f64], step: f64) {
+        let (nq, nv) = (model.nq(), model.nv());
+        (0..2 * nv).for_each(|i| self.dx[i] = step * self.k[i]);
+        model.integrate(&x[..nq], &self.dx[..nv], &mut self.y[..nq]);
+        (0..nv).for_each(|i| self.y[nq + i] = x[nq + i] + self.dx[nv + i]);
+    }
+
+    /// The next state; returns the cost.
+    pub(super) fn calc<M: ContinuousModel>(
+        &mut self,
+        model: &mut M,
+        dt: f64,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        next: &mut [f64],
+    ) -> f64 {
+        let (nq, nv, mut cost) = (model.nq(), model.nv(), 0.0);
+        self.sum.fill(0.0);
+        self.k.fill(0.0);
+        for i in 0..self.b.len() {
+            self.advance(model, x, self.c[i] * dt);
+            let (a, rate) = model.calc(t, &self.y, u);
+            cost += self.b[i] * rate;
+            self.k[..nv].copy_from_slice(&self.y[nq..]);
+            self.k[nv..].copy_from_slice(a);
+            (0..2 * nv).for_each(|j| self.sum[j] += dt * self.b[i] * self.k[j]);
+        }
+        model.integrate(&x[..nq], &self.sum[..nv], &mut next[..nq]);
+        (0..nv).for_each(|j| next[nq + j] = x[nq + j] + self.sum[nv + j]);
+        dt * cost
+    }
+
+    /// Its derivatives, by the chain rule through the stages.
+    pub(super) fn calc_diff<M: ContinuousModel>(
+        &mut self,
+        model: &mut M,
+        dt: f64,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        [transport, exp]: [&mut DMatrix<f64>; 2],
+        node: &mut LqNode,
+    ) {
+        let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
+        let n = 2 * nv;
+        for field in [&mut node.Q, &mut node.S, &mut node.R] {
+            field.fill(0.0);
+        }
+        node.q.fill(0.0);
+        node.r.fill(0.0);
+        self.sum.fill(0.0);
+        self.k.fill(0.0);
+        self.dk.fill(0.0);
+        self.dsum.fill(0.0);
+        for i in 0..self.b.len() {
+            let (step, weight) = (self.c[i] * dt, self.b[i] * dt);
+            self.advance(model, x, step);
+            self.dy.copy_from(&self.dk);
+            self.dy *= step; // ∂(c Δt k)
+            chain(model, &self.dx[..nv], [transport, exp], &mut self.dy);
+            let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(t, &self.y, u, weight, &mut self.stage);
+            self.k[..nv].copy_from_slice(&self.y[nq..]);
+            self.k[nv..].copy_from_slice(a);
+            for j in 0..n + nu {
+                for r in 0..nv {
+                    let mut slope = if j < n { 0.0 } else { da_du[(j - n) * nv + r] };
+                    for s in 0..nv {
+                        slope += da_dq[(r, s)] * self.dy[(s, j)] + da_dv[(r, s)] * self.dy[(nv + s, j)];
+                    }
+                    self.dk[(r, j)] = self.dy[(nv + r, j)]; // ∂v
+                    self.dk[(nv + r, j)] = slope; // a_x ∂y + a_u
+                }
+            }
+            (0..n).for_each(|j| self.sum[j] += weight * self.k[j]);
+            if weight != 0.0 {
+                self.dk.iter().zip(self.dsum.iter_mut()).for_each(|(dk, sum)| *sum += weight * dk);
+                self.add_cost(node, n, nu);
+            }
+        }
+        chain(model, &self.sum[..nv], [transport, exp], &mut self.dsum);
+        node.A.copy_from(&self.dsum.columns(0, n));
+        node.B.copy_from(&self.dsum.columns(n, nu));
+    }
+
+    /// Adds the cost of a stage, a function of y and u, as one of x and u: H += Yᵀ Q Y + …, with Y = ∂y/∂(x, u).
+    fn add_cost(&mut self, node: &mut LqNode, n: usize, nu: usize) {
+        let Self { dy: Y, stage, H, W, .. } = self;
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (q, S) = (stage.q.as_slice(), stage.S.as_slice());
+        for (j, (y, w)) in Y.as_slice().chunks_exact(n).zip(W.as_mut_slice().chunks_exact_mut(n)).enumerate() {
+            for (Q_r, w) in stage.Q.as_slice().chunks_exact(n).zip(w.iter_mut()) {
+                *w = dot(Q_r, y); // Q Y
+            }
+            if j >= n {
+                w.iter_mut().zip(&S[(j - n) * n..]).for_each(|(w, s)| *w += s); // + [0 S]
+            }
+            for (i, y) in Y.as_slice().chunks_exact(n).enumerate() {
+                H[(i, j)] = dot(y, w); // Yᵀ (Q Y + [0 S])
+            }
+            for (k, S_k) in S.chunks_exact(n).enumerate() {
+                let own = if j < n { 0.0 } else { stage.R[(k, j - n)] };
+                H[(n + k, j)] += dot(S_k, y) + own; // + [0; Sᵀ Y + R]
+            }
+            if j < n {
+                node.q[j] += dot(q, y);
+            } else {
+                node.r[j - n] += dot(q, y) + stage.r[j - n];
+            }
+        }
+        node.Q += H.view((0, 0), (n, n));
+        node.S += H.view((0, n), (n, nu));
+        node.R += H.view((n, n), (nu, nu));
+    }
+}
+
+/// ∂(x ⊕ dx)/∂(x, u) in place of ∂dx/∂(x, u).
+fn chain<M: ContinuousModel>(model: &M, dq: &[f64], [transport, exp]: [&mut DMatrix<f64>; 2], X: &mut DMatrix<f64>) {
+    let nv = dq.len();
+    if !model.groups().is_empty() {
+        model.integrate_jacobians(dq, transport, exp);
+        model.groups().iter().for_each(|group| apply_block(exp, group, X));
+    }
+    let mut from = 0;
+    for group in model.groups().iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
+        (from..group.start).for_each(|k| X[(k, k)] += 1.0);
+        from = group.end;
+        for c in group.clone() {
+            for r in group.clone() {
+                X[(r, c)] += transport[(r, c)];
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! What the dynamics of a knot offer to its residuals, and what residuals share.
+
+use condyle_dynamics::{
+    Data, Model, Placements, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
+    forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
+};
+use core::ops::Range;
+use nalgebra::DMatrix;
+
+/// A vector that the dynamics of a knot give beside the next state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Signal {
+    /// q̈, or v⁺ − v at an impact.
+    Acceleration,
+    /// τ of all joints.
+    Effort,
+    /// λ, the forces or impulses of all contacts.
+    Force,
+}
+
+/// What the dynamics of a knot can tell, known when it is made.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Offer {
+    pub nu: usize,
+    /// Whether there are accelerations and efforts.
+    pub effort: bool,
+    /// Whether it is an impact.
+    pub impulse: bool,
+    /// The contacts' names and rows of λ.
+    pub contacts: Vec<(String, Range<usize>)>,
+}
+
+impl Offer {
+    /// The rows of a contact.
+    pub(super) fn contact(&self, name: &str) -> Result<Range<usize>, String> {
+        match self.contacts.iter().find(|(n, _)| n == name) {
+            Some((_, rows)) => Ok(rows.clone()),
+            None => {
+                let names: Vec<_> = self.contacts.iter().map(|(n, _)| format!("`{n}`")).collect();
+                let there = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                Err(format!("there is no contact `{name}` at this knot; there is {there}"))
+            }
+        }
+    }
+}
+
+/// A knot as its residuals see it.
+#[derive(Clone, Copy)]
+pub(super) struct Scene<'a> {
+    pub x: &'a [f64],
+    pub u: &'a [f64],
+    /// q̈, or v⁺ − v at an impact.
+    pub a: &'a [f64],
+    pub tau: &'a [f64],
+    pub lambda: &'a [f64],
+}
+
+/// How the signals of a knot change with x and u.
+pub(super) trait Slopes {
+    /// g += c · ∂s_row/∂(q, v, u) for entry `row` of a signal s; g has 2 nv + nu numbers.
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]);
+}
+
+/// Of a knot without dynamics.
+pub(super) struct NoSlopes;
+
+impl Slopes for NoSlopes {
+    fn add_row(&self, _: Signal, _: usize, _: f64, _: &mut [f64]) {}
+}
+
+/// g += c X[row, :] for a matrix with as many columns as g has numbers.
+pub(super) fn add_matrix_row(X: &DMatrix<f64>, row: usize, c: f64, g: &mut [f64]) {
+    for (g, column) in g.iter_mut().zip(X.as_slice().chunks_exact(X.nrows())) {
+        *g += c * column[row];
+    }
+}
+
+/// What the residuals of a knot look at, so that each is computed once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Needs {
+    pub placements: bool,
+    pub velocities: bool,
+    /// The Jacobian of the centre of mass.
+    pub com: bool,
+    pub momentum: bool,
+    /// M q̈ + h − g.
+    pub surplus: bool,
+    pub impulse_com: bool,
+}
+
+impl core::ops::BitOr for Needs {
+    type Output = Self;
+    fn bitor(self, o: Self) -> Self {
+        Self {
+            placements: self.placements | o.placements,
+            velocities: self.velocities | o.velocities,
+            com: self.com | o.com,
+            momentum: self.momentum | o.momentum,
+            surplus: self.surplus | o.surplus,
+            impulse_com: self.impulse_com | o.impulse_com,
+        }
+    }
+}
+
+/// The robot's kinematics at a knot, and the scratch of its residuals.
+#[derive(Clone, Debug)]
+pub(super) struct Watch {
+    data: Data<f64>,
+    pub scratch: Scratch,
+}
+
+/// What residuals write, and the quantities of the whole robot.
+#[derive(Clone, Debug)]
+pub(super) struct Scratch {
+    /// The residual, its activation's gradient and the diagonal of the Hessian.
+    pub r: Vec<f64>,
+    pub d: Vec<f64>,
+    pub dd: Vec<f64>,
+    /// The Jacobian of a residual with respect to q. Shape: 6 × nv.
+    pub J: DMatrix<f64>,
+    /// The same with respect to v. Shape: 6 × nv.
+    pub Jv: DMatrix<f64>,
+    /// A row of the Jacobian with respect to (q, v, u). Shape: 2 nv + nu.
+    pub g: Vec<f64>,
+    /// The Jacobian of the difference of configurations. Shape: nv × nv.
+    pub D: DMatrix<f64>,
+    /// ∂c/∂q, and ∂ċ/∂q for the change of velocity at an impact. Shape: 3 × nv.
+    pub com: [DMatrix<f64>; 2],
+    /// ∂h_G/∂q, ∂h_G/∂v. Shape: 6 × nv.
+    pub momentum: [DMatrix<f64>; 2],
+    /// M q̈ + h − g. Shape: nv.
+    pub surplus: Vec<f64>,
+    /// Its derivatives with respect to q, v, q̈. Shape: nv × nv, nothing if no residual needs them.
+    pub surplus_slopes: [DMatrix<f64>; 3],
+    /// J_c (v⁺ − v).
+    pub com_change: [f64; 3],
+    /// Zeros. Shape: nv.
+    zero: Vec<f64>,
+}
+
+impl Watch {
+    /// For a robot with nu controls and residuals of at most `longest` numbers.
+    pub(super) fn new(model: &Model, nu: usize, longest: usize, needs: Needs) -> Self {
+        let nv = model.nv();
+        let rows = |n| DMatrix::zeros(n, nv);
+        let square = || if needs.surplus { rows(nv) } else { DMatrix::zeros(0, 0) };
+        let scratch = Scratch {
+            r: vec![0.0; longest],
+            d: vec![0.0; longest],
+            dd: vec![0.0; longest],
+            J: rows(6),
+            Jv: rows(6),
+            g: vec![0.0; 2 * nv + nu],
+            D: rows(nv),
+            com: [rows(3), rows(3)],
+            momentum: [rows(6), rows(6)],
+            surplus: vec![0.0; nv],
+            surplus_slopes: [square(), square(), square()],
+            com_change: [0.0; 3],
+            zero: vec![0.0; nv],
+        };
+        Self { data: Data::new(model), scratch }
+    }
+
+    /// Makes room for other residuals.
+    pub(super) fn resize(&mut self, longest: usize, needs: Needs) {
+        let s = &mut self.scratch;
+        for numbers in [&mut s.r, &mut s.d, &mut s.dd] {
+            numbers.resize(longest, 0.0);
+        }
+        let nv = s.zero.len();
+        if needs.surplus && s.surplus_slopes[0].is_empty() {
+            s.surplus_slopes.fill(DMatrix::zeros(nv, nv));
+        }
+    }
+
+    /// Computes what the residuals need of a scene, with its slopes if they are asked for.
+    pub(super) fn look<'a>(
+        &'a mut self,
+        model: &'a Model,
+        needs: Needs,
+        scene: &Scene<'_>,
+        slopes: bool,
+    ) -> (Option<Placements<'a, f64>>, Option<Velocities<'a, f64>>, &'a mut Scratch) {
+        let Self { data, scratch } = self;
+        let (q, v) = scene.x.split_at(model.nq());
+        if needs.surplus {
+            scratch.surplus.copy_from_slice(rnea(model, data, q, v, scene.a, &[]));
+            let g = gravity(model, data, q);
+            scratch.surplus.iter_mut().zip(g).for_each(|(s, g)| *s -= g); // M q̈ + h − g
+            if slopes {
+                let d = rnea_derivatives(model, data, q, v, scene.a, &[]);
+                for (to, from) in scratch.surplus_slopes.iter_mut().zip([d.dtau_dq, d.dtau_dv, d.dtau_da]) {
+                    to.copy_from(from);
+                }
+                scratch.surplus_slopes[0] -= static_torque_derivative(model, data, q, &[]);
+            }
+        }
+        if needs.impulse_com {
+            let change = forward_velocities(model, data, q, scene.a).com_velocity();
+            scratch.com_change = change.to_array();
+        }
+        if slopes && needs.impulse_com {
+            let d = centroidal_derivatives(model, data, q, scene.a, &scratch.zero);
+            scratch.com[0].copy_from(d.dcom_dq);
+            scratch.com[1].copy_from(d.dvcom_dq);
+        } else if slopes && needs.com {
+            scratch.com[0].copy_from(centroidal_map(model, data, q).Jcom);
+        }
+        if slopes && needs.momentum {
+            let d = centroidal_derivatives(model, data, q, v, &scratch.zero);
+            scratch.momentum[0].copy_from(d.dh_dq);
+            scratch.momentum[1].copy_from(d.dh_dv);
+        }
+        if needs.velocities {
+            let velocities = forward_velocities(model, data, q, v);
+            (Some(*velocities), Some(velocities), scratch)
+        } else if needs.placements {
+            (Some(forward_kinematics(model, data, q)), None, scratch)
+        } else {
+            (None, None, scratch)
+        }
+    }
+}

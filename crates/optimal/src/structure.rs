@@ -1,0 +1,86 @@
+//! What a sweep may know of a knot's dynamics beforehand.
+#![allow(non_snake_case)] // A, B, T, E
+
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// The most rows of a block: those of a free joint.
+pub(crate) const LARGEST_BLOCK: usize = 6;
+
+/// The form of the A and B of an [`LqNode`](crate::LqNode).
+///
+/// Nothing is known of them, unless the action says so each time that it differentiates. With x = (q, v), nv numbers each
+/// for a change of q and of v, and the next state by semi-implicit Euler from an acceleration a(x, u),
+///
+/// ```text
+/// v⁺ = v + a Δt,   q⁺ = q ⊕ v⁺ Δt:      A = ⎡ T 0 ⎤ + ⎡ Δt E ⎤ A_v,   B = ⎡ Δt E ⎤ B_v
+///                                           ⎣ 0 0 ⎦   ⎣   1  ⎦           ⎣   1  ⎦
+/// ```
+///
+/// where A_v, B_v are the last nv rows of A and B, and T = ∂(q ⊕ δ)/∂q, E = ∂(q ⊕ δ)/∂δ at δ = v⁺ Δt are the identity but
+/// for a block for each joint whose configurations are no vector space. A sweep that knows this multiplies with A_v and B_v
+/// alone: half the operations.
+///
+/// A and B hold all of their entries nevertheless; the form is a promise about them, which is not checked.
+///
+/// # Examples
+/// ```
+/// use condyle_optimal::LqNode;
+///
+/// // One joint: v⁺ = v + 0.1 (u − q), q⁺ = q + 0.1 v⁺.
+/// let mut node = LqNode::zeros(2, 1);
+/// node.A.copy_from_slice(&[0.99, -0.1, 0.1, 1.0]); // column after column
+/// node.B.copy_from_slice(&[0.01, 0.1]);
+/// node.structure.set_euler(0.1, &[]);
+/// ```
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Structure {
+    /// Δt, if the form is known.
+    dt: Option<f64>,
+    blocks: Vec<EulerBlock>,
+}
+
+/// The blocks of T and E of one joint; see [`Structure`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct EulerBlock {
+    /// Its first row and column.
+    pub(crate) start: usize,
+    /// ∂(q ⊕ δ)/∂q.
+    pub T: DMatrix<f64>,
+    /// ∂(q ⊕ δ)/∂δ.
+    pub E: DMatrix<f64>,
+}
+
+impl Structure {
+    /// Nothing is known. Keeps the memory of blocks.
+    pub fn set_dense(&mut self) {
+        self.dt = None;
+    }
+
+    /// The form of semi-implicit Euler steps of `dt` seconds, in which T and E are the identity but for a block over each
+    /// range of at most six rows and columns. Returns the blocks, to be written. Allocates them at the first call.
+    pub fn set_euler(&mut self, dt: f64, ranges: &[Range<usize>]) -> &mut [EulerBlock] {
+        self.dt = Some(dt);
+        let fits = |(block, range): (&EulerBlock, &Range<usize>)| block.range() == *range;
+        if self.blocks.len() != ranges.len() || !self.blocks.iter().zip(ranges).all(fits) {
+            let block = |range: &Range<usize>| {
+                let identity = DMatrix::identity(range.len(), range.len());
+                EulerBlock { start: range.start, T: identity.clone(), E: identity }
+            };
+            self.blocks = ranges.iter().map(block).collect();
+        }
+        &mut self.blocks
+    }
+
+    /// Δt and the blocks, if the form is that of semi-implicit Euler.
+    pub(crate) fn euler(&self) -> Option<(f64, &[EulerBlock])> {
+        Some((self.dt?, &self.blocks))
+    }
+}
+
+impl EulerBlock {
+    /// Its rows and columns.
+    pub(crate) fn range(&self) -> Range<usize> {
+        self.start..self.start + self.T.nrows()
+    }
+}

@@ -1,0 +1,449 @@
+//! Robots in contact, at impacts, with other drives and integrators: exact derivatives, and what is refused.
+#![allow(non_snake_case)] // the names of the literature
+
+use condyle_dynamics::{
+    Constraint, Data, Force, Mat3, Model, Motion, ReferenceFrame, Vec3, centroidal_map, forward_kinematics,
+    forward_velocities, integrate, neutral, robots,
+};
+use condyle_optimal::robot::{
+    Activation, Actuation, Contact, ContactDynamics, Contacts, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
+    Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
+};
+use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status};
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+use std::sync::Arc;
+
+/// Central differences of a function with values and derivatives of order one are good to about 1e-9 of them; contact
+/// forces are some hundred times larger than their arguments.
+const DIFFERENCES: f64 = 1e-6;
+/// Both solves stop where the cost is expected to fall by less than 1e-9.
+const OPTIMUM: f64 = 1e-7;
+/// A sum of some dozen products in another order.
+const ROUNDING: f64 = 1e-13;
+const DT: f64 = 0.02;
+
+fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
+    (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
+}
+
+/// A state around neutral, of which no joint is near a singularity of its group.
+fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
+    let mut q = neutral(model);
+    integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
+    [q, random(model.nv(), 1.0, rng)].concat()
+}
+
+fn rotation(rng: &mut StdRng) -> Mat3<f64> {
+    let axis = random(3, 1.0, rng);
+    condyle_dynamics::lie::exp3(Vec3::new(axis[0], axis[1], axis[2])).to_rotation()
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    let scale = 1.0 + b.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale
+}
+
+/// Compares written derivatives with differences at a random state.
+fn check_derivatives<A: ActionModel + Clone>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
+    let (ndx, nu) = (action.ndx(), action.nu());
+    let mut oracle = NumDiff(action.clone());
+    let (mut exact, mut numeric) = (LqNode::zeros(ndx, nu), LqNode::zeros(ndx, nu));
+    let (x, u) = (random_state(model, rng), random(nu, effort, rng));
+    action.calc_diff(0, &x, &u, &mut exact);
+    oracle.calc_diff(0, &x, &u, &mut numeric);
+    for (name, a, b) in [
+        ("A", exact.A.as_slice(), numeric.A.as_slice()),
+        ("B", exact.B.as_slice(), numeric.B.as_slice()),
+        ("q", exact.q.as_slice(), numeric.q.as_slice()),
+        ("r", exact.r.as_slice(), numeric.r.as_slice()),
+    ] {
+        let error = largest_difference(a, b);
+        assert!(error < DIFFERENCES, "{what}: {name} is off by {error:e}");
+    }
+    for (name, H) in [("Q", &exact.Q), ("R", &exact.R)] {
+        let error = largest_difference(H.as_slice(), H.transpose().as_slice());
+        assert!(error < ROUNDING, "{what}: {name} is unsymmetric by {error:e}");
+    }
+}
+
+/// Two feet of the quadruped as points, or both of the humanoid as a whole.
+fn feet(model: &Model, reference: ReferenceFrame) -> Vec<Contact> {
+    let make: fn(usize) -> Constraint = match model.name() {
+        "quadruped" => Constraint::point,
+        _ => Constraint::rigid,
+    };
+    let names = match model.name() {
+        "quadruped" => ["LF_foot", "RH_foot"],
+        _ => ["left_foot", "right_foot"],
+    };
+    let contact = |name: &str| {
+        let constraint = Constraint { reference, kp: 20.0, kd: 30.0, ..make(model.frame(name).unwrap()) };
+        Contact::new(name, constraint)
+    };
+    names.map(contact).into()
+}
+
+fn barrier(n: usize) -> Activation {
+    Activation::Barrier { lower: vec![-0.1; n], upper: vec![0.2; n] }
+}
+
+/// Every residual of a robot in contact.
+fn contact_costs(model: &Model, contacts: &[Contact], nu: usize, rng: &mut StdRng) -> Vec<Cost> {
+    let (nv, name, rows) = (model.nv(), contacts[1].name.clone(), contacts[1].constraint.kind.rows());
+    let frame = model.frame(&contacts[0].name).unwrap();
+    let friction = FrictionCone { rotation: rotation(rng), inner: true, facets: 6, ..FrictionCone::new(0.6) };
+    let force: [f64; 6] = core::array::from_fn(|k| if k < rows { rng.random::<f64>() } else { 0.0 });
+    let velocity: [f64; 6] = core::array::from_fn(|_| rng.random::<f64>());
+    let mut costs = vec![
+        Cost::new("state", 0.3, Residual::State { reference: random_state(model, rng) }, Activation::Quadratic),
+        Cost::new("effort", 0.1, Residual::Control { reference: random(nu, 1.0, rng) }, barrier(nu)),
+        Cost::new("gravity", 1e-4, Residual::ControlGravity, Activation::Weighted(random(nv, 1.0, rng))),
+        Cost::new(
+            "torque",
+            1e-2,
+            Residual::JointEffort { reference: random(nv, 1.0, rng) },
+            Activation::Smooth1 { epsilon: 0.3 },
+        ),
+        Cost::new(
+            "acceleration",
+            1e-4,
+            Residual::JointAcceleration { reference: random(nv, 1.0, rng) },
+            Activation::Quadratic,
+        ),
+        Cost::new("com", 0.8, Residual::CenterOfMass { target: Vec3::new(0.1, 0.2, 0.3) }, Activation::Quadratic),
+        Cost::new(
+            "momentum",
+            1e-2,
+            Residual::CentroidalMomentum { target: Force::from(velocity) },
+            Activation::Smooth2 { epsilon: 0.5 },
+        ),
+        Cost::new("turn", 0.7, Residual::FrameRotation { frame, target: rotation(rng) }, Activation::Quadratic),
+        Cost::new(
+            "force",
+            1e-4,
+            Residual::ContactForce { contact: name.clone(), target: Force::from(force) },
+            Activation::WeightedBarrier {
+                lower: vec![-0.5; rows],
+                upper: vec![0.3; rows],
+                weights: random(rows, 1.0, rng),
+            },
+        ),
+        Cost::new(
+            "cone",
+            1e-4,
+            Residual::FrictionCone { contact: name.clone(), cone: friction.clone() },
+            Activation::Barrier { lower: friction.bounds().0, upper: friction.bounds().1 },
+        ),
+    ];
+    for (axes, label) in [
+        (ReferenceFrame::Local, "fast"),
+        (ReferenceFrame::World, "fast in the world"),
+        (ReferenceFrame::LocalWorldAligned, "fast along the world"),
+    ] {
+        let residual = Residual::FrameVelocity { frame, target: Motion::from(velocity), reference: axes };
+        costs.push(Cost::new(label, 0.2, residual, Activation::Quadratic));
+    }
+    if rows == 6 {
+        let cone = WrenchCone { friction, size: [0.2, 0.1] };
+        let (lower, upper) = cone.bounds();
+        let wrench = Residual::WrenchCone { contact: name.clone(), cone };
+        costs.push(Cost::new("wrench", 1e-4, wrench, Activation::Barrier { lower, upper }));
+        let pressure = Residual::CenterOfPressure { contact: name, rotation: rotation(rng), size: [0.1, 0.2] };
+        costs.push(Cost::new("pressure", 1e-4, pressure, barrier(4)));
+    }
+    costs
+}
+
+#[test]
+fn derivatives_in_contact_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(11);
+    for model in [robots::quadruped(), robots::humanoid()].map(Arc::new) {
+        for reference in [ReferenceFrame::Local, ReferenceFrame::LocalWorldAligned] {
+            let (contacts, nu) = (feet(&model, reference), model.nv() - 6);
+            let costs = contact_costs(&model, &contacts, nu, &mut rng);
+            let action = ContactDynamics::running(model.clone(), &contacts, DT, costs).unwrap();
+            check_derivatives(&format!("{} {reference:?}", model.name()), action, &model, 5.0, &mut rng);
+        }
+    }
+}
+
+#[test]
+fn derivatives_with_damping_and_other_drives_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(12);
+    let model = Arc::new(robots::quadruped());
+    let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+    let S = DMatrix::from_fn(18, 4, |_, _| rng.random::<f64>() - 0.5);
+    let drives = Actuation::matrix(&model, S).unwrap();
+    let costs = contact_costs(&model, &contacts, 4, &mut rng);
+    let inner = Contacts::new(model.clone(), drives, &contacts, 1e-3, costs).unwrap();
+    let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
+    check_derivatives("damped", action, &model, 5.0, &mut rng);
+}
+
+#[test]
+fn derivatives_of_an_impact_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(13);
+    for model in [robots::quadruped(), robots::humanoid()].map(Arc::new) {
+        let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+        let kept = ["state", "com", "momentum", "turn", "force", "cone", "fast", "wrench"];
+        let mut costs = contact_costs(&model, &contacts, 0, &mut rng);
+        costs.retain(|cost| kept.contains(&cost.name.as_str()));
+        costs.push(Cost::new("jump", 0.4, Residual::ImpulseCenterOfMass, Activation::Quadratic));
+        let action = ImpulseDynamics::new(model.clone(), &contacts, 0.3, 1e-9, costs).unwrap();
+        check_derivatives(&format!("impact of the {}", model.name()), action, &model, 0.0, &mut rng);
+    }
+}
+
+#[test]
+fn derivatives_of_inverse_dynamics_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(17);
+    for model in [robots::arm7(), robots::quadruped()].map(Arc::new) {
+        let nv = model.nv();
+        let costs = vec![
+            Cost::new(
+                "state",
+                0.3,
+                Residual::State { reference: random_state(&model, &mut rng) },
+                Activation::Quadratic,
+            ),
+            Cost::new("torque", 1e-2, Residual::JointEffort { reference: random(nv, 1.0, &mut rng) }, barrier(nv)),
+            Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
+            Cost::new("change", 0.1, Residual::Control { reference: random(nv, 1.0, &mut rng) }, Activation::Quadratic),
+        ];
+        let action = InverseDynamics::running(model.clone(), DT, costs).unwrap();
+        check_derivatives(&format!("inverse dynamics of {}", model.name()), action, &model, 1.0, &mut rng);
+    }
+}
+
+/// The same reach with torques and with accelerations as controls ends in the same optimum.
+#[test]
+fn inverse_and_forward_dynamics_have_one_optimum() {
+    let arm = Arc::new(robots::arm7());
+    let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    let frame = arm.frame("tool").unwrap();
+    let reach = Residual::FrameTranslation { frame, target: Vec3::new(0.4, 0.2, 0.5) };
+    let effort = || Residual::JointEffort { reference: vec![0.0; 7] };
+    let acceleration = || Residual::JointAcceleration { reference: vec![0.0; 7] };
+    let running = || {
+        vec![
+            Cost::new("rest", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic),
+            Cost::new("effort", 1e-3, effort(), Activation::Quadratic),
+            Cost::new("smooth", 1e-4, acceleration(), Activation::Quadratic),
+        ]
+    };
+    let end =
+        || FreeDynamics::terminal(arm.clone(), vec![Cost::new("reach", 1e2, reach.clone(), Activation::Quadratic)]);
+    let solve = |knot: Box<dyn ActionModel>, us: &[f64]| {
+        let mut problem = Problem::new(x0.clone(), vec![knot], vec![0; 20], Box::new(end().unwrap())).unwrap();
+        let mut solver = Fddp::new(&problem);
+        let solution = solver.solve(&mut problem, &x0.repeat(21), us).unwrap();
+        assert_eq!(solution.status, Status::Converged);
+        solution.cost
+    };
+    let mut forward = FreeDynamics::running(arm.clone(), 0.05, running()).unwrap();
+    let hold = forward.quasi_static(&x0).repeat(20);
+    let by_effort = solve(Box::new(forward), &hold);
+    let by_acceleration = solve(Box::new(InverseDynamics::running(arm.clone(), 0.05, running()).unwrap()), &[0.0; 140]);
+    assert!((by_effort - by_acceleration).abs() < OPTIMUM * by_effort, "{by_effort} and {by_acceleration}");
+}
+
+#[test]
+fn derivatives_of_runge_kutta_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(14);
+    let methods = [Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4];
+    for model in [robots::arm7(), robots::quadruped()].map(Arc::new) {
+        for method in methods {
+            let drives = Actuation::joints(&model);
+            let nu = drives.nu();
+            let frame = model.frames().len() - 1;
+            let costs = vec![
+                Cost::new(
+                    "state",
+                    0.3,
+                    Residual::State { reference: random_state(&model, &mut rng) },
+                    Activation::Quadratic,
+                ),
+                Cost::new("effort", 0.1, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic),
+                Cost::new(
+                    "place",
+                    0.9,
+                    Residual::FrameTranslation { frame, target: Vec3::new(0.1, 0.2, 0.3) },
+                    Activation::Quadratic,
+                ),
+                Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
+            ];
+            let inner = Free::new(model.clone(), drives, costs).unwrap();
+            let action = FreeDynamics::new(inner, method, DT).unwrap();
+            check_derivatives(&format!("{method:?} of {}", model.name()), action, &model, 0.3, &mut rng);
+        }
+    }
+}
+
+/// A step of Δt against many small ones: halving Δt divides the error by 2^(order + 1).
+#[test]
+fn runge_kutta_methods_have_their_order() {
+    let mut rng = StdRng::seed_from_u64(15);
+    let model = Arc::new(robots::arm7());
+    let (x, u) = (random_state(&model, &mut rng), random(7, 1.0, &mut rng));
+    let end = |method, dt: f64, steps: usize| {
+        let inner = Free::new(model.clone(), Actuation::joints(&model), vec![]).unwrap();
+        let mut action = FreeDynamics::new(inner, method, dt).unwrap();
+        let (mut x, mut next) = (x.clone(), x.clone());
+        for _ in 0..steps {
+            action.calc(0, &x, &u, &mut next);
+            x.copy_from_slice(&next);
+        }
+        x
+    };
+    let time = 0.02;
+    let exact = end(Integrator::RungeKutta4, time / 256.0, 256);
+    for (method, order) in
+        [(Integrator::RungeKutta2, 2.0), (Integrator::RungeKutta3, 3.0), (Integrator::RungeKutta4, 4.0)]
+    {
+        let error = |steps: usize| largest_difference(&end(method, time / steps as f64, steps), &exact);
+        let observed = (error(2) / error(4)).log2();
+        assert!((observed - order).abs() < 0.3, "{method:?}: order {observed}");
+    }
+}
+
+#[test]
+fn residuals_are_what_they_say() {
+    let mut rng = StdRng::seed_from_u64(16);
+    let model = Arc::new(robots::quadruped());
+    let (x, frame) = (random_state(&model, &mut rng), model.frame("LF_foot").unwrap());
+    let (q, v) = x.split_at(model.nq());
+    let mut data = Data::new(&model);
+    let R = forward_kinematics(&model, &mut data, q).frame(frame).rotation;
+    let motion = forward_velocities(&model, &mut data, q, v);
+    let (speed, momentum) = (motion.frame_velocity(frame, ReferenceFrame::World), motion.centroidal_momentum());
+    let com = centroidal_map(&model, &mut data, q).com;
+    let reference = ReferenceFrame::World;
+    for residual in [
+        Residual::CenterOfMass { target: com },
+        Residual::CentroidalMomentum { target: momentum },
+        Residual::FrameRotation { frame, target: R },
+        Residual::FrameVelocity { frame, target: speed, reference },
+    ] {
+        let terms = vec![Cost::new("zero", 1.0, residual, Activation::Quadratic)];
+        let mut action = FreeDynamics::terminal(model.clone(), terms).unwrap();
+        let cost = action.calc(0, &x, &[], &mut []);
+        assert!(cost < 1e-24, "{cost:e}");
+    }
+    // the efforts that hold the robot still leave nothing of `ControlGravity`, whatever touches the ground
+    let still = [q, &[0.0; 18]].concat();
+    let all = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
+    let contacts = all.map(|name| Contact::new(name, Constraint::point(model.frame(name).unwrap())));
+    let costs = vec![Cost::new("gravity", 1.0, Residual::ControlGravity, Activation::Quadratic)];
+    let mut stand = ContactDynamics::running(model.clone(), &contacts, DT, costs).unwrap();
+    let u = stand.quasi_static(&still);
+    let mut next = still.clone();
+    let cost = stand.calc(0, &still, &u, &mut next) / DT;
+    assert!(cost < 1e-16 && largest_difference(&next, &still) < 1e-9, "{cost:e}");
+}
+
+#[test]
+fn a_knot_can_have_costs_of_its_own() {
+    let model = Arc::new(robots::arm7());
+    let term = |weight| {
+        vec![Cost::new("effort", weight, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic)]
+    };
+    let mut action = FreeDynamics::running(model, 1.0, term(2.0)).unwrap();
+    action.set_costs(3, term(10.0)).unwrap();
+    let (x, u, mut next) = ([0.0; 14], [1.0; 7], [0.0; 14]);
+    let costs: Vec<f64> = (0..5).map(|t| action.calc(t, &x, &u, &mut next)).collect();
+    assert_eq!(costs, [7.0, 7.0, 7.0, 35.0, 7.0]);
+    assert!(action.costs_at_mut(3).set_weight("effort", 4.0) && action.costs_mut().set_weight("effort", 0.0));
+    assert_eq!([2, 3].map(|t| action.calc(t, &x, &u, &mut next)), [0.0, 14.0]);
+    let moved = Residual::Control { reference: vec![1.0; 7] };
+    action.costs_at_mut(3).set_residual("effort", moved).unwrap();
+    assert_eq!(action.calc(3, &x, &u, &mut next), 0.0);
+    let other = action.costs_at_mut(3).set_residual("effort", Residual::State { reference: vec![0.0; 14] });
+    assert_eq!(other.unwrap_err().to_string(), "cost `effort`: its residual is of another kind than before");
+}
+
+#[test]
+fn what_does_not_fit_is_refused_by_name() {
+    let model = Arc::new(robots::humanoid());
+    let sole = |name: &str, frame: &str| Contact::new(name, Constraint::rigid(model.frame(frame).unwrap()));
+    let refused = |contacts: &[Contact], costs| {
+        ContactDynamics::running(model.clone(), contacts, DT, costs).map(|_| ()).unwrap_err().to_string()
+    };
+    let left = sole("left", "left_foot");
+    assert_eq!(
+        refused(&[left.clone(), sole("left", "right_foot")], vec![]),
+        "contact `left`: another contact has this name"
+    );
+    let heel = Contact::new("heel", Constraint::point(left.constraint.frame));
+    assert!(
+        refused(&[left.clone(), heel], vec![])
+            .ends_with("as contact `left`: together they are singular without damping")
+    );
+    assert_eq!(
+        refused(&[Contact::new("ghost", Constraint::point(10_000))], vec![]),
+        format!("contact `ghost`: there is no frame 10000; the robot has {}", model.frames().len())
+    );
+    let loose = Contact::new("loose", Constraint { kd: f64::NAN, ..Constraint::point(left.constraint.frame) });
+    assert_eq!(refused(&[loose], vec![]), "contact `loose`: kd must be a number of at least 0, found NaN");
+    let cone = |contact: &str, mu| Residual::FrictionCone { contact: contact.into(), cone: FrictionCone::new(mu) };
+    let term = |residual| vec![Cost::new("grip", 1.0, residual, Activation::Quadratic)];
+    let contacts = [left];
+    assert_eq!(
+        refused(&contacts, term(cone("right", 0.7))),
+        "cost `grip`: there is no contact `right` at this knot; there is `left`"
+    );
+    assert_eq!(
+        refused(&contacts, term(cone("left", -1.0))),
+        "cost `grip`: its friction is -1, but it must be at least 0"
+    );
+    let twice = [term(cone("left", 0.7)), term(cone("left", 0.7))].concat();
+    assert_eq!(refused(&contacts, twice), "cost `grip`: another term has this name");
+    assert_eq!(
+        refused(&contacts, term(Residual::ImpulseCenterOfMass)),
+        "cost `grip`: only an impact changes velocities at once"
+    );
+    let exclusive = Activation::Barrier { lower: vec![1.0; 3], upper: vec![0.0; 3] };
+    let com = Residual::CenterOfMass { target: Vec3::zero() };
+    assert_eq!(
+        refused(&contacts, vec![Cost::new("grip", 1.0, com, exclusive)]),
+        "cost `grip`: its bounds of entry 0 exclude each other: 1 and 0"
+    );
+    let flat = WrenchCone { friction: FrictionCone::new(0.7), size: [0.1, 0.1] };
+    let point = [Contact::new("toe", Constraint::point(contacts[0].constraint.frame))];
+    assert_eq!(
+        refused(&point, term(Residual::WrenchCone { contact: "toe".into(), cone: flat })),
+        "cost `grip`: a wrench cone needs a rigid contact, of 6 rows; this one has 3"
+    );
+    let bounce = ImpulseDynamics::new(model.clone(), &contacts, 2.0, 0.0, vec![]).unwrap_err();
+    assert_eq!(bounce.to_string(), "contact `restitution`: ε is 2, not from 0 to 1");
+    let drives = Actuation::matrix(&model, DMatrix::zeros(3, 2)).unwrap_err();
+    assert_eq!(drives.to_string(), format!("actuation: its map is 3 × 2, expected {} rows", model.nv()));
+    let end = FreeDynamics::terminal(model.clone(), term(cone("left", 0.7))).map(|_| ()).unwrap_err();
+    assert!(matches!(end, Error::Cost { .. }));
+}
+
+/// Points on a line on one body hold it in five ways of six; with damping they share the forces, and a solve goes on.
+#[test]
+fn a_line_of_contacts_on_one_body_needs_damping() {
+    let arm = robots::arm7();
+    let tool = arm.frame("tool").unwrap();
+    let model = Arc::new(arm);
+    let body = model.frames()[tool].body;
+    let on_body: Vec<_> = (0..model.frames().len()).filter(|&f| model.frames()[f].body == body).collect();
+    let contacts: Vec<_> =
+        on_body.iter().enumerate().map(|(k, &f)| Contact::new(&format!("point {k}"), Constraint::point(f))).collect();
+    assert!(contacts.len() > 1);
+    assert!(ContactDynamics::running(model.clone(), &contacts, DT, vec![]).is_err());
+    let x0 = [[0.3; 7], [0.0; 7]].concat();
+    let costs = || vec![Cost::new("rest", 1.0, Residual::State { reference: x0.clone() }, Activation::Quadratic)];
+    let effort = Cost::new("effort", 1e-2, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
+    let running = [costs(), vec![effort]].concat();
+    let inner = Contacts::new(model.clone(), Actuation::joints(&model), &contacts, 1e-6, running).unwrap();
+    let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
+    let end = FreeDynamics::terminal(model.clone(), costs()).unwrap();
+    let mut problem = Problem::new(x0.clone(), vec![Box::new(action)], vec![0; 10], Box::new(end)).unwrap();
+    let mut solver = Fddp::new(&problem);
+    let solution = solver.solve(&mut problem, &x0.repeat(11), &[0.0; 70]).unwrap();
+    assert_eq!(solution.status, Status::Converged);
+    assert!(solution.xs.iter().all(|x| x.is_finite()));
+}

@@ -1,0 +1,154 @@
+//! Model predictive control: horizons that move on, solves with little time, solutions that are kept.
+
+mod common;
+
+use common::{HANGING, Linear, cartpole, random, random_matrix, random_node, straight};
+use condyle_optimal::{ActionModel, Error, Fddp, Problem, Solution, Status};
+use std::time::Duration;
+
+/// Solves of the same problem from different warm starts differ by the regularisation, 1e-9 of entries of size one that
+/// grow along the horizon.
+const SAME: f64 = 1e-5;
+
+/// Linear-quadratic knots with 3, 0 and 2 controls; the horizon may begin at any of them.
+fn linear(stages: &[usize], x0: &[f64]) -> Problem {
+    let mut random = random();
+    let models = [3, 0, 2].map(|nu| {
+        let mut node = random_node(&mut random, 4, nu);
+        node.A *= 0.5;
+        Box::new(Linear(node)) as Box<dyn ActionModel>
+    });
+    let end = Box::new(Linear(random_node(&mut random, 4, 0)));
+    Problem::new(x0.to_vec(), models.into(), stages.to_vec(), end).unwrap()
+}
+
+#[test]
+fn a_shifted_horizon_is_solved_like_a_new_one() {
+    let mut stages = vec![0, 1, 2, 2, 0, 1, 0, 0];
+    let x0 = random_matrix(&mut random(), 4, 1).as_slice().to_vec();
+    let mut problem = linear(&stages, &x0);
+    let mut solver = Fddp::new(&problem);
+    let us = vec![0.0; problem.control_range(8).end];
+    solver.solve(&mut problem, &x0.repeat(9), &us).unwrap();
+    for next in [2, 1, 0, 0, 2] {
+        let before = solver.solution().clone();
+        problem.shift(next).unwrap();
+        solver.shift(&mut problem).unwrap();
+        stages.rotate_left(1);
+        stages[7] = next;
+        assert_eq!(problem.stages(), stages);
+        let moved = solver.solution();
+        assert!((0..7).all(|t| moved.u(t) == before.u(t + 1) && moved.x(t) == before.x(t + 1)));
+        assert!((0..7).all(|t| moved.K[t] == before.K[t + 1] && moved.k[t] == before.k[t + 1]));
+        assert_eq!(moved.u(7).len(), [3, 0, 2][next]);
+
+        let measured: Vec<f64> = moved.x(0).iter().map(|x| x + 0.1).collect();
+        problem.set_x0(&measured).unwrap();
+        let ours = solver.resume(&mut problem).unwrap().clone();
+        let mut fresh = linear(&stages, &measured);
+        let us = vec![0.0; fresh.control_range(8).end];
+        let mut other = Fddp::new(&fresh);
+        let expected = other.solve(&mut fresh, &measured.repeat(9), &us).unwrap();
+        assert_eq!((ours.status, ours.us.len()), (Status::Converged, us.len()));
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME);
+        assert!(close(&ours.xs, &expected.xs) && close(&ours.us, &expected.us));
+        assert!(ours.K.iter().zip(&expected.K).all(|(a, b)| close(a.as_slice(), b.as_slice())));
+    }
+}
+
+/// One iteration a step keeps a pole up that is pushed, and allocates nothing (see `allocations.rs`).
+#[test]
+fn a_closed_loop_stands_up_to_pushes() {
+    let mut problem = cartpole(&[0.0, 0.2, 0.0, 0.0], 40, 1);
+    let mut plant = common::cartpole_action();
+    let mut solver = Fddp::new(&problem);
+    solver.solve(&mut problem, &[0.0, 0.2, 0.0, 0.0].repeat(41), &[0.0; 40]).unwrap();
+    (solver.settings.max_iterations, solver.settings.tolerance) = (1, 0.0);
+    let mut x = problem.x0().to_vec();
+    for step in 0..150 {
+        let (solution, mut u) = (solver.solution(), [0.0]);
+        let dx: Vec<f64> = x.iter().zip(solution.x(0)).map(|(x, plan)| x - plan).collect();
+        u[0] = solution.u(0)[0] + solution.K[0].row(0).iter().zip(&dx).map(|(k, dx)| k * dx).sum::<f64>();
+        let mut next = [0.0; 4];
+        plant.calc(0, &x, &u, &mut next);
+        next[3] += if step % 50 == 10 { 0.8 } else { 0.0 }; // a push at the pole
+        x.copy_from_slice(&next);
+        problem.shift(0).unwrap();
+        solver.shift(&mut problem).unwrap();
+        problem.set_x0(&x).unwrap();
+        let solution = solver.resume(&mut problem).unwrap();
+        assert_eq!((solution.status, solution.trace.len()), (Status::MaxIterations, 1));
+        assert!(x[1].abs() < 0.6, "step {step}: {x:?}");
+    }
+    assert!(x[1].abs() < 0.05 && x[3].abs() < 0.1, "{x:?}");
+}
+
+#[test]
+fn a_solve_without_time_returns_what_it_has() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let xs = straight(problem.x0(), problem.x0(), 50);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.time_budget = Some(Duration::ZERO);
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+    assert_eq!((solution.status, &solution.xs, solution.trace.len()), (Status::TimeLimit, &xs, 0));
+
+    // What an observer spends counts too: the second iteration does not begin.
+    solver.settings.time_budget = Some(Duration::from_millis(200));
+    let mut seen = 0;
+    let pause = |_: &_| {
+        seen += 1;
+        std::thread::sleep(Duration::from_millis(250));
+    };
+    let solution = solver.solve_with(&mut problem, &xs, &[0.0; 50], pause).unwrap().clone();
+    assert_eq!((solution.status, seen, solution.trace.len()), (Status::TimeLimit, 1, 1));
+    assert_eq!(solution.cost, solution.trace[0].cost);
+
+    // Without any time the gains are those of the solve before, a knot further on.
+    problem.shift(0).unwrap();
+    solver.shift(&mut problem).unwrap();
+    solver.settings.time_budget = Some(Duration::ZERO);
+    let moved = solver.resume(&mut problem).unwrap();
+    assert!(
+        moved.status == Status::TimeLimit && moved.K[..49] == solution.K[1..] && moved.xs[..200] == solution.xs[4..]
+    );
+
+    // With time enough it is the same solve.
+    solver.settings.time_budget = Some(Duration::from_secs(100));
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let limited = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone();
+    solver.settings.time_budget = None;
+    let free = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+    assert!(limited.status == Status::Converged && limited.trace == free.trace && limited.xs == free.xs);
+}
+
+#[test]
+fn a_horizon_moves_by_one_knot_at_a_time() {
+    let mut problem = linear(&[0, 1, 2, 0], &[0.0; 4]);
+    let mut solver = Fddp::new(&problem);
+    assert_eq!(problem.shift(3), Err(Error::UnknownModel { knot: 3, index: 3, models: 3 }));
+    problem.shift(1).unwrap();
+    let us = vec![0.0; problem.control_range(4).end];
+    let error = solver.solve(&mut problem, &[0.0; 20], &us).unwrap_err();
+    assert_eq!(error, Error::Dimension { node: 0, name: "nu", expected: 3, found: 0 });
+    problem.shift(1).unwrap();
+    let error = solver.shift(&mut problem).unwrap_err();
+    assert_eq!(error, Error::Dimension { node: 0, name: "nu", expected: 0, found: 2 });
+    assert!(solver.shift(&mut linear(&[0, 1, 2], &[0.0; 4])).is_err());
+}
+
+#[test]
+fn a_solution_survives_a_file() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let xs = straight(problem.x0(), problem.x0(), 50);
+    let mut solver = Fddp::new(&problem);
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
+    let text = serde_json::to_string(solution).unwrap();
+    let read: Solution = serde_json::from_str(&text).unwrap();
+    // serde_json reads a decimal number to within its last bit.
+    let close =
+        |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs());
+    assert!(close(&read.xs, &solution.xs) && close(&read.us, &solution.us) && close(read.x(50), solution.x(50)));
+    assert!(read.K.iter().zip(&solution.K).all(|(a, b)| close(a.as_slice(), b.as_slice())));
+    assert!(read.status == solution.status && read.trace.len() == solution.trace.len());
+    assert!(text.contains("\"status\":\"converged\""));
+}

@@ -1,0 +1,122 @@
+//! Model predictive control of an arm at a fixed rate: it follows a moving point while something pushes it.
+//!
+//! `cargo run --release --example mpc`
+//!
+//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, move the horizon on by a knot, and improve the plan by
+//! one iteration within 5 ms. Prints how well the tool follows, and how punctual the loop was.
+
+use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle::optimal::{ActionModel, Fddp, Problem, Status};
+use condyle::{Data, Model, Vec3, forward_kinematics, robots};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const DT: f64 = 0.01;
+const HORIZON: usize = 30;
+const STEPS: usize = 500;
+const BUDGET: Duration = Duration::from_millis(5);
+
+/// Where the tool should be: once around a circle in 2.5 s.
+fn target(time: f64) -> Vec3<f64> {
+    let (sin, cos) = (time * core::f64::consts::TAU / 2.5).sin_cos();
+    Vec3::new(0.45, 0.15 * cos, 0.45 + 0.15 * sin)
+}
+
+/// The model whose costs lead the tool to a point.
+fn knot(arm: &Arc<Model>, rest: &[f64], point: Vec3<f64>, dt: Option<f64>) -> FreeDynamics {
+    let frame = arm.frame("tool").expect("the arm has a tool");
+    let mut costs = vec![
+        Cost::new("follow", 1e3, Residual::FrameTranslation { frame, target: point }, Activation::Quadratic),
+        Cost::new("rest", 1e-1, Residual::State { reference: rest.to_vec() }, Activation::Quadratic),
+    ];
+    let knot = match dt {
+        Some(dt) => {
+            let effort = Residual::Control { reference: vec![0.0; arm.nv()] };
+            costs.push(Cost::new("effort", 1e-3, effort, Activation::Quadratic));
+            FreeDynamics::running(arm.clone(), dt, costs)
+        }
+        None => FreeDynamics::terminal(arm.clone(), costs),
+    };
+    knot.expect("the costs fit the arm")
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arm = Arc::new(robots::arm7());
+    let rest = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    // One model for each knot of a ring as long as the horizon: a model keeps its target while its knot moves to the front.
+    let models =
+        (0..HORIZON).map(|t| Box::new(knot(&arm, &rest, target(t as f64 * DT), Some(DT))) as Box<dyn ActionModel>);
+    let end = Box::new(knot(&arm, &rest, target(HORIZON as f64 * DT), None));
+    let mut problem = Problem::new(rest.clone(), models.collect(), (0..HORIZON).collect(), end)?;
+    let mut plant = knot(&arm, &rest, target(0.0), Some(DT));
+    let hold = plant.quasi_static(&rest);
+
+    let mut solver = Fddp::new(&problem);
+    solver.solve(&mut problem, &rest.repeat(HORIZON + 1), &hold.repeat(HORIZON))?;
+    (solver.settings.max_iterations, solver.settings.tolerance) = (1, 0.0);
+    solver.settings.time_budget = Some(BUDGET);
+
+    let (mut x, mut u, mut dx, mut next) = (rest.clone(), hold, vec![0.0; 14], rest.clone());
+    let (mut late, mut used, mut cut_short) = (Vec::new(), Vec::new(), 0);
+    let (mut errors, mut data) = (Vec::new(), Data::new(&arm));
+    let begin = Instant::now();
+    for step in 0..STEPS {
+        let due = begin + Duration::from_secs_f64(DT) * step as u32;
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        late.push(due.elapsed());
+
+        // u = ū + K (x ⊖ x̄)
+        let plan = solver.solution();
+        plant.difference(plan.x(0), &x, &mut dx);
+        for (i, u) in u.iter_mut().enumerate() {
+            *u = plan.u(0)[i] + plan.K[0].row(i).iter().zip(&dx).map(|(k, dx)| k * dx).sum::<f64>();
+        }
+        // the arm moves; twice, something hits its elbow
+        plant.calc(0, &x, &u, &mut next);
+        if step == STEPS / 3 || step == 2 * STEPS / 3 {
+            next[7 + 3] += 1.0;
+        }
+        x.copy_from_slice(&next);
+
+        // the horizon moves on: its last knot is served by the model of the first, with a new target
+        let last = problem.stages()[0];
+        let ahead = target((step + 1 + HORIZON) as f64 * DT);
+        *problem.model_mut(last).expect("there is one for each knot") = knot(&arm, &rest, ahead, Some(DT));
+        problem.shift(last)?;
+        solver.shift(&mut problem)?;
+        problem.set_x0(&x)?;
+        let plan = solver.resume(&mut problem)?;
+        cut_short += usize::from(plan.status == Status::TimeLimit);
+        used.push(plan.timings.total);
+
+        let tool = forward_kinematics(&arm, &mut data, &x[..7]).frame(arm.frame("tool")?).translation;
+        let off = tool - target((step + 1) as f64 * DT);
+        errors.push(off.norm_squared().sqrt());
+    }
+
+    let percentile = |times: &mut Vec<Duration>, p: usize| {
+        times.sort();
+        times[(times.len() - 1) * p / 100]
+    };
+    println!("{STEPS} steps of {:.0} ms; a plan has {HORIZON} knots", DT * 1e3);
+    println!(
+        "woken late:     median {:?}, 99 % {:?}, worst {:?}",
+        percentile(&mut late, 50),
+        percentile(&mut late, 99),
+        percentile(&mut late, 100)
+    );
+    println!(
+        "an iteration:   median {:?}, 99 % {:?}, worst {:?}",
+        percentile(&mut used, 50),
+        percentile(&mut used, 99),
+        percentile(&mut used, 100)
+    );
+    println!("out of time:    {cut_short} times");
+    let worst = |errors: &[f64]| errors.iter().fold(0.0, |worst: f64, e| worst.max(*e));
+    println!(
+        "off the target: {:.1} mm at worst, {:.1} mm before the first push",
+        1e3 * worst(&errors[50..]),
+        1e3 * worst(&errors[50..STEPS / 3])
+    );
+    Ok(())
+}

@@ -1,0 +1,411 @@
+//! Actions: the robot's, and those written in Python.
+
+use super::costs::Cost;
+use super::{exception, rust};
+use crate::arrays::{Give, matrix, vector};
+use crate::constrained::constraint;
+use crate::functions::wrong_word;
+use crate::model::Model as Robot;
+use nalgebra::DMatrix;
+use numpy::PyArray1;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rust::robot::{self, Actuation, Integrator};
+use rust::{ActionModel, LqNode, NumDiff};
+use std::sync::{Arc, Mutex};
+
+/// What an action written in Python raised during a solve.
+pub(super) type Fault = Arc<Mutex<Option<PyErr>>>;
+
+/// What kind of action a model of a problem is.
+#[derive(Clone, Copy)]
+pub(super) enum Model {
+    Free,
+    Contact,
+    Impulse,
+    Own,
+}
+
+impl Model {
+    /// Changes a weight of model k, or of the terminal one; says whether there is such a term.
+    pub(super) fn set_weight(self, problem: &mut rust::Problem, k: Option<usize>, name: &str, weight: f64) -> bool {
+        fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
+            match k {
+                Some(k) => problem.model_mut(k),
+                None => problem.terminal_mut(),
+            }
+        }
+        let costs = match self {
+            Self::Free => find::<robot::FreeDynamics>(problem, k).map(|m| m.costs_mut()),
+            Self::Contact => find::<robot::ContactDynamics>(problem, k).map(|m| m.costs_mut()),
+            Self::Impulse => find::<robot::ImpulseDynamics>(problem, k).map(|m| m.costs_mut()),
+            Self::Own => None,
+        };
+        costs.is_some_and(|costs| costs.set_weight(name, weight))
+    }
+}
+
+/// A copy of any action.
+pub(super) fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<(Box<dyn ActionModel>, Model)> {
+    if let Ok(free) = model.cast::<FreeDynamics>() {
+        return Ok((Box::new(free.get().0.clone()), Model::Free));
+    }
+    if let Ok(contact) = model.cast::<ContactDynamics>() {
+        return Ok((Box::new(contact.get().0.clone()), Model::Contact));
+    }
+    if let Ok(impulse) = model.cast::<ImpulseDynamics>() {
+        return Ok((Box::new(impulse.get().0.clone()), Model::Impulse));
+    }
+    let Ok(own) = model.cast::<Action>() else {
+        let found = model.get_type().name()?;
+        return Err(PyTypeError::new_err(format!("models: expected an action, found '{found}'")));
+    };
+    let own = own.get().copy(model.py());
+    faults.push(own.fault.clone());
+    Ok(if own.calc_diff.is_some() { (Box::new(own), Model::Own) } else { (Box::new(NumDiff(own)), Model::Own) })
+}
+
+fn integrator(name: &str) -> PyResult<Integrator> {
+    match name {
+        "semi_implicit_euler" => Ok(Integrator::SemiImplicitEuler),
+        "runge_kutta_2" => Ok(Integrator::RungeKutta2),
+        "runge_kutta_3" => Ok(Integrator::RungeKutta3),
+        "runge_kutta_4" => Ok(Integrator::RungeKutta4),
+        other => {
+            let allowed = "'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'";
+            Err(wrong_word("integrator", allowed, other))
+        }
+    }
+}
+
+/// The drives: of every joint but a free-flyer at the root, or the map S given.
+fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult<Actuation> {
+    let Some(map) = map else { return Ok(Actuation::joints(model)) };
+    let shape: Vec<usize> = map.getattr("shape").and_then(|shape| shape.extract()).unwrap_or_default();
+    let &[_, nu] = shape.as_slice() else {
+        return Err(PyValueError::new_err("actuation: expected an array of shape (nv, nu)"));
+    };
+    Actuation::matrix(model, matrix("actuation", map, [model.nv(), nu])?.to_matrix()).map_err(exception)
+}
+
+fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
+    costs.iter().map(|c| c.0.clone()).collect()
+}
+
+/// Contacts with the names that residuals call them by.
+fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Vec<robot::Contact>> {
+    let contact = |(name, given): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        Ok(robot::Contact::new(&name.extract::<String>()?, constraint(model, &given)?))
+    };
+    contacts.iter().map(contact).collect()
+}
+
+/// Bounds on nu controls, if there are any.
+fn bounds(
+    nu: usize,
+    lower: Option<&Bound<'_, PyAny>>,
+    upper: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<[Vec<f64>; 2]>> {
+    let bound = |name, given: Option<&Bound<'_, PyAny>>, none: f64| match given {
+        Some(numbers) => Ok(vector(name, numbers, nu)?.to_vec()),
+        None => PyResult::Ok(vec![none; nu]),
+    };
+    if lower.is_none() && upper.is_none() {
+        return Ok(None);
+    }
+    Ok(Some([bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?]))
+}
+
+/// A knot with bounds on its controls.
+fn bounded<M: robot::ContinuousModel>(
+    knot: robot::Integrated<M>,
+    lower: Option<&Bound<'_, PyAny>>,
+    upper: Option<&Bound<'_, PyAny>>,
+) -> PyResult<robot::Integrated<M>> {
+    Ok(match bounds(knot.nu(), lower, upper)? {
+        Some([lower, upper]) => knot.with_bounds(lower, upper),
+        None => knot,
+    })
+}
+
+/// A knot of a robot that moves freely under its joints' efforts.
+///
+/// q̈ = aba(q, v, S u); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is
+/// x = (q, v).
+///
+/// model: the robot.
+/// dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
+/// costs: a list of `Cost`.
+/// actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
+/// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
+/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+///
+/// Raises `ProblemError` for a cost or drives that do not fit.
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct FreeDynamics(pub(super) robot::FreeDynamics);
+
+#[pymethods]
+impl FreeDynamics {
+    #[new]
+    #[pyo3(signature = (model, dt, costs, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
+    fn new(
+        model: &Bound<'_, Robot>,
+        dt: Option<f64>,
+        costs: Vec<PyRef<'_, Cost>>,
+        actuation: Option<&Bound<'_, PyAny>>,
+        integrator: &str,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
+        let drives = self::actuation(&model, actuation)?;
+        let costs = terms(&costs);
+        let action = match dt {
+            Some(dt) => {
+                robot::Free::new(model, drives, costs).and_then(|free| robot::FreeDynamics::new(free, integrator, dt))
+            }
+            None => robot::FreeDynamics::terminal(model, costs),
+        };
+        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
+    }
+
+    /// The efforts that hold the robot still at the state x, nu numbers.
+    fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let model = self.0.model();
+        let x = vector("x", x, model.nq() + model.nv())?;
+        self.0.clone().quasi_static(&x).give(py, None)
+    }
+}
+
+/// A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
+///
+/// model: the robot.
+/// contacts: a dict of `Constraint`s by name; residuals call them by these names. May be empty.
+/// dt: Δt in seconds.
+/// costs: a list of `Cost`.
+/// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
+/// actuation, integrator, lower, upper: as of `FreeDynamics`.
+///
+/// Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
+///
+/// >>> from condyle.optimal import ContactDynamics
+/// >>> quadruped = condyle.robots.quadruped()
+/// >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
+/// >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct ContactDynamics(pub(super) robot::ContactDynamics);
+
+#[pymethods]
+impl ContactDynamics {
+    #[new]
+    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
+    fn new(
+        model: &Bound<'_, Robot>,
+        contacts: &Bound<'_, PyDict>,
+        dt: f64,
+        costs: Vec<PyRef<'_, Cost>>,
+        damping: f64,
+        actuation: Option<&Bound<'_, PyAny>>,
+        integrator: &str,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
+        let (drives, contacts) = (self::actuation(&model, actuation)?, self::contacts(&model, contacts)?);
+        let action = robot::Contacts::new(model, drives, &contacts, damping, terms(&costs))
+            .and_then(|inner| robot::ContactDynamics::new(inner, integrator, dt));
+        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
+    }
+
+    /// The smallest controls and forces that hold the robot still at the state x: nu controls of them.
+    fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let model = self.0.model();
+        let x = vector("x", x, model.nq() + model.nv())?;
+        self.0.clone().quasi_static(&x).give(py, None)
+    }
+}
+
+/// A knot at which contacts set in: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w a(r).
+///
+/// There are no controls.
+///
+/// model: the robot.
+/// contacts: a dict of `Constraint`s by name.
+/// costs: a list of `Cost`; they look at the state before the impact.
+/// restitution: ε, 0 to 1.
+/// damping: μ (1/kg).
+///
+/// Raises `ProblemError` as `ContactDynamics` does.
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct ImpulseDynamics(pub(super) robot::ImpulseDynamics);
+
+#[pymethods]
+impl ImpulseDynamics {
+    #[new]
+    #[pyo3(signature = (model, contacts, costs, restitution=0.0, damping=0.0))]
+    fn new(
+        model: &Bound<'_, Robot>,
+        contacts: &Bound<'_, PyDict>,
+        costs: Vec<PyRef<'_, Cost>>,
+        restitution: f64,
+        damping: f64,
+    ) -> PyResult<Self> {
+        let model = Arc::new(model.get().inner.clone());
+        let contacts = self::contacts(&model, contacts)?;
+        let action = robot::ImpulseDynamics::new(model, &contacts, restitution, damping, terms(&costs));
+        Ok(Self(action.map_err(exception)?))
+    }
+}
+
+/// An action written in Python.
+///
+/// nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
+/// calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+/// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
+///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+///
+/// >>> from condyle.optimal import Action, Fddp, Problem
+/// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
+/// >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+/// >>> problem = Problem([1.0], [knot], [0] * 30, end)
+/// >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
+/// 0.809017
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Action {
+    nx: usize,
+    nu: usize,
+    calc: Py<PyAny>,
+    calc_diff: Option<Py<PyAny>>,
+    bounds: Option<[Vec<f64>; 2]>,
+}
+
+#[pymethods]
+impl Action {
+    #[new]
+    #[pyo3(signature = (nx, nu, calc, calc_diff=None, lower=None, upper=None))]
+    fn new(
+        nx: usize,
+        nu: usize,
+        calc: Py<PyAny>,
+        calc_diff: Option<Py<PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        Ok(Self { nx, nu, calc, calc_diff, bounds: bounds(nu, lower, upper)? })
+    }
+}
+
+impl Action {
+    fn copy(&self, py: Python<'_>) -> Own {
+        Own {
+            nx: self.nx,
+            nu: self.nu,
+            calc: self.calc.clone_ref(py),
+            calc_diff: self.calc_diff.as_ref().map(|f| f.clone_ref(py)),
+            bounds: self.bounds.clone(),
+            fault: Fault::default(),
+        }
+    }
+}
+
+/// An `Action` as the solver calls it. What it raises becomes a cost that is not a number, and is raised after the solve.
+struct Own {
+    nx: usize,
+    nu: usize,
+    calc: Py<PyAny>,
+    calc_diff: Option<Py<PyAny>>,
+    bounds: Option<[Vec<f64>; 2]>,
+    fault: Fault,
+}
+
+impl Own {
+    fn keep<T>(&self, result: PyResult<T>) -> Option<T> {
+        match result {
+            Ok(value) => Some(value),
+            Err(error) => {
+                let mut fault = self.fault.lock().expect("nobody panics while holding it");
+                fault.get_or_insert(error);
+                None
+            }
+        }
+    }
+
+    fn call<'py>(&self, py: Python<'py>, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        f.bind(py).call1((t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
+    }
+
+    fn try_calc(&self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> PyResult<f64> {
+        Python::attach(|py| {
+            let (state, cost): (Bound<'_, PyAny>, f64) = self.call(py, &self.calc, t, x, u)?.extract()?;
+            if !state.is_none() {
+                next.copy_from_slice(&vector("the next state", &state, self.nx)?);
+            }
+            Ok(cost)
+        })
+    }
+
+    fn try_calc_diff(&self, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) -> PyResult<()> {
+        Python::attach(|py| {
+            let given = self.call(py, f, t, x, u)?.cast_into::<PyDict>()?;
+            let LqNode { A, B, Q, S, R, q, r, .. } = node;
+            for (name, entry) in given.iter() {
+                let name: String = name.extract()?;
+                let (to, shape): (&mut DMatrix<f64>, _) = match name.as_str() {
+                    "A" => (&mut *A, [self.nx, self.nx]),
+                    "B" => (&mut *B, [self.nx, self.nu]),
+                    "Q" => (&mut *Q, [self.nx, self.nx]),
+                    "S" => (&mut *S, [self.nx, self.nu]),
+                    "R" => (&mut *R, [self.nu, self.nu]),
+                    "q" => {
+                        q.copy_from_slice(&vector("q", &entry, self.nx)?);
+                        continue;
+                    }
+                    "r" => {
+                        r.copy_from_slice(&vector("r", &entry, self.nu)?);
+                        continue;
+                    }
+                    other => {
+                        let what = format!("calc_diff: expected A, B, Q, S, R, q or r, found '{other}'");
+                        return Err(PyValueError::new_err(what));
+                    }
+                };
+                to.copy_from(&matrix(&name, &entry, shape)?.to_matrix());
+            }
+            Ok(())
+        })
+    }
+}
+
+impl ActionModel for Own {
+    fn nx(&self) -> usize {
+        self.nx
+    }
+
+    fn nu(&self) -> usize {
+        self.nu
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let result = self.try_calc(t, x, u, next);
+        self.keep(result).unwrap_or(f64::NAN)
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        for field in [&mut node.A, &mut node.B, &mut node.Q, &mut node.S, &mut node.R] {
+            field.fill(0.0);
+        }
+        node.q.fill(0.0);
+        node.r.fill(0.0);
+        let f = self.calc_diff.as_ref().expect("an action without it is differentiated by differences");
+        let result = self.try_calc_diff(f, t, x, u, node);
+        if self.keep(result).is_none() {
+            node.q.fill(f64::NAN);
+        }
+    }
+}
