@@ -8,13 +8,14 @@
 //! ```
 
 use crate::aba::aba;
+use crate::articulated_solve::{self, minus_solve};
 use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::layout::{Layout, Single};
 use crate::ltdl::axpy;
 use crate::minv;
-use crate::model::Model;
+use crate::model::{Coupled, Model};
 use crate::rnea_derivatives;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
@@ -28,25 +29,27 @@ pub(crate) struct Workspace<S> {
     pub da_dq: DMatrix<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
     pub da_dv: DMatrix<S>,
+    solve: articulated_solve::Workspace<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
+    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = DMatrix::from_element(size.nv, size.nv, S::zero());
-        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square }
+        let solve = articulated_solve::Workspace::new(&model.columns, size.nv);
+        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square, solve }
     }
 }
 
-/// C = −A B, of square matrices, where column j of B has zeros but in the rows `coupled[j]`.
+/// C = −A B, of square matrices, where column j of B has zeros but in the rows of `coupled[j]`.
 ///
 /// Four columns with the same rows, as those of one limb have, go together: eight entries of each stay in registers while
 /// their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored a quarter as often.
 #[inline(always)]
-pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>]) {
+pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Coupled]) {
     let (n, mut j) = (coupled.len(), 0);
     while j < n {
-        let rows = &coupled[j];
-        if S::LANES == 1 && j + 4 <= n && coupled[j + 1..j + 4].iter().all(|other| other == rows) {
+        let Coupled { rows, alike } = &coupled[j];
+        if S::LANES == 1 && *alike >= 4 {
             four_columns(A, &B[j * n..(j + 4) * n], &mut C[j * n..(j + 4) * n], rows, n);
             j += 4;
         } else {
@@ -136,6 +139,15 @@ kernel! {
     }
 }
 
+kernel! {
+    /// After `aba` and `rnea_derivatives`.
+    fn solves(_model, data) {
+        let (d, Workspace { da_dq, da_dv, solve, .. }) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+        let B = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
+        minus_solve(&data.world, &data.aba, solve, B, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);
+    }
+}
+
 /// [`aba`](crate::aba) and its derivatives with respect to q, v and τ, exact.
 ///
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
@@ -171,7 +183,11 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     } else {
         minv::from_factors(model, data); // those of `aba`
     }
-    products(model, data);
+    if data.aba_derivatives.solve.pays() {
+        solves(model, data);
+    } else {
+        products(model, data);
+    }
     let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
     data.aba_derivatives.view(data.minv.matrix(), state)
 }

@@ -343,7 +343,7 @@ fn pass<S: Scalar, R: Constant<S>>(
     let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
     let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
     constraints.load(model, world, f_ext, &mut d.forces);
-    rnea_derivatives::pass(&l, world, id, v, qdd, &d.forces, l.minus_gravity());
+    rnea_derivatives::pass(&l, world, id, v, qdd, &d.forces, l.minus_gravity(), false);
     constraints.add_turning(world, &mut id.dtau_dq);
     let columns = Columns { S: &world.S, Psid: &id.Psid, Psidd: &id.Psidd, PsidSd: &id.PsidSd };
     let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = &mut *constraints;

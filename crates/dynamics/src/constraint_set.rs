@@ -239,7 +239,7 @@ impl<S: Scalar> ConstraintSet<S> {
             // what carries a frame moves the force on the other one
             let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
             let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
-            model.coupled[k].iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
+            model.coupled[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
         };
         let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
         Ok(Self {

@@ -1,6 +1,6 @@
 //! What the algorithms see of a tree of bodies.
 
-use crate::model::{Body, Column, Model, Node};
+use crate::model::{Body, Column, Coupled, Model, Node};
 use condyle_spatial::{Act, Se3, Vec3};
 
 impl Model {
@@ -69,6 +69,8 @@ impl Model {
         let structure = structure.chain(self.nodes.iter().flat_map(|n| [n.parent, n.column]));
         self.tree = structure.fold(0xcbf2_9ce4_8422_2325, |hash, x| (hash ^ x as u64).wrapping_mul(0x100_0000_01b3));
         let all = || (0..self.nv).collect(); // joints that follow tie branches together
-        self.coupled = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) }).collect();
+        let rows: Vec<_> = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) }).collect();
+        let alike = |c: usize| rows[c..].iter().take_while(|other| **other == rows[c]).count();
+        self.coupled = (0..self.nv).map(|c| Coupled { rows: rows[c].clone(), alike: alike(c) }).collect();
     }
 }

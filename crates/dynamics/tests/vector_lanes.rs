@@ -5,7 +5,7 @@
 mod common;
 
 use common::table::{Input, Output, kernels};
-use common::{all_models, rng};
+use common::{all_models, long_branches, rng};
 use condyle_dynamics::level::{Level, pin};
 use condyle_dynamics::{Data, Force, Model, Scalar};
 use condyle_spatial::lanes::Lanes;
@@ -78,7 +78,7 @@ fn knots_are_single_calls<S: Vector>(models: &[Model]) {
 /// One test for all levels: they share the level in use.
 #[test]
 fn every_level() {
-    let models = all_models(4);
+    let models: Vec<Model> = all_models(4).into_iter().chain(long_branches()).collect();
     for level in [Level::Avx2, Level::Avx512] {
         match pin(level) {
             Ok(()) if level == Level::Avx2 => knots_are_single_calls::<Lanes<f64, 4>>(&models),
