@@ -8,12 +8,13 @@
 //! ```
 
 use crate::aba::one_by_one;
+use crate::articulated_solve::{self, minus_solve};
 use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::ltdl::axpy;
 use crate::minv;
-use crate::model::Model;
+use crate::model::{Coupled, Model};
 use crate::rnea_derivatives;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
@@ -27,52 +28,49 @@ pub(crate) struct Workspace<S> {
     pub da_dq: DMatrix<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
     pub da_dv: DMatrix<S>,
+    solve: articulated_solve::Workspace<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
+    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = DMatrix::from_element(size.nv, size.nv, S::zero());
-        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square }
+        let solve = articulated_solve::Workspace::new(&model.columns, size.nv);
+        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square, solve }
     }
 }
 
-/// C = −A B, of square matrices, where column j of B has zeros but in the rows `coupled[j]`.
+/// C = −A B, of square matrices, where column j of B has zeros but in the rows of `coupled[j]`.
 ///
 /// Four columns with the same rows, as those of one limb have, go together: as many entries of each as there are registers
 /// for stay there while their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored
 /// a quarter as often.
 #[inline(always)]
-pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>]) {
+pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Coupled]) {
     let (n, mut j) = (coupled.len(), 0);
     while j < n {
-        let many = alike(coupled, j, true);
+        let Coupled { rows, alike } = &coupled[j];
+        let many = if *alike >= 4 { 4 } else { 1 };
         let (b, c) = (&B[j * n..(j + many) * n], &mut C[j * n..(j + many) * n]);
         match (many, size_of::<S>()) {
-            (4, 64..) => four_columns::<S, 4>(A, b, c, &coupled[j], n),
-            (4, 16..) => four_columns::<S, 2>(A, b, c, &coupled[j], n),
-            (4, _) => four_columns::<S, 8>(A, b, c, &coupled[j], n),
+            (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n),
+            (4, 16..) => four_columns::<S, 2>(A, b, c, rows, n),
+            (4, _) => four_columns::<S, 8>(A, b, c, rows, n),
             _ => {
                 c.fill(S::zero());
-                subtract_column(A, b, c, &coupled[j]);
+                subtract_column(A, b, c, rows);
             }
         }
         j += many;
     }
 }
 
-/// How many columns from j on have the same rows, at most four, but 1 in place of 2 or 3 if only four will do.
-#[inline(always)]
-fn alike(coupled: &[Vec<usize>], j: usize, only_four: bool) -> usize {
-    let same = coupled[j + 1..].iter().take(3).take_while(|other| **other == coupled[j]).count();
-    if only_four && same < 3 { 1 } else { 1 + same }
-}
-
 /// Twice `minus_product` with one A that is symmetric, in lanes, where matrices are too large for the nearest cache.
 #[inline(always)]
-fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], coupled: &[Vec<usize>]) {
+fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], coupled: &[Coupled]) {
     let (n, mut j) = (coupled.len(), 0);
     while j < n {
-        let (many, rows) = (alike(coupled, j, false), &coupled[j]);
+        let Coupled { rows, alike } = &coupled[j];
+        let many = (*alike).min(4);
         let columns = j * n..(j + many) * n;
         let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
         let C = [&mut C0[columns.clone()], &mut C1[columns]];
@@ -200,6 +198,15 @@ kernel! {
     }
 }
 
+kernel! {
+    /// After `aba` and `rnea_derivatives`.
+    fn solves(_model, data) {
+        let (d, Workspace { da_dq, da_dv, solve, .. }) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+        let B = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
+        minus_solve(&data.world, &data.aba, solve, B, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);
+    }
+}
+
 /// [`aba`](crate::aba) and its derivatives with respect to q, v and τ, exact.
 ///
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
@@ -235,7 +242,11 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     } else {
         minv::from_factors(model, data); // those of `aba`
     }
-    products(model, data);
+    if data.aba_derivatives.solve.pays() {
+        solves(model, data);
+    } else {
+        products(model, data);
+    }
     let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
     data.aba_derivatives.view(data.minv.matrix(), state)
 }

@@ -87,7 +87,7 @@ impl<S: Scalar> Data<S> {
             aba: aba::Workspace::new(size),
             minv: minv::Workspace::new(size, model),
             rnea_derivatives: rnea_derivatives::Workspace::new(size),
-            aba_derivatives: aba_derivatives::Workspace::new(size),
+            aba_derivatives: aba_derivatives::Workspace::new(size, model),
             rnea_hessian: rnea_hessian::Workspace::new(size),
             aba_hessian: aba_hessian::Workspace::new(size),
             constrained_dynamics: constrained_dynamics::Workspace::new(size, model),

@@ -148,6 +148,15 @@ pub(crate) struct Column {
     pub depth: usize,
 }
 
+/// The coordinates that the motion of one of them needs efforts of.
+#[derive(Clone, Debug)]
+pub(crate) struct Coupled {
+    /// Those before and after it in the tree, itself included.
+    pub rows: Vec<usize>,
+    /// How many coordinates in a row, from this one on, have the same ones.
+    pub alike: usize,
+}
+
 /// A robot: bodies, joints, frames, inertias, limits. Frozen, checked when built, shared between threads.
 ///
 /// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names (of
@@ -180,8 +189,8 @@ pub struct Model<R = f64> {
     pub(crate) support: Vec<usize>,
     /// The bodies, children before parents.
     pub(crate) finished: Vec<usize>,
-    /// For each coordinate the ones that its motion needs efforts of: before and after it in the tree, itself included.
-    pub(crate) coupled: Vec<Vec<usize>>,
+    /// For each coordinate.
+    pub(crate) coupled: Vec<Coupled>,
     /// How single calls compute several bodies at once, if they do.
     pub(crate) limbs: Option<Plan>,
     pub(crate) warnings: Vec<Warning>,

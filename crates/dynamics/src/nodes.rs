@@ -1,6 +1,6 @@
 //! What the algorithms see of a tree of bodies.
 
-use crate::model::{Body, Column, Model, Node};
+use crate::model::{Body, Column, Coupled, Model, Node};
 use condyle_spatial::{Act, Se3, Vec3};
 
 impl Model {
@@ -80,6 +80,21 @@ impl Model {
         let structure = structure.chain(self.nodes.iter().flat_map(|n| [n.parent, n.column]));
         self.tree = structure.fold(0xcbf2_9ce4_8422_2325, |hash, x| (hash ^ x as u64).wrapping_mul(0x100_0000_01b3));
         let all = || (0..self.nv).collect(); // joints that follow tie branches together
-        self.coupled = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) }).collect();
+        let rows = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) });
+        self.coupled = Coupled::with(rows.collect());
+    }
+}
+
+impl Coupled {
+    /// Of each coordinate, with these rows.
+    pub(crate) fn with(rows: Vec<Vec<usize>>) -> Vec<Self> {
+        let alike = |c: usize| rows[c..].iter().take_while(|other| **other == rows[c]).count();
+        (0..rows.len()).map(|c| Self { rows: rows[c].clone(), alike: alike(c) }).collect()
+    }
+}
+
+impl AsRef<[usize]> for Coupled {
+    fn as_ref(&self) -> &[usize] {
+        &self.rows
     }
 }

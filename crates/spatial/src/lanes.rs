@@ -369,7 +369,7 @@ macro_rules! lanes {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Element, Kernel, Lanes, avx2, avx512};
+    use super::{Element, Fused, Kernel, Lanes, avx2, avx512};
     use crate::scalar::{Constant, Scalar};
     use crate::sin_cos;
     use core::arch::x86_64::*;
@@ -404,6 +404,23 @@ mod x86 {
         f32 by 8, __m256, single up to LARGEST_SINGLE, f32x8,
         _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_fmadd_ps _mm256_sqrt_ps;
         _mm256_set1_ps _mm256_andnot_ps _mm256_sub_ps _mm256_cmp_ps _mm256_blendv_ps _mm256_and_ps _mm256_or_ps _mm256_movemask_ps
+    }
+
+    impl Lanes<f64, 4> {
+        /// Four single numbers, one for each lane.
+        #[inline(always)]
+        pub fn from_fused(x: &[Fused; 4]) -> Self {
+            // SAFETY: `Fused` is a transparent wrapper of `f64`; the level is supported, see the head of the file.
+            Self(unsafe { _mm256_loadu_pd(x.as_ptr().cast()) })
+        }
+        /// The single number in each lane.
+        #[inline(always)]
+        pub fn to_fused(self) -> [Fused; 4] {
+            let mut x = [Fused(0.0); 4];
+            // SAFETY: as for `from_fused`.
+            unsafe { _mm256_storeu_pd(x.as_mut_ptr().cast(), self.0) };
+            x
+        }
     }
 
     /// A mask is a number with a bit for each lane.

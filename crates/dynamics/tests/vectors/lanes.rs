@@ -1,7 +1,7 @@
 //! Several knots in a vector register: the same bits as single calls, at the same level.
 
-use crate::common::rng;
 use crate::common::table::{Input, Output, kernels};
+use crate::common::{long_branches, rng};
 use crate::{each_level, models};
 use condyle_dynamics::level::Level;
 use condyle_dynamics::{Data, Force, Model, Scalar};
@@ -74,7 +74,8 @@ fn knots_are_single_calls<S: Vector>(models: &[Model]) {
 
 #[test]
 fn every_lane_is_a_single_call() {
-    let all = models(4);
+    let long = long_branches().into_iter().map(|model| model.with_limbs(false));
+    let all: Vec<Model> = models(4).into_iter().chain(long).collect();
     each_level(|level| match level {
         Level::Baseline => {}
         Level::Avx2 => knots_are_single_calls::<Lanes<f64, 4>>(&all),
