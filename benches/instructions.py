@@ -4,8 +4,8 @@
     python3 benches/instructions.py [--write]
 
 It runs benches/instructions.rs under callgrind (of valgrind), and compares with benches/instructions.json, which
---write makes anew. A compiler other than the one that the baseline is from gives other counts: then they are shown, and nothing
-is compared.
+--write makes anew. A compiler other than the one that the baseline is from gives other counts: then they are shown, and
+nothing is compared.
 """
 
 import argparse
@@ -47,7 +47,10 @@ def counts(program: Path, robot: str) -> dict[str, int]:
         command = ("valgrind", "--quiet", "--tool=callgrind", f"--callgrind-out-file={profile}", program, robot)
         run(*command, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
         table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", profile)
-    found = {m[2]: int(m[1].replace(",", "")) // STATES for m in map(LINE.match, table.splitlines()) if m}
+    found: dict[str, int] = {}
+    for match in filter(None, map(LINE.match, table.splitlines())):  # a function stands in a line for each of its files
+        name, n = match[2], int(match[1].replace(",", "")) // STATES
+        found[name] = max(n, found.get(name, 0))
     if not found:
         raise SystemExit("callgrind names no function of instructions::measured")
     return found
