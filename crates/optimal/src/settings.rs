@@ -24,6 +24,9 @@ pub enum Method {
 pub struct Settings {
     /// How gaps are closed and which steps are accepted.
     pub method: Method,
+    /// Whether the curvature of the dynamics counts, Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action gives it: full DDP,
+    /// which converges quadratically. Quu may need more regularisation then.
+    pub second_order: bool,
     /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
@@ -60,6 +63,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             method: Method::Fddp,
+            second_order: false,
             max_iterations: 100,
             tolerance: 1e-9,
             tolerance_bounded: 5e-5,

@@ -4,9 +4,9 @@ use super::costs::{Cost, Costs};
 use super::state::{groups, state_difference, state_integrate};
 use crate::action::ActionModel;
 use crate::error::{Error, assert_length};
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 use condyle_dynamics::{
-    Data, IntegrateArgument, Joint, Model, aba, aba_derivatives, gravity, integrate, integrate_jacobian,
+    Data, IntegrateArgument, Joint, Model, aba, aba_derivatives, aba_hessian, gravity, integrate, integrate_jacobian,
 };
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -207,6 +207,32 @@ impl ActionModel for FreeDynamics {
                 }
             }
         }
+    }
+
+    /// For a robot whose configurations are a vector space: of λᵀ∂²(q⁺, v⁺) there is left Δt (λ_v + Δt λ_q)ᵀ ∂²q̈.
+    fn dynamics_hessian(&mut self, _: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let Some(dt) = self.dt.filter(|_| self.groups.is_empty()) else { return false };
+        self.set_tau(u);
+        let (nv, passive) = (self.model.nv(), self.passive);
+        let (q, v) = x.split_at(self.model.nq());
+        for k in 0..nv {
+            self.dq[k] = dt * (lambda[nv + k] + dt * lambda[k]);
+        }
+        let d = aba_hessian(&self.model, &mut self.data, q, v, &self.tau, &[], &self.dq);
+        for c in 0..nv {
+            for r in 0..nv {
+                hessian.xx[(r, c)] = d.dqdq[(r, c)];
+                hessian.xx[(nv + r, c)] = d.dvdq[(r, c)];
+                hessian.xx[(c, nv + r)] = d.dvdq[(r, c)];
+                hessian.xx[(nv + r, nv + c)] = d.dvdv[(r, c)];
+            }
+            for k in 0..u.len() {
+                hessian.xu[(c, k)] = d.dtaudq[(passive + k, c)];
+                hessian.xu[(nv + c, k)] = 0.0;
+            }
+        }
+        hessian.uu.fill(0.0);
+        true
     }
 
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
