@@ -6,8 +6,10 @@ use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::watch::{NoSlopes, Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
-use crate::lq::LqNode;
-use condyle_dynamics::{AbaDerivatives, Data, Model, aba, aba_derivatives, difference, gravity, integrate};
+use crate::lq::{Hessian, LqNode};
+use condyle_dynamics::{
+    AbaDerivatives, Data, Model, aba, aba_derivatives, aba_hessian, difference, gravity, integrate,
+};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -21,6 +23,8 @@ pub struct Free {
     still: bool,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
     da_du: Vec<f64>,
+    /// A row of ∂²q̈/∂q∂u. Shape: nu.
+    du: Vec<f64>,
     /// Zeros, at the end of a horizon. Shape: nv × nv.
     zeros: DMatrix<f64>,
 }
@@ -66,6 +70,7 @@ impl Free {
         Ok(Self {
             data: Data::new(&model),
             da_du: actuation.scratch(),
+            du: vec![0.0; actuation.nu()],
             robot: Robot::new(model, actuation, offer, costs)?,
             still,
             zeros: DMatrix::zeros(nv, nv),
@@ -148,6 +153,33 @@ impl ContinuousModel for Free {
         robot.schedule.calc_diff(t, &scene, &FreeSlopes { d, actuation: &robot.actuation }, scale, node);
         let da_du = robot.actuation.columns(d.da_dtau, &mut self.da_du); // M⁻¹ S
         Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
+    }
+
+    /// By the contracted second derivatives of `aba`.
+    fn hessian(&mut self, _: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let Self { robot, data, du, .. } = self;
+        robot.actuation.effort(u, &mut robot.tau);
+        let (q, v) = x.split_at(robot.model.nq());
+        let d = aba_hessian(&robot.model, data, q, v, &robot.tau, &[], lambda);
+        let nv = v.len();
+        for c in 0..nv {
+            for r in 0..nv {
+                hessian.xx[(r, c)] = d.dqdq[(r, c)];
+                hessian.xx[(nv + r, c)] = d.dvdq[(r, c)];
+                hessian.xx[(c, nv + r)] = d.dvdq[(r, c)];
+                hessian.xx[(nv + r, nv + c)] = d.dvdv[(r, c)];
+            }
+            du.fill(0.0);
+            for i in 0..nv {
+                robot.actuation.add_row(i, d.dtaudq[(i, c)], du); // ∂²q̈/∂q∂u = ∂²q̈/∂q∂τ S
+            }
+            for (k, &x) in du.iter().enumerate() {
+                hessian.xu[(c, k)] = x;
+                hessian.xu[(nv + c, k)] = 0.0;
+            }
+        }
+        hessian.uu.fill(0.0);
+        true
     }
 
     fn groups(&self) -> &[Range<usize>] {

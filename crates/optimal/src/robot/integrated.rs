@@ -5,7 +5,7 @@ use super::runge_kutta::RungeKutta;
 use crate::Error;
 use crate::action::ActionModel;
 use crate::error::assert_length;
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -61,6 +61,13 @@ pub trait ContinuousModel: Send + 'static {
 
     /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the node, which are overwritten.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_>;
+
+    /// The second derivatives of λᵀ a by x and u, for nv numbers λ; says whether it knows them, which by default it does
+    /// not. Asked for where positions are a vector space.
+    fn hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let _ = (t, x, u, lambda, hessian);
+        false
+    }
 
     /// The coordinates of each group of positions that is no vector space, at most six a group: elsewhere q ⊕ δ is a sum.
     /// None by default.
@@ -230,6 +237,19 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
             Method::Euler => euler::calc_diff(inner, dt, t, x, u, dq, [transport, exp], node),
             Method::RungeKutta(method) => method.calc_diff(inner, dt, t, x, u, [transport, exp], node),
         }
+    }
+
+    /// For semi-implicit Euler and positions that are a vector space: of λᵀ∂²(q⁺, v⁺) there is left
+    /// Δt (λ_v + Δt λ_q)ᵀ ∂²a.
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let (Some(dt), Method::Euler, true) = (self.dt, &self.method, self.inner.groups().is_empty()) else {
+            return false;
+        };
+        let nv = self.inner.nv();
+        for k in 0..nv {
+            self.dq[k] = dt * (lambda[nv + k] + dt * lambda[k]);
+        }
+        self.inner.hessian(t, x, u, &self.dq, hessian)
     }
 
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
