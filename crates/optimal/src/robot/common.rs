@@ -2,6 +2,7 @@
 
 use super::actuation::Actuation;
 use super::costs::{Cost, Costs};
+use super::lanes::SideBySide;
 use super::state::groups;
 use super::watch::{Needs, Offer, Scene, Slopes, Watch};
 use crate::Error;
@@ -46,6 +47,14 @@ impl Robot {
                 Err(Error::Actuation { what })
             }
         }
+    }
+
+    /// Computes the dynamics of some states side by side.
+    pub(super) fn prepare(&self, lanes: &mut SideBySide, xs: &[f64], us: &[f64], derivatives: bool) {
+        let nx = self.model.nq() + self.model.nv();
+        let (count, nu) = (xs.len() / nx, self.actuation.nu());
+        (0..count).for_each(|k| self.actuation.effort(&us[k * nu..(k + 1) * nu], lanes.tau_mut(k)));
+        lanes.run(&self.model, count, xs, self.schedule.look_at_forces(), derivatives);
     }
 
     /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
@@ -101,6 +110,11 @@ impl Schedule {
         let needs = self.variants.iter().map(Costs::needs).fold(Needs::default(), |a, b| a | b);
         self.watch.resize(longest, needs);
         Ok(())
+    }
+
+    /// Whether a residual of some knot looks at forces.
+    pub(super) fn look_at_forces(&self) -> bool {
+        self.variants.iter().any(Costs::look_at_forces)
     }
 
     /// ℓ at knot t.
