@@ -1,5 +1,6 @@
 """Optimal control problems, from their JSON, in Condyle."""
 
+import json
 import time
 
 import numpy as np
@@ -59,7 +60,8 @@ def our_contact(contact, gains):
     return condyle.Constraint(contact["frame"], kind, reference=axes, kp=gains[0], kd=gains[1], placement=placement)
 
 
-def our_action(stage, model, spec, terminal):
+def our_action(stage, model, spec, terminal=False, others=()):
+    """An action; `others` are knots and the stages of those that differ from this one in their costs alone."""
     kind = stage["kind"]
     if kind == "unicycle":
         return unicycle(stage)[terminal]
@@ -69,8 +71,12 @@ def our_action(stage, model, spec, terminal):
         return DoublePendulum(model, stage).actions()[terminal]
     listed = stage["impulses"] if kind == "impulse" else stage["dynamics"].get("contacts", [])
     names = {contact["frame"]: contact.get("name", contact["frame"]) for contact in listed}
-    costs = [our_cost(cost, model, terminal, names) for cost in stage["costs"]]
-    costs = [cost for cost in costs if cost is not None]
+
+    def costs_of(stage):
+        costs = [our_cost(cost, model, terminal, names) for cost in stage["costs"]]
+        return [cost for cost in costs if cost is not None]
+
+    costs, costs_at = costs_of(stage), {t: costs_of(other) for t, other in others}
     contacts = {
         names[contact["frame"]]: our_contact(contact, (contact.get("kp", 0.0), contact.get("kd", 0.0)))
         for contact in listed
@@ -81,8 +87,9 @@ def our_action(stage, model, spec, terminal):
         return optimal.FreeDynamics(model, None, costs)
     actuation = actuation_matrix(spec, model.nv)
     if stage["dynamics"]["type"] == "free_fwd":
-        return optimal.FreeDynamics(model, stage["dt"], costs, actuation)
-    return optimal.ContactDynamics(model, contacts, stage["dt"], costs, stage["dynamics"]["damping"], actuation)
+        return optimal.FreeDynamics(model, stage["dt"], costs, costs_at, actuation)
+    damping = stage["dynamics"]["damping"]
+    return optimal.ContactDynamics(model, contacts, stage["dt"], costs, damping, costs_at, actuation)
 
 
 class Ours:
@@ -91,9 +98,7 @@ class Ours:
     def __init__(self, spec, robot):
         self.spec = spec
         model = our_robot(robot) if robot else None
-        used = sorted(set(spec["stages"]))
-        models = [our_action(spec["stage_models"][k], model, spec, False) for k in used]
-        stages = [used.index(k) for k in spec["stages"]]
+        models, stages = self.phases(model)
         terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, True)
         solver = getattr(optimal, OURS[spec["solvers"][0]], None)
         if solver is None:
@@ -107,6 +112,21 @@ class Ours:
         if any("u_lb" in stage for stage in spec["stage_models"]):
             raise NotRunError("Condyle's actions have no bounds")
         self.solver = solver(self.problem, **settings)
+
+    def phases(self, model):
+        """An action for all knots with the same dynamics, which may differ in their costs; and which serves a knot."""
+        first, serves = {}, []
+        for t, k in enumerate(self.spec["stages"]):
+            stage = self.spec["stage_models"][k]
+            same = stage if "dynamics" not in stage else {name: stage[name] for name in stage if name != "costs"}
+            key = json.dumps(same, sort_keys=True)
+            first.setdefault(key, (stage, []))[1].append((t, stage))
+            serves.append(list(first).index(key))
+
+        def action(stage, knots):
+            return our_action(stage, model, self.spec, others=[(t, s) for t, s in knots if s is not stage])
+
+        return [action(*phase) for phase in first.values()], serves
 
     def solve(self, xs, us):
         if len({len(u) for u in us}) == 1:

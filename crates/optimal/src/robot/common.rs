@@ -93,6 +93,15 @@ impl Schedule {
         &mut self.variants[k]
     }
 
+    /// Changes the weights of the terms called `name`, of all knots; says whether there is one.
+    pub(super) fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+        let mut found = false;
+        for costs in &mut self.variants {
+            found |= costs.set_weight(name, weight);
+        }
+        found
+    }
+
     /// Gives knot t costs of its own.
     pub(super) fn set(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         let costs = Costs::new(self.model.clone(), self.offer.clone(), costs)?;
@@ -154,6 +163,11 @@ macro_rules! robot_knot {
             /// The costs of knot t.
             pub fn costs_at_mut(&mut self, t: usize) -> &mut super::Costs {
                 self$(.$inner)?.robot.schedule.costs_mut(Some(t))
+            }
+
+            /// Changes the weights of the terms called `name` of all knots, between solves; says whether there is one.
+            pub fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+                self$(.$inner)?.robot.schedule.set_weight(name, weight)
             }
 
             /// Gives knot t of the horizon costs of its own, so that one action serves knots that differ in their
