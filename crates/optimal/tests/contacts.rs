@@ -452,7 +452,7 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
 #[test]
 fn knots_side_by_side_are_single_knots() {
     let mut rng = StdRng::seed_from_u64(18);
-    let model = Arc::new(robots::quadruped());
+    let model = Arc::new(robots::quadruped().with_limbs(false)); // which add up in another order
     let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
     let costs = contact_costs(&model, &contacts, 12, &mut rng);
     let free = costs.iter().filter(|cost| !["force", "cone"].contains(&cost.name.as_str())).cloned().collect();
