@@ -1,5 +1,6 @@
 """Optimal control problems, from their JSON, in Condyle."""
 
+import json
 import time
 
 import numpy as np
@@ -56,7 +57,8 @@ def our_contact(contact, gains):
     return condyle.Constraint(contact["frame"], kind, reference=axes, kp=gains[0], kd=gains[1], placement=placement)
 
 
-def our_action(stage, model, spec, terminal, bounded):
+def our_action(stage, model, spec, bounded, terminal=False, others=()):
+    """An action; `others` are knots and the stages of those that differ from this one in their costs alone."""
     kind = stage["kind"]
     if kind == "unicycle":
         return unicycle(stage)[terminal]
@@ -66,8 +68,12 @@ def our_action(stage, model, spec, terminal, bounded):
         return DoublePendulum(model, stage).actions()[terminal]
     listed = stage["impulses"] if kind == "impulse" else stage["dynamics"].get("contacts", [])
     names = {contact["frame"]: contact.get("name", contact["frame"]) for contact in listed}
-    costs = [our_cost(cost, model, terminal, names) for cost in stage["costs"]]
-    costs = [cost for cost in costs if cost is not None]
+
+    def costs_of(stage):
+        costs = [our_cost(cost, model, terminal, names) for cost in stage["costs"]]
+        return [cost for cost in costs if cost is not None]
+
+    costs, costs_at = costs_of(stage), {t: costs_of(other) for t, other in others}
     contacts = {
         names[contact["frame"]]: our_contact(contact, (contact.get("kp", 0.0), contact.get("kd", 0.0)))
         for contact in listed
@@ -81,21 +87,19 @@ def our_action(stage, model, spec, terminal, bounded):
     if bounded and "u_lb" in stage:
         limits = {"lower": bounds(stage["u_lb"], -np.inf), "upper": bounds(stage["u_ub"], np.inf)}
     if stage["dynamics"]["type"] == "free_fwd":
-        return optimal.FreeDynamics(model, stage["dt"], costs, actuation, **limits)
+        return optimal.FreeDynamics(model, stage["dt"], costs, costs_at, actuation, **limits)
     damping = stage["dynamics"]["damping"]
-    return optimal.ContactDynamics(model, contacts, stage["dt"], costs, damping, actuation, **limits)
+    return optimal.ContactDynamics(model, contacts, stage["dt"], costs, damping, costs_at, actuation, **limits)
 
 
 class Ours:
     """A problem of a JSON in Condyle, for what Crocoddyl's solver of some name does."""
 
     def __init__(self, spec, robot, solver):
-        bounded = solver.startswith("box")
+        self.spec, bounded = spec, solver.startswith("box")
         model = our_robot(robot) if robot else None
-        used = sorted(set(spec["stages"]))
-        models = [our_action(spec["stage_models"][k], model, spec, False, bounded) for k in used]
-        stages = [used.index(k) for k in spec["stages"]]
-        terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, True, bounded)
+        models, stages = self.phases(model, bounded)
+        terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, bounded, terminal=True)
         self.problem = optimal.Problem(spec["x0"], models, stages, terminal)
         settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
         if spec["init_reg"] is not None:
@@ -103,6 +107,21 @@ class Ours:
         if spec["th_stop"] is not None:
             settings["tolerance"] = settings["tolerance_bounded"] = spec["th_stop"]
         self.solver = optimal.Fddp(self.problem, **settings)
+
+    def phases(self, model, bounded):
+        """An action for all knots with the same dynamics, which may differ in their costs; and which serves a knot."""
+        first, serves = {}, []
+        for t, k in enumerate(self.spec["stages"]):
+            stage = self.spec["stage_models"][k]
+            same = stage if "dynamics" not in stage else {name: stage[name] for name in stage if name != "costs"}
+            key = json.dumps(same, sort_keys=True)
+            first.setdefault(key, (stage, []))[1].append((t, stage))
+            serves.append(list(first).index(key))
+
+        def action(stage, knots):
+            return our_action(stage, model, self.spec, bounded, others=[(t, s) for t, s in knots if s is not stage])
+
+        return [action(*phase) for phase in first.values()], serves
 
     def solve(self, xs, us):
         if len({len(u) for u in us}) == 1:

@@ -52,7 +52,9 @@ __all__ = [
     "FreeDynamics",
     "FrictionCone",
     "ImpulseDynamics",
+    "InverseDynamics",
     "Joint",
+    "Lqr",
     "Ltdl",
     "Model",
     "ModelBuilder",
@@ -158,7 +160,7 @@ _Input: TypeAlias = (
     | tuple[Literal["force", "inertia"], str | int]
     | tuple[Literal["friction"], float]
 )
-_Action: TypeAlias = FreeDynamics | ContactDynamics | ImpulseDynamics | Action
+_Action: TypeAlias = FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action
 _Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
 _RneaOut: TypeAlias = RneaDerivatives | tuple[_Array, _Array, _Array]
 _AbaOut: TypeAlias = AbaDerivatives | tuple[_Array, _Array, _Array, _Array]
@@ -2102,6 +2104,7 @@ class FreeDynamics:
     model: the robot.
     dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
     costs: a list of `Cost`.
+    costs_at: lists of `Cost` by the number of a knot, for knots with costs of their own; so one action serves a phase.
     actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
     lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
@@ -2114,6 +2117,7 @@ class FreeDynamics:
         model: Model,
         dt: float | None,
         costs: Sequence[Cost],
+        costs_at: dict[int, Sequence[Cost]] | None = None,
         actuation: ArrayLike | None = None,
         integrator: _Scheme = "semi_implicit_euler",
         lower: ArrayLike | None = None,
@@ -2131,7 +2135,7 @@ class ContactDynamics:
     dt: Δt in seconds.
     costs: a list of `Cost`.
     damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-    actuation, integrator, lower, upper: as of `FreeDynamics`.
+    costs_at, actuation, integrator, lower, upper: as of `FreeDynamics`.
 
     Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
 
@@ -2148,6 +2152,7 @@ class ContactDynamics:
         dt: float,
         costs: Sequence[Cost],
         damping: float = 0.0,
+        costs_at: dict[int, Sequence[Cost]] | None = None,
         actuation: ArrayLike | None = None,
         integrator: _Scheme = "semi_implicit_euler",
         lower: ArrayLike | None = None,
@@ -2179,6 +2184,53 @@ class ImpulseDynamics:
         restitution: float = 0.0,
         damping: float = 0.0,
     ) -> ImpulseDynamics: ...
+
+@final
+class InverseDynamics:
+    """A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
+
+    model: the robot.
+    dt: Δt in seconds.
+    costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
+    integrator, lower, upper: as of `FreeDynamics`.
+
+    Raises `ProblemError` for a cost that does not fit.
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        dt: float,
+        costs: Sequence[Cost],
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> InverseDynamics: ...
+
+@final
+class Lqr:
+    """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
+
+    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no bound;
+    without R and B it has no controls, as at a terminal knot.
+
+    >>> from condyle.optimal import Lqr
+    >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
+    """
+
+    def __new__(
+        cls,
+        A: ArrayLike,
+        B: ArrayLike | None = None,
+        f: ArrayLike | None = None,
+        Q: ArrayLike | None = None,
+        S: ArrayLike | None = None,
+        R: ArrayLike | None = None,
+        q: ArrayLike | None = None,
+        r: ArrayLike | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Lqr: ...
 
 @final
 class Action:
@@ -2213,7 +2265,7 @@ class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `Action`.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`.
     stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
     terminal: the model of the end, without controls.
 

@@ -83,8 +83,8 @@ mod _condyle {
     use model::Model;
     #[pymodule_export]
     use optimal::{
-        Action, Activation, ContactDynamics, Cost, Fddp, FreeDynamics, FrictionCone, ImpulseDynamics, Problem,
-        WrenchCone,
+        Action, Activation, ContactDynamics, Cost, Fddp, FreeDynamics, FrictionCone, ImpulseDynamics, InverseDynamics,
+        Lqr, Problem, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

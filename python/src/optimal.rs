@@ -5,7 +5,7 @@ mod costs;
 
 use crate::arrays::{matrix, named_tuple, output, vector};
 use crate::exceptions::ProblemError;
-pub(crate) use actions::{Action, ContactDynamics, FreeDynamics, ImpulseDynamics};
+pub(crate) use actions::{Action, ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics, Lqr};
 use actions::{Fault, Model};
 use condyle::optimal as rust;
 pub(crate) use costs::{Activation, Cost, FrictionCone, WrenchCone};
@@ -83,7 +83,7 @@ fn row_major(K: &DMatrix<f64>, out: &mut [f64]) {
 /// An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 ///
 /// x0: the initial state, nx numbers.
-/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `Action`.
+/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`.
 /// stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
 /// terminal: the model of the end, without controls.
 ///

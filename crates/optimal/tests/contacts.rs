@@ -447,3 +447,38 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
     assert_eq!(solution.status, Status::Converged);
     assert!(solution.xs.iter().all(|x| x.is_finite()));
 }
+
+/// A group of knots in the lanes of a vector register: the bits of single calls, with knots left over and all.
+#[test]
+fn knots_side_by_side_are_single_knots() {
+    let mut rng = StdRng::seed_from_u64(18);
+    let model = Arc::new(robots::quadruped());
+    let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+    let costs = contact_costs(&model, &contacts, 12, &mut rng);
+    let free = costs.iter().filter(|cost| !["force", "cone"].contains(&cost.name.as_str())).cloned().collect();
+    let stance = ContactDynamics::running(model.clone(), &contacts, DT, costs).unwrap();
+    let flight = FreeDynamics::running(model.clone(), DT, free).unwrap();
+    check_group(stance, &model, &mut rng);
+    check_group(flight, &model, &mut rng);
+}
+
+fn check_group(mut action: impl ActionModel, model: &Model, rng: &mut StdRng) {
+    for count in [1, 2, 3, 8, 21] {
+        let knots: Vec<usize> = (0..count).collect();
+        let xs = knots.iter().flat_map(|_| random_state(model, rng)).collect::<Vec<_>>();
+        let us = random(count * action.nu(), 5.0, rng);
+        let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
+        let (mut next, mut costs) = (vec![0.0; count * nx], vec![0.0; count]);
+        let mut nodes = vec![LqNode::zeros(ndx, nu); count];
+        action.calc_group(&knots, &xs, &us, &mut next, &mut costs);
+        action.calc_diff_group(&knots, &xs, &us, &mut nodes);
+        for t in knots {
+            let (x, u) = (&xs[t * nx..][..nx], &us[t * nu..][..nu]);
+            let (mut alone, mut node) = (vec![0.0; nx], LqNode::zeros(ndx, nu));
+            assert_eq!(action.calc(t, x, u, &mut alone), costs[t], "{count}");
+            assert_eq!(alone, next[t * nx..][..nx]);
+            action.calc_diff(t, x, u, &mut node);
+            assert!(node == nodes[t], "knot {t} of {count} has other derivatives");
+        }
+    }
+}

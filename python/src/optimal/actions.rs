@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rust::robot::{self, Actuation, Integrator};
 use rust::{ActionModel, LqNode, NumDiff};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 /// What an action written in Python raised during a solve.
@@ -24,6 +25,7 @@ pub(super) enum Model {
     Free,
     Contact,
     Impulse,
+    Inverse,
     Own,
 }
 
@@ -36,13 +38,13 @@ impl Model {
                 None => problem.terminal_mut(),
             }
         }
-        let costs = match self {
-            Self::Free => find::<robot::FreeDynamics>(problem, k).map(|m| m.costs_mut()),
-            Self::Contact => find::<robot::ContactDynamics>(problem, k).map(|m| m.costs_mut()),
-            Self::Impulse => find::<robot::ImpulseDynamics>(problem, k).map(|m| m.costs_mut()),
-            Self::Own => None,
-        };
-        costs.is_some_and(|costs| costs.set_weight(name, weight))
+        match self {
+            Self::Free => find::<robot::FreeDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
+            Self::Contact => find::<robot::ContactDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
+            Self::Impulse => find::<robot::ImpulseDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
+            Self::Inverse => find::<robot::InverseDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
+            Self::Own => false,
+        }
     }
 }
 
@@ -56,6 +58,12 @@ pub(super) fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResu
     }
     if let Ok(impulse) = model.cast::<ImpulseDynamics>() {
         return Ok((Box::new(impulse.get().0.clone()), Model::Impulse));
+    }
+    if let Ok(inverse) = model.cast::<InverseDynamics>() {
+        return Ok((Box::new(inverse.get().0.clone()), Model::Inverse));
+    }
+    if let Ok(lqr) = model.cast::<Lqr>() {
+        return Ok((Box::new(lqr.get().0.clone()), Model::Own));
     }
     let Ok(own) = model.cast::<Action>() else {
         let found = model.get_type().name()?;
@@ -92,6 +100,9 @@ fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult
 fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
     costs.iter().map(|c| c.0.clone()).collect()
 }
+
+/// Costs of single knots.
+type CostsAt<'py> = Option<BTreeMap<usize, Vec<PyRef<'py, Cost>>>>;
 
 /// Contacts with the names that residuals call them by.
 fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Vec<robot::Contact>> {
@@ -137,6 +148,7 @@ fn bounded<M: robot::ContinuousModel>(
 /// model: the robot.
 /// dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
 /// costs: a list of `Cost`.
+/// costs_at: lists of `Cost` by the number of a knot, for knots with costs of their own; so one action serves a phase.
 /// actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
@@ -148,11 +160,12 @@ pub(crate) struct FreeDynamics(pub(super) robot::FreeDynamics);
 #[pymethods]
 impl FreeDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
+    #[pyo3(signature = (model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
     fn new(
         model: &Bound<'_, Robot>,
         dt: Option<f64>,
         costs: Vec<PyRef<'_, Cost>>,
+        costs_at: CostsAt<'_>,
         actuation: Option<&Bound<'_, PyAny>>,
         integrator: &str,
         lower: Option<&Bound<'_, PyAny>>,
@@ -167,7 +180,11 @@ impl FreeDynamics {
             }
             None => robot::FreeDynamics::terminal(model, costs),
         };
-        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
+        let mut action = action.map_err(exception)?;
+        for (t, costs) in costs_at.into_iter().flatten() {
+            action.set_costs(t, terms(&costs)).map_err(exception)?;
+        }
+        Ok(Self(bounded(action, lower, upper)?))
     }
 
     /// The efforts that hold the robot still at the state x, nu numbers.
@@ -185,7 +202,7 @@ impl FreeDynamics {
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`.
 /// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-/// actuation, integrator, lower, upper: as of `FreeDynamics`.
+/// costs_at, actuation, integrator, lower, upper: as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
 ///
@@ -199,13 +216,14 @@ pub(crate) struct ContactDynamics(pub(super) robot::ContactDynamics);
 #[pymethods]
 impl ContactDynamics {
     #[new]
-    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
+    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
     fn new(
         model: &Bound<'_, Robot>,
         contacts: &Bound<'_, PyDict>,
         dt: f64,
         costs: Vec<PyRef<'_, Cost>>,
         damping: f64,
+        costs_at: CostsAt<'_>,
         actuation: Option<&Bound<'_, PyAny>>,
         integrator: &str,
         lower: Option<&Bound<'_, PyAny>>,
@@ -215,7 +233,11 @@ impl ContactDynamics {
         let (drives, contacts) = (self::actuation(&model, actuation)?, self::contacts(&model, contacts)?);
         let action = robot::Contacts::new(model, drives, &contacts, damping, terms(&costs))
             .and_then(|inner| robot::ContactDynamics::new(inner, integrator, dt));
-        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
+        let mut action = action.map_err(exception)?;
+        for (t, costs) in costs_at.into_iter().flatten() {
+            action.set_costs(t, terms(&costs)).map_err(exception)?;
+        }
+        Ok(Self(bounded(action, lower, upper)?))
     }
 
     /// The smallest controls and forces that hold the robot still at the state x: nu controls of them.
@@ -255,6 +277,97 @@ impl ImpulseDynamics {
         let contacts = self::contacts(&model, contacts)?;
         let action = robot::ImpulseDynamics::new(model, &contacts, restitution, damping, terms(&costs));
         Ok(Self(action.map_err(exception)?))
+    }
+}
+
+/// A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
+///
+/// model: the robot.
+/// dt: Δt in seconds.
+/// costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
+/// integrator, lower, upper: as of `FreeDynamics`.
+///
+/// Raises `ProblemError` for a cost that does not fit.
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct InverseDynamics(pub(super) robot::InverseDynamics);
+
+#[pymethods]
+impl InverseDynamics {
+    #[new]
+    #[pyo3(signature = (model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None))]
+    fn new(
+        model: &Bound<'_, Robot>,
+        dt: f64,
+        costs: Vec<PyRef<'_, Cost>>,
+        integrator: &str,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
+        let action = robot::Inverse::new(model, terms(&costs))
+            .and_then(|inner| robot::InverseDynamics::new(inner, integrator, dt));
+        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
+    }
+}
+
+/// Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
+///
+/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no bound;
+/// without R and B it has no controls, as at a terminal knot.
+///
+/// >>> from condyle.optimal import Lqr
+/// >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Lqr(rust::Lqr);
+
+#[pymethods]
+impl Lqr {
+    #[new]
+    #[pyo3(signature = (A, B=None, f=None, Q=None, S=None, R=None, q=None, r=None, lower=None, upper=None))]
+    #[allow(non_snake_case, clippy::too_many_arguments)]
+    fn new(
+        A: &Bound<'_, PyAny>,
+        B: Option<&Bound<'_, PyAny>>,
+        f: Option<&Bound<'_, PyAny>>,
+        Q: Option<&Bound<'_, PyAny>>,
+        S: Option<&Bound<'_, PyAny>>,
+        R: Option<&Bound<'_, PyAny>>,
+        q: Option<&Bound<'_, PyAny>>,
+        r: Option<&Bound<'_, PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let nx = A.len()?;
+        let nu = match (R, B) {
+            (Some(R), _) => R.len()?,
+            (None, Some(B)) => B.get_item(0)?.len()?,
+            (None, None) => 0,
+        };
+        let mut node = LqNode::zeros(nx, nu);
+        for (name, given, to, shape) in [
+            ("A", Some(A), &mut node.A, [nx, nx]),
+            ("B", B, &mut node.B, [nx, nu]),
+            ("Q", Q, &mut node.Q, [nx, nx]),
+            ("S", S, &mut node.S, [nx, nu]),
+            ("R", R, &mut node.R, [nu, nu]),
+        ] {
+            if let Some(given) = given {
+                *to = matrix(name, given, shape)?.to_matrix();
+            }
+        }
+        for (name, given, to) in [
+            ("f", f, &mut node.f),
+            ("q", q, &mut node.q),
+            ("r", r, &mut node.r),
+            ("lower", lower, &mut node.lower),
+            ("upper", upper, &mut node.upper),
+        ] {
+            if let Some(given) = given {
+                let length = to.len();
+                to.copy_from_slice(&vector(name, given, length)?);
+            }
+        }
+        Ok(Self(rust::Lqr::new(node)))
     }
 }
 

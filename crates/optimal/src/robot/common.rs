@@ -2,6 +2,7 @@
 
 use super::actuation::Actuation;
 use super::costs::{Cost, Costs};
+use super::lanes::SideBySide;
 use super::state::groups;
 use super::watch::{Needs, Offer, Scene, Slopes, Watch};
 use crate::Error;
@@ -48,6 +49,14 @@ impl Robot {
         }
     }
 
+    /// Computes the dynamics of some states side by side.
+    pub(super) fn prepare(&self, lanes: &mut SideBySide, xs: &[f64], us: &[f64], derivatives: bool) {
+        let nx = self.model.nq() + self.model.nv();
+        let (count, nu) = (xs.len() / nx, self.actuation.nu());
+        (0..count).for_each(|k| self.actuation.effort(&us[k * nu..(k + 1) * nu], lanes.tau_mut(k)));
+        lanes.run(&self.model, count, xs, self.schedule.look_at_forces(), derivatives);
+    }
+
     /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
     pub(super) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         integrate_jacobian(&self.model, dq, IntegrateArgument::Position, by_q);
@@ -84,6 +93,15 @@ impl Schedule {
         &mut self.variants[k]
     }
 
+    /// Changes the weights of the terms called `name`, of all knots; says whether there is one.
+    pub(super) fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+        let mut found = false;
+        for costs in &mut self.variants {
+            found |= costs.set_weight(name, weight);
+        }
+        found
+    }
+
     /// Gives knot t costs of its own.
     pub(super) fn set(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         let costs = Costs::new(self.model.clone(), self.offer.clone(), costs)?;
@@ -101,6 +119,11 @@ impl Schedule {
         let needs = self.variants.iter().map(Costs::needs).fold(Needs::default(), |a, b| a | b);
         self.watch.resize(longest, needs);
         Ok(())
+    }
+
+    /// Whether a residual of some knot looks at forces.
+    pub(super) fn look_at_forces(&self) -> bool {
+        self.variants.iter().any(Costs::look_at_forces)
     }
 
     /// ℓ at knot t.
@@ -140,6 +163,11 @@ macro_rules! robot_knot {
             /// The costs of knot t.
             pub fn costs_at_mut(&mut self, t: usize) -> &mut super::Costs {
                 self$(.$inner)?.robot.schedule.costs_mut(Some(t))
+            }
+
+            /// Changes the weights of the terms called `name` of all knots, between solves; says whether there is one.
+            pub fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+                self$(.$inner)?.robot.schedule.set_weight(name, weight)
             }
 
             /// Gives knot t of the horizon costs of its own, so that one action serves knots that differ in their

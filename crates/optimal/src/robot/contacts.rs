@@ -5,12 +5,12 @@ use super::common::{Robot, robot_knot};
 use super::contact::{Contact, constraint_set, offer};
 use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+use super::lanes::{Held, Outcome, SideBySide};
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
 use condyle_dynamics::{
-    ConstrainedDerivatives, ConstraintSet, Data, Model, constrained_dynamics, constrained_dynamics_derivatives,
-    difference, gravity, integrate,
+    ConstraintSet, Data, Model, constrained_dynamics, constrained_dynamics_derivatives, difference, gravity, integrate,
 };
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -22,6 +22,7 @@ pub struct Contacts {
     pub(super) robot: Robot,
     set: ConstraintSet<f64>,
     data: Data<f64>,
+    lanes: Option<SideBySide>,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
     da_du: Vec<f64>,
 }
@@ -71,10 +72,11 @@ impl Contacts {
         let set = constraint_set(&model, contacts, damping)?;
         let own = Offer { nu: actuation.nu(), effort: true, ..Offer::default() };
         let data = Data::new(&model);
+        let lanes = SideBySide::new(&model, Some(Held { contacts, proximal: set.proximal }));
         let da_du = actuation.scratch();
         let robot = Robot::new(model, actuation, offer(own, contacts), costs)?;
         robot.check_regular()?;
-        Ok(Self { robot, set, data, da_du })
+        Ok(Self { robot, set, data, lanes, da_du })
     }
 }
 
@@ -136,9 +138,48 @@ impl ContinuousModel for Contacts {
         let (q, v) = x.split_at(robot.model.nq());
         let d = constrained_dynamics_derivatives(&robot.model, data, set, q, v, &robot.tau, &[]);
         let scene = Scene { x, u, a: d.a, tau: &robot.tau, lambda: d.lambda };
-        robot.schedule.calc_diff(t, &scene, &ContactSlopes { d, actuation: &robot.actuation }, scale, node);
+        let da = [d.da_dq, d.da_dv, d.da_dtau];
+        let dlambda = [d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau];
+        robot.schedule.calc_diff(t, &scene, &ContactSlopes { da, dlambda, actuation: &robot.actuation }, scale, node);
         let da_du = robot.actuation.columns(d.da_dtau, &mut self.da_du); // P S
         Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
+    }
+
+    fn lanes(&self) -> usize {
+        self.lanes.as_ref().map_or(1, SideBySide::lanes)
+    }
+
+    fn prepare(&mut self, xs: &[f64], us: &[f64], derivatives: bool) {
+        if let Some(lanes) = &mut self.lanes {
+            self.robot.prepare(lanes, xs, us, derivatives);
+        }
+    }
+
+    fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
+        let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc(t, x, u) };
+        let Outcome { a, lambda, .. } = &lanes.outcomes[i];
+        robot.actuation.effort(u, &mut robot.tau);
+        let scene = Scene { x, u, a, tau: &robot.tau, lambda };
+        (a, robot.schedule.calc(t, &scene))
+    }
+
+    fn calc_diff_prepared(
+        &mut self,
+        i: usize,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        scale: f64,
+        node: &mut LqNode,
+    ) -> Derivatives<'_> {
+        let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc_diff(t, x, u, scale, node) };
+        let Outcome { a, lambda, da, dlambda } = &lanes.outcomes[i];
+        robot.actuation.effort(u, &mut robot.tau);
+        let scene = Scene { x, u, a, tau: &robot.tau, lambda };
+        let slopes = ContactSlopes { da: da.each_ref(), dlambda: dlambda.each_ref(), actuation: &robot.actuation };
+        robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
+        let da_du = robot.actuation.columns(&da[2], &mut self.da_du);
+        Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
     }
 
     fn groups(&self) -> &[Range<usize>] {
@@ -159,16 +200,19 @@ impl ContinuousModel for Contacts {
 }
 
 struct ContactSlopes<'a> {
-    d: ConstrainedDerivatives<'a, f64>,
+    /// ∂q̈/∂q, ∂q̈/∂v, ∂q̈/∂τ.
+    da: [&'a DMatrix<f64>; 3],
+    /// ∂λ/∂q, ∂λ/∂v, ∂λ/∂τ.
+    dlambda: [&'a DMatrix<f64>; 3],
     actuation: &'a Actuation,
 }
 
 impl Slopes for ContactSlopes<'_> {
     fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]) {
-        let (nv, d) = (self.d.a.len(), &self.d);
-        let (by_q, by_v, by_tau) = match signal {
-            Signal::Acceleration => (d.da_dq, d.da_dv, d.da_dtau),
-            Signal::Force => (d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau),
+        let nv = self.da[0].nrows();
+        let [by_q, by_v, by_tau] = match signal {
+            Signal::Acceleration => self.da,
+            Signal::Force => self.dlambda,
             Signal::Effort => return self.actuation.add_row(row, c, &mut g[2 * nv..]),
         };
         add_matrix_row(by_q, row, c, &mut g[..nv]);

@@ -132,6 +132,11 @@ impl Costs {
         self.plans.iter().map(|plan| plan.n).max().unwrap_or(0)
     }
 
+    /// Whether a residual looks at forces.
+    pub(super) fn look_at_forces(&self) -> bool {
+        self.terms.iter().any(|term| term.residual.signal() == Some(Signal::Force))
+    }
+
     fn needs_of(term: &Cost) -> Needs {
         let mut needs = Needs::default();
         match term.residual {

@@ -5,9 +5,10 @@ use crate::lq::LqNode;
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// The next state; returns ℓ Δt.
+/// The next state; returns ℓ Δt. Of a state that was prepared, `lane` is its number.
 pub(super) fn calc<M: ContinuousModel>(
     model: &mut M,
+    lane: Option<usize>,
     dt: f64,
     t: usize,
     x: &[f64],
@@ -17,7 +18,10 @@ pub(super) fn calc<M: ContinuousModel>(
 ) -> f64 {
     let (q, v) = x.split_at(model.nq());
     let (q_next, v_next) = next.split_at_mut(q.len());
-    let (a, cost) = model.calc(t, x, u);
+    let (a, cost) = match lane {
+        Some(i) => model.calc_prepared(i, t, x, u),
+        None => model.calc(t, x, u),
+    };
     for k in 0..v.len() {
         v_next[k] = v[k] + a[k] * dt; // v⁺ = v + a Δt
         dq[k] = v[k] * dt + a[k] * dt * dt; // v Δt + a Δt²
@@ -31,6 +35,7 @@ pub(super) fn calc<M: ContinuousModel>(
 /// A = [T + E ∂a/∂q Δt², E (Δt 1 + ∂a/∂v Δt²); ∂a/∂q Δt, 1 + ∂a/∂v Δt],   B = [E ∂a/∂u Δt²; ∂a/∂u Δt]
 pub(super) fn calc_diff<M: ContinuousModel>(
     model: &mut M,
+    lane: Option<usize>,
     dt: f64,
     t: usize,
     x: &[f64],
@@ -40,7 +45,10 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     node: &mut LqNode,
 ) {
     let (nv, v) = (model.nv(), &x[model.nq()..]);
-    let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(t, x, u, dt, node);
+    let Derivatives { a, da_dq, da_dv, da_du } = match lane {
+        Some(i) => model.calc_diff_prepared(i, t, x, u, dt, node),
+        None => model.calc_diff(t, x, u, dt, node),
+    };
     for k in 0..nv {
         dq[k] = v[k] * dt + a[k] * dt * dt;
     }

@@ -4,10 +4,11 @@ use super::actuation::Actuation;
 use super::common::{Robot, robot_knot};
 use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+use super::lanes::{Outcome, SideBySide};
 use super::watch::{NoSlopes, Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
-use condyle_dynamics::{AbaDerivatives, Data, Model, aba, aba_derivatives, difference, gravity, integrate};
+use condyle_dynamics::{Data, Model, aba, aba_derivatives, difference, gravity, integrate};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -17,6 +18,7 @@ use std::sync::Arc;
 pub struct Free {
     pub(super) robot: Robot,
     data: Data<f64>,
+    lanes: Option<SideBySide>,
     /// Whether this is the end of a horizon, where nothing moves.
     still: bool,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
@@ -65,6 +67,7 @@ impl Free {
         let (nv, still) = (model.nv(), !offer.effort);
         Ok(Self {
             data: Data::new(&model),
+            lanes: if still { None } else { SideBySide::new(&model, None) },
             da_du: actuation.scratch(),
             robot: Robot::new(model, actuation, offer, costs)?,
             still,
@@ -145,9 +148,47 @@ impl ContinuousModel for Free {
         let (q, v) = x.split_at(robot.model.nq());
         let d = aba_derivatives(&robot.model, data, q, v, &robot.tau, &[]);
         let scene = Scene { x, u, a: d.a, tau: &robot.tau, lambda: &[] };
-        robot.schedule.calc_diff(t, &scene, &FreeSlopes { d, actuation: &robot.actuation }, scale, node);
+        let slopes = FreeSlopes { da: [d.da_dq, d.da_dv, d.da_dtau], actuation: &robot.actuation };
+        robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
         let da_du = robot.actuation.columns(d.da_dtau, &mut self.da_du); // M⁻¹ S
         Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
+    }
+
+    fn lanes(&self) -> usize {
+        self.lanes.as_ref().map_or(1, SideBySide::lanes)
+    }
+
+    fn prepare(&mut self, xs: &[f64], us: &[f64], derivatives: bool) {
+        if let Some(lanes) = &mut self.lanes {
+            self.robot.prepare(lanes, xs, us, derivatives);
+        }
+    }
+
+    fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
+        let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc(t, x, u) };
+        let a = &lanes.outcomes[i].a;
+        robot.actuation.effort(u, &mut robot.tau);
+        let scene = Scene { x, u, a, tau: &robot.tau, lambda: &[] };
+        (a, robot.schedule.calc(t, &scene))
+    }
+
+    fn calc_diff_prepared(
+        &mut self,
+        i: usize,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        scale: f64,
+        node: &mut LqNode,
+    ) -> Derivatives<'_> {
+        let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc_diff(t, x, u, scale, node) };
+        let Outcome { a, da, .. } = &lanes.outcomes[i];
+        robot.actuation.effort(u, &mut robot.tau);
+        let scene = Scene { x, u, a, tau: &robot.tau, lambda: &[] };
+        let slopes = FreeSlopes { da: da.each_ref(), actuation: &robot.actuation };
+        robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
+        let da_du = robot.actuation.columns(&da[2], &mut self.da_du);
+        Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
     }
 
     fn groups(&self) -> &[Range<usize>] {
@@ -168,18 +209,19 @@ impl ContinuousModel for Free {
 }
 
 struct FreeSlopes<'a> {
-    d: AbaDerivatives<'a, f64>,
+    /// ∂q̈/∂q, ∂q̈/∂v, ∂q̈/∂τ.
+    da: [&'a DMatrix<f64>; 3],
     actuation: &'a Actuation,
 }
 
 impl Slopes for FreeSlopes<'_> {
     fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]) {
-        let nv = self.d.a.len();
+        let ([by_q, by_v, by_tau], nv) = (self.da, self.da[0].nrows());
         match signal {
             Signal::Acceleration => {
-                add_matrix_row(self.d.da_dq, row, c, &mut g[..nv]);
-                add_matrix_row(self.d.da_dv, row, c, &mut g[nv..2 * nv]);
-                self.actuation.add_product_row(self.d.da_dtau, row, c, &mut g[2 * nv..]);
+                add_matrix_row(by_q, row, c, &mut g[..nv]);
+                add_matrix_row(by_v, row, c, &mut g[nv..2 * nv]);
+                self.actuation.add_product_row(by_tau, row, c, &mut g[2 * nv..]);
             }
             Signal::Effort => self.actuation.add_row(row, c, &mut g[2 * nv..]),
             Signal::Force => {}

@@ -1,6 +1,7 @@
 //! Steps of time: from accelerations to the next state.
 
 use super::euler;
+use super::lanes::WORTHWHILE;
 use super::runge_kutta::RungeKutta;
 use crate::Error;
 use crate::action::ActionModel;
@@ -61,6 +62,37 @@ pub trait ContinuousModel: Send + 'static {
 
     /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the node, which are overwritten.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_>;
+
+    /// How many states [`prepare`](Self::prepare) takes at the price of few; 1 unless it uses vector lanes.
+    fn lanes(&self) -> usize {
+        1
+    }
+
+    /// Computes the dynamics of some states, at most [`lanes`](Self::lanes), side by side, with derivatives if they are
+    /// asked for, so that the calls for each of them that follow need not. Nothing by default.
+    fn prepare(&mut self, xs: &[f64], us: &[f64], derivatives: bool) {
+        let _ = (xs, us, derivatives);
+    }
+
+    /// [`calc`](Self::calc) of the i-th state that was prepared.
+    fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
+        let _ = i;
+        self.calc(t, x, u)
+    }
+
+    /// [`calc_diff`](Self::calc_diff) of the i-th state that was prepared.
+    fn calc_diff_prepared(
+        &mut self,
+        i: usize,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        scale: f64,
+        node: &mut LqNode,
+    ) -> Derivatives<'_> {
+        let _ = i;
+        self.calc_diff(t, x, u, scale, node)
+    }
 
     /// The coordinates of each group of positions that is no vector space, at most six a group: elsewhere q ⊕ δ is a sum.
     /// None by default.
@@ -212,10 +244,67 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
+    fn lanes(&self) -> usize {
+        match (self.dt, &self.method) {
+            (Some(_), Method::Euler) => self.inner.lanes(),
+            _ => 1,
+        }
+    }
+
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        let (nx, nu, lanes) = (self.nx(), self.nu(), self.lanes());
+        assert_length("xs", xs.len(), knots.len() * nx);
+        assert_length("us", us.len(), knots.len() * nu);
+        assert_length("next", next.len(), knots.len() * nx);
+        assert_length("costs", costs.len(), knots.len());
+        for from in (0..knots.len()).step_by(lanes) {
+            let to = (from + lanes).min(knots.len());
+            let side_by_side = to - from >= WORTHWHILE;
+            if side_by_side {
+                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], false);
+            }
+            for i in from..to {
+                let (x, u, next) = (&xs[i * nx..][..nx], &us[i * nu..][..nu], &mut next[i * nx..][..nx]);
+                costs[i] = match self.dt {
+                    Some(dt) if side_by_side => {
+                        let lane = Some(i - from);
+                        euler::calc(&mut self.inner, lane, dt, knots[i], x, u, &mut self.dq, next)
+                    }
+                    _ => self.calc(knots[i], x, u, next),
+                };
+            }
+        }
+    }
+
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        let (nx, nu, lanes) = (self.nx(), self.nu(), self.lanes());
+        assert_length("xs", xs.len(), knots.len() * nx);
+        assert_length("us", us.len(), knots.len() * nu);
+        assert_length("nodes", nodes.len(), knots.len());
+        for from in (0..knots.len()).step_by(lanes) {
+            let to = (from + lanes).min(knots.len());
+            let side_by_side = to - from >= WORTHWHILE;
+            if side_by_side {
+                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], true);
+            }
+            for i in from..to {
+                let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
+                match self.dt {
+                    Some(dt) if side_by_side => {
+                        let Self { inner, dq, transport, exp, .. } = self;
+                        let lane = Some(i - from);
+                        euler::calc_diff(inner, lane, dt, knots[i], x, u, dq, [transport, exp], &mut nodes[i]);
+                    }
+                    _ => self.calc_diff(knots[i], x, u, &mut nodes[i]),
+                }
+            }
+        }
+    }
+
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         match (self.dt, &mut self.method) {
             (None, _) => self.inner.calc(t, x, u).1,
-            (Some(dt), Method::Euler) => euler::calc(&mut self.inner, dt, t, x, u, &mut self.dq, next),
+            (Some(dt), Method::Euler) => euler::calc(&mut self.inner, None, dt, t, x, u, &mut self.dq, next),
             (Some(dt), Method::RungeKutta(method)) => method.calc(&mut self.inner, dt, t, x, u, next),
         }
     }
@@ -227,7 +316,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         };
         let Self { inner, dq, transport, exp, .. } = self;
         match &mut self.method {
-            Method::Euler => euler::calc_diff(inner, dt, t, x, u, dq, [transport, exp], node),
+            Method::Euler => euler::calc_diff(inner, None, dt, t, x, u, dq, [transport, exp], node),
             Method::RungeKutta(method) => method.calc_diff(inner, dt, t, x, u, [transport, exp], node),
         }
     }

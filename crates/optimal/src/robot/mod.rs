@@ -52,6 +52,7 @@ mod free;
 mod impulse;
 mod integrated;
 mod inverse;
+mod lanes;
 mod quadratic;
 mod residual;
 mod runge_kutta;

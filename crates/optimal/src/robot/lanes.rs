@@ -1,0 +1,274 @@
+//! The dynamics of several knots side by side, in the lanes of a vector register, and their results one by one.
+//!
+//! A robot's coordinates are packed so that each number has a lane for each knot; the algorithms of dynamics then run
+//! once for all of them, with the bits of single calls. What they give is unpacked in blocks, since the costs and the
+//! sweep look at one knot after the other.
+#![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+
+use super::contact::Contact;
+#[cfg(target_arch = "x86_64")]
+use condyle_dynamics::level::{Level, level};
+use condyle_dynamics::{
+    ConstraintSet, Data, Model, Proximal, Scalar, aba, aba_derivatives, constrained_dynamics,
+    constrained_dynamics_derivatives,
+};
+use condyle_spatial::lanes::Kernel;
+#[cfg(target_arch = "x86_64")]
+use condyle_spatial::lanes::Lanes;
+use nalgebra::DMatrix;
+
+/// Most lanes that there are.
+const WIDEST: usize = 8;
+
+/// A scalar of several numbers.
+trait Packed: Scalar {
+    fn pack(x: &[f64; WIDEST]) -> Self;
+    fn unpack(self) -> [f64; WIDEST];
+}
+
+#[cfg(target_arch = "x86_64")]
+macro_rules! packed {
+    ($($n:literal)*) => {$(
+        impl Packed for Lanes<f64, $n> {
+            #[inline(always)]
+            fn pack(x: &[f64; WIDEST]) -> Self {
+                Self::from_array(core::array::from_fn(|k| x[k]))
+            }
+            #[inline(always)]
+            fn unpack(self) -> [f64; WIDEST] {
+                let (x, mut out) = (self.to_array(), [0.0; WIDEST]);
+                out[..$n].copy_from_slice(&x);
+                out
+            }
+        }
+    )*};
+}
+#[cfg(target_arch = "x86_64")]
+packed! { 4 8 }
+
+/// What the dynamics of one knot give.
+#[derive(Clone, Debug)]
+pub(super) struct Outcome {
+    pub a: Vec<f64>,
+    pub lambda: Vec<f64>,
+    /// ∂q̈/∂q, ∂q̈/∂v, ∂q̈/∂τ. Shape: nv × nv.
+    pub da: [DMatrix<f64>; 3],
+    /// ∂λ/∂q, ∂λ/∂v, ∂λ/∂τ. Shape: rows × nv.
+    pub dlambda: [DMatrix<f64>; 3],
+}
+
+#[derive(Clone, Debug)]
+struct Group<S> {
+    data: Data<S>,
+    /// None of a robot that touches nothing.
+    set: Option<ConstraintSet<S>>,
+    q: Vec<S>,
+    v: Vec<S>,
+    tau: Vec<S>,
+}
+
+/// Writes numbers that lie knot after knot side by side; knots that are missing repeat the first one.
+struct Pack<'a, S> {
+    from: &'a [f64],
+    stride: usize,
+    count: usize,
+    to: &'a mut [S],
+}
+
+impl<S: Packed> Kernel for Pack<'_, S> {
+    #[inline(always)]
+    fn run(self) {
+        for (i, to) in self.to.iter_mut().enumerate() {
+            let mut x = [self.from[i]; WIDEST];
+            for k in 1..self.count {
+                x[k] = self.from[k * self.stride + i];
+            }
+            *to = S::pack(&x);
+        }
+    }
+    #[inline(always)]
+    fn run_fused(self) {
+        self.run();
+    }
+}
+
+/// Writes the numbers of each lane to a place of its own.
+struct Unpack<'a, 'b, S> {
+    from: &'a [S],
+    to: &'a mut [&'b mut [f64]],
+}
+
+impl<S: Packed> Kernel for Unpack<'_, '_, S> {
+    #[inline(always)]
+    fn run(self) {
+        let (blocks, rest) = self.from.as_chunks::<WIDEST>();
+        for (b, block) in blocks.iter().enumerate() {
+            let mut x = [[0.0; WIDEST]; WIDEST];
+            for i in 0..WIDEST {
+                x[i] = block[i].unpack();
+            }
+            for (k, to) in self.to.iter_mut().enumerate() {
+                let mut lane = [0.0; WIDEST];
+                for i in 0..WIDEST {
+                    lane[i] = x[i][k];
+                }
+                to[b * WIDEST..(b + 1) * WIDEST].copy_from_slice(&lane);
+            }
+        }
+        for (i, from) in rest.iter().enumerate() {
+            let x = from.unpack();
+            for (k, to) in self.to.iter_mut().enumerate() {
+                to[blocks.len() * WIDEST + i] = x[k];
+            }
+        }
+    }
+    #[inline(always)]
+    fn run_fused(self) {
+        self.run();
+    }
+}
+
+/// Unpacks to the part of each outcome that `part` names.
+fn unpack<S: Packed>(from: &[S], to: &mut [Outcome], part: impl Fn(&mut Outcome) -> &mut [f64]) {
+    let mut places: [&mut [f64]; WIDEST] = Default::default();
+    let count = to.len();
+    for (place, outcome) in places.iter_mut().zip(to) {
+        *place = part(outcome);
+    }
+    S::enter(Unpack { from, to: &mut places[..count] });
+}
+
+impl<S: Packed> Group<S> {
+    fn new(model: &Model, set: Option<ConstraintSet<S>>) -> Self {
+        let o = S::zero();
+        let (q, v) = (vec![o; model.nq()], vec![o; model.nv()]);
+        Self { data: Data::new(model), set, q, tau: v.clone(), v }
+    }
+
+    fn run(&mut self, model: &Model, xs: &[f64], taus: &[f64], forces: bool, slopes: bool, out: &mut [Outcome]) {
+        let (nq, nv, count) = (model.nq(), model.nv(), out.len());
+        let Self { data, set, q, v, tau } = self;
+        S::enter(Pack { from: xs, stride: nq + nv, count, to: q });
+        S::enter(Pack { from: &xs[nq..], stride: nq + nv, count, to: v });
+        S::enter(Pack { from: taus, stride: nv, count, to: tau });
+        match (set, slopes) {
+            (None, false) => unpack(aba(model, data, q, v, tau, &[]), out, |o| &mut o.a),
+            (None, true) => {
+                let d = aba_derivatives(model, data, q, v, tau, &[]);
+                unpack(d.a, out, |o| &mut o.a);
+                for (k, da) in [d.da_dq, d.da_dv, d.da_dtau].into_iter().enumerate() {
+                    unpack(da.as_slice(), out, |o| o.da[k].as_mut_slice());
+                }
+            }
+            (Some(set), false) => {
+                let d = constrained_dynamics(model, data, set, q, v, tau, &[]);
+                unpack(d.a, out, |o| &mut o.a);
+                unpack(d.lambda, out, |o| &mut o.lambda);
+            }
+            (Some(set), true) => {
+                let d = constrained_dynamics_derivatives(model, data, set, q, v, tau, &[]);
+                unpack(d.a, out, |o| &mut o.a);
+                unpack(d.lambda, out, |o| &mut o.lambda);
+                for (k, da) in [d.da_dq, d.da_dv, d.da_dtau].into_iter().enumerate() {
+                    unpack(da.as_slice(), out, |o| o.da[k].as_mut_slice());
+                }
+                let dlambda = [d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau];
+                for (k, dlambda) in dlambda.into_iter().enumerate().filter(|_| forces) {
+                    unpack(dlambda.as_slice(), out, |o| o.dlambda[k].as_mut_slice());
+                }
+            }
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+enum Width {
+    #[cfg(target_arch = "x86_64")]
+    Four(Group<Lanes<f64, 4>>),
+    #[cfg(target_arch = "x86_64")]
+    Eight(Group<Lanes<f64, 8>>),
+    #[cfg(not(target_arch = "x86_64"))]
+    Never(core::convert::Infallible),
+}
+
+/// The dynamics of as many knots as this processor has lanes.
+#[derive(Clone, Debug)]
+pub(super) struct SideBySide {
+    width: Box<Width>,
+    taus: Vec<f64>,
+    pub outcomes: Vec<Outcome>,
+}
+
+/// Contacts, and how they share their forces.
+#[derive(Clone, Copy)]
+pub(super) struct Held<'a> {
+    pub contacts: &'a [Contact],
+    pub proximal: Proximal,
+}
+
+/// Fewer knots than this are computed one by one.
+pub(super) const WORTHWHILE: usize = 3;
+
+#[cfg(target_arch = "x86_64")]
+fn group<S: Packed>(model: &Model, held: Option<Held<'_>>) -> Group<S> {
+    let set = held.map(|held| {
+        let constraints: Vec<_> = held.contacts.iter().map(|contact| contact.constraint).collect();
+        let mut set = ConstraintSet::new(model, &constraints).expect("a set of the same was made before");
+        set.proximal = held.proximal;
+        set
+    });
+    Group::new(model, set)
+}
+
+impl SideBySide {
+    /// None where there are no lanes.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn new(model: &Model, held: Option<Held<'_>>) -> Option<Self> {
+        let (lanes, width) = match level() {
+            Level::Baseline => return None,
+            Level::Avx2 => (4, Width::Four(group(model, held))),
+            Level::Avx512 => (8, Width::Eight(group(model, held))),
+        };
+        let nv = model.nv();
+        let rows = held.map_or(0, |held| held.contacts.iter().map(|c| c.constraint.kind.rows()).sum());
+        let square = || DMatrix::zeros(nv, nv);
+        let wide = || DMatrix::zeros(rows, nv);
+        let outcome = Outcome {
+            a: vec![0.0; nv],
+            lambda: vec![0.0; rows],
+            da: [square(), square(), square()],
+            dlambda: [wide(), wide(), wide()],
+        };
+        Some(Self { width: Box::new(width), taus: vec![0.0; lanes * nv], outcomes: vec![outcome; lanes] })
+    }
+
+    /// There are none on this processor.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub(super) fn new(_: &Model, _: Option<Held<'_>>) -> Option<Self> {
+        None
+    }
+
+    /// How many knots it takes.
+    pub(super) fn lanes(&self) -> usize {
+        self.outcomes.len()
+    }
+
+    /// The efforts of knot k, to be set before `run`.
+    pub(super) fn tau_mut(&mut self, k: usize) -> &mut [f64] {
+        let nv = self.taus.len() / self.outcomes.len();
+        &mut self.taus[k * nv..(k + 1) * nv]
+    }
+
+    /// Computes the outcomes of some states, with their slopes and those of the forces if they are asked for.
+    pub(super) fn run(&mut self, model: &Model, count: usize, xs: &[f64], forces: bool, slopes: bool) {
+        let Self { width, taus, outcomes } = self;
+        match &mut **width {
+            #[cfg(target_arch = "x86_64")]
+            Width::Four(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
+            #[cfg(target_arch = "x86_64")]
+            Width::Eight(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
+            #[cfg(not(target_arch = "x86_64"))]
+            Width::Never(never) => match *never {},
+        }
+    }
+}

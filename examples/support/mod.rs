@@ -1,0 +1,180 @@
+//! Walking as an optimal control problem, and a page that shows it: what `trot.rs` and `walk.rs` share.
+
+use condyle::optimal::robot::{
+    Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Residual, WrenchCone,
+};
+use condyle::optimal::{ActionModel, Error, Fddp, Problem, Solution};
+use condyle::{Constraint, Data, Mat3, Model, ReferenceFrame, Se3, Vec3, forward_kinematics};
+use std::sync::Arc;
+
+const FRICTION: f64 = 0.7;
+/// How fast a foot's slip decays (1/s).
+const HOLD: f64 = 40.0;
+
+/// Costs are some hundreds: less than a millionth of them counts for nothing.
+const TOLERANCE: f64 = 1e-4;
+
+/// What the feet are.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Foot {
+    /// Points.
+    Point,
+    /// Soles, with their sides along x and y (m).
+    #[allow(dead_code)] // by the quadruped
+    Sole([f64; 2]),
+}
+
+/// A gait in the making: its knots so far, and where feet and centre of mass are at their end.
+pub(crate) struct Gait {
+    model: Arc<Model>,
+    x0: Vec<f64>,
+    dt: f64,
+    foot: Foot,
+    feet: Vec<(usize, Vec3<f64>)>,
+    com: Vec3<f64>,
+    models: Vec<Box<dyn ActionModel>>,
+    stages: Vec<usize>,
+    us: Vec<f64>,
+    times: Vec<f64>,
+}
+
+impl Gait {
+    /// From a posture q, in which the robot stands on its feet, with knots of dt seconds.
+    pub(crate) fn new(model: Arc<Model>, q: &[f64], foot: Foot, names: &[&str], dt: f64) -> Self {
+        let mut data = Data::new(&model);
+        let placements = forward_kinematics(&model, &mut data, q);
+        let frames = names.iter().map(|name| model.frame(name).expect("the robot has these feet"));
+        let mut feet: Vec<_> = frames.map(|frame| (frame, placements.frame(frame).translation)).collect();
+        let (mut com, mut x0) = (placements.com(), [q, &vec![0.0; model.nv()]].concat());
+        let ground = feet[0].1.z;
+        feet.iter_mut().for_each(|foot| foot.1.z -= ground); // it stands at height 0
+        (com.z, x0[2]) = (com.z - ground, x0[2] - ground);
+        let (models, stages, us) = (Vec::new(), Vec::new(), Vec::new());
+        Self { x0, dt, foot, feet, com, models, stages, us, times: vec![0.0], model }
+    }
+
+    fn contacts(&self, frames: &[usize], kd: f64) -> Vec<Contact> {
+        let make = if self.foot == Foot::Point { Constraint::point } else { Constraint::rigid };
+        let reference = ReferenceFrame::LocalWorldAligned;
+        let contact = |&frame: &usize| Contact::new(&self.name(frame), Constraint { kd, reference, ..make(frame) });
+        frames.iter().map(contact).collect()
+    }
+
+    fn name(&self, frame: usize) -> String {
+        self.model.frames()[frame].name.clone()
+    }
+
+    /// Back to the posture, with weights of the trunk's position and rotation, the joints, and their velocities.
+    fn rest(&self, weights: [f64; 6]) -> Cost {
+        let counts = [3, 3, self.model.nv() - 6].repeat(2);
+        let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
+        Cost::new("rest", 1e1, Residual::State { reference: self.x0.clone() }, Activation::Weighted(w))
+    }
+
+    /// A foot should be at a point, a sole level too.
+    fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
+        let residual = match self.foot {
+            Foot::Point => Residual::FrameTranslation { frame, target },
+            Foot::Sole(_) => Residual::FramePlacement { frame, target: Se3::new(Mat3::identity(), target) },
+        };
+        Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
+    }
+
+    /// The costs of a knot on some feet, others on their way.
+    fn costs(&self, support: &[usize], moving: &[(usize, Vec3<f64>)], com: Vec3<f64>) -> Vec<Cost> {
+        let grip = |&frame: &usize| {
+            let (contact, friction) = (self.name(frame), FrictionCone::new(FRICTION));
+            let (residual, (lower, upper)) = match self.foot {
+                Foot::Point => (Residual::FrictionCone { contact, cone: friction.clone() }, friction.bounds()),
+                Foot::Sole(size) => {
+                    let cone = WrenchCone { friction: FrictionCone { inner: true, ..friction }, size };
+                    let bounds = cone.bounds();
+                    (Residual::WrenchCone { contact, cone }, bounds)
+                }
+            };
+            Cost::new(&format!("{} grips", self.name(frame)), 1e1, residual, Activation::Barrier { lower, upper })
+        };
+        let mut costs: Vec<Cost> = support.iter().map(grip).collect();
+        costs.extend(moving.iter().map(|&(frame, target)| self.place(frame, target, 1e6)));
+        costs.push(Cost::new("com", 1e5, Residual::CenterOfMass { target: com }, Activation::Quadratic));
+        costs.push(self.rest([0.0, 1e3, 1e-1, 1e1, 1e1, 1e0]));
+        let reference = vec![0.0; self.model.nv() - 6];
+        costs.push(Cost::new("effort", 1e-1, Residual::Control { reference }, Activation::Quadratic));
+        costs
+    }
+
+    /// Some knots on `support`; the k-th has the costs that `costs` gives. One action serves all.
+    fn phase(
+        &mut self,
+        support: &[usize],
+        knots: usize,
+        costs: impl Fn(&Self, usize) -> Vec<Cost>,
+    ) -> Result<(), Error> {
+        let contacts = self.contacts(support, HOLD);
+        let mut action = ContactDynamics::running(self.model.clone(), &contacts, self.dt, costs(self, 0))?;
+        let hold = action.quasi_static(&self.x0);
+        for k in 0..knots {
+            action.set_costs(self.stages.len() + k, costs(self, k))?;
+        }
+        self.us.extend(hold.repeat(knots));
+        self.stages.extend(vec![self.models.len(); knots]);
+        let last = self.times.last().copied().unwrap_or(0.0);
+        self.times.extend((1..=knots).map(|k| last + k as f64 * self.dt));
+        self.models.push(Box::new(action));
+        Ok(())
+    }
+
+    /// Stands on all feet for some knots.
+    pub(crate) fn stand(&mut self, knots: usize) -> Result<(), Error> {
+        let feet: Vec<_> = self.feet.iter().map(|foot| foot.0).collect();
+        self.phase(&feet, knots, |gait, _| gait.costs(&feet, &[], gait.com))
+    }
+
+    /// Swings the feet with these numbers ahead by `length` in an arc of some height, and sets them down.
+    pub(crate) fn step(&mut self, swinging: &[usize], length: f64, height: f64, knots: usize) -> Result<(), Error> {
+        let swings = |k: &usize| swinging.contains(k);
+        let support: Vec<_> = (0..self.feet.len()).filter(|k| !swings(k)).map(|k| self.feet[k].0).collect();
+        let share = swinging.len() as f64 / self.feet.len() as f64;
+        let ahead = |s: f64| Vec3::new(length * s, 0.0, 0.0);
+        self.phase(&support, knots, |gait, k| {
+            let s = (k + 1) as f64 / knots as f64;
+            let lift = Vec3::new(0.0, 0.0, height * (core::f64::consts::PI * s).sin());
+            let moving: Vec<_> = swinging.iter().map(|&k| (gait.feet[k].0, gait.feet[k].1 + ahead(s) + lift)).collect();
+            gait.costs(&support, &moving, gait.com + ahead(share * s))
+        })?;
+        self.com += ahead(share);
+        let mut costs = vec![self.rest([1e0, 1e1, 1e0, 1e1, 1e1, 1e1])];
+        let mut landing = Vec::new();
+        for &k in swinging {
+            self.feet[k].1 += ahead(1.0);
+            landing.push(self.feet[k].0);
+            costs.push(self.place(self.feet[k].0, self.feet[k].1, 1e7));
+        }
+        let contacts = self.contacts(&landing, 0.0);
+        self.models.push(Box::new(ImpulseDynamics::new(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
+        self.stages.push(self.models.len() - 1);
+        self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact takes no time
+        Ok(())
+    }
+
+    /// Solves it, with a line for each iteration; returns the solution and the time of each knot.
+    pub(crate) fn solve(self) -> Result<(Solution, Vec<f64>), Error> {
+        let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
+        let end = FreeDynamics::terminal(self.model.clone(), terminal)?;
+        let xs = self.x0.repeat(self.stages.len() + 1);
+        let mut problem = Problem::new(self.x0, self.models, self.stages, Box::new(end))?;
+        let mut solver = Fddp::new(&problem);
+        solver.settings.tolerance = TOLERANCE;
+        let solution = solver.solve_with(&mut problem, &xs, &self.us, |i| {
+            println!("iteration {:2}   cost {:14.6}   step {:.3}   gap {:.1e}", i.iteration, i.cost, i.step, i.gap);
+        })?;
+        let knots = xs.len() / solution.x(0).len() - 1;
+        let per_iteration = 1e3 * solution.timings.total.as_secs_f64() / solution.trace.len() as f64;
+        println!(
+            "{:?} after {} iterations of {per_iteration:.2} ms, {knots} knots",
+            solution.status,
+            solution.trace.len()
+        );
+        Ok((solution.clone(), self.times))
+    }
+}
