@@ -40,6 +40,11 @@ BESIDE = {
 }
 """What Pinocchio's bench does not have, and with which of our own times it is compared."""
 
+MODES = {"": "one call", "batch": "per state of a batch", "horizon": "a horizon"}
+"""What stands before the name of an algorithm, and how its time was taken."""
+KNOT = ("aba", "aba_derivatives", "rnea")
+"""What a solver asks for at each knot of a horizon."""
+
 
 def run(*command: "str | Path", **options: object) -> str:
     """The output of a command."""
@@ -131,6 +136,13 @@ def times(output: str) -> dict[str, float]:
     return {name: float(ns) for name, ns in (line.split() for line in output.splitlines())}
 
 
+def peer_time(kind: str, name: str, mine: dict[str, float], theirs: dict[str, float]) -> float:
+    """What a time of ours is compared with."""
+    if kind == "horizon":
+        return int(name) * sum(theirs[algorithm] for algorithm in KNOT)
+    return theirs.get(name) or mine[BESIDE[name]]
+
+
 def compare(robot: str, python: Path, theirs: Path, ours: Path, rounds: int, cpu: int) -> list[dict]:
     """Both programs in turn on one robot."""
     source, locked = ROBOTS[robot]
@@ -143,32 +155,42 @@ def compare(robot: str, python: Path, theirs: Path, ours: Path, rounds: int, cpu
         for _ in range(rounds)
     ]
     rows = []
-    for name in runs[0][0]:
-        peer = [peer.get(name) or mine[BESIDE[name]] for mine, peer in runs]
+    for key in runs[0][0]:
+        kind, _, name = key.rpartition(":")
+        mode = MODES[kind]
+        if name in BESIDE:
+            mode += f", beside our {BESIDE[name]}"
+        peer = [peer_time(kind, name, mine, peer) for mine, peer in runs]
         rows.append(
             {
                 "robot": robot,
-                "algorithm": name,
-                "mode": "one call" if name not in BESIDE else f"one call, beside our {BESIDE[name]}",
-                "ours_ns": statistics.median(mine[name] for mine, _ in runs),
+                "algorithm": name if kind != "horizon" else f"{name} knots of {', '.join(KNOT)}",
+                "mode": mode,
+                "ours_ns": statistics.median(mine[key] for mine, _ in runs),
                 "peer_ns": statistics.median(peer),
-                "ratio": statistics.median(mine[name] / other for (mine, _), other in zip(runs, peer, strict=True)),
+                "ratio": statistics.median(mine[key] / other for (mine, _), other in zip(runs, peer, strict=True)),
             }
         )
     return rows
 
 
 def table(rows: list[dict]) -> str:
-    """The ratios, a robot in each column."""
+    """The ratios, a robot in each column, and a table for each mode."""
     robots = list(dict.fromkeys(row["robot"] for row in rows))
-    lines = ["| ratio (ours in µs) | " + " | ".join(robots) + " |", "| --- |" + " --- |" * len(robots)]
-    for name in dict.fromkeys(row["algorithm"] for row in rows):
-        cells = {
-            row["robot"]: f"{row['ratio']:.2f} ({row['ours_ns'] / 1e3:.2f})" for row in rows if row["algorithm"] == name
-        }
-        beside = f" / {BESIDE[name]}" if name in BESIDE else ""
-        lines.append(f"| {name}{beside} | " + " | ".join(cells[robot] for robot in robots) + " |")
-    return "\n".join(lines)
+    tables = []
+    for mode in MODES.values():
+        lines = [f"| {mode}: ratio (ours in µs) | " + " | ".join(robots) + " |", "| --- |" + " --- |" * len(robots)]
+        mine = [row for row in rows if row["mode"].split(",")[0] == mode]
+        for name in dict.fromkeys(row["algorithm"] for row in mine):
+            cells = {
+                row["robot"]: f"{row['ratio']:.2f} ({row['ours_ns'] / 1e3:.2f})"
+                for row in mine
+                if row["algorithm"] == name
+            }
+            beside = f" / {BESIDE[name]}" if name in BESIDE else ""
+            lines.append(f"| {name}{beside} | " + " | ".join(cells[robot] for robot in robots) + " |")
+        tables.append("\n".join(lines))
+    return "\n\n".join(tables)
 
 
 def processor() -> str:

@@ -5,11 +5,12 @@
 //! ```
 //!
 //! STATES has q, v, a, τ of one state after the other as doubles. Prints a line for each algorithm: its name and the median
-//! time of a call in ns; and of the derivatives of `rnea` also by dual numbers and by central differences.
+//! time of a call in ns; of the derivatives of `rnea` also by dual numbers and by central differences; then, after `batch:`,
+//! the time for each state of a batch of them, and after `horizon:`, that of N knots with `aba`, its derivatives and `rnea`.
 
 use condyle::{
-    Data, Joint, Model, UrdfOptions, aba, aba_derivatives, aba_hessian, crba, integrate, minv, rnea, rnea_derivatives,
-    rnea_hessian,
+    Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, aba_hessian, crba, integrate, minv, rnea,
+    rnea_derivatives, rnea_hessian,
 };
 use num_dual::Dual64;
 use std::hint::black_box;
@@ -30,7 +31,7 @@ fn median(states: &[State], mut call: impl FnMut(&State)) -> f64 {
         start.elapsed().as_secs_f64() * 1e9 / calls as f64
     };
     batch(200);
-    let calls = ((2e6 / batch(50)) as usize).max(10);
+    let calls = ((2e6 / batch(50)) as usize).max(2);
     let mut times: Vec<f64> = (0..21).map(|_| batch(calls)).collect();
     times.sort_by(f64::total_cmp);
     times[10]
@@ -99,5 +100,27 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     print("aba_hessian", median(&states, |s| _ = black_box(aba_hessian(m, d, &s.q, &s.v, &s.tau, &[], &s.a))));
     print("dtau_dq_by_duals", median(&states, |s| _ = black_box(by_duals(m, duals, s))));
     print("dtau_dq_by_differences", median(&states, |s| _ = black_box(by_differences(m, d, s))));
+    let all = |part: fn(&State) -> &[f64]| states.iter().flat_map(part).copied().collect::<Vec<f64>>();
+    let (q, v, a, tau) = (all(|s| &s.q), all(|s| &s.v), all(|s| &s.a), all(|s| &s.tau));
+    let b = &mut Batch::new(m, states.len(), 1);
+    let print = |name: &str, ns: f64| println!("batch:{name} {:.2}", ns / states.len() as f64);
+    let one = &states[..1];
+    print("rnea", median(one, |_| _ = black_box(b.rnea(m, &q, &v, &a, &[]))));
+    print("aba", median(one, |_| _ = black_box(b.aba(m, &q, &v, &tau, &[]))));
+    print("crba", median(one, |_| _ = black_box(b.crba(m, &q))));
+    print("minv", median(one, |_| _ = black_box(b.minv(m, &q))));
+    print("rnea_derivatives", median(one, |_| _ = black_box(b.rnea_derivatives(m, &q, &v, &a, &[]))));
+    print("aba_derivatives", median(one, |_| _ = black_box(b.aba_derivatives(m, &q, &v, &tau, &[]))));
+    for knots in [20, 60, 100, 200] {
+        let cycle = |x: &[f64], n: usize| x.iter().copied().cycle().take(knots * n).collect::<Vec<_>>();
+        let (q, v, a, tau) = (cycle(&q, nq), cycle(&v, nv), cycle(&a, nv), cycle(&tau, nv));
+        let b = &mut Batch::new(m, knots, 1);
+        let ns = median(one, |_| {
+            black_box(b.aba(m, &q, &v, &tau, &[]));
+            black_box(b.aba_derivatives(m, &q, &v, &tau, &[]));
+            black_box(b.rnea(m, &q, &v, &a, &[]));
+        });
+        println!("horizon:{knots} {ns:.2}");
+    }
     Ok(())
 }

@@ -13,6 +13,15 @@ A `Model` is a robot, frozen; a `Data` is one thread's scratch; an algorithm is 
 Numbers and layout are Pinocchio's: linear parts before angular ones, quaternions x, y, z, w, joints in the same order.
 Functions return new arrays, or fill those given as `out`. Arguments may be anything that NumPy understands as an array
 of real numbers; float64 C-contiguous arrays are read where they lie. A wrong shape is a `ValueError`.
+
+Where a state goes, many go: positions, velocities, efforts and forces may have one more axis in front, and results
+then have it too. The dynamics and its derivatives compute several states side by side in vector registers, with the
+interpreter's lock released, on as many threads as the `Data` was made for:
+
+>>> arm = condyle.robots.arm7()
+>>> data = condyle.Data(arm, threads=2)
+>>> condyle.crba(arm, data, np.zeros((100, 7))).shape
+(100, 7, 7)
 """
 
 from . import inertial_parameters, optimal, robots, simulation

@@ -431,12 +431,15 @@ class Data:
     what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
     with another robot's model, a `ValueError`.
 
+    Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
+    registers, and on so many threads.
+
     >>> arm = condyle.robots.arm7()
     >>> condyle.Data(arm)
     <condyle.Data of 'arm7'>
     """
 
-    def __new__(cls, model: Model) -> Data: ...
+    def __new__(cls, model: Model, threads: int = 1) -> Data: ...
 
 def _model_from_bytes(data: bytes) -> Model:
     """The model that a pickle holds."""

@@ -3,7 +3,7 @@
 //! Each call takes microseconds and keeps the interpreter's lock.
 
 use crate::arrays::named_tuples;
-use crate::functions::{functions, regular};
+use crate::functions::{any, functions, regular};
 use pyo3::prelude::*;
 
 named_tuples! {
@@ -25,6 +25,7 @@ functions! {
 fn rnea(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
     condyle::rnea(model, data, &q, &v, &a, &f_ext)
 }
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) { b.rnea(model, q, v, a, f_ext) }
 
 /// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, nv numbers (rad/s², m/s²); O(n).
 ///
@@ -39,6 +40,7 @@ fn aba(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None;
     regular(model)?;
     condyle::aba(model, data, &q, &v, &tau, &f_ext)
 }
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) { b.aba(model, q, v, tau, f_ext) }
 
 /// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, nv numbers (rad/s², m/s²).
 ///
@@ -68,6 +70,7 @@ fn forward_dynamics(model, data;
 fn crba(model, data; q: Position; out) {
     condyle::crba(model, data, &q)
 }
+batch b: any(q: Position) { b.crba(model, q) }
 
 /// M(q)⁻¹: (nv, nv), symmetric, both triangles filled; without forming M.
 ///
@@ -81,6 +84,7 @@ fn minv(model, data; q: Position; out) {
     regular(model)?;
     condyle::minv(model, data, &q)
 }
+batch b: regular(q: Position) { b.minv(model, q) }
 
 /// h(q, v) = C(q, v) v + g(q): the efforts that keep the velocity as it is, nv numbers; `rnea` with a = 0.
 ///
@@ -88,6 +92,7 @@ fn minv(model, data; q: Position; out) {
 fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
     condyle::nonlinear_effects(model, data, &q, &v)
 }
+batch b: any(q: Position, v: Tangent) { b.nonlinear_effects(model, q, v) }
 
 /// g(q): the efforts that hold the robot still, nv numbers; `rnea` with v = a = 0.
 ///
@@ -100,6 +105,7 @@ fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
 fn gravity(model, data; q: Position; out) {
     condyle::gravity(model, data, &q)
 }
+batch b: any(q: Position) { b.gravity(model, q) }
 
 /// τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, nv numbers (N m, N); O(n).
 ///
@@ -134,6 +140,7 @@ fn coriolis_matrix(model, data; q: Position, v: Tangent; out) {
 fn rnea_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
     condyle::rnea_derivatives(model, data, &q, &v, &a, &f_ext)
 }
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) { b.rnea_derivatives(model, q, v, a, f_ext) }
 
 /// `aba` and its derivatives with respect to q, v and τ, exact, as `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv
 /// numbers and three matrices (nv, nv).
@@ -150,4 +157,5 @@ fn aba_derivatives(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Fo
     regular(model)?;
     condyle::aba_derivatives(model, data, &q, &v, &tau, &f_ext)
 }
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) { b.aba_derivatives(model, q, v, tau, f_ext) }
 }

@@ -10,6 +10,9 @@ use pyo3::prelude::*;
 /// what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
 /// with another robot's model, a `ValueError`.
 ///
+/// Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
+/// registers, and on so many threads.
+///
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.Data(arm)
 /// <condyle.Data of 'arm7'>
@@ -18,19 +21,36 @@ pub(crate) struct Data {
     pub(crate) inner: condyle::Data<f64>,
     structure: u64,
     name: String,
+    threads: usize,
+    /// For as many states as were asked for at most.
+    batch: Option<Box<condyle::Batch>>,
 }
 
 #[pymethods]
 impl Data {
     #[new]
-    fn new(model: &Bound<'_, Model>) -> Self {
+    #[pyo3(signature = (model, threads = 1))]
+    fn new(model: &Bound<'_, Model>, threads: usize) -> PyResult<Self> {
+        if threads == 0 {
+            return Err(PyValueError::new_err("threads: expected at least 1, found 0"));
+        }
         let Model { inner, structure } = model.get();
-        Self { inner: condyle::Data::new(inner), structure: *structure, name: inner.name().to_owned() }
+        let (structure, name) = (*structure, inner.name().to_owned());
+        Ok(Self { inner: condyle::Data::new(inner), structure, name, threads, batch: None })
     }
 
     /// The robot's name.
     fn __repr__(&self) -> String {
         format!("<condyle.Data of '{}'>", self.name)
+    }
+}
+
+impl Data {
+    /// Room for so many states.
+    pub(crate) fn batch(&mut self, model: &condyle::Model, states: usize) -> &mut condyle::Batch {
+        let enough = self.batch.take().filter(|batch| batch.capacity() >= states);
+        let threads = self.threads;
+        self.batch.insert(enough.unwrap_or_else(|| Box::new(condyle::Batch::new(model, states, threads))))
     }
 }
 

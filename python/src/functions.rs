@@ -12,9 +12,11 @@
 //! Each argument is of a kind, a type below that says how it is read; the last expression is what Python gets, an array
 //! or a tuple of arrays, or with `out` what was given as such. The call borrows its `Data` before it looks at any other
 //! argument, so that a second use of the same one, from wherever, is an error; it gives its inputs back before it writes
-//! to `out`, which may be one of them.
+//! to `out`, which may be one of them. Positions, tangent vectors and forces may be given for many states, with one axis
+//! more: then so are the results, see `batch.rs`.
 
 use crate::arrays::{Input, matrix, vector};
+use crate::batch;
 use crate::exceptions::ModelError;
 use crate::model::{body_index, frame_index};
 use condyle::{Force, Method, Model, ReferenceFrame};
@@ -28,8 +30,20 @@ pub(crate) trait Argument<'a, 'py> {
     type Given;
     /// What the library takes.
     type Read;
+    /// What the library takes for many states.
+    type All;
     /// Reads the argument of this name of a function of this model.
-    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read>;
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+        Self::read_at(name, &given, model, None)
+    }
+    /// The same for one of many states, if it is given for many.
+    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read>;
+    /// For how many states it is given; none for a single one, or if it is no part of a state.
+    fn states(_given: &Self::Given) -> PyResult<Option<usize>> {
+        Ok(None)
+    }
+    /// Reads it for so many states.
+    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All>;
 }
 
 /// A position: nq numbers.
@@ -60,57 +74,95 @@ pub(crate) enum Word {}
 impl<'a, 'py: 'a> Argument<'a, 'py> for Position {
     type Given = &'a Bound<'py, PyAny>;
     type Read = Input<'py, Ix1>;
-    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
-        vector(name, given, model.nq())
+    type All = Input<'py, Ix2>;
+    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
+        vector(name, &batch::at(given, 1, state)?, model.nq())
+    }
+    fn states(given: &Self::Given) -> PyResult<Option<usize>> {
+        batch::states(given, 1)
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
+        batch::all(name, given, 1, states, model.nq())
     }
 }
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for Tangent {
     type Given = &'a Bound<'py, PyAny>;
     type Read = Input<'py, Ix1>;
-    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
-        vector(name, given, model.nv())
+    type All = Input<'py, Ix2>;
+    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
+        vector(name, &batch::at(given, 1, state)?, model.nv())
+    }
+    fn states(given: &Self::Given) -> PyResult<Option<usize>> {
+        batch::states(given, 1)
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
+        batch::all(name, given, 1, states, model.nv())
     }
 }
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for Tangents {
     type Given = &'a Bound<'py, PyAny>;
     type Read = Input<'py, Ix2>;
-    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+    type All = Input<'py, Ix2>;
+    fn read_at(name: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<Self::Read> {
+        let given = *given;
         rows(name, given, model.nv())
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
     }
 }
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     type Given = Option<&'a Bound<'py, PyAny>>;
     type Read = Vec<Force<f64>>;
-    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+    type All = Vec<Force<f64>>;
+    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
         let Some(given) = given else { return Ok(Vec::new()) };
-        let rows = matrix(name, given, [model.bodies().len(), 6])?;
-        Ok(rows.as_chunks::<6>().0.iter().map(|&row| row.into()).collect())
+        Ok(batch::forces(&matrix(name, &batch::at(given, 2, state)?, [model.bodies().len(), 6])?))
+    }
+    fn states(given: &Self::Given) -> PyResult<Option<usize>> {
+        given.map_or(Ok(None), |given| batch::states(given, 2))
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
+        let Some(given) = given else { return Ok(Vec::new()) };
+        Ok(batch::forces(&batch::all(name, given, 2, states, 6 * model.bodies().len())?))
     }
 }
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for FrameOf {
     type Given = &'a Bound<'py, PyAny>;
     type Read = usize;
-    fn read(_: &str, given: Self::Given, model: &Model) -> PyResult<usize> {
+    type All = usize;
+    fn read_at(_: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<usize> {
+        let given = *given;
         frame_index(model, given)
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
     }
 }
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for BodyOf {
     type Given = &'a Bound<'py, PyAny>;
     type Read = usize;
-    fn read(_: &str, given: Self::Given, model: &Model) -> PyResult<usize> {
+    type All = usize;
+    fn read_at(_: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<usize> {
+        let given = *given;
         body_index("body: expected a joint's name", model, given, 0)
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
     }
 }
 
 impl<'a> Argument<'a, '_> for Reference {
     type Given = &'a str;
     type Read = ReferenceFrame;
-    fn read(name: &str, given: &str, _: &Model) -> PyResult<ReferenceFrame> {
+    type All = ReferenceFrame;
+    fn read_at(name: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<ReferenceFrame> {
+        let given = *given;
         match given {
             "local" => Ok(ReferenceFrame::Local),
             "world" => Ok(ReferenceFrame::World),
@@ -118,12 +170,17 @@ impl<'a> Argument<'a, '_> for Reference {
             other => Err(wrong_word(name, "'local', 'world' or 'local_world_aligned'", other)),
         }
     }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
+    }
 }
 
 impl<'a> Argument<'a, '_> for MethodOf {
     type Given = Option<&'a str>;
     type Read = Option<Method>;
-    fn read(name: &str, given: Self::Given, _: &Model) -> PyResult<Self::Read> {
+    type All = Option<Method>;
+    fn read_at(name: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<Self::Read> {
+        let given = *given;
         match given {
             None => Ok(None),
             Some("aba") => Ok(Some(Method::ArticulatedBody)),
@@ -132,12 +189,17 @@ impl<'a> Argument<'a, '_> for MethodOf {
             Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
         }
     }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
+    }
 }
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for InputOf {
     type Given = &'a Bound<'py, PyAny>;
     type Read = condyle::Input;
-    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+    type All = condyle::Input;
+    fn read_at(name: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<Self::Read> {
+        let given = *given;
         use condyle::Input;
         if let Ok((word, of)) = given.extract::<(String, Bound<'py, PyAny>)>() {
             let body = || body_index("wrt: expected a joint's name", model, &of, 0);
@@ -158,29 +220,47 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for InputOf {
             other => Err(wrong_word(name, "'gravity', 'armature', 'damping' or a pair", other)),
         }
     }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
+    }
 }
 
 impl Argument<'_, '_> for Number {
     type Given = f64;
     type Read = f64;
-    fn read(_: &str, given: f64, _: &Model) -> PyResult<f64> {
+    type All = f64;
+    fn read_at(_: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<f64> {
+        let given = *given;
         Ok(given)
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
     }
 }
 
 impl Argument<'_, '_> for Speed {
     type Given = f64;
     type Read = f64;
-    fn read(name: &str, given: f64, _: &Model) -> PyResult<f64> {
+    type All = f64;
+    fn read_at(name: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<f64> {
+        let given = *given;
         positive_speed(name, given)
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
     }
 }
 
 impl<'a> Argument<'a, '_> for Word {
     type Given = &'a str;
     type Read = &'a str;
-    fn read(_: &str, given: &'a str, _: &Model) -> PyResult<&'a str> {
+    type All = &'a str;
+    fn read_at(_: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<&'a str> {
+        let given = *given;
         Ok(given)
+    }
+    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
+        Self::read_at(name, given, model, None)
     }
 }
 
@@ -205,6 +285,11 @@ pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
 }
 
+/// That nothing need hold.
+pub(crate) fn any(_: &Model) -> PyResult<()> {
+    Ok(())
+}
+
 /// That the inertia matrix of a robot has an inverse.
 pub(crate) fn regular(model: &Model) -> PyResult<()> {
     match model.warnings().iter().find(|w| matches!(w, condyle::Warning::Singular { .. })) {
@@ -219,6 +304,7 @@ macro_rules! functions {
         $(#[$doc:meta])*
         fn $name:ident($model:ident $(, $data:ident)?;
             $($arg:ident: $kind:ident $(= $default:tt)?),* $(; $out:ident)?) $body:block
+        $(batch $batch:ident: $check:ident($($all:ident: $all_kind:ident),*) $in_lanes:block)?
     )*) => {$(
         $(#[$doc])*
         #[pyfunction]
@@ -231,20 +317,43 @@ macro_rules! functions {
         ) -> PyResult<Bound<'py, PyAny>> {
             use $crate::arrays::Give as _;
             let (py, robot) = ($model.py(), $model.get());
-            $(
-                let mut scratch = $crate::data::scratch(robot, $data)?;
-                let $data = &mut scratch.inner;
-            )?
+            $(let mut scratch = $crate::data::scratch(robot, $data)?;)?
             let $model = &robot.inner;
-            let result = {
-                $(let $arg = <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::read(
-                    stringify!($arg), $arg, $model,
-                )?;)*
-                $body
-            };
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            result.give(py, out)
+            let states = [$((stringify!($arg), <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::states(&$arg)?)),*];
+            let states = $crate::batch::agreed(&states)?;
+            $(if let Some(states) = states {
+                use $crate::batch::Batched as _;
+                $check($model)?;
+                $(let $all = <$crate::functions::$all_kind as $crate::functions::Argument<'_, '_>>::read_all(
+                    stringify!($all), &$all, $model, states,
+                )?;)*
+                let $batch = scratch.batch($model, states);
+                let in_lanes = {
+                    $(let $all = &$all[..];)*
+                    py.detach(|| $in_lanes)
+                };
+                return in_lanes.give_all(py, states, out);
+            })?
+            #[allow(unused_mut, unused_variables)] // by functions without a `Data` or without arguments
+            let mut call = |state: Option<usize>, out: Option<&Bound<'py, PyAny>>| {
+                $(let $data = &mut scratch.inner;)?
+                let result = {
+                    $(let $arg = <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::read_at(
+                        stringify!($arg), &$arg, $model, state,
+                    )?;)*
+                    $body
+                };
+                result.give(py, out)
+            };
+            match states {
+                None => call(None, out),
+                Some(states) => {
+                    let results = (0..states).map(|k| call(Some(k), None)).collect::<PyResult<Vec<_>>>()?;
+                    $crate::batch::stack(py, results, out)
+                }
+            }
         }
     )*};
 }

@@ -10,6 +10,7 @@
 
 mod algorithms;
 mod arrays;
+mod batch;
 mod builder;
 mod centroidal;
 mod configuration;

@@ -11,113 +11,130 @@ use crate::forward_dynamics::{Method, forward_dynamics};
 use crate::kinematics::{World, positions};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
-    /// Rigid inertia. Shape: bodies. Written by: `factorize`.
-    I: Vec<Inertia<S>>,
-    /// Articulated inertia. Shape: bodies. Written by: `factorize`.
+    /// Articulated inertia. Shape: levels. Written by: `factorize`, `pass`.
     IA: Vec<ArticulatedInertia<S>>,
-    /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`.
+    /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`, `pass`.
     pub U: Vec<Force<S>>,
-    /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`.
+    /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`, `pass`.
     pub D_inv: Vec<S>,
-    /// Velocity. Shape: bodies. Written by: `pass`.
+    /// Velocity; the world's stays 0. Shape: levels. Written by: `pass`.
     v: Vec<Motion<S>>,
-    /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
+    /// Acceleration, with gravity as the world's. Shape: levels. Written by: `pass`.
     a: Vec<Motion<S>>,
     /// v × v_J. Shape: bodies. Written by: `pass`.
     c: Vec<Motion<S>>,
-    /// Articulated bias force. Shape: bodies. Written by: `pass`.
+    /// Articulated bias force. Shape: levels. Written by: `pass`.
     pA: Vec<Force<S>>,
     /// τ − Sᵀ pᴬ. Shape: columns. Written by: `pass`.
     u: Vec<S>,
     /// Joint accelerations. Shape: nv. Written by: `pass`.
-    qdd: Vec<S>,
+    pub qdd: Vec<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            I: vec![Inertia::zero(); size.bodies],
-            IA: vec![ArticulatedInertia::zero(); size.bodies],
+            IA: vec![ArticulatedInertia::zero(); size.levels],
             U: vec![Force::zero(); size.columns],
             D_inv: vec![S::zero(); size.columns],
-            v: vec![Motion::zero(); size.bodies],
-            a: vec![Motion::zero(); size.bodies],
+            v: vec![Motion::zero(); size.levels],
+            a: vec![Motion::zero(); size.levels],
             c: vec![Motion::zero(); size.bodies],
-            pA: vec![Force::zero(); size.bodies],
+            pA: vec![Force::zero(); size.levels],
             u: vec![S::zero(); size.columns],
             qdd: vec![S::zero(); size.nv],
         }
     }
 }
 
-/// Eliminates all degrees of freedom from the tips to the root: what depends on q alone, for
-/// bodies that are placed.
+/// Eliminates the degrees of freedom of joint i: of Iᴬ remains Iᵃ, what the parent feels.
+#[inline(always)]
+fn eliminate<L: Layout>(
+    l: &L,
+    S: &[Motion<L::S>],
+    U: &mut [Force<L::S>],
+    D_inv: &mut [L::S],
+    i: usize,
+    mut Ia: ArticulatedInertia<L::S>,
+) -> ArticulatedInertia<L::S> {
+    for k in (0..l.joint(i).nv()).rev() {
+        let c = l.slot(i) + k;
+        U[c] = Ia * S[c]; // U = Iᴬ S
+        D_inv[c] = (S[c].dot(U[c]) + l.armature(i, k)).recip(); // D = Sᵀ U
+        Ia = Ia.minus_outer(U[c], D_inv[c]); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
+    }
+    Ia
+}
+
+/// U and D⁻¹ of all columns, which depend on q alone, for bodies that are placed.
 #[inline(always)]
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
-    let Workspace { I, IA, U, D_inv, .. } = d;
+    let Workspace { IA, U, D_inv, .. } = d;
     for i in l.bodies() {
-        I[i] = w.oX[i].act(l.inertia(i));
-        IA[i] = I[i].into();
-    }
-    for i in l.bodies().rev() {
-        let mut Ia = IA[i];
-        for k in (0..l.joint(i).nv()).rev() {
-            let c = l.slot(i) + k;
-            U[c] = Ia * w.S[c]; // U = Iᴬ S
-            D_inv[c] = (w.S[c].dot(U[c]) + l.armature(i, k)).recip(); // D = Sᵀ U
-            Ia = Ia.minus_outer(U[c], D_inv[c]); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
+        IA[l.level(i)] = w.oX[i].act(l.inertia(i)).into();
+        for &j in l.finished(i) {
+            let Ia = eliminate(l, &w.S, U, D_inv, j, IA[l.level(j)]);
+            l.lift(IA, j, Ia); // Iᴬ_λ += Iᵃ
         }
-        IA[i] = Ia; // from here on Iᵃ, what the parent feels
-        l.push(IA, i, Ia); // Iᴬ_λ += Iᵃ
     }
 }
 
-/// The whole algorithm.
+/// The whole algorithm: down and up each branch in turn, then down once more.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], tau: &[L::S], f_ext: &[Force<L::S>]) {
-    factorize(l, w, d);
-    let Workspace { I, IA, U, D_inv, v, a, c, pA, u, qdd, .. } = d;
+pub(crate) fn pass<L: Layout>(
+    l: &L,
+    w: &World<L::S>,
+    d: &mut Workspace<L::S>,
+    qd: &[L::S],
+    tau: &[L::S],
+    f_ext: &[Force<L::S>],
+) {
+    let Workspace { IA, U, D_inv, v, a, c, pA, u, qdd } = d;
     let (oX, S) = (&w.oX, &w.S);
     for i in l.bodies() {
         let mut vJ = Motion::zero();
         for k in 0..l.joint(i).nv() {
             vJ = S[l.slot(i) + k].scale_add(l.load(qd, i, k), vJ); // v_J = S q̇
         }
-        v[i] = l.parent(v, i) + vJ; // v_i = v_λ + v_J
-        c[i] = v[i].cross(vJ); // c_i = v_i × v_J
-        pA[i] = v[i].cross(I[i] * v[i]); // p_i = v_i ×* I_i v_i
+        let vi = l.above(v, i) + vJ; // v_i = v_λ + v_J
+        let I = oX[i].act(l.inertia(i));
+        let mut pi = vi.cross(I * vi); // p_i = v_i ×* I_i v_i
         if let Some(external) = l.force(f_ext, i) {
-            pA[i] -= oX[i].act(external);
+            pi -= oX[i].act(external);
         }
-    }
-    for i in l.bodies().rev() {
-        let mut pa = pA[i] + IA[i] * c[i]; // pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
-        for k in (0..l.joint(i).nv()).rev() {
-            let s = l.slot(i) + k;
-            u[s] = l.load(tau, i, k) - S[s].dot(pA[i]); // u = τ − Sᵀ pᴬ
-            let x = D_inv[s] * u[s];
-            pA[i] = U[s].scale_add(x, pA[i]);
-            pa = U[s].scale_add(x, pa);
+        let here = l.level(i);
+        (v[here], IA[here], pA[here]) = (vi, I.into(), pi);
+        c[i] = vi.cross(vJ); // c_i = v_i × v_J
+        for &j in l.finished(i) {
+            let here = l.level(j);
+            let Ia = eliminate(l, S, U, D_inv, j, l.whole(j, IA[here]));
+            let mut pa = l.whole(j, pA[here]);
+            for k in (0..l.joint(j).nv()).rev() {
+                let s = l.slot(j) + k;
+                u[s] = l.load(tau, j, k) - S[s].dot(pa); // u = τ − Sᵀ pᴬ
+                pa = U[s].scale_add(D_inv[s] * u[s], pa);
+            }
+            l.lift(IA, j, Ia); // Iᴬ_λ += Iᵃ
+            l.lift(pA, j, pa + Ia * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
         }
-        l.push(pA, i, pa); // pᴬ_λ += pᵃ
     }
     a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
     qdd.fill(L::S::zero());
     for i in l.bodies() {
-        let mut ai = l.parent(a, i) + c[i]; // a' = a_λ + c
+        let mut ai = l.above(a, i) + c[i]; // a' = a_λ + c
         for k in 0..l.joint(i).nv() {
             let s = l.slot(i) + k;
             let x = D_inv[s] * (u[s] - ai.dot(U[s])); // q̈ = D⁻¹ (u − Uᵀ a')
             l.add(qdd, i, k, x);
             ai = S[s].scale_add(x, ai); // a = a' + S q̈
         }
-        a[i] = ai;
+        a[l.level(i)] = ai;
     }
 }
 
@@ -155,12 +172,35 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
+    check_all(model, data, q, v, tau, f_ext);
+    #[cfg(target_arch = "x86_64")]
+    if !model.has_mimic() && crate::limbs::run(true, model, data, q, v, tau, f_ext) {
+        return &data.aba.qdd;
+    }
+    one_by_one(model, data, q, v, tau, f_ext)
+}
+
+#[inline]
+#[track_caller]
+fn check_all<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) {
     data.check(model);
     model.check_regular();
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("tau", tau.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
+}
+
+/// Body by body, which leaves what depends on q behind.
+pub(crate) fn one_by_one<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> &'d [S] {
+    check_all(model, data, q, v, tau, f_ext);
     if model.has_mimic() {
         return forward_dynamics(model, data, q, v, tau, f_ext, Some(Method::Sparse));
     }

@@ -7,14 +7,14 @@
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
 
-use crate::aba::aba;
+use crate::aba::one_by_one;
+use crate::articulated_solve::{self, minus_solve};
 use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::inputs::State;
-use crate::layout::{Layout, Single};
 use crate::ltdl::axpy;
 use crate::minv;
-use crate::model::Model;
+use crate::model::{Coupled, Model};
 use crate::rnea_derivatives;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
@@ -28,33 +28,89 @@ pub(crate) struct Workspace<S> {
     pub da_dq: DMatrix<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
     pub da_dv: DMatrix<S>,
+    solve: articulated_solve::Workspace<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
+    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = DMatrix::from_element(size.nv, size.nv, S::zero());
-        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square }
+        let solve = articulated_solve::Workspace::new(&model.columns, size.nv);
+        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square, solve }
     }
 }
 
-/// C = −A B, of square matrices, where column j of B has zeros but in the rows `coupled[j]`.
+/// C = −A B, of square matrices, where column j of B has zeros but in the rows of `coupled[j]`.
 ///
-/// Four columns with the same rows, as those of one limb have, go together: eight entries of each stay in registers while
-/// their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored a quarter as often.
+/// Four columns with the same rows, as those of one limb have, go together: as many entries of each as there are registers
+/// for stay there while their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored
+/// a quarter as often.
 #[inline(always)]
-pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Vec<usize>]) {
+pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Coupled]) {
     let (n, mut j) = (coupled.len(), 0);
     while j < n {
-        let rows = &coupled[j];
-        if S::LANES == 1 && j + 4 <= n && coupled[j + 1..j + 4].iter().all(|other| other == rows) {
-            four_columns(A, &B[j * n..(j + 4) * n], &mut C[j * n..(j + 4) * n], rows, n);
-            j += 4;
-        } else {
-            let c = &mut C[j * n..(j + 1) * n];
-            c.fill(S::zero());
-            subtract_column(A, &B[j * n..(j + 1) * n], c, rows);
-            j += 1;
+        let Coupled { rows, alike } = &coupled[j];
+        let many = if *alike >= 4 { 4 } else { 1 };
+        let (b, c) = (&B[j * n..(j + many) * n], &mut C[j * n..(j + many) * n]);
+        match (many, size_of::<S>()) {
+            (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n),
+            (4, 16..) => four_columns::<S, 2>(A, b, c, rows, n),
+            (4, _) => four_columns::<S, 8>(A, b, c, rows, n),
+            _ => {
+                c.fill(S::zero());
+                subtract_column(A, b, c, rows);
+            }
         }
+        j += many;
+    }
+}
+
+/// Twice `minus_product` with one A that is symmetric, in lanes, where matrices are too large for the nearest cache.
+#[inline(always)]
+fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], coupled: &[Coupled]) {
+    let (n, mut j) = (coupled.len(), 0);
+    while j < n {
+        let Coupled { rows, alike } = &coupled[j];
+        let many = (*alike).min(4);
+        let columns = j * n..(j + many) * n;
+        let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
+        let C = [&mut C0[columns.clone()], &mut C1[columns]];
+        match many {
+            4 => twice::<S, 4, 2>(A, B, C, rows, n),
+            3 => twice::<S, 3, 2>(A, B, C, rows, n),
+            2 => twice::<S, 2, 4>(A, B, C, rows, n),
+            _ => twice::<S, 1, 4>(A, B, C, rows, n),
+        }
+        j += many;
+    }
+}
+
+/// The sums of `subtract_column` for N rows of M columns at a time: of A, N columns are read from end to end.
+#[inline(always)]
+fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&mut [S]; 2], rows: &[usize], n: usize) {
+    let ([B0, B1], [C0, C1]) = (B, C);
+    let mut i = 0;
+    while i < n {
+        let mut a = [&A[..n]; N];
+        for y in 0..N {
+            a[y] = &A[(i + y).min(n - 1) * n..][..n];
+        }
+        let mut c = [[[S::zero(); 2]; M]; N];
+        for &k in rows {
+            for x in 0..M {
+                let (b0, b1) = (-B0[x * n + k], -B1[x * n + k]);
+                for y in 0..N {
+                    c[y][x][0] = a[y][k].mul_add(b0, c[y][x][0]);
+                    c[y][x][1] = a[y][k].mul_add(b1, c[y][x][1]);
+                }
+            }
+        }
+        for y in 0..N.min(n - i) {
+            for x in 0..M {
+                C0[x * n + i + y] = c[y][x][0];
+                C1[x * n + i + y] = c[y][x][1];
+            }
+        }
+        i += N;
     }
 }
 
@@ -78,24 +134,24 @@ pub(crate) fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[
 
 /// The sums of `subtract_column`, in the same order, so that the bits are the same.
 #[inline(always)]
-fn four_columns<S: Scalar>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], n: usize) {
+fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], n: usize) {
     let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
     let mut i = 0;
-    while i + 8 <= n {
-        let mut c = [[S::zero(); 8]; 4];
+    while i + N <= n {
+        let mut c = [[S::zero(); N]; 4];
         for &k in rows {
-            let a = &A[k * n + i..k * n + i + 8];
+            let a = &A[k * n + i..k * n + i + N];
             let b = [-b0[k], -b1[k], -b2[k], -b3[k]];
             for y in 0..4 {
-                for x in 0..8 {
+                for x in 0..N {
                     c[y][x] = a[x].mul_add(b[y], c[y][x]);
                 }
             }
         }
         for y in 0..4 {
-            C[y * n + i..y * n + i + 8].copy_from_slice(&c[y]);
+            C[y * n + i..y * n + i + N].copy_from_slice(&c[y]);
         }
-        i += 8;
+        i += N;
     }
     while i < n {
         let mut c = [S::zero(); 4];
@@ -131,8 +187,23 @@ kernel! {
     /// After `rnea_derivatives` and `minv`.
     fn products(model, data) {
         let (Minv, d, out) = (data.minv.matrix().as_slice(), &data.rnea_derivatives, &mut data.aba_derivatives);
-        minus_product(Minv, d.dtau_dq.as_slice(), out.da_dq.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂q
-        minus_product(Minv, d.dtau_dv.as_slice(), out.da_dv.as_mut_slice(), &model.coupled); // −M⁻¹ ∂τ/∂v
+        let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
+        let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
+        // ∂q̈ = −M⁻¹ ∂τ
+        if S::LANES > 1 {
+            minus_products(Minv, dtau, da, &model.coupled);
+        } else {
+            dtau.into_iter().zip(da).for_each(|(dtau, da)| minus_product(Minv, dtau, da, &model.coupled));
+        }
+    }
+}
+
+kernel! {
+    /// After `aba` and `rnea_derivatives`.
+    fn solves(_model, data) {
+        let (d, Workspace { da_dq, da_dv, solve, .. }) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+        let B = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
+        minus_solve(&data.world, &data.aba, solve, B, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);
     }
 }
 
@@ -163,20 +234,28 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S, R> {
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
-    a_kept.copy_from_slice(aba(model, data, q, v, tau, f_ext));
-    rnea_derivatives::run(model, data, v, &a_kept, f_ext, &[Single::new(model).minus_gravity()]);
+    a_kept.copy_from_slice(one_by_one(model, data, q, v, tau, f_ext));
+    rnea_derivatives::run(model, data, v, &a_kept, f_ext, &[]);
     data.aba_derivatives.a = a_kept;
     if data.minv.by_factor() {
         minv::from_derivatives(model, data);
     } else {
         minv::from_factors(model, data); // those of `aba`
     }
-    products(model, data);
+    if data.aba_derivatives.solve.pays() {
+        solves(model, data);
+    } else {
+        products(model, data);
+    }
     let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
     data.aba_derivatives.view(data.minv.matrix(), state)
 }
 
 impl<S> Workspace<S> {
+    pub(crate) fn a(&self) -> &[S] {
+        &self.a
+    }
+
     /// What `aba_derivatives` has left.
     pub(crate) fn view<'d, R>(&'d self, Minv: &'d DMatrix<S>, state: State<'d, S, R>) -> AbaDerivatives<'d, S, R> {
         AbaDerivatives { a: &self.a, da_dq: &self.da_dq, da_dv: &self.da_dv, da_dtau: Minv, state }

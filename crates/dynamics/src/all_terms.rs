@@ -9,7 +9,7 @@ use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Layout, Single};
+use crate::layout::{Layout, Pairs, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
@@ -44,9 +44,9 @@ impl<S: Scalar> Workspace<S> {
 
 /// The whole algorithm, for bodies whose velocities are known.
 #[inline(always)]
-fn pass<L: Layout>(
+fn pass<L: Pairs>(
     l: &L,
-    World { oX, S }: &World<L::S>,
+    World { oX, S, .. }: &World<L::S>,
     Moving { v, dS, qd, .. }: &Moving<L::S>,
     centroidal::Workspace { IC, BC, F, dF, .. }: &mut centroidal::Workspace<L::S>,
     Workspace { a, f, M, h, twice }: &mut Workspace<L::S>,
@@ -67,7 +67,7 @@ fn pass<L: Layout>(
         *twice += v[i].dot(BC[i].momentum); // 2T = Σ v_iᵀ I v_i
     }
     let M = M.as_mut_slice();
-    M.fill(L::S::zero());
+    l.clear(M);
     h.fill(L::S::zero());
     for i in l.bodies().rev() {
         let dIC = BC[i].inertia_rate();
@@ -81,10 +81,10 @@ fn pass<L: Layout>(
             l.add(h, i, k, S[c].dot(f[i])); // h = Sᵀ f
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F_c); // M_ej = S_eᵀ Iᶜ S_j for every ancestor e
-                l.add_at(M, e, support[own], x);
-                l.add_at(M, support[own], e, x);
+                l.put_at(M, e, support[own], x);
+                l.put_at(M, support[own], e, x);
             }
-            l.add_at(M, support[own], support[own], S[c].dot(F_c));
+            l.put_at(M, support[own], support[own], S[c].dot(F_c));
         }
         let (IC_i, BC_i, f_i) = (IC[i], BC[i], f[i]);
         l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i

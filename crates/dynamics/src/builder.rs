@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::joint::Joint;
+use crate::limbs::Plan;
 use crate::model::{Body, Frame, FrameKind, Limits, Mimic, Model};
 use crate::soundness;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
@@ -185,7 +186,9 @@ impl ModelBuilder {
             nodes: Vec::with_capacity(order.len()),
             columns: Vec::new(),
             support: Vec::new(),
+            finished: Vec::new(),
             coupled: Vec::new(),
+            limbs: None,
             warnings: Vec::new(),
             singular: Vec::new(),
             tree: 0,
@@ -214,6 +217,7 @@ impl ModelBuilder {
             }
         }
         model.add_nodes();
+        model.limbs = Plan::new(&model);
         for (body, &old) in model.bodies.iter().zip(&order).skip(1) {
             soundness::of_body(body, self.drafts[old].between, &mut model.warnings);
         }

@@ -52,7 +52,7 @@ impl<S: Scalar> Workspace<S> {
 
 /// Iᶜ S of all columns, for bodies that are placed.
 #[inline(always)]
-fn map<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>) {
+fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, F, .. } = d;
     IC[0] = Inertia::zero();
     for i in l.bodies() {
@@ -70,7 +70,7 @@ fn map<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>)
 
 /// Iᶜ S and its rate of all columns, for bodies whose velocities are known.
 #[inline(always)]
-fn map_rate<L: Layout>(l: &L, World { oX, S }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, dF, .. } = d;
     (IC[0], BC[0]) = (Inertia::zero(), Coriolis::zero());
     for i in l.bodies() {

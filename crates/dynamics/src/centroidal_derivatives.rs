@@ -79,7 +79,7 @@ impl<S: Scalar> Workspace<S> {
 
 /// The derivatives about the world's origin, for bodies whose velocities and accelerations are known.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, World { oX, S }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, columns, .. } = d;
     (IC[0], BC[0], F[0]) = (Inertia::zero(), Coriolis::zero(), Force::zero());
     for i in l.bodies() {

@@ -27,7 +27,7 @@ use crate::frames::Placements;
 use crate::kinematics::World;
 use crate::layout::{Layout, Single};
 use crate::ltdl::{Ltdl, axpy};
-use crate::model::Model;
+use crate::model::{Coupled, Model};
 use crate::rnea_derivatives;
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
 use nalgebra::DMatrix;
@@ -54,11 +54,11 @@ impl<S: Scalar> Workspace<S> {
 
 /// C −= A B, where column j of B has zeros but in the rows `rows[j]`.
 #[inline(always)]
-fn subtract_product<S: Scalar>(A: &DMatrix<S>, B: &DMatrix<S>, C: &mut DMatrix<S>, rows: &[Vec<usize>]) {
+fn subtract_product<S: Scalar, R: AsRef<[usize]>>(A: &DMatrix<S>, B: &DMatrix<S>, C: &mut DMatrix<S>, rows: &[R]) {
     let (n, m) = A.shape();
     let (A, B, C) = (A.as_slice(), B.as_slice(), C.as_mut_slice());
     for (j, rows) in rows.iter().enumerate() {
-        subtract_column(A, &B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n], rows);
+        subtract_column(A, &B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n], rows.as_ref());
     }
 }
 
@@ -203,7 +203,7 @@ struct Equations<'e, S> {
     proximal: Proximal,
     r: &'e DMatrix<S>,
     c: &'e DMatrix<S>,
-    coupled: &'e [Vec<usize>],
+    coupled: &'e [Coupled],
     touching: &'e [Vec<usize>],
 }
 
@@ -357,7 +357,7 @@ fn pass<S: Scalar, R: Constant<S>>(
     let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
     let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
     constraints.load(model, world, f_ext, &mut d.forces);
-    rnea_derivatives::pass(&l, world, id, v, qdd, &d.forces, l.minus_gravity());
+    rnea_derivatives::pass(&l, world, id, v, qdd, &d.forces, l.minus_gravity(), false);
     constraints.add_turning(world, &mut id.dtau_dq);
     let columns = Columns { S: &world.S, Psid: &id.Psid, Psidd: &id.Psidd, PsidSd: &id.PsidSd };
     let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = &mut *constraints;
@@ -370,5 +370,6 @@ fn pass<S: Scalar, R: Constant<S>>(
     }
     constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
     constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
+    id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
     constraints.respond_to_v(&d.P, &id.dtau_dv, &mut d.da_dv);
 }

@@ -17,7 +17,7 @@ use crate::constraint_set::ConstraintSet;
 use crate::crba;
 use crate::data::{Data, Size, check, check_forces};
 use crate::kinematics::{World, place};
-use crate::layout::{Layout, Single};
+use crate::layout::{Pairs, Single};
 use crate::ltdl::Ltdl;
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
@@ -63,7 +63,7 @@ impl<S: Scalar> Workspace<S> {
 /// M, h and the bodies' motion for q̈ = 0, for bodies that are placed: the Newton–Euler and the composite-rigid-body
 /// algorithm in one pass to the tips and one back.
 #[inline(always)]
-fn bias<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
+fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let Workspace { v, a, IC, F, M, effort, .. } = d;
     a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
     for i in l.bodies() {
@@ -92,7 +92,7 @@ fn bias<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S],
 
 /// M alone, for bodies that are placed.
 #[inline(always)]
-pub(crate) fn inertia<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
+pub(crate) fn inertia<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     for i in l.bodies() {
         d.IC[i] = w.oX[i].act(l.inertia(i));
     }
@@ -251,7 +251,7 @@ impl Algorithm for Forward {
 
 /// The whole algorithm.
 #[inline(always)]
-pub(crate) fn pass<L: Layout>(
+pub(crate) fn pass<L: Pairs>(
     l: &L,
     data: &mut Data<L::S>,
     constraints: &mut ConstraintSet<L::S>,

@@ -10,7 +10,7 @@ use crate::elimination::NONE;
 use crate::error::Error;
 use crate::frames::ReferenceFrame;
 use crate::ltdl::Ltdl;
-use crate::model::Model;
+use crate::model::{Coupled, Model};
 use condyle_spatial::{Scalar, Se3, Vec3};
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -138,7 +138,7 @@ pub struct ConstraintSet<S> {
     /// Of the tree that it was made for.
     tree: u64,
     /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
-    pub(crate) coupled: Vec<Vec<usize>>,
+    pub(crate) coupled: Vec<Coupled>,
     /// For each coordinate, the rows of J in which it may differ from zero.
     pub(crate) touching: Vec<Vec<usize>>,
     /// J on the places of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
@@ -240,7 +240,7 @@ impl<S: Scalar> ConstraintSet<S> {
             // what carries a frame moves the force on the other one
             let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
             let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
-            model.coupled[k].iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
+            model.coupled[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
         };
         let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
         Ok(Self {
@@ -248,7 +248,7 @@ impl<S: Scalar> ConstraintSet<S> {
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
             nv,
             tree: model.tree,
-            coupled: (0..nv).map(coupled).collect(),
+            coupled: Coupled::with((0..nv).map(coupled).collect()),
             touching: (0..nv).map(touching).collect(),
             J: vec![o; entries],
             gamma: vec![o; rows],

@@ -14,7 +14,7 @@
 use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Layout, Single};
+use crate::layout::{Pairs, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;
@@ -59,14 +59,17 @@ impl<S: Scalar> Coriolis<S> {
     #[inline(always)]
     pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
-        Force { linear: m.angular.cross(p).scale(S::splat(2.0)), angular: self.rate * m.angular + m.angular.cross(l) }
+        Force {
+            linear: m.angular.cross(p).scale(S::splat(2.0)),
+            angular: self.rate.mul_add(m.angular, m.angular.cross(l)),
+        }
     }
 
     /// 2Bᵀ m, of which only the angular part is not zero.
     #[inline(always)]
     pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
-        self.rate * m.angular + l.cross(m.angular) + p.cross(m.linear).scale(S::splat(2.0))
+        self.rate.mul_add(m.angular, l.cross_add(m.angular, p.cross(m.linear).scale(S::splat(2.0))))
     }
 
     /// The rate of the inertia, İ m = v ×* I m − I (v × m): of the mass 0, of m c the linear momentum.
@@ -100,7 +103,7 @@ impl<S: Scalar> Workspace<S> {
 
 /// The whole algorithm, for bodies whose velocities are known.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let (S, dS, half) = (&w.S, &m.dS, L::S::splat(0.5));
     let Workspace { IC, BC, C } = d;
     for i in l.bodies() {
@@ -108,7 +111,7 @@ fn pass<L: Layout>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L
         BC[i] = Coriolis::of(IC[i], m.v[i]);
     }
     let C = C.as_mut_slice();
-    C.fill(L::S::zero());
+    l.clear(C);
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
@@ -121,12 +124,12 @@ fn pass<L: Layout>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L
             let F = IC[i] * dS[s] + BC[i].apply(S[s]).scale(half); // Iᶜ Ṡ_d + B S_d
             for &e in before {
                 let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
-                l.add_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS)); // C_de
-                l.add_at(C, e, column, S_e.dot(F)); // C_ed
+                l.put_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS)); // C_de
+                l.put_at(C, e, column, S_e.dot(F)); // C_ed
             }
             for &e in own {
                 let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
-                l.add_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS));
+                l.put_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS));
             }
         }
         let (IC_i, BC_i) = (IC[i], BC[i]);

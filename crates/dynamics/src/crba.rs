@@ -6,7 +6,7 @@
 use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Single};
+use crate::layout::{Pairs, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
@@ -17,7 +17,7 @@ pub(crate) struct Workspace<S> {
     /// Inertia of the body and all that it carries, in the world's frame. Shape: bodies. Written by: `pass`.
     IC: Vec<Inertia<S>>,
     /// Shape: nv × nv. Written by: `pass`.
-    M: DMatrix<S>,
+    pub M: DMatrix<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -34,7 +34,7 @@ impl<S> Workspace<S> {
 
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, w: &World<L::S>, Workspace { IC, M }: &mut Workspace<L::S>) {
+fn pass<L: Pairs>(l: &L, w: &World<L::S>, Workspace { IC, M }: &mut Workspace<L::S>) {
     for i in l.bodies() {
         IC[i] = w.oX[i].act(l.inertia(i));
     }
@@ -43,9 +43,9 @@ fn pass<L: Layout>(l: &L, w: &World<L::S>, Workspace { IC, M }: &mut Workspace<L
 
 /// M, for the inertias of the bodies, which become those of all that the joints carry.
 #[inline(always)]
-pub(crate) fn carry<L: Layout>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut DMatrix<L::S>) {
+pub(crate) fn carry<L: Pairs>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut DMatrix<L::S>) {
     let M = M.as_mut_slice();
-    M.fill(L::S::zero());
+    l.clear(M);
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
@@ -54,10 +54,10 @@ pub(crate) fn carry<L: Layout>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [I
             let own = support.len() - nv + k;
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
-                l.add_at(M, e, support[own], x);
-                l.add_at(M, support[own], e, x);
+                l.put_at(M, e, support[own], x);
+                l.put_at(M, support[own], e, x);
             }
-            l.add_at(M, support[own], support[own], l.at(S, support[own]).dot(F));
+            l.put_at(M, support[own], support[own], l.at(S, support[own]).dot(F));
         }
         let IC_i = IC[i];
         l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i

@@ -4,7 +4,7 @@ use crate::kinematics::{Moving, World};
 use crate::model::Model;
 use crate::{
     aba, aba_derivatives, aba_hessian, all_terms, centroidal, centroidal_derivatives, constrained_derivatives,
-    constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, minv, regressor, rnea,
+    constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, limbs, minv, regressor, rnea,
     rnea_derivatives, rnea_hessian, statics,
 };
 use condyle_spatial::Scalar;
@@ -47,6 +47,9 @@ pub struct Data<S> {
     pub(crate) all_terms: all_terms::Workspace<S>,
     pub(crate) forward_dynamics: forward_dynamics::Workspace<S>,
     pub(crate) regressor: regressor::Workspace<S>,
+    /// Of single calls on robots with limbs.
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) limbs: Option<Box<limbs::Scratch>>,
 }
 
 /// How large the arrays of a workspace are.
@@ -58,6 +61,8 @@ pub(crate) struct Size {
     pub columns: usize,
     /// Columns on the longest way from the root.
     pub depth: usize,
+    /// Bodies on the longest way from the root, the world included.
+    pub levels: usize,
     /// Coordinates.
     pub nv: usize,
 }
@@ -69,6 +74,7 @@ impl<S: Scalar> Data<S> {
             bodies: model.nodes.len(),
             columns: model.columns.len(),
             depth: model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0),
+            levels: model.nodes.iter().map(|n| n.level + 1).max().unwrap_or(1),
             nv: model.nv,
         };
         Self {
@@ -81,7 +87,7 @@ impl<S: Scalar> Data<S> {
             aba: aba::Workspace::new(size),
             minv: minv::Workspace::new(size, model),
             rnea_derivatives: rnea_derivatives::Workspace::new(size),
-            aba_derivatives: aba_derivatives::Workspace::new(size),
+            aba_derivatives: aba_derivatives::Workspace::new(size, model),
             rnea_hessian: rnea_hessian::Workspace::new(size),
             aba_hessian: aba_hessian::Workspace::new(size),
             constrained_dynamics: constrained_dynamics::Workspace::new(size, model),
@@ -95,6 +101,8 @@ impl<S: Scalar> Data<S> {
             all_terms: all_terms::Workspace::new(size),
             forward_dynamics: forward_dynamics::Workspace::new(model),
             regressor: regressor::Workspace::new(size),
+            #[cfg(target_arch = "x86_64")]
+            limbs: limbs::Scratch::new::<S, R>(model),
         }
     }
 }

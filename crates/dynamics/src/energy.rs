@@ -93,7 +93,7 @@ impl<S: Scalar> Workspace<S> {
 
 /// The derivatives, for bodies whose velocities are known.
 #[inline(always)]
-fn derivatives<L: Layout>(l: &L, World { oX, S }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, h, dT_dq, dT_dv, dV_dq } = d;
     for i in l.bodies() {
         IC[i] = oX[i].act(l.inertia(i));

@@ -21,7 +21,7 @@ use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, Size, check};
 use crate::kinematics::{World, place};
-use crate::layout::{Layout, Single};
+use crate::layout::{Layout, Pairs, Single};
 use crate::ltdl::axpy;
 use crate::model::Model;
 use crate::rnea_derivatives;
@@ -153,7 +153,7 @@ impl Algorithm for ImpactDerivatives {
         let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
         let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
         constraints.load(model, world, &[], &mut d.forces);
-        rnea_derivatives::pass(&l, world, id, &out.zero, change, &d.forces, Vec3::zero()); // ∂(M Δ − Jᵀ Λ)/∂q
+        rnea_derivatives::pass(&l, world, id, &out.zero, change, &d.forces, Vec3::zero(), false); // ∂(M Δ − Jᵀ Λ)/∂q
         constraints.add_turning(world, &mut id.dtau_dq);
         spread(&l, world, out);
         constraints.dgamma_dq.fill(S::zero());
@@ -164,13 +164,14 @@ impl Algorithm for ImpactDerivatives {
         }
         constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
         constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
+        id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
         constraints.respond_to_v_before(restitution, &mut d.da_dv);
     }
 }
 
 /// The whole algorithm.
 #[inline(always)]
-fn pass<L: Layout>(
+fn pass<L: Pairs>(
     l: &L,
     data: &mut Data<L::S>,
     constraints: &mut ConstraintSet<L::S>,

@@ -15,7 +15,7 @@ use crate::aba_derivatives::AbaDerivatives;
 use crate::elementary::tanh;
 use crate::frames::Placements;
 use crate::kinematics::World;
-use crate::layout::{Layout, Single};
+use crate::layout::{Layout, Pairs, Single};
 use crate::model::Model;
 use crate::regressor::{PARAMETERS, effort};
 use crate::rnea_derivatives::{RneaDerivatives, Workspace};

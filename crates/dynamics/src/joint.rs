@@ -6,9 +6,10 @@
 
 mod group;
 
+use crate::dispatch::Kernel;
 use crate::layout::Layout;
 use crate::model::Mimic;
-use condyle_spatial::{Act, Cross, Force, Mat3, Motion, Quaternion, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Force, Mat3, Motion, Quaternion, Scalar, Se3, Vec3};
 pub(crate) use group::GroupJacobian;
 use serde::{Deserialize, Serialize};
 
@@ -62,6 +63,23 @@ pub(crate) enum JointMotion<S> {
     Any(Motion<S>),
 }
 
+/// Of each body's joint: see [`Joint::turns`]. What stands behind the last body has no meaning.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Turns<S> {
+    /// Shape: bodies, in whole steps. Written by: `Joint::turns`.
+    pub sin: Vec<S>,
+    /// Shape: as sin. Written by: `Joint::turns`.
+    pub cos: Vec<S>,
+}
+
+impl<S: Scalar> Turns<S> {
+    pub(crate) fn new(bodies: usize) -> Self {
+        let n = bodies.next_multiple_of(4);
+        Self { sin: vec![S::zero(); n], cos: vec![S::zero(); n] }
+    }
+}
+
 impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
     type Output = Self;
     #[inline(always)]
@@ -75,16 +93,44 @@ impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
     }
 }
 
+/// How a body turns, and how its origin accelerates: what the equations of Newton and Euler need.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Turning<S> {
+    /// ω.
+    pub w: Vec3<S>,
+    /// ω̇.
+    pub dw: Vec3<S>,
+    /// The classical acceleration.
+    pub a: Vec3<S>,
+}
+
 impl<S: Scalar> JointMotion<S> {
-    /// v × vJ.
+    fn motion(self) -> Motion<S> {
+        Motion::zero() + self
+    }
+
+    /// Adds a joint that moves with this velocity and with the acceleration aJ to what the body would do without it:
+    /// ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J.
     #[inline(always)]
-    pub(crate) fn crossed_by(self, v: Motion<S>) -> Motion<S> {
-        let across = |a: Vec3<S>, x: S| Vec3::new(a.y * x, -(a.x * x), S::zero()); // a × x e_z
-        match self {
-            Self::Turn(x) => Motion { linear: across(v.linear, x), angular: across(v.angular, x) },
-            Self::Slide(x) => Motion { linear: across(v.angular, x), angular: Vec3::zero() },
-            Self::Any(m) => v.cross(m),
+    pub(crate) fn added_to(self, aJ: Self, Turning { mut w, mut dw, mut a }: Turning<S>) -> Turning<S> {
+        match (self, aJ) {
+            (Self::Turn(x), Self::Turn(xx)) => {
+                dw = Vec3::new(w.y.mul_add(x, dw.x), (-w.x).mul_add(x, dw.y), dw.z + xx);
+                w.z += x;
+            }
+            (Self::Slide(x), Self::Slide(xx)) => {
+                let twice = x + x;
+                a = Vec3::new(w.y.mul_add(twice, a.x), (-w.x).mul_add(twice, a.y), a.z + xx);
+            }
+            (vJ, aJ) => {
+                let (vJ, aJ) = (vJ.motion(), aJ.motion());
+                dw = w.cross_add(vJ.angular, dw + aJ.angular);
+                a = (w + w + vJ.angular).cross_add(vJ.linear, a + aJ.linear);
+                w += vJ.angular;
+            }
         }
+        Turning { w, dw, a }
     }
 }
 
@@ -213,25 +259,50 @@ impl Joint {
         }
     }
 
+    /// The sine and cosine of what each joint turns by about z (0 and 1 where it does not), all of them at once.
+    #[inline(always)]
+    pub(crate) fn turns<L: Layout>(l: &L, q: &[L::S], Turns { sin, cos }: &mut Turns<L::S>) {
+        for i in l.bodies() {
+            if let Self::Revolute { .. } | Self::Helical { .. } = l.joint(i) {
+                sin[i] = l.position(q, i, 0);
+            }
+        }
+        L::S::sin_cos_of_all(sin, cos);
+        for i in l.bodies() {
+            match l.joint(i) {
+                Self::Continuous { .. } => (cos[i], sin[i]) = (l.position(q, i, 0), l.position(q, i, 1)),
+                Self::Planar => (cos[i], sin[i]) = (l.position(q, i, 2), l.position(q, i, 3)),
+                _ => {}
+            }
+        }
+    }
+
     /// λXi = X_T X_J(q), for joint i of a pass.
     #[inline(always)]
     pub(crate) fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
+        let (sin, cos) = match l.joint(i) {
+            Self::Revolute { .. } | Self::Helical { .. } => l.position(q, i, 0).sin_cos(),
+            Self::Continuous { .. } => (l.position(q, i, 1), l.position(q, i, 0)),
+            Self::Planar => (l.position(q, i, 3), l.position(q, i, 2)),
+            _ => (L::S::zero(), L::S::one()),
+        };
+        Self::turned_placement(l, i, q, sin, cos)
+    }
+
+    /// The same, the sine and cosine being known.
+    #[inline(always)]
+    pub(crate) fn turned_placement<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         let X_T = l.placement(i);
         match l.joint(i) {
-            Self::Revolute { .. } => {
-                let (sin, cos) = l.position(q, i, 0).sin_cos();
-                turned(X_T, sin, cos)
-            }
-            Self::Continuous { .. } => turned(X_T, l.position(q, i, 1), l.position(q, i, 0)),
+            Self::Revolute { .. } | Self::Continuous { .. } => turned(X_T, sin, cos),
             Self::Prismatic { .. } => {
                 let d = l.position(q, i, 0);
                 Se3::new(X_T.rotation, X_T.rotation.z.scale_add(d, X_T.translation))
             }
             Self::Helical { pitch, .. } => {
-                let angle = l.position(q, i, 0);
-                let (sin, cos) = angle.sin_cos();
                 let X = turned(X_T, sin, cos);
-                Se3::new(X.rotation, X.rotation.z.scale_add(angle * L::S::splat(pitch), X_T.translation))
+                let d = l.position(q, i, 0) * L::S::splat(pitch);
+                Se3::new(X.rotation, X.rotation.z.scale_add(d, X_T.translation))
             }
             Self::Spherical => {
                 let R = quaternion(l, i, q, 0).to_rotation();
@@ -239,7 +310,7 @@ impl Joint {
             }
             Self::Planar => {
                 let p = Vec3::new(l.position(q, i, 0), l.position(q, i, 1), L::S::zero());
-                let X = turned(X_T, l.position(q, i, 3), l.position(q, i, 2));
+                let X = turned(X_T, sin, cos);
                 Se3::new(X.rotation, X_T.act(p))
             }
             Self::Translation => Se3::new(X_T.rotation, X_T.act(point(l, i, q))),
@@ -303,21 +374,37 @@ impl Joint {
     }
 }
 
-/// cos kθ and sin kθ from cos θ and sin θ, k a whole number: (cos θ + i sin θ)ᵏ by repeated squaring. Rare, so
-/// kept out of the passes.
+/// cos kθ and sin kθ from cos θ and sin θ, k a whole number: (cos θ + i sin θ)ᵏ by repeated squaring. Rare, so kept out of
+/// the passes.
 #[cold]
 #[inline(never)]
-fn multiple<S: Scalar>([mut c, mut s]: [S; 2], k: f64) -> [S; 2] {
-    let (mut cos, mut sin) = (S::one(), S::zero());
-    let mut n = k.abs() as u64;
-    while n > 0 {
-        if n & 1 == 1 {
-            (cos, sin) = (cos * c - sin * s, sin * c + cos * s);
+fn multiple<S: Scalar>([cos, sin]: [S; 2], k: f64) -> [S; 2] {
+    let mut result = [cos, sin];
+    S::enter(Multiple(&mut result, k));
+    result
+}
+
+struct Multiple<'a, S>(&'a mut [S; 2], f64);
+
+impl<S: Scalar> Kernel for Multiple<'_, S> {
+    #[inline(always)]
+    fn run(self) {
+        let Self(result, k) = self;
+        let ([mut c, mut s], mut cos, mut sin) = (*result, S::one(), S::zero());
+        let mut n = k.abs() as u64;
+        while n > 0 {
+            if n & 1 == 1 {
+                (cos, sin) = (cos * c - sin * s, sin * c + cos * s);
+            }
+            (c, s) = (c * c - s * s, (c + c) * s);
+            n >>= 1;
         }
-        (c, s) = (c * c - s * s, (c + c) * s);
-        n >>= 1;
+        *result = [cos, if k < 0.0 { -sin } else { sin }];
     }
-    [cos, if k < 0.0 { -sin } else { sin }]
+    #[inline(always)]
+    fn run_fused(self) {
+        self.run();
+    }
 }
 
 /// X_T, then a rotation about z.

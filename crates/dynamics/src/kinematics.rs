@@ -4,7 +4,7 @@
 use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Placements, Velocities};
-use crate::joint::Joint;
+use crate::joint::{Joint, Turns};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
@@ -13,6 +13,8 @@ use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct World<S> {
+    /// Written by: `place`, and by `rnea`.
+    pub turns: Turns<S>,
     /// oXi: the body's turned frame in the world. Shape: bodies. Written by: `place`.
     pub oX: Vec<Se3<S>>,
     /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
@@ -21,15 +23,20 @@ pub(crate) struct World<S> {
 
 impl<S: Scalar> World<S> {
     pub(crate) fn new(size: Size) -> Self {
-        Self { oX: vec![Se3::identity(); size.bodies], S: vec![Motion::zero(); size.columns] }
+        Self {
+            turns: Turns::new(size.bodies),
+            oX: vec![Se3::identity(); size.bodies],
+            S: vec![Motion::zero(); size.columns],
+        }
     }
 }
 
 /// oXi = oXλ λXi, and the columns of S, for all bodies.
 #[inline(always)]
-pub(crate) fn place<L: Layout>(l: &L, World { oX, S }: &mut World<L::S>, q: &[L::S]) {
+pub(crate) fn place<L: Layout>(l: &L, World { turns, oX, S }: &mut World<L::S>, q: &[L::S]) {
+    Joint::turns(l, q, turns);
     for i in l.bodies() {
-        oX[i] = l.parent(oX, i) * Joint::placement(l, i, q); // oXi = oXλ λXi
+        oX[i] = l.parent(oX, i) * Joint::turned_placement(l, i, q, turns.sin[i], turns.cos[i]); // oXi = oXλ λXi
         let joint = l.joint(i);
         for k in 0..joint.nv() {
             S[l.slot(i) + k] = joint.column(&oX[i], k); // oXi S, in the world

@@ -9,7 +9,7 @@
 //!
 //! The first two are [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v: several
 //! joints may share a coordinate (mimic joints), v_joint = G v with one entry in each row of G. [`load`](Layout::load)
-//! applies G, [`add`](Layout::add) and [`add_at`](Layout::add_at) apply Gᵀ and Gᵀ · G, and no algorithm knows more.
+//! applies G, [`add`](Layout::add), [`put_at`](Pairs::put_at) and [`add_at`](Pairs::add_at) apply Gᵀ and Gᵀ · G, and no algorithm knows more.
 
 use crate::joint::Joint;
 use crate::model::Model;
@@ -21,8 +21,6 @@ use core::ops::{AddAssign, Range};
 pub(crate) trait Layout {
     /// The number that the pass computes with.
     type S: Scalar;
-    /// Names a column, in the list of a body's ancestors.
-    type Column: Copy;
 
     /// The bodies in order, parents first; 0 is the world and not among them.
     fn bodies(&self) -> Range<usize>;
@@ -44,6 +42,19 @@ pub(crate) trait Layout {
     /// Adds to the parent's entry.
     fn push<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
+    /// The place of body i among those on its way from the world, which has place 0: where a pass that goes down and up
+    /// the branches, one after the other, keeps what it needs of a body while its subtree is not finished.
+    fn level(&self, i: usize) -> usize;
+    /// The bodies whose subtrees are finished when the pass has gone down to body i: children before parents.
+    fn finished(&self, i: usize) -> &[usize];
+    /// The parent's entry in an array by levels.
+    fn above<T: Copy>(&self, of: &[T], i: usize) -> T;
+    /// Adds to the parent's entry in an array by levels.
+    fn lift<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
+
+    /// What the copies of body i hold together: a body may stand in several lanes, each with a part of what it carries.
+    fn whole<T: Copy>(&self, i: usize, x: T) -> T;
+
     /// The k-th number of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
     /// The k-th number of the velocity (or acceleration, or effort) of joint i.
@@ -53,16 +64,28 @@ pub(crate) trait Layout {
 
     /// The first of the places of joint i's columns, in an array with an entry for each column.
     fn slot(&self, i: usize) -> usize;
+    /// Armature times acceleration, added to the coordinates of an effort.
+    fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
+}
+
+/// How a pass sees pairs of columns, and matrices in coordinates.
+pub(crate) trait Pairs: Layout {
+    /// Names a column, in the list of a body's ancestors.
+    type Column: Copy;
+
     /// The columns of all joints from the root to joint i, its own last.
     fn support(&self, i: usize) -> &[Self::Column];
     /// The entry of a column.
     fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
+    /// Makes a matrix in coordinates, stored by columns, ready for `put_at`. What no column of a joint puts there stays 0.
+    fn clear(&self, matrix: &mut [Self::S]);
+    /// Sets the entry (row, column) of such a matrix, or adds to it if several columns share it. Once for each pair of
+    /// columns.
+    fn put_at(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
     /// Adds to the entry (row, column) of a matrix in coordinates, stored by columns.
     fn add_at(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
     /// The armature of all coordinates, added to the diagonal of such a matrix.
     fn add_armature(&self, matrix: &mut [Self::S]);
-    /// Armature times acceleration, added to the coordinates of an effort.
-    fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
 }
 
 /// One body at a time: one state, or several knots of a horizon in the lanes of the scalar.
@@ -79,7 +102,6 @@ impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
 
 impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     type S = S;
-    type Column = usize;
 
     #[inline(always)]
     fn bodies(&self) -> Range<usize> {
@@ -121,6 +143,28 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     }
 
     #[inline(always)]
+    fn level(&self, i: usize) -> usize {
+        self.model.nodes[i].level
+    }
+    #[inline(always)]
+    fn finished(&self, i: usize) -> &[usize] {
+        let (first, end) = self.model.nodes[i].finished;
+        &self.model.finished[first..end]
+    }
+    #[inline(always)]
+    fn above<T: Copy>(&self, of: &[T], i: usize) -> T {
+        of[self.model.nodes[i].level - 1]
+    }
+    #[inline(always)]
+    fn lift<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        onto[self.model.nodes[i].level - 1] += x;
+    }
+    #[inline(always)]
+    fn whole<T: Copy>(&self, _: usize, x: T) -> T {
+        x
+    }
+
+    #[inline(always)]
     fn position(&self, q: &[S], i: usize, k: usize) -> S {
         let node = &self.model.nodes[i];
         match node.mimic {
@@ -150,6 +194,17 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
         self.model.nodes[i].column
     }
     #[inline(always)]
+    fn add_armature_torque(&self, a: &[S], tau: &mut [S]) {
+        for (k, &armature) in self.model.armature.iter().enumerate() {
+            tau[k] += armature.lift() * a[k];
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Pairs for Single<'_, S, R> {
+    type Column = usize;
+
+    #[inline(always)]
     fn support(&self, i: usize) -> &[usize] {
         let node = &self.model.nodes[i];
         &self.model.support[node.support..node.support + node.depth]
@@ -157,6 +212,20 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     #[inline(always)]
     fn at<T: Copy>(&self, of: &[T], column: usize) -> T {
         of[column]
+    }
+    #[inline(always)]
+    fn clear(&self, matrix: &mut [S]) {
+        if self.model.has_mimic() {
+            matrix.fill(S::zero());
+        }
+    }
+    #[inline(always)]
+    fn put_at(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
+        if self.model.has_mimic() {
+            self.add_at(matrix, row, column, value);
+        } else {
+            matrix[row + self.model.nv * column] = value;
+        }
     }
     #[inline(always)]
     fn add_at(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
@@ -171,12 +240,6 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     fn add_armature(&self, matrix: &mut [S]) {
         for (k, &armature) in self.model.armature.iter().enumerate() {
             matrix[k * (self.model.nv + 1)] += armature.lift();
-        }
-    }
-    #[inline(always)]
-    fn add_armature_torque(&self, a: &[S], tau: &mut [S]) {
-        for (k, &armature) in self.model.armature.iter().enumerate() {
-            tau[k] += armature.lift() * a[k];
         }
     }
 }

@@ -87,7 +87,10 @@ fn eliminate<S: Scalar, const N: usize>(tree: &Tree, rows: &mut [S], D_inv: &mut
     let own: [&[S]; N] = core::array::from_fn(|i| &block[at(start + i)..at(start + i + 1)]);
     let mut e = parent[start];
     for p in (0..depth[start]).rev() {
-        let scale = core::array::from_fn(|i| -(own[i][p] * D_inv[start + i]));
+        let mut scale = [S::zero(); N];
+        for i in 0..N {
+            scale[i] = -(own[i][p] * D_inv[start + i]); // not by `from_fn`, which would not be inlined in lanes
+        }
         update(scale, own, &mut above[first[e]..first[e + 1]]);
         e = parent[e];
     }
@@ -324,7 +327,7 @@ impl<S: Scalar> Ltdl<S> {
             }
             let (mut diagonal, mut e) = (self.D_inv[k], parent[k]);
             for &L in L.iter().rev() {
-                diagonal -= L * row[e];
+                diagonal = (-L).mul_add(row[e], diagonal);
                 e = parent[e];
             }
             rest[k] = diagonal;

@@ -29,7 +29,7 @@ pub(crate) struct Workspace<S> {
     /// columns. Written by: `sweep`.
     A: Vec<S>,
     /// Shape: nv × nv. Written by: `minv`.
-    Minv: DMatrix<S>,
+    pub Minv: DMatrix<S>,
     /// A factor of M. Written by: `from_matrix`.
     factor: Ltdl<S>,
     /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.

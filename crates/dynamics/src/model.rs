@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::joint::Joint;
+use crate::limbs::Plan;
 use crate::soundness::Warning;
 use condyle_spatial::{Act, Constant, Inertia, Mat3, Scalar, Se3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -122,6 +123,10 @@ pub(crate) struct Node<R> {
     /// Where the columns from the root to this joint stand in `Model::support`, and how many they are.
     pub support: usize,
     pub depth: usize,
+    /// How many bodies are between it and the world, itself included.
+    pub level: usize,
+    /// Where in `Model::finished` the bodies stand of whose subtrees this is the last.
+    pub finished: (usize, usize),
     /// X_T, between turned frames.
     pub placement: Se3<R>,
     /// In the turned frame.
@@ -141,6 +146,15 @@ pub(crate) struct Column {
     pub end: usize,
     /// How many columns are between it and the root.
     pub depth: usize,
+}
+
+/// The coordinates that the motion of one of them needs efforts of.
+#[derive(Clone, Debug)]
+pub(crate) struct Coupled {
+    /// Those before and after it in the tree, itself included.
+    pub rows: Vec<usize>,
+    /// How many coordinates in a row, from this one on, have the same ones.
+    pub alike: usize,
 }
 
 /// A robot: bodies, joints, frames, inertias, limits. Frozen, checked when built, shared between threads.
@@ -173,8 +187,12 @@ pub struct Model<R = f64> {
     pub(crate) nodes: Vec<Node<R>>,
     pub(crate) columns: Vec<Column>,
     pub(crate) support: Vec<usize>,
-    /// For each coordinate the ones that its motion needs efforts of: before and after it in the tree, itself included.
-    pub(crate) coupled: Vec<Vec<usize>>,
+    /// The bodies, children before parents.
+    pub(crate) finished: Vec<usize>,
+    /// For each coordinate.
+    pub(crate) coupled: Vec<Coupled>,
+    /// How single calls compute several bodies at once, if they do.
+    pub(crate) limbs: Option<Plan>,
     pub(crate) warnings: Vec<Warning>,
     /// Bodies whose joints make M singular.
     pub(crate) singular: Vec<usize>,
@@ -323,11 +341,13 @@ impl Model {
             column: n.column,
             support: n.support,
             depth: n.depth,
+            level: n.level,
+            finished: n.finished,
             placement: n.placement.lift(),
             inertia: Se3::new(n.reframing, Vec3::zero()).lift().act_inv(inertias[i]),
             reframing: n.reframing,
         };
-        Model {
+        let mut model = Model {
             nodes: self.nodes.iter().enumerate().map(node).collect(),
             armature: self.armature.iter().map(|&a| T::of(a)).collect(),
             gravity: self.gravity.lift(),
@@ -339,13 +359,19 @@ impl Model {
             friction: self.friction.clone(),
             columns: self.columns.clone(),
             support: self.support.clone(),
+            finished: self.finished.clone(),
             coupled: self.coupled.clone(),
+            limbs: None,
             warnings: self.warnings.clone(),
             singular: self.singular.clone(),
             nq: self.nq,
             nv: self.nv,
             tree: self.tree,
+        };
+        if let Some(plain) = (&mut model as &mut dyn Any).downcast_mut::<Model>() {
+            plain.limbs = self.limbs.as_ref().and_then(|_| Plan::new(plain));
         }
+        model
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the algorithms see of a tree of bodies.
 
-use crate::model::{Body, Column, Model, Node};
+use crate::model::{Body, Column, Coupled, Model, Node};
 use condyle_spatial::{Act, Se3, Vec3};
 
 impl Model {
@@ -45,11 +45,22 @@ impl Model {
                 column: first,
                 support: self.support.len(),
                 depth: path.len(),
+                level: if i == 0 { 0 } else { self.nodes[body.parent].level + 1 },
+                finished: (0, 0),
                 placement: pXz.inverse() * body.placement * bXz * offset,
                 inertia: bXz.act_inv(body.inertia),
                 reframing,
             });
             self.support.extend(path);
+        }
+        // depth first: a body at whose end no child stands finishes itself, and all ancestors of which it is the last
+        let mut unfinished = Vec::new();
+        for i in 1..self.nodes.len() {
+            unfinished.push(i);
+            let next = self.nodes.get(i + 1).map_or(0, |next| next.level.saturating_sub(1));
+            let first = self.finished.len();
+            self.finished.extend(unfinished.drain(next..).rev());
+            self.nodes[i].finished = (first, self.finished.len());
         }
         // depth first, so a subtree's columns end where its last descendant's do
         for c in (0..self.columns.len()).rev() {
@@ -69,6 +80,21 @@ impl Model {
         let structure = structure.chain(self.nodes.iter().flat_map(|n| [n.parent, n.column]));
         self.tree = structure.fold(0xcbf2_9ce4_8422_2325, |hash, x| (hash ^ x as u64).wrapping_mul(0x100_0000_01b3));
         let all = || (0..self.nv).collect(); // joints that follow tie branches together
-        self.coupled = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) }).collect();
+        let rows = (0..self.nv).map(|c| if self.has_mimic() { all() } else { coupled(c) });
+        self.coupled = Coupled::with(rows.collect());
+    }
+}
+
+impl Coupled {
+    /// Of each coordinate, with these rows.
+    pub(crate) fn with(rows: Vec<Vec<usize>>) -> Vec<Self> {
+        let alike = |c: usize| rows[c..].iter().take_while(|other| **other == rows[c]).count();
+        (0..rows.len()).map(|c| Self { rows: rows[c].clone(), alike: alike(c) }).collect()
+    }
+}
+
+impl AsRef<[usize]> for Coupled {
+    fn as_ref(&self) -> &[usize] {
+        &self.rows
     }
 }

@@ -1,39 +1,43 @@
 //! Inverse dynamics by the recursive Newton–Euler algorithm.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 5.1; in the bodies' own frames.
+//! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980); in the bodies' own
+//! frames. It is Featherstone's (*Rigid Body Dynamics Algorithms*, 2008, table 5.1) with the classical acceleration of each
+//! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
+//! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
 
 use crate::data::{Data, Size, check, check_forces};
 use crate::dispatch::kernel;
-use crate::joint::Joint;
+use crate::joint::{Joint, Turning, Turns};
 use crate::layout::{Layout, Single};
 use crate::model::Model;
-use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
 /// In the bodies' turned frames.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
-    /// λXi. Shape: bodies. Written by: `pass`.
+    /// λXi. Shape: levels. Written by: `pass`.
     X: Vec<Se3<S>>,
-    /// Velocity. Shape: bodies. Written by: `pass`.
-    v: Vec<Motion<S>>,
-    /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
-    a: Vec<Motion<S>>,
-    /// Force through the joint. Shape: bodies. Written by: `pass`.
+    /// Turning, and acceleration of the origin, with gravity as the world's. Shape: levels. Written by: `pass`.
+    motion: Vec<Turning<S>>,
+    /// K; the world's stays 0. Shape: levels. Written by: `pass`.
+    K: Vec<Mat3<S>>,
+    /// Force through the joint. Shape: levels. Written by: `pass`.
     f: Vec<Force<S>>,
     /// Joint efforts. Shape: nv. Written by: `pass`.
-    tau: Vec<S>,
+    pub tau: Vec<S>,
     /// Zeros, for the accelerations and velocities that are not given. Shape: nv. Written by: nobody.
     zero: Vec<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
+        let still = Turning { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() };
         Self {
-            X: vec![Se3::identity(); size.bodies],
-            v: vec![Motion::zero(); size.bodies],
-            a: vec![Motion::zero(); size.bodies],
-            f: vec![Force::zero(); size.bodies],
+            X: vec![Se3::identity(); size.levels],
+            motion: vec![still; size.levels],
+            K: vec![Mat3::zero(); size.levels],
+            f: vec![Force::zero(); size.levels],
             tau: vec![S::zero(); size.nv],
             zero: vec![S::zero(); size.nv],
         }
@@ -46,43 +50,83 @@ impl<S> Workspace<S> {
     }
 }
 
-/// The whole algorithm.
+/// K = ω̇× + ω× ω×.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, d: &mut Workspace<L::S>, q: &[L::S], qd: &[L::S], qdd: &[L::S], f_ext: &[Force<L::S>]) {
-    let Workspace { X, v, a, f, tau, .. } = d;
-    a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
+fn centripetal<S: Scalar>(w: Vec3<S>, dw: Vec3<S>) -> Mat3<S> {
+    let minus = -w;
+    let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
+    let (xx, yy) = (minus.x * w.x, minus.y * w.y);
+    Mat3 {
+        x: Vec3::new(minus.z.mul_add(w.z, yy), xy + dw.z, xz - dw.y),
+        y: Vec3::new(xy - dw.z, minus.z.mul_add(w.z, xx), yz + dw.x),
+        z: Vec3::new(xz + dw.y, yz - dw.x, xx + yy),
+    }
+}
+
+/// The whole algorithm, down and up each branch in turn.
+#[inline(always)]
+pub(crate) fn pass<L: Layout>(
+    l: &L,
+    turns: &mut Turns<L::S>,
+    d: &mut Workspace<L::S>,
+    q: &[L::S],
+    qd: &[L::S],
+    qdd: &[L::S],
+    f_ext: &[Force<L::S>],
+) {
+    let Workspace { X, motion, K, f, tau, .. } = d;
+    Joint::turns(l, q, turns);
+    motion[0].a = l.minus_gravity();
+    tau.fill(L::S::zero());
     for i in l.bodies() {
         let vJ = Joint::motion(l, i, qd); // v_J = S q̇
         let aJ = Joint::motion(l, i, qdd); // S q̈
-        let I = l.inertia(i);
-        X[i] = Joint::placement(l, i, q); // λXi = X_T X_J
-        v[i] = X[i].act_inv(l.parent(v, i)) + vJ; // v_i = iXλ v_λ + v_J
-        a[i] = X[i].act_inv(l.parent(a, i)) + aJ + vJ.crossed_by(v[i]); // a_i = iXλ a_λ + S q̈ + v_i × v_J
-        f[i] = I * a[i] + v[i].cross(I * v[i]); // f_i = I a_i + v_i ×* I v_i
+        let Inertia { mass, mass_com, rotational } = l.inertia(i);
+        let Xi = Joint::turned_placement(l, i, q, turns.sin[i], turns.cos[i]); // λXi = X_T X_J
+        let (parent, R) = (l.above(motion, i), Xi.rotation);
+        let a = l.above(K, i).mul_add(Xi.translation, parent.a); // a_λ + K_λ p
+        let m = Turning { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
+        let m = vJ.added_to(aJ, m);
+        let Ki = centripetal(m.w, m.dw);
+        // Newton: f = m a + K h.  Euler: n = I ω̇ + ω × I ω + h × a
+        let n = mass_com.cross_add(m.a, m.w.cross_add(rotational * m.w, rotational * m.dw));
+        let mut fi = Force::new(Ki.mul_add(mass_com, m.a.scale(mass)), n);
         if let Some(external) = l.force(f_ext, i) {
-            f[i] -= external;
+            fi -= external;
         }
-    }
-    tau.fill(L::S::zero());
-    for i in l.bodies().rev() {
-        Joint::project(l, i, f[i], tau); // τ_i = Sᵀ f_i
-        let f_parent = X[i].act(f[i]);
-        l.push(f, i, f_parent); // f_λ += λXi f_i
+        let here = l.level(i);
+        (X[here], motion[here], K[here], f[here]) = (Xi, m, Ki, fi);
+        for &j in l.finished(i) {
+            let here = l.level(j);
+            let fj = l.whole(j, f[here]);
+            Joint::project(l, j, fj, tau); // τ_j = Sᵀ f_j
+            l.lift(f, j, X[here].act(fj)); // f_λ += λXj f_j
+        }
     }
     l.add_armature_torque(qdd, tau);
 }
 
 kernel! {
-    fn run(model, data, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
-        pass(&Single::new(model), &mut data.rnea, q, v, a, f_ext);
+    fn one_by_one(model, data, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
+        pass(&Single::new(model), &mut data.world.turns, &mut data.rnea, q, v, a, f_ext);
     }
+}
+
+/// With the limbs side by side where there are some, else body by body.
+#[inline(always)]
+fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
+    #[cfg(target_arch = "x86_64")]
+    if crate::limbs::run(false, model, data, q, v, a, f_ext) {
+        return;
+    }
+    one_by_one(model, data, q, v, a, f_ext);
 }
 
 /// τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n).
 ///
 /// q: nq numbers; v, a: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
 /// frame, number 0 being the world's; or empty for none. Returns nv numbers (N m, N). Allocates nothing.
-/// Source: Featherstone (2008), table 5.1.
+/// Source: Luh, Walker, Paul (1980).
 ///
 /// ```
 /// use condyle_dynamics::{Data, robots, rnea};

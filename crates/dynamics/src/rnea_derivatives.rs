@@ -25,8 +25,9 @@ use crate::data::{Data, Size, check, check_forces};
 use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Single};
+use crate::layout::{Layout, Pairs, Single};
 use crate::model::Model;
+use crate::side_by_side::{self, Rows};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -50,6 +51,8 @@ pub(crate) struct Workspace<S> {
     pub Psidd: Vec<Motion<S>>,
     /// Ψ̇ + Ṡ. Shape: columns. Written by: `pass`.
     pub PsidSd: Vec<Motion<S>>,
+    /// Written by: `pass`, for `side_by_side`.
+    pub rows: Rows<S>,
     /// The velocity and acceleration coordinates. Shape: nv. Written by: `pass`.
     pub qd: Vec<S>,
     pub qdd: Vec<S>,
@@ -75,6 +78,7 @@ impl<S: Scalar> Workspace<S> {
             Psid: vec![Motion::zero(); size.columns],
             Psidd: vec![Motion::zero(); size.columns],
             PsidSd: vec![Motion::zero(); size.columns],
+            rows: Rows::new(size.columns),
             qd: vec![S::zero(); size.nv],
             qdd: vec![S::zero(); size.nv],
             still: vec![S::zero(); size.nv],
@@ -87,7 +91,7 @@ impl<S: Scalar> Workspace<S> {
 
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
-pub(crate) fn pass<L: Layout>(
+pub(crate) fn pass<L: Pairs>(
     l: &L,
     w: &World<L::S>,
     d: &mut Workspace<L::S>,
@@ -95,11 +99,12 @@ pub(crate) fn pass<L: Layout>(
     qdd: &[L::S],
     f_ext: &[Force<L::S>],
     minus_gravity: Vec3<L::S>,
+    by_rows: bool,
 ) {
     let (oX, S) = (&w.oX, &w.S);
     d.qd.copy_from_slice(qd);
     d.qdd.copy_from_slice(qdd);
-    let Workspace { v, a, IC, BC, F, Psid, Psidd, PsidSd, dtau_dq, dtau_dv, dtau_da, .. } = d;
+    let Workspace { v, a, IC, BC, F, Psid, Psidd, PsidSd, rows, dtau_dq, dtau_dv, dtau_da, .. } = d;
     a[0] = Motion::new(minus_gravity, Vec3::zero());
     for i in l.bodies() {
         let (v_parent, a_parent) = (l.parent(v, i), l.parent(a, i));
@@ -125,9 +130,9 @@ pub(crate) fn pass<L: Layout>(
         }
     }
     let (dq, dv, da) = (dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice(), dtau_da.as_mut_slice());
-    dq.fill(L::S::zero());
-    dv.fill(L::S::zero());
-    da.fill(L::S::zero());
+    l.clear(dq);
+    l.clear(dv);
+    l.clear(da);
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
@@ -139,21 +144,24 @@ pub(crate) fn pass<L: Layout>(
             let BS = BC[i].apply_transpose(S[s]); // 2Bᵀ S_d
             let by_q = IC[i] * Psidd[s] + BC[i].apply(Psid[s]) + S[s].cross(F[i]); // Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F
             let by_v = IC[i] * PsidSd[s] + BC[i].apply(S[s]); // Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d
-            for &e in before {
+            if by_rows {
+                rows.keep(s, IS, BS, by_q, by_v);
+            }
+            for &e in if by_rows { &[] } else { before } {
                 let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
-                l.add_at(dq, column, e, Psidd_e.dot(IS) + Psid_e.angular.dot(BS)); // ∂τ_d/∂q_e
-                l.add_at(dv, column, e, PsidSd_e.dot(IS) + S_e.angular.dot(BS)); // ∂τ_d/∂q̇_e
-                l.add_at(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
-                l.add_at(dv, e, column, S_e.dot(by_v)); // ∂τ_e/∂q̇_d
+                l.put_at(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS))); // ∂τ_d/∂q_e
+                l.put_at(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS))); // ∂τ_d/∂q̇_e
+                l.put_at(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
+                l.put_at(dv, e, column, S_e.dot(by_v)); // ∂τ_e/∂q̇_d
                 let x = S_e.dot(IS); // M_de
-                l.add_at(da, column, e, x);
-                l.add_at(da, e, column, x);
+                l.put_at(da, column, e, x);
+                l.put_at(da, e, column, x);
             }
             for &e in own {
                 let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
-                l.add_at(dq, column, e, Psidd_e.dot(IS) + Psid_e.angular.dot(BS));
-                l.add_at(dv, column, e, PsidSd_e.dot(IS) + S_e.angular.dot(BS));
-                l.add_at(da, column, e, S_e.dot(IS));
+                l.put_at(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
+                l.put_at(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
+                l.put_at(da, column, e, S_e.dot(IS));
             }
         }
         let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
@@ -165,9 +173,15 @@ pub(crate) fn pass<L: Layout>(
 }
 
 kernel! {
-    /// For bodies that are placed.
-    pub(crate) fn run(model, data, v: &[S], a: &[S], f_ext: &[Force<S>], minus_gravity: &[Vec3<S>]) {
-        pass(&Single::new(model), &data.world, &mut data.rnea_derivatives, v, a, f_ext, minus_gravity[0]);
+    /// For bodies that are placed, under the model's gravity if no other acceleration of the world is given.
+    pub(crate) fn run(model, data, v: &[S], a: &[S], f_ext: &[Force<S>], world: &[Vec3<S>]) {
+        let (l, w, d) = (Single::new(model), &data.world, &mut data.rnea_derivatives);
+        let minus_gravity = if world.is_empty() { l.minus_gravity() } else { world[0] };
+        let by_rows = side_by_side::pays::<S, R>(model);
+        pass(&l, w, d, v, a, f_ext, minus_gravity, by_rows);
+        if by_rows {
+            side_by_side::pairs(model, w, d);
+        }
     }
 }
 
@@ -214,7 +228,7 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     check("a", a.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
     positions(model, data, q);
-    run(model, data, v, a, f_ext, &[Single::new(model).minus_gravity()]);
+    run(model, data, v, a, f_ext, &[]);
     view(model, &data.world, &data.rnea_derivatives)
 }
 

@@ -33,7 +33,7 @@ use crate::coriolis::Coriolis;
 use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::kinematics::World;
-use crate::layout::{Layout, Single};
+use crate::layout::{Pairs, Single};
 use crate::model::Model;
 use crate::rnea_derivatives::{self, RneaDerivatives, rnea_derivatives};
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Vec3};
@@ -79,9 +79,9 @@ impl<S: Scalar> Workspace<S> {
 
 /// The whole algorithm, after `rnea_derivatives::pass`, whose sums over what joints carry it reads.
 #[inline(always)]
-fn pass<L: Layout>(
+fn pass<L: Pairs>(
     l: &L,
-    World { oX, S }: &World<L::S>,
+    World { oX, S, .. }: &World<L::S>,
     first: &rnea_derivatives::Workspace<L::S>,
     d: &mut Workspace<L::S>,
     lambda: &[L::S],

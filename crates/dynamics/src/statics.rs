@@ -11,7 +11,7 @@
 use crate::data::{Data, Size, check, check_forces};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Single};
+use crate::layout::{Pairs, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
@@ -43,7 +43,7 @@ impl<S: Scalar> Workspace<S> {
 
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
-fn pass<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
+fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, tau, .. } = d;
     let g = -l.minus_gravity();
     for i in l.bodies() {
@@ -106,7 +106,7 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
 
 /// The derivative, for bodies that are placed.
 #[inline(always)]
-fn derivative<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
+fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, IC, dtau_dq, .. } = d;
     let a_0 = Motion::new(l.minus_gravity(), Vec3::zero());
     for i in l.bodies() {
@@ -117,7 +117,7 @@ fn derivative<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace
         }
     }
     let dq = dtau_dq.as_mut_slice();
-    dq.fill(L::S::zero());
+    l.clear(dq);
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
@@ -128,11 +128,11 @@ fn derivative<L: Layout>(l: &L, World { oX, S }: &World<L::S>, d: &mut Workspace
             let by_q = IC[i] * a_0.cross(S_d) + S_d.cross(F[i]); // Iᶜ Ψ̈_d + S_d ×* F
             for &e in before {
                 let S_e = l.at(S, e);
-                l.add_at(dq, column, e, S_e.angular.dot(weight)); // ∂τ_d/∂q_e
-                l.add_at(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
+                l.put_at(dq, column, e, S_e.angular.dot(weight)); // ∂τ_d/∂q_e
+                l.put_at(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
             }
             for &e in own {
-                l.add_at(dq, column, e, l.at(S, e).angular.dot(weight));
+                l.put_at(dq, column, e, l.at(S, e).angular.dot(weight));
             }
         }
         let (IC_i, F_i) = (IC[i], F[i]);

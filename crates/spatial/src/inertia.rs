@@ -41,7 +41,7 @@ impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
     fn mul(self, v: Motion<S>) -> Force<S> {
         Force {
             linear: v.linear.scale_add(self.mass, v.angular.cross(self.mass_com)),
-            angular: self.rotational * v.angular + self.mass_com.cross(v.linear),
+            angular: self.rotational.mul_add(v.angular, self.mass_com.cross(v.linear)),
         }
     }
 }
@@ -92,8 +92,8 @@ impl<S: Scalar> Mul<Motion<S>> for ArticulatedInertia<S> {
     #[inline(always)]
     fn mul(self, v: Motion<S>) -> Force<S> {
         Force {
-            linear: self.linear * v.linear + self.coupling * v.angular,
-            angular: self.coupling.transpose_mul(v.linear) + self.rotational * v.angular,
+            linear: self.linear.mul_add(v.linear, self.coupling * v.angular),
+            angular: self.coupling.transpose_mul_add(v.linear, self.rotational * v.angular),
         }
     }
 }
@@ -102,12 +102,16 @@ impl<S: Scalar> ArticulatedInertia<S> {
     /// I − s U Uᵀ.
     #[inline(always)]
     pub fn minus_outer(self, U: Force<S>, s: S) -> Self {
-        let sa = U.angular.scale(s);
-        let coupling = Mat3 { x: U.linear.scale(sa.x), y: U.linear.scale(sa.y), z: U.linear.scale(sa.z) };
+        let (s, Mat3 { x, y, z }) = (-s, self.coupling);
+        let a = U.angular.scale(s);
         Self {
-            linear: self.linear - Sym3::outer(U.linear).scale(s),
-            coupling: self.coupling - coupling,
-            rotational: self.rotational - Sym3::outer(U.angular).scale(s),
+            linear: self.linear.add_outer(s, U.linear),
+            coupling: Mat3 {
+                x: U.linear.scale_add(a.x, x),
+                y: U.linear.scale_add(a.y, y),
+                z: U.linear.scale_add(a.z, z),
+            },
+            rotational: self.rotational.add_outer(s, U.angular),
         }
     }
 }

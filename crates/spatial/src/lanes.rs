@@ -20,7 +20,7 @@ pub trait Element<const N: usize>: Copy + 'static {
 /// N numbers side by side.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub struct Lanes<T: Element<N>, const N: usize>(T::Vector);
+pub struct Lanes<T: Element<N>, const N: usize>(pub(crate) T::Vector);
 
 /// Work that is to be compiled for a level: `run` is always inlined, and so takes the level of the function it stands in.
 pub trait Kernel: Sized {
@@ -120,6 +120,20 @@ impl Scalar for Fused {
         let (sin, cos) = self.0.sin_cos();
         (Self(sin), Self(cos))
     }
+    /// Four at a time: where products are fused, there are vectors of four.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
+        let (angles, others) = angles.as_chunks_mut::<4>();
+        let (cosines, other_cosines) = cosines.as_chunks_mut::<4>();
+        for (x, y) in angles.iter_mut().zip(cosines) {
+            let (sin, cos) = Lanes::<f64, 4>::from_array([x[0].0, x[1].0, x[2].0, x[3].0]).sin_cos();
+            (*x, *y) = (sin.to_array().map(Self), cos.to_array().map(Self));
+        }
+        for (sin, cos) in others.iter_mut().zip(other_cosines) {
+            (*sin, *cos) = sin.sin_cos();
+        }
+    }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         Self(self.0.atan2(x.0))
@@ -150,7 +164,7 @@ impl Scalar for Fused {
 #[cfg(target_arch = "x86_64")]
 macro_rules! masks {
     (
-        $vector:ident, $mask:ident, $set1:ident $andnot:ident $xor:ident;
+        $vector:ident, $mask:ident, $set1:ident $andnot:ident $sub:ident;
         lt($la:ident, $lb:ident): $lt:expr;
         select($sm:ident, $sa:ident, $sb:ident): $select:expr;
         and($aa:ident, $ab:ident): $and:expr;
@@ -158,7 +172,7 @@ macro_rules! masks {
         any($am:ident): $any:expr
     ) => {
         use core::arch::x86_64::*;
-        masks! { fn neg(x: $vector) -> $vector { $xor(x, $set1(-0.0)) } }
+        masks! { fn neg(x: $vector) -> $vector { $sub($set1(-0.0), x) } }
         masks! { fn abs(x: $vector) -> $vector { $andnot($set1(-0.0), x) } }
         masks! { fn lt($la: $vector, $lb: $vector) -> $mask { $lt } }
         masks! { fn select($sm: $mask, $sa: $vector, $sb: $vector) -> $vector { $select } }
@@ -265,6 +279,16 @@ macro_rules! lanes {
                 self.to_array().fmt(f)
             }
         }
+        /// A constant of its own in each lane.
+        impl Constant<Lanes<$float, $n>> for [$float; $n] {
+            #[inline(always)]
+            fn lift(self) -> Lanes<$float, $n> {
+                Lanes::<$float, $n>::from_array(self)
+            }
+            fn of(x: f64) -> Self {
+                [x as $float; $n]
+            }
+        }
         impl Scalar for Lanes<$float, $n> {
             type Mask = $mask;
             const LANES: usize = $n;
@@ -345,8 +369,8 @@ macro_rules! lanes {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Element, Kernel, Lanes, avx2, avx512};
-    use crate::scalar::Scalar;
+    use super::{Element, Fused, Kernel, Lanes, avx2, avx512};
+    use crate::scalar::{Constant, Scalar};
     use crate::sin_cos;
     use core::arch::x86_64::*;
     use core::fmt;
@@ -356,11 +380,11 @@ mod x86 {
     macro_rules! avx2 {
         (
             $float:ident by $n:literal, $vector:ident, $sin_cos:ident up to $largest:ident, $m:ident, $($p:ident)*;
-            $set1:ident $andnot:ident $xor:ident $cmp:ident $blendv:ident $and:ident $or:ident $movemask:ident
+            $set1:ident $andnot:ident $sub:ident $cmp:ident $blendv:ident $and:ident $or:ident $movemask:ident
         ) => {
             mod $m {
                 masks! {
-                    $vector, $vector, $set1 $andnot $xor;
+                    $vector, $vector, $set1 $andnot $sub;
                     lt(a, b): $cmp::<_CMP_LT_OQ>(a, b);
                     select(mask, a, b): $blendv(b, a, mask);
                     and(a, b): $and(a, b);
@@ -374,23 +398,40 @@ mod x86 {
     avx2! {
         f64 by 4, __m256d, double up to LARGEST, f64x4,
         _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_fmadd_pd _mm256_sqrt_pd;
-        _mm256_set1_pd _mm256_andnot_pd _mm256_xor_pd _mm256_cmp_pd _mm256_blendv_pd _mm256_and_pd _mm256_or_pd _mm256_movemask_pd
+        _mm256_set1_pd _mm256_andnot_pd _mm256_sub_pd _mm256_cmp_pd _mm256_blendv_pd _mm256_and_pd _mm256_or_pd _mm256_movemask_pd
     }
     avx2! {
         f32 by 8, __m256, single up to LARGEST_SINGLE, f32x8,
         _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_fmadd_ps _mm256_sqrt_ps;
-        _mm256_set1_ps _mm256_andnot_ps _mm256_xor_ps _mm256_cmp_ps _mm256_blendv_ps _mm256_and_ps _mm256_or_ps _mm256_movemask_ps
+        _mm256_set1_ps _mm256_andnot_ps _mm256_sub_ps _mm256_cmp_ps _mm256_blendv_ps _mm256_and_ps _mm256_or_ps _mm256_movemask_ps
+    }
+
+    impl Lanes<f64, 4> {
+        /// Four single numbers, one for each lane.
+        #[inline(always)]
+        pub fn from_fused(x: &[Fused; 4]) -> Self {
+            // SAFETY: `Fused` is a transparent wrapper of `f64`; the level is supported, see the head of the file.
+            Self(unsafe { _mm256_loadu_pd(x.as_ptr().cast()) })
+        }
+        /// The single number in each lane.
+        #[inline(always)]
+        pub fn to_fused(self) -> [Fused; 4] {
+            let mut x = [Fused(0.0); 4];
+            // SAFETY: as for `from_fused`.
+            unsafe { _mm256_storeu_pd(x.as_mut_ptr().cast(), self.0) };
+            x
+        }
     }
 
     /// A mask is a number with a bit for each lane.
     macro_rules! avx512 {
         (
             $float:ident by $n:literal, $vector:ident, $mask:ident, $sin_cos:ident up to $largest:ident, $m:ident, $($p:ident)*;
-            $set1:ident $andnot:ident $xor:ident $cmp:ident $blend:ident
+            $set1:ident $andnot:ident $sub:ident $cmp:ident $blend:ident
         ) => {
             mod $m {
                 masks! {
-                    $vector, $mask, $set1 $andnot $xor;
+                    $vector, $mask, $set1 $andnot $sub;
                     lt(a, b): $cmp::<_CMP_LT_OQ>(a, b);
                     select(mask, a, b): $blend(mask, b, a);
                     and(a, b): a & b;
@@ -404,11 +445,11 @@ mod x86 {
     avx512! {
         f64 by 8, __m512d, __mmask8, double up to LARGEST, f64x8,
         _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd _mm512_fmadd_pd _mm512_sqrt_pd;
-        _mm512_set1_pd _mm512_andnot_pd _mm512_xor_pd _mm512_cmp_pd_mask _mm512_mask_blend_pd
+        _mm512_set1_pd _mm512_andnot_pd _mm512_sub_pd _mm512_cmp_pd_mask _mm512_mask_blend_pd
     }
     avx512! {
         f32 by 16, __m512, __mmask16, single up to LARGEST_SINGLE, f32x16,
         _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_fmadd_ps _mm512_sqrt_ps;
-        _mm512_set1_ps _mm512_andnot_ps _mm512_xor_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps
+        _mm512_set1_ps _mm512_andnot_ps _mm512_sub_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps
     }
 }

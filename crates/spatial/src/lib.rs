@@ -17,6 +17,8 @@
 //! ```
 #![allow(non_snake_case)]
 
+#[doc(hidden)]
+pub mod block;
 mod dual;
 mod inertia;
 #[doc(hidden)]
@@ -24,6 +26,9 @@ pub mod lanes;
 pub mod level;
 pub mod lie;
 mod motion;
+#[cfg(target_arch = "x86_64")]
+#[doc(hidden)]
+pub mod moves;
 mod scalar;
 mod se3;
 mod sin_cos;

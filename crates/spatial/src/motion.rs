@@ -63,7 +63,7 @@ impl<S: Scalar> Motion<S> {
     /// ⟨m, f⟩ = m · f: the power of force f on motion m (W).
     #[inline(always)]
     pub fn dot(self, f: Force<S>) -> S {
-        self.linear.dot(f.linear) + self.angular.dot(f.angular)
+        self.linear.dot_add(f.linear, self.angular.dot(f.angular))
     }
 }
 
@@ -72,7 +72,7 @@ impl<S: Scalar> Cross<Motion<S>> for Motion<S> {
     #[inline(always)]
     fn cross(self, m: Motion<S>) -> Motion<S> {
         Motion {
-            linear: self.angular.cross(m.linear) + self.linear.cross(m.angular),
+            linear: self.angular.cross_add(m.linear, self.linear.cross(m.angular)),
             angular: self.angular.cross(m.angular),
         }
     }
@@ -84,7 +84,7 @@ impl<S: Scalar> Cross<Force<S>> for Motion<S> {
     fn cross(self, f: Force<S>) -> Force<S> {
         Force {
             linear: self.angular.cross(f.linear),
-            angular: self.angular.cross(f.angular) + self.linear.cross(f.linear),
+            angular: self.angular.cross_add(f.angular, self.linear.cross(f.linear)),
         }
     }
 }

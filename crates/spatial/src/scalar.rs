@@ -57,6 +57,14 @@ pub trait Scalar:
     fn sqrt(self) -> Self;
     /// (sin self, cos self).
     fn sin_cos(self) -> (Self, Self);
+    /// The sines of some angles in their place, and their cosines; the bits of [`sin_cos`](Self::sin_cos).
+    #[doc(hidden)]
+    #[inline(always)]
+    fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
+        for (sin, cos) in angles.iter_mut().zip(cosines) {
+            (*sin, *cos) = sin.sin_cos();
+        }
+    }
     /// The angle of the point (x, self), in (−π, π].
     fn atan2(self, x: Self) -> Self;
     /// |self|.

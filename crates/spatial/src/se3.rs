@@ -50,7 +50,10 @@ impl<S: Scalar> Mul for Se3<S> {
     /// aXc = aXb bXc.
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        Self { rotation: self.rotation * o.rotation, translation: self.translation + self.rotation * o.translation }
+        Self {
+            rotation: self.rotation * o.rotation,
+            translation: self.rotation.mul_add(o.translation, self.translation),
+        }
     }
 }
 
@@ -59,13 +62,13 @@ impl<S: Scalar> Act<Motion<S>> for Se3<S> {
     #[inline(always)]
     fn act(&self, m: Motion<S>) -> Motion<S> {
         let angular = self.rotation * m.angular;
-        Motion { linear: self.rotation * m.linear + self.translation.cross(angular), angular }
+        Motion { linear: self.rotation.mul_add(m.linear, self.translation.cross(angular)), angular }
     }
     /// [Rᵀ(v − p × ω); Rᵀ ω].
     #[inline(always)]
     fn act_inv(&self, m: Motion<S>) -> Motion<S> {
         Motion {
-            linear: self.rotation.transpose_mul(m.linear - self.translation.cross(m.angular)),
+            linear: self.rotation.transpose_mul(m.angular.cross_add(self.translation, m.linear)),
             angular: self.rotation.transpose_mul(m.angular),
         }
     }
@@ -76,14 +79,14 @@ impl<S: Scalar> Act<Force<S>> for Se3<S> {
     #[inline(always)]
     fn act(&self, f: Force<S>) -> Force<S> {
         let linear = self.rotation * f.linear;
-        Force { linear, angular: self.rotation * f.angular + self.translation.cross(linear) }
+        Force { linear, angular: self.rotation.mul_add(f.angular, self.translation.cross(linear)) }
     }
     /// [Rᵀ f; Rᵀ(n − p × f)].
     #[inline(always)]
     fn act_inv(&self, f: Force<S>) -> Force<S> {
         Force {
             linear: self.rotation.transpose_mul(f.linear),
-            angular: self.rotation.transpose_mul(f.angular - self.translation.cross(f.linear)),
+            angular: self.rotation.transpose_mul(f.linear.cross_add(self.translation, f.angular)),
         }
     }
 }
@@ -93,7 +96,7 @@ impl<S: Scalar> Act<Vec3<S>> for Se3<S> {
     /// R x + p.
     #[inline(always)]
     fn act(&self, x: Vec3<S>) -> Vec3<S> {
-        self.rotation * x + self.translation
+        self.rotation.mul_add(x, self.translation)
     }
     /// Rᵀ(x − p).
     #[inline(always)]

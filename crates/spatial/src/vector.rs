@@ -145,6 +145,20 @@ impl<S: Scalar> Vec3<S> {
     pub fn dot(self, o: Self) -> S {
         self.x.mul_add(o.x, self.y.mul_add(o.y, self.z * o.z))
     }
+    /// a · b + s.
+    #[inline(always)]
+    pub fn dot_add(self, o: Self, s: S) -> S {
+        self.x.mul_add(o.x, self.y.mul_add(o.y, self.z.mul_add(o.z, s)))
+    }
+    /// a × b + c.
+    #[inline(always)]
+    pub fn cross_add(self, o: Self, c: Self) -> Self {
+        Self {
+            x: self.y.mul_add(o.z, (-self.z).mul_add(o.y, c.x)),
+            y: self.z.mul_add(o.x, (-self.x).mul_add(o.z, c.y)),
+            z: self.x.mul_add(o.y, (-self.y).mul_add(o.x, c.z)),
+        }
+    }
     /// a × b.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
@@ -196,6 +210,16 @@ impl<S: Scalar> Mat3<S> {
     pub fn identity() -> Self {
         let (o, i) = (S::zero(), S::one());
         Self { x: Vec3::new(i, o, o), y: Vec3::new(o, i, o), z: Vec3::new(o, o, i) }
+    }
+    /// A b + c.
+    #[inline(always)]
+    pub fn mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
+        self.x.scale_add(b.x, self.y.scale_add(b.y, self.z.scale_add(b.z, c)))
+    }
+    /// Aᵀ b + c.
+    #[inline(always)]
+    pub fn transpose_mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
+        Vec3::new(self.x.dot_add(b, c.x), self.y.dot_add(b, c.y), self.z.dot_add(b, c.z))
     }
     /// Aᵀ b.
     #[inline(always)]
@@ -264,6 +288,28 @@ impl<S: Scalar> Sym3<S> {
     #[inline(always)]
     pub fn outer(a: Vec3<S>) -> Self {
         Self { xx: a.x * a.x, xy: a.x * a.y, yy: a.y * a.y, xz: a.x * a.z, yz: a.y * a.z, zz: a.z * a.z }
+    }
+    /// A + s a aᵀ.
+    #[inline(always)]
+    pub fn add_outer(self, s: S, a: Vec3<S>) -> Self {
+        let b = a.scale(s);
+        Self {
+            xx: b.x.mul_add(a.x, self.xx),
+            xy: b.x.mul_add(a.y, self.xy),
+            yy: b.y.mul_add(a.y, self.yy),
+            xz: b.x.mul_add(a.z, self.xz),
+            yz: b.y.mul_add(a.z, self.yz),
+            zz: b.z.mul_add(a.z, self.zz),
+        }
+    }
+    /// A b + c.
+    #[inline(always)]
+    pub fn mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
+        Vec3::new(
+            self.xx.mul_add(b.x, self.xy.mul_add(b.y, self.xz.mul_add(b.z, c.x))),
+            self.xy.mul_add(b.x, self.yy.mul_add(b.y, self.yz.mul_add(b.z, c.y))),
+            self.xz.mul_add(b.x, self.yz.mul_add(b.y, self.zz.mul_add(b.z, c.z))),
+        )
     }
     /// a bᵀ + b aᵀ.
     #[inline(always)]

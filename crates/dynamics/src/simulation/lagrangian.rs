@@ -18,7 +18,7 @@
 //! ```
 
 use crate::kinematics::World;
-use crate::layout::Layout;
+use crate::layout::Pairs;
 use crate::model::Model;
 use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
@@ -71,7 +71,7 @@ impl<S: Scalar> Workspace<S> {
 /// All of it, for bodies that are placed, in O(n · depth). External forces take part in ∂L/∂q as if they were slopes of a
 /// potential, which they need not be: ∂²L/∂q∂q is then not symmetric.
 #[inline(always)]
-pub(super) fn pass<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
+pub(super) fn pass<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let (oX, S) = (&w.oX, &w.S);
     let Workspace { v, IC, hC, FC, Psid, Psidd, p, L_q, M, p_q, L_qq } = d;
     let minus_g = Motion::new(l.minus_gravity(), Vec3::zero());

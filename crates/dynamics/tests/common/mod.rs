@@ -153,7 +153,7 @@ impl Tree {
         self.parts.len()
     }
 
-    fn follow(&mut self, follower: usize, leader: usize, ratio: f64, offset: f64) {
+    pub(crate) fn follow(&mut self, follower: usize, leader: usize, ratio: f64, offset: f64) {
         self.parts[follower - 1].mimic = Some((leader, Mimic { ratio, offset }));
     }
 
@@ -192,6 +192,39 @@ pub(crate) fn all_models(trees: u64) -> Vec<Model> {
         models.push(Tree::random_with_mimics(&mut rng(100 + seed)).build());
     }
     models
+}
+
+/// n hinges (and slides, one in four), each body on the one that `parent` names; on a free-flyer if `floating`.
+pub(crate) fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) -> Model {
+    let rng = &mut rng(n as u64);
+    let mut builder = ModelBuilder::new("tree");
+    let mut ids = vec![WORLD];
+    for i in 1..=n {
+        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
+        let joint = match i {
+            1 if floating => Joint::FreeFlyer,
+            _ if i % 4 == 0 => Joint::Prismatic { axis },
+            _ => Joint::Revolute { axis },
+        };
+        let id = builder.body(&format!("b{i}"), ids[parent(i)], joint, random_pose(rng), random_inertia(rng));
+        builder.frame(&format!("f{i}"), id, Se3::identity());
+        ids.push(id);
+    }
+    builder.build().expect("a tree is well-formed")
+}
+
+/// Long chains: one on the world, one on a floating base, and branches upon branches.
+pub(crate) fn long_branches() -> [Model; 3] {
+    [
+        tree(53, false, |i| i - 1),
+        tree(50, true, |i| i - 1),
+        tree(90, true, |i| match i {
+            31 | 61 => 30,
+            71 => 50,
+            76 => 0,
+            _ => i - 1,
+        }),
+    ]
 }
 
 /// A state, and what acts on it.

@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use common::{State, Worst, all_models, lift, lift_forces, random_inertia, random_pose, rng};
+use common::{State, Worst, all_models, lift, lift_forces, random_inertia, random_pose, rng, tree};
 use condyle_dynamics::{
     BodyId, Data, DivideConquer, Inertia, Joint, JointOptions, Mat3, Mimic, Model, ModelBuilder, Scalar, Se3, Sym3,
     Vec3, WORLD, aba, robots,
@@ -16,23 +16,6 @@ use std::cell::Cell;
 /// error is relative, are those of the light tips and grow alike.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
-
-/// n hinges (and slides, one in four), each body on the one that `parent` names; on a free-flyer if `floating`.
-fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) -> Model {
-    let rng = &mut rng(n as u64);
-    let mut builder = ModelBuilder::new("tree");
-    let mut ids: Vec<BodyId> = vec![WORLD];
-    for i in 1..=n {
-        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
-        let joint = match i {
-            1 if floating => Joint::FreeFlyer,
-            _ if i % 4 == 0 => Joint::Prismatic { axis },
-            _ => Joint::Revolute { axis },
-        };
-        ids.push(builder.body(&format!("b{i}"), ids[parent(i)], joint, random_pose(rng), random_inertia(rng)));
-    }
-    builder.build().expect("a tree is well-formed")
-}
 
 fn chain(n: usize) -> Model {
     tree(n, false, |i| i - 1)

@@ -21,6 +21,7 @@ mod identities;
 mod inertial_parameters;
 mod inputs;
 mod kinematics;
+mod limbs;
 mod mimic;
 mod mjcf;
 mod model_files;

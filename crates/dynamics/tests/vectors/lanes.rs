@@ -1,12 +1,9 @@
 //! Several knots in a vector register: the same bits as single calls, at the same level.
-#![cfg(target_arch = "x86_64")]
-#![allow(non_snake_case)]
 
-mod common;
-
-use common::table::{Input, Output, kernels};
-use common::{all_models, rng};
-use condyle_dynamics::level::{Level, pin};
+use crate::common::table::{Input, Output, kernels};
+use crate::common::{long_branches, rng};
+use crate::{each_level, models};
+use condyle_dynamics::level::Level;
 use condyle_dynamics::{Data, Force, Model, Scalar};
 use condyle_spatial::lanes::Lanes;
 
@@ -75,15 +72,13 @@ fn knots_are_single_calls<S: Vector>(models: &[Model]) {
     }
 }
 
-/// One test for all levels: they share the level in use.
 #[test]
-fn every_level() {
-    let models = all_models(4);
-    for level in [Level::Avx2, Level::Avx512] {
-        match pin(level) {
-            Ok(()) if level == Level::Avx2 => knots_are_single_calls::<Lanes<f64, 4>>(&models),
-            Ok(()) => knots_are_single_calls::<Lanes<f64, 8>>(&models),
-            Err(error) => eprintln!("NOT RUN: {error}"),
-        }
-    }
+fn every_lane_is_a_single_call() {
+    let long = long_branches().into_iter().map(|model| model.with_limbs(false));
+    let all: Vec<Model> = models(4).into_iter().chain(long).collect();
+    each_level(|level| match level {
+        Level::Baseline => {}
+        Level::Avx2 => knots_are_single_calls::<Lanes<f64, 4>>(&all),
+        Level::Avx512 => knots_are_single_calls::<Lanes<f64, 8>>(&all),
+    });
 }

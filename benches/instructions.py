@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""Counts the instructions of the algorithms at the AVX2 level, and fails where they have grown by more than 3 %.
+
+    python3 benches/instructions.py [--write]
+
+It runs benches/instructions.rs under callgrind (of valgrind), and compares with benches/instructions.json, which
+--write makes anew. A compiler other than the one that the baseline is from gives other counts: then they are shown, and
+nothing is compared.
+"""
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).resolve().parents[1]
+BASELINE = Path(__file__).with_suffix(".json")
+ROBOTS = ("arm7", "quadruped", "humanoid")
+STATES = 16
+"""As in instructions.rs."""
+GROWTH = 1.03
+LINE = re.compile(r"^\s*([\d,]+) .*\binstructions::measured::(\w+)")
+
+
+def run(*command: str | Path, **options: object) -> str:
+    return subprocess.run([str(c) for c in command], check=True, stdout=subprocess.PIPE, text=True, **options).stdout
+
+
+def build() -> Path:
+    command = ("cargo", "build", "--release", "--bench", "instructions", "--message-format=json", "--locked")
+    for line in run(*command, cwd=ROOT).splitlines():
+        message = json.loads(line)
+        if message.get("target", {}).get("name") == "instructions" and message.get("executable"):
+            return Path(message["executable"])
+    raise SystemExit("cargo built no program")
+
+
+def counts(program: Path, robot: str) -> dict[str, int]:
+    """Instructions of one state, of each algorithm."""
+    with TemporaryDirectory() as folder:
+        profile = Path(folder) / "profile"
+        command = ("valgrind", "--quiet", "--tool=callgrind", f"--callgrind-out-file={profile}", program, robot)
+        run(*command, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
+        table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", profile)
+    found: dict[str, int] = {}
+    for match in filter(None, map(LINE.match, table.splitlines())):  # a function stands in a line for each of its files
+        name, n = match[2], int(match[1].replace(",", "")) // STATES
+        found[name] = max(n, found.get(name, 0))
+    if not found:
+        raise SystemExit("callgrind names no function of instructions::measured")
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--write", action="store_true", help=f"write {BASELINE.name}")
+    options = parser.parse_args()
+    if shutil.which("valgrind") is None:
+        print("NOT RUN: there is no valgrind to count instructions with")
+        return
+    if "avx2" not in Path("/proc/cpuinfo").read_text(encoding="utf-8"):
+        print("NOT RUN: this processor has no AVX2")
+        return
+    program, compiler = build(), run("rustc", "--version").strip()
+    found = {robot: counts(program, robot) for robot in ROBOTS}
+    if options.write:
+        BASELINE.write_text(
+            json.dumps({"compiler": compiler, "instructions": found}, indent=1) + "\n", encoding="utf-8"
+        )
+    baseline = json.loads(BASELINE.read_text(encoding="utf-8"))
+    comparable, grown = baseline["compiler"] == compiler, []
+    for robot, algorithms in found.items():
+        for name, n in algorithms.items():
+            before = baseline["instructions"].get(robot, {}).get(name)
+            print(f"{robot:10} {name:24} {n:9}" + (f"  {n / before - 1:+.1%}" if before and comparable else ""))
+            if comparable and before and n > GROWTH * before:
+                grown.append(f"{robot} {name}: {before} -> {n}")
+    if not comparable:
+        print(f"NOT COMPARED: the baseline is from {baseline['compiler']}, this is {compiler}")
+    if grown:
+        sys.exit("more instructions than 3 % above the baseline:\n" + "\n".join(grown))
+
+
+if __name__ == "__main__":
+    main()

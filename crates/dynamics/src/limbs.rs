@@ -1,0 +1,152 @@
+//! The limbs of one robot side by side: which bodies share a step of a pass, and in which lane each stands.
+//!
+//! Bodies of different legs, arms or fingers do not wait for each other, so one pass can treat four of them at once, each
+//! in a lane of a vector register. The plan is a list schedule: step after step takes up to four bodies whose parents are
+//! done, those with the longest way to their tips first, and leaves each in its parent's lane where that is free. The body
+//! on which all others hang stands in all lanes, each of which adds up what its own limbs exert on it.
+//!
+//! All four must have joints of one kind, but whatever their axes: these are turned to z already. Robots with less than two
+//! bodies a step, chains above all, are computed one body after the other.
+
+#[cfg(target_arch = "x86_64")]
+mod pass;
+mod steps;
+
+use crate::joint::Joint;
+use crate::model::{Model, Node};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use pass::{Scratch, run};
+
+/// How many bodies stand side by side.
+pub(crate) const LANES: usize = 4;
+
+/// From how many bodies a step on it pays.
+const WORTH: usize = 2;
+
+/// A schedule, and what a pass needs of it. Step 0 is the world.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    /// The bodies of each step, one in each lane, 0 where there is none.
+    bodies: Vec<[usize; LANES]>,
+    /// The step and lane of each body.
+    place: Vec<(usize, usize)>,
+    /// Whether the first step is one body in all lanes.
+    shared: bool,
+    /// The bodies as a pass sees them.
+    pub steps: Vec<steps::Step>,
+    /// All steps but the world, the last first.
+    pub finished: Vec<usize>,
+    /// Of the positions and of the degrees of freedom of all steps.
+    pub positions: Vec<steps::Source>,
+    pub coordinates: Vec<steps::Source>,
+    /// Where, among the numbers in lanes, that of each coordinate stands.
+    pub leaders: Vec<usize>,
+    /// The coordinate, the number, and the ratio, of joints that follow.
+    pub followers: Vec<(usize, usize, f64)>,
+}
+
+impl Plan {
+    /// The plan for a robot, if it has limbs enough.
+    pub(crate) fn new(model: &Model) -> Option<Self> {
+        let turns_with = |n: &Node<f64>| n.mimic.is_some() && matches!(n.joint, Joint::Continuous { .. });
+        if model.nodes.iter().any(turns_with) {
+            return None; // its position is no multiple of its leader's
+        }
+        let mut plan = Self::schedule(&model.nodes)?;
+        plan.leaders = vec![0; model.nv];
+        plan.add_steps(model);
+        Some(plan)
+    }
+
+    fn schedule(nodes: &[Node<f64>]) -> Option<Self> {
+        let bodies = nodes.len();
+        let mut children = vec![Vec::new(); bodies];
+        let mut height = vec![0; bodies]; // bodies on the longest way to a tip
+        for i in (1..bodies).rev() {
+            children[nodes[i].parent].push(i);
+            height[nodes[i].parent] = height[nodes[i].parent].max(height[i] + 1);
+        }
+        let shared = bodies > 1 && children[0].len() == 1;
+        let mut plan = Self {
+            bodies: vec![[0; LANES]],
+            place: vec![(0, 0); bodies],
+            shared,
+            steps: Vec::new(),
+            finished: Vec::new(),
+            positions: Vec::new(),
+            coordinates: Vec::new(),
+            leaders: Vec::new(),
+            followers: Vec::new(),
+        };
+        let mut ready = children[0].clone();
+        if shared {
+            let root = ready.remove(0);
+            plan.bodies.push([root; LANES]);
+            plan.place[root] = (1, 0);
+            ready = children[root].clone();
+        }
+        while !ready.is_empty() {
+            ready.sort_by_key(|&i| (core::cmp::Reverse(height[i]), i));
+            let first = nodes[ready[0]].joint;
+            let (mut chosen, mut others) = (Vec::new(), Vec::new());
+            for i in ready {
+                let fits = chosen.len() < LANES && side_by_side(nodes[i].joint, first);
+                if fits { chosen.push(i) } else { others.push(i) }
+            }
+            let mut step = [0; LANES];
+            for at_home in [true, false] {
+                for &i in chosen.iter().filter(|&&i| plan.place[i].0 == 0) {
+                    let (parent_step, parent_lane) = plan.place[nodes[i].parent];
+                    let home = (!plan.in_all_lanes(parent_step) && step[parent_lane] == 0).then_some(parent_lane);
+                    let free = (0..LANES).find(|&lane| step[lane] == 0);
+                    if let Some(lane) = if at_home { home } else { free } {
+                        step[lane] = i;
+                    }
+                }
+                for (lane, &i) in step.iter().enumerate().filter(|(_, i)| **i > 0) {
+                    plan.place[i] = (plan.bodies.len(), lane);
+                }
+            }
+            plan.bodies.push(step);
+            others.extend(chosen.iter().flat_map(|&i| &children[i]));
+            ready = others;
+        }
+        plan.finished = (1..plan.bodies.len()).rev().collect();
+        (bodies > WORTH * (plan.bodies.len() - 1)).then_some(plan)
+    }
+
+    /// Whether a step's body is the same in all lanes: the world, or the one on which all hang.
+    pub(crate) fn in_all_lanes(&self, step: usize) -> bool {
+        step == 0 || (step == 1 && self.shared)
+    }
+}
+
+/// Whether two joints are computed by the same operations.
+fn side_by_side(a: Joint, b: Joint) -> bool {
+    let pitch = |joint| if let Joint::Helical { pitch, .. } = joint { pitch } else { 0.0 };
+    core::mem::discriminant(&a) == core::mem::discriminant(&b) && pitch(a) == pitch(b)
+}
+
+impl Model {
+    /// The same robot, with its limbs side by side in single calls or one body after the other.
+    ///
+    /// Where it has limbs enough (four legs, two legs and two arms, fingers), [`rnea`](crate::rnea()) and
+    /// [`aba`](crate::aba()) of one state compute four bodies at a time if the processor has AVX2, twice as fast. A
+    /// [`Batch`](crate::Batch) never does, since its lanes hold states. The two ways add up in different orders, so their
+    /// results differ in the last digits; without limbs a single call gives the bits of a batch.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, rnea, robots};
+    /// let quadruped = robots::quadruped();
+    /// let in_turn = quadruped.clone().with_limbs(false);
+    /// let (mut data, q) = (Data::new(&quadruped), condyle_dynamics::neutral(&quadruped));
+    /// let tau = rnea(&quadruped, &mut data, &q, &[0.1; 18], &[0.2; 18], &[]).to_vec();
+    /// let same = rnea(&in_turn, &mut data, &q, &[0.1; 18], &[0.2; 18], &[]);
+    /// assert!(tau.iter().zip(same).all(|(a, b)| f64::abs(a - b) < 1e-12));
+    /// ```
+    #[must_use]
+    pub fn with_limbs(mut self, side_by_side: bool) -> Self {
+        self.limbs = if side_by_side { Plan::new(&self) } else { None };
+        self
+    }
+}

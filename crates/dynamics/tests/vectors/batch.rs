@@ -1,0 +1,149 @@
+//! Many states at once: the same bits as one by one.
+
+use crate::common::rng;
+use crate::common::table::Input;
+use crate::counting::allocations;
+use crate::{each_level, models};
+use condyle_dynamics::{
+    Batch, Data, Force, Model, aba, aba_derivatives, crba, gravity, minv, nonlinear_effects, rnea, rnea_derivatives,
+};
+
+/// The arguments of many states, one after the other.
+struct States {
+    one: Vec<Input<f64>>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    x: Vec<f64>,
+    f_ext: Vec<Force<f64>>,
+}
+
+impl States {
+    fn random(model: &Model, n: usize, seed: u64) -> Self {
+        let mut rng = rng(seed);
+        let one: Vec<_> = (0..n).map(|_| Input::random(model, &mut rng)).collect();
+        let all = |part: fn(&Input<f64>) -> &[f64]| one.iter().flat_map(part).copied().collect::<Vec<f64>>();
+        let (q, v, x) = (all(|i| &i.q), all(|i| &i.v), all(|i| &i.x));
+        let f_ext = one.iter().flat_map(|i| &i.f_ext).copied().collect();
+        Self { one, q, v, x, f_ext }
+    }
+}
+
+/// Everything that a batch computes, in turn.
+fn of_batch(model: &Model, b: &mut Batch, s: &States, numbers: &mut Vec<f64>) {
+    let m = model;
+    numbers.clear();
+    numbers.extend_from_slice(b.rnea(m, &s.q, &s.v, &s.x, &s.f_ext));
+    numbers.extend_from_slice(b.rnea(m, &s.q, &s.v, &s.x, &[]));
+    numbers.extend_from_slice(b.nonlinear_effects(m, &s.q, &s.v));
+    numbers.extend_from_slice(b.gravity(m, &s.q));
+    numbers.extend_from_slice(b.aba(m, &s.q, &s.v, &s.x, &s.f_ext));
+    b.crba(m, &s.q).iter().for_each(|M| numbers.extend(M.iter()));
+    b.minv(m, &s.q).iter().for_each(|M| numbers.extend(M.iter()));
+    let d = b.rnea_derivatives(m, &s.q, &s.v, &s.x, &s.f_ext);
+    [d.dtau_dq, d.dtau_dv, d.dtau_da].iter().flat_map(|x| x.iter()).for_each(|x| numbers.extend(x.iter()));
+    let d = b.aba_derivatives(m, &s.q, &s.v, &s.x, &s.f_ext);
+    numbers.extend_from_slice(d.a);
+    [d.da_dq, d.da_dv, d.da_dtau].iter().flat_map(|x| x.iter()).for_each(|x| numbers.extend(x.iter()));
+}
+
+/// The same by single calls.
+fn one_by_one(model: &Model, s: &States) -> Vec<f64> {
+    let (m, d) = (model, &mut Data::new(model));
+    let mut numbers = Vec::new();
+    let mut each = |call: &mut dyn FnMut(&Input<f64>, &mut Vec<f64>)| s.one.iter().for_each(|i| call(i, &mut numbers));
+    each(&mut |i, to| to.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &i.f_ext)));
+    each(&mut |i, to| to.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &[])));
+    each(&mut |i, to| to.extend_from_slice(nonlinear_effects(m, d, &i.q, &i.v)));
+    each(&mut |i, to| to.extend_from_slice(gravity(m, d, &i.q)));
+    each(&mut |i, to| to.extend_from_slice(aba(m, d, &i.q, &i.v, &i.x, &i.f_ext)));
+    each(&mut |i, to| to.extend_from_slice(crba(m, d, &i.q).as_slice()));
+    each(&mut |i, to| to.extend_from_slice(minv(m, d, &i.q).as_slice()));
+    for k in 0..3 {
+        each(&mut |i, to| {
+            let r = rnea_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
+            to.extend_from_slice([r.dtau_dq, r.dtau_dv, r.dtau_da][k].as_slice());
+        });
+    }
+    each(&mut |i, to| to.extend_from_slice(aba_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext).a));
+    for k in 0..3 {
+        each(&mut |i, to| {
+            let r = aba_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
+            to.extend_from_slice([r.da_dq, r.da_dv, r.da_dtau][k].as_slice());
+        });
+    }
+    numbers
+}
+
+/// Whatever the number of states, full groups or not, and of threads; and without allocating on one thread.
+#[test]
+fn every_state_is_a_single_call() {
+    const MOST: usize = 19;
+    let all = models(3);
+    each_level(|level| {
+        for (seed, model) in all.iter().enumerate() {
+            let mut batches = [1, 2, 3].map(|threads| Batch::new(model, MOST, threads));
+            for n in [1, 8, MOST] {
+                let states = States::random(model, n, seed as u64);
+                let expected = one_by_one(model, &states);
+                let mut found = Vec::with_capacity(expected.len());
+                for (batch, threads) in batches.iter_mut().zip(1..) {
+                    let count = allocations(|| of_batch(model, batch, &states, &mut found));
+                    assert!(found == expected, "{n} states, {threads} threads, {level}, on\n{model}");
+                    assert!(threads > 1 || count == 0, "{count} allocations on\n{model}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn a_state_that_is_not_a_number_stays_alone() {
+    let model = &models(1)[1];
+    each_level(|level| {
+        let (mut batch, mut states) = (Batch::new(model, 9, 1), States::random(model, 9, 0));
+        let clean = batch.aba(model, &states.q, &states.v, &states.x, &[]).to_vec();
+        let nv = model.nv();
+        states.v[4 * nv] = f64::NAN;
+        let broken = batch.aba(model, &states.q, &states.v, &states.x, &[]);
+        assert!(broken[4 * nv..5 * nv].iter().any(|a| a.is_nan()));
+        assert!(broken[..4 * nv] == clean[..4 * nv] && broken[5 * nv..] == clean[5 * nv..], "{level}");
+    });
+}
+
+/// Twice as many lanes; nothing is fused in a single call in `f32`, so not the same bits.
+#[test]
+fn in_single_precision() {
+    const TOLERANCE: f32 = 1e-3; // 1e4 units of the last place, for cancellation over some 20 bodies
+    let model = &models(0)[1];
+    each_level(|level| {
+        let states = States::random(model, 19, 0);
+        let narrow = |x: &[f64]| x.iter().map(|&x| x as f32).collect::<Vec<_>>();
+        let (q, v, a) = (narrow(&states.q), narrow(&states.v), narrow(&states.x));
+        let mut batch = Batch::<f32>::new(model, 19, 1);
+        let tau = batch.rnea(model, &q, &v, &a, &[]);
+        let mut wide = Batch::new(model, 19, 1);
+        let expected = wide.rnea(model, &states.q, &states.v, &states.x, &[]);
+        let largest = narrow(expected).iter().fold(1.0, |m: f32, x| m.max(x.abs()));
+        assert!(tau.iter().zip(narrow(expected)).all(|(x, y)| (x - y).abs() < TOLERANCE * largest), "{level}");
+    });
+}
+
+#[test]
+fn no_state() {
+    let model = &models(0)[0];
+    assert!(Batch::<f64>::new(model, 4, 1).rnea(model, &[], &[], &[], &[]).is_empty());
+}
+
+#[test]
+#[should_panic(expected = "q: expected 7 numbers for each of at most 2 states, found 21")]
+fn too_many_states() {
+    let model = &models(0)[0];
+    _ = Batch::<f64>::new(model, 2, 1).gravity(model, &[0.0; 21]);
+}
+
+#[test]
+#[should_panic(expected = "v: expected 14 numbers, found 7")]
+fn too_few_velocities() {
+    let model = &models(0)[0];
+    _ = Batch::<f64>::new(model, 2, 1).nonlinear_effects(model, &[0.0; 14], &[0.0; 7]);
+}

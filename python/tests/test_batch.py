@@ -1,0 +1,148 @@
+"""Many states in one call: every function that takes a state, against one call for each."""
+
+import inspect
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from sample import Robot
+
+import condyle
+
+N = 11
+"""More than a vector holds, and no multiple of it."""
+CLOSE = {"rtol": 1e-9, "atol": 1e-9}
+"""A single call may compute the limbs of a robot side by side and add up in another order; times the condition of M."""
+
+
+def argument(name: str, robot: Robot, states: int) -> Any:
+    """A value for each of some states, or for one if there are none."""
+    model, rng = robot.model, np.random.default_rng(len(name))
+    shape = (states,) if states else ()
+    match name:
+        case "q" | "q0" | "q1":
+            draws = [
+                condyle.random_configuration(model, seed=31 * k + len(name) + ord(name[-1]))
+                for k in range(max(states, 1))
+            ]
+            return np.stack(draws) if states else draws[0]
+        case "v" | "a" | "tau" | "lambda_" | "dq" | "w":
+            return rng.standard_normal((*shape, model.nv))
+        case "f_ext":
+            return rng.standard_normal((*shape, model.nbodies, 6))
+        case "frame" | "body":
+            return 1
+        case "by" | "argument" | "of":
+            return None
+    return inspect.Parameter.empty
+
+
+def functions() -> list[str]:
+    """Those of a model, a `Data` and a state."""
+    names = []
+    for name in condyle.__all__:
+        function = getattr(condyle, name)
+        if inspect.isbuiltin(function) and {"model", "q"} <= inspect.signature(function).parameters.keys():
+            names.append(name)
+    return names
+
+
+def members(result: Any) -> list[Any]:
+    if isinstance(result, tuple):
+        return [member for part in result for member in members(part)]
+    return [result]
+
+
+@pytest.mark.parametrize("name", functions())
+def test_as_one_by_one(name: str, robot: Robot) -> None:
+    function, model = getattr(condyle, name), robot.model
+    varying, given = {}, {}
+    for parameter in inspect.signature(function).parameters.values():
+        if parameter.name in ("model", "data", "out"):
+            continue
+        value = argument(parameter.name, robot, N)
+        if isinstance(value, np.ndarray):
+            varying[parameter.name] = value
+        elif value is not inspect.Parameter.empty and value is not None:
+            given[parameter.name] = value
+        elif parameter.default is inspect.Parameter.empty:
+            pytest.skip(f"{parameter.name} is no part of a state")
+    data = {"data": robot.data} if "data" in inspect.signature(function).parameters else {}
+    together = members(function(model, **data, **varying, **given))
+    for k in range(N):
+        one = members(function(model, **data, **{n: x[k] for n, x in varying.items()}, **given))
+        for all_states, alone in zip(together, one, strict=True):
+            assert len(all_states) == N
+            np.testing.assert_allclose(all_states[k], alone, **CLOSE)
+
+
+def test_most_functions_are_compared() -> None:
+    assert len(functions()) > 40
+
+
+def test_arguments_are_shared(robot: Robot) -> None:
+    model, data = robot.model, robot.data
+    q = argument("q", robot, N)
+    shared = condyle.rnea(model, data, q, robot.v, robot.a, robot.f_ext)
+    repeated = [np.stack([x] * N) for x in (robot.v, robot.a, robot.f_ext)]
+    np.testing.assert_array_equal(shared, condyle.rnea(model, data, q, *repeated))
+    np.testing.assert_array_equal(
+        condyle.rnea(model, data, q.tolist(), robot.v.tolist(), robot.a), condyle.rnea(model, data, q, robot.v, robot.a)
+    )
+
+
+def test_out(robot: Robot) -> None:
+    model, data, q = robot.model, robot.data, argument("q", robot, N)
+    out = np.empty((N, model.nv, model.nv))
+    assert condyle.crba(model, data, q, out=out) is out
+    np.testing.assert_array_equal(out, condyle.crba(model, data, q))
+    v, a = (argument(name, robot, N) for name in "va")
+    outs = tuple(np.empty_like(out) for _ in range(3))
+    d = condyle.rnea_derivatives(model, data, q, v, a, out=outs)
+    assert d.dtau_dq is outs[0]
+    np.testing.assert_array_equal(
+        outs[2], np.stack([condyle.rnea_derivatives(model, data, *x).dtau_da for x in zip(q, v, a, strict=True)])
+    )
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_the_same_bits_on_any_number_of_threads(robot: Robot, threads: int) -> None:
+    model = robot.model
+    q, v, tau = (argument(name, robot, 100) for name in ("q", "v", "tau"))
+    expected = condyle.aba_derivatives(model, robot.data, q, v, tau)
+    found = condyle.aba_derivatives(model, condyle.Data(model, threads=threads), q, v, tau)
+    for x, y in zip(expected, found, strict=True):
+        np.testing.assert_array_equal(x, y)
+
+
+def test_errors(robot: Robot) -> None:
+    model, data, q = robot.model, robot.data, argument("q", robot, N)
+    with pytest.raises(ValueError, match=f"^v: expected {N} states, as many as q has, found 3$"):
+        condyle.nonlinear_effects(model, data, q, np.zeros((3, model.nv)))
+    with pytest.raises(ValueError, match=rf"^q: expected shape \({N}, {model.nq}\), found \({N}, {model.nq + 1}\)$"):
+        condyle.gravity(model, data, np.zeros((N, model.nq + 1)))
+    with pytest.raises(ValueError, match="^threads: expected at least 1, found 0$"):
+        condyle.Data(model, threads=0)
+
+
+def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
+    """The interpreter's lock is released: another thread that uses the same `Data` meanwhile is told."""
+    model, data = quadruped.model, condyle.Data(quadruped.model)
+    q, v, tau = (argument(name, quadruped, 4000) for name in ("q", "v", "tau"))
+    condyle.aba_derivatives(model, data, q[:1], v[:1], tau[:1])
+    errors: list[BaseException] = []
+
+    def use() -> None:
+        while worker.is_alive():
+            try:
+                condyle.gravity(model, data, q[0])
+            except RuntimeError as error:
+                errors.append(error)
+                return
+
+    worker = threading.Thread(target=lambda: condyle.aba_derivatives(model, data, q, v, tau))
+    worker.start()
+    use()
+    worker.join()
+    assert errors and "data: in use by another call" in str(errors[0])
