@@ -2311,7 +2311,8 @@ class Fddp:
     Where controls are bounded, these are those of its box solvers.
 
     problem: what is solved; the solver allocates for its shape once.
-    settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
+    settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
+        `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP); and
         any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
         `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
         `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,

@@ -171,7 +171,8 @@ impl Problem {
 /// Where controls are bounded, these are those of its box solvers.
 ///
 /// problem: what is solved; the solver allocates for its shape once.
-/// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout); and
+/// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
+///     `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP); and
 ///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
 ///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
 ///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
@@ -194,6 +195,10 @@ impl Fddp {
             let number = match name.as_str() {
                 "max_iterations" => {
                     s.max_iterations = value.extract()?;
+                    continue;
+                }
+                "second_order" => {
+                    s.second_order = value.extract()?;
                     continue;
                 }
                 "step_lengths" => {

@@ -1,7 +1,7 @@
 //! One knot's dynamics and cost, asked for many knots at a time.
 
 use crate::error::assert_length;
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 use std::any::Any;
 
 /// The dynamics x⁺ = φₜ(x, u) and the cost ℓₜ(x, u) of the knots t that it serves.
@@ -87,6 +87,14 @@ pub trait ActionModel: Any + Send {
     /// The derivatives of both at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B = ∂x⁺/∂u, q = ∂ℓ/∂x,
     /// r = ∂ℓ/∂u, and the Hessian of ℓ or its Gauss–Newton approximation, Q, S, R. The gap f is the solver's.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode);
+
+    /// The second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for ndx numbers
+    /// `lambda`; says whether it did. Where it did not, the dynamics count as linear around each iterate
+    /// (Gauss–Newton), as they do everywhere unless [`second_order`](crate::Settings::second_order) is set.
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let _ = (t, x, u, lambda, hessian);
+        false
+    }
 
     /// [`calc`](Self::calc) for a group: knot `knots[i]` at the i-th state of `xs` and the i-th control of `us`, which
     /// lie one after the other, as do the states written to `next`.

@@ -69,6 +69,19 @@ pub enum Error {
         upper: f64,
     },
 
+    /// No value satisfies the bounds of a constraint.
+    #[error("knot {knot}: constraint {row} must be at least {lower} and at most {upper}")]
+    Constraint {
+        /// The knot.
+        knot: usize,
+        /// The entry of the constraint.
+        row: usize,
+        /// Its least value.
+        lower: f64,
+        /// Its greatest value.
+        upper: f64,
+    },
+
     /// A term of a robot's cost does not fit the robot.
     #[error("cost `{name}`: {what}")]
     Cost {

@@ -3,8 +3,8 @@
 
 use crate::dense::{SLACK, View, add_product_lower, add_transposed_product_lower, product, transpose};
 use crate::lq::LqNode;
+use crate::riccati::{Work, stride};
 use crate::structure::{EulerBlock, LARGEST_BLOCK};
-use crate::sweep::{Work, stride};
 use crate::vector::Vector;
 
 /// Scratch for the form; column-major with slack rows, stride nv + SLACK but for `M`.

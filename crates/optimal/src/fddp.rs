@@ -71,7 +71,7 @@ use std::time::Instant;
 pub struct Fddp {
     /// May be changed between solves.
     pub settings: Settings,
-    nodes: Vec<LqNode>,
+    pub(crate) nodes: Vec<LqNode>,
     pub(crate) sweep: Sweep,
     pub(crate) trials: Trials,
     /// The step lengths, 1, ½, ¼, ….
@@ -193,45 +193,6 @@ impl Fddp {
         Ok(&self.solution)
     }
 
-    /// Makes the solution a warm start for a problem that was [shifted](Problem::shift) by a knot since: states, controls
-    /// and gains move one knot to the front, the last control stays (where the number of controls changes, it is zero),
-    /// and the last state follows from it. Allocates nothing unless numbers of controls differ along the horizon.
-    ///
-    /// # Errors
-    /// [`Error`] if the problem is not the one solved before, shifted once.
-    pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
-        let (old, new) = (self.solution.shape(), problem.shape());
-        let (horizon, ndx) = (new.horizon(), new.ndx);
-        if old.horizon() != horizon {
-            return Err(Error::Length { name: "stages", expected: old.horizon(), found: horizon });
-        }
-        for t in 0..horizon - 1 {
-            if old.nu(t + 1) != new.nu(t) {
-                return Err(Error::Dimension { node: t, name: "nu", expected: old.nu(t + 1), found: new.nu(t) });
-            }
-        }
-        for (name, expected, found) in [("nx", old.nx, new.nx), ("ndx", old.ndx, new.ndx)] {
-            if expected != found {
-                return Err(Error::Dimension { node: 0, name, expected, found });
-            }
-        }
-        self.solution.shift(new);
-        if (0..horizon).any(|t| self.nodes[t].nu() != new.nu(t)) {
-            self.nodes[..horizon].rotate_left(1);
-            self.nodes[horizon - 1] = LqNode::zeros(ndx, new.nu(horizon - 1));
-            self.sweep = Sweep::new(&self.nodes);
-        }
-        self.trials.reshape(problem);
-        // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
-        let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
-        let next = &mut self.next[..end.len()];
-        problem.action_mut(horizon - 1).calc(horizon - 1, &self.solution.xs[x], &self.solution.us[u], next);
-        if next.iter().all(|x| x.is_finite()) {
-            self.solution.xs[end].copy_from_slice(next);
-        }
-        Ok(())
-    }
-
     /// The result of the last solve.
     pub fn solution(&self) -> &Solution {
         &self.solution
@@ -258,7 +219,7 @@ impl Fddp {
             if !self.clock.allows(Phase::Sweep) {
                 return Status::TimeLimit;
             }
-            while let Err(error) = self.sweep(now.regularisation) {
+            while let Err(error) = self.sweep(problem, now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
                 if now.regularisation == self.settings.regularisation_max {
                     return match error {
@@ -356,9 +317,18 @@ impl Fddp {
         self.solution.timings.calc_diff += self.clock.ran(Phase::CalcDiff, clock);
     }
 
-    fn sweep(&mut self, regularisation: f64) -> Result<(), SweepError> {
+    fn sweep(&mut self, problem: &mut Problem, regularisation: f64) -> Result<(), SweepError> {
         let clock = Instant::now();
-        let result = self.sweep.run(&self.nodes, regularisation);
+        let result = if self.settings.second_order {
+            let Solution { xs, us, .. } = &self.solution;
+            let shape = self.solution.shape();
+            self.sweep.run_with(&self.nodes, regularisation, |t, lambda, hessian| {
+                let (x, u) = (&xs[shape.x(t)], &us[shape.u(t)]);
+                problem.action_mut(t).dynamics_hessian(t, x, u, lambda, hessian)
+            })
+        } else {
+            self.sweep.run(&self.nodes, regularisation)
+        };
         self.solution.timings.sweep += self.clock.ran(Phase::Sweep, clock);
         result
     }

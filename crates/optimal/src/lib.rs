@@ -12,6 +12,7 @@
 //!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
+//! - [`AugmentedLagrangian`] repeats that until general constraints hold, those of [`Constrained`] actions.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
@@ -67,8 +68,10 @@
 //! ```
 
 mod action;
+mod augmented;
 mod box_qp;
 mod clock;
+mod constrained;
 mod dense;
 mod error;
 mod euler;
@@ -78,23 +81,27 @@ mod lq;
 mod lqr;
 mod numdiff;
 mod problem;
+mod riccati;
 pub mod robot;
 mod rollout;
 mod search;
 mod settings;
+mod shift;
 mod solution;
 mod structure;
 mod sweep;
 mod vector;
 
 pub use action::ActionModel;
+pub use augmented::{AugmentedLagrangian, Outcome};
+pub use constrained::{Constrained, Constraint};
 pub use error::Error;
 pub use fddp::Fddp;
-pub use lq::{LqKnot, LqNode};
+pub use lq::{Hessian, LqKnot, LqNode};
 pub use lqr::Lqr;
 pub use numdiff::NumDiff;
 pub use problem::Problem;
-pub use settings::{Method, Settings};
+pub use settings::{ConstraintSettings, Method, Settings};
 pub use solution::{Iteration, Solution, Status, Timings};
 pub use structure::{EulerBlock, Structure};
 pub use sweep::{Sweep, SweepError};

@@ -131,3 +131,22 @@ impl LqKnot {
         }
     }
 }
+
+/// The second derivatives of a function ψ(δx, δu) of one knot; see
+/// [`dynamics_hessian`](crate::ActionModel::dynamics_hessian).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hessian {
+    /// ∂²ψ/∂x², ndx × ndx, symmetric.
+    pub xx: DMatrix<f64>,
+    /// ∂²ψ/∂x∂u, ndx × nu.
+    pub xu: DMatrix<f64>,
+    /// ∂²ψ/∂u², nu × nu, symmetric.
+    pub uu: DMatrix<f64>,
+}
+
+impl Hessian {
+    /// Zeros for ndx states and nu controls.
+    pub fn zeros(ndx: usize, nu: usize) -> Self {
+        Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }
+    }
+}

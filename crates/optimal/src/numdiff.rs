@@ -1,7 +1,7 @@
 //! Derivatives of any action by finite differences: the oracle against which written derivatives are tested.
 
 use crate::action::ActionModel;
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 
 /// The step of first differences, about ε^⅓: truncation h² meets rounding ε/h.
 const FIRST: f64 = 6e-6;
@@ -121,6 +121,35 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
                 }
             }
         }
+    }
+
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let (ndx, nu) = (self.ndx(), self.nu());
+        let (mut centre, mut moved) = (x.to_vec(), x.to_vec());
+        let (mut z, mut change) = (vec![0.0; ndx + nu], vec![0.0; ndx]);
+        self.at(t, x, u, &z, &mut centre);
+        for i in 0..ndx + nu {
+            for j in 0..=i {
+                let mut sum = 0.0;
+                for (si, sj) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+                    z[i] += si * SECOND;
+                    z[j] += sj * SECOND;
+                    self.at(t, x, u, &z, &mut moved);
+                    self.0.difference(&centre, &moved, &mut change);
+                    sum += si * sj * lambda.iter().zip(&change).map(|(l, c)| l * c).sum::<f64>();
+                    (z[i], z[j]) = (0.0, 0.0);
+                }
+                let curvature = sum / (4.0 * SECOND * SECOND);
+                match (i < ndx, j < ndx) {
+                    (true, _) => (hessian.xx[(i, j)], hessian.xx[(j, i)]) = (curvature, curvature),
+                    (false, true) => hessian.xu[(j, i - ndx)] = curvature,
+                    (false, false) => {
+                        (hessian.uu[(i - ndx, j - ndx)], hessian.uu[(j - ndx, i - ndx)]) = (curvature, curvature);
+                    }
+                }
+            }
+        }
+        true
     }
 
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {

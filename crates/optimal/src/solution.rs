@@ -19,6 +19,8 @@ pub enum Status {
     TimeLimit,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
+    /// The constraints do not hold, however much leaving them costs: there may be no solution.
+    Infeasible,
     /// Cost, dynamics or derivatives of the iterate are infinite or NaN, so that no direction can be computed. States
     /// and controls of the solution are finite nevertheless; its cost may be infinite.
     NotFinite,

@@ -2,7 +2,10 @@
 
 mod common;
 
-use common::{Cartpole, Circle, HANGING, Unicycle, cartpole, limited_cartpole, limited_unicycle, straight, unicycle};
+use common::{
+    Cartpole, Circle, HANGING, Unicycle, cartpole, cartpole_action, limited_cartpole, limited_unicycle, straight,
+    unicycle,
+};
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Settings, Status};
 
 /// The accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
@@ -313,4 +316,61 @@ fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
         assert!(projected.abs() < 1e-4, "knot {t}: u = {u}, ∂J/∂u = {slope:e}");
     }
     assert!(at_bounds > 3, "{at_bounds}");
+}
+
+/// Notes how many trials it is asked for at once, at the first knot.
+struct Noting {
+    action: Cartpole,
+    groups: Vec<usize>,
+}
+
+impl ActionModel for Noting {
+    fn nx(&self) -> usize {
+        4
+    }
+    fn nu(&self) -> usize {
+        1
+    }
+    fn lanes(&self) -> usize {
+        self.action.lanes
+    }
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.action.calc(t, x, u, next)
+    }
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.action.calc_diff(t, x, u, node);
+    }
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        if knots.iter().all(|t| *t == 0) {
+            self.groups.push(knots.len());
+        }
+        self.action.calc_group(knots, xs, us, next, costs);
+    }
+}
+
+/// The first step length is tried alone, the other nine side by side, as many as there are lanes.
+#[test]
+fn a_refused_step_is_followed_by_the_others_at_once() {
+    for (lanes, after) in [(1, vec![1; 9]), (4, vec![4, 4, 1]), (8, vec![8, 1]), (16, vec![9])] {
+        let action = Cartpole { lanes, ..cartpole_action() };
+        let noting = Noting { action, groups: vec![] };
+        let end = Cartpole { nu: 0, lanes, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
+        let mut problem = Problem::new(HANGING.to_vec(), vec![Box::new(noting)], vec![0; 50], Box::new(end)).unwrap();
+        let mut solver = Fddp::new(&problem);
+        let solution = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap();
+        // per line search: 1, and after a refusal as many of the groups as it took to find the step
+        let mut expected = vec![];
+        for iteration in &solution.trace {
+            expected.push(1);
+            let (mut tried, needed) = (1, 1 + (-iteration.step.log2()) as usize);
+            for group in &after {
+                if tried < needed {
+                    expected.push(*group);
+                    tried += group;
+                }
+            }
+        }
+        assert!(expected.len() > solution.trace.len());
+        assert_eq!(problem.model_mut::<Noting>(0).unwrap().groups, expected, "{lanes} lanes");
+    }
 }

@@ -7,8 +7,8 @@ use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::lanes::{Outcome, SideBySide};
 use super::watch::{NoSlopes, Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
-use crate::lq::LqNode;
-use condyle_dynamics::{Data, Model, aba, aba_derivatives, difference, gravity, integrate};
+use crate::lq::{Hessian, LqNode};
+use condyle_dynamics::{Data, Model, aba, aba_derivatives, aba_hessian, difference, gravity, integrate};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -189,6 +189,28 @@ impl ContinuousModel for Free {
         robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
         let da_du = robot.actuation.columns(&da[2], &mut self.da_du);
         Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
+    }
+
+    fn hessian(&mut self, _: usize, x: &[f64], u: &[f64], mu: &[f64], hessian: &mut Hessian) -> bool {
+        let Self { robot, data, .. } = self;
+        robot.actuation.effort(u, &mut robot.tau);
+        let (nv, (q, v)) = (robot.model.nv(), x.split_at(robot.model.nq()));
+        let d = aba_hessian(&robot.model, data, q, v, &robot.tau, &[], mu);
+        for c in 0..nv {
+            for r in 0..nv {
+                hessian.xx[(r, c)] = d.dqdq[(r, c)];
+                hessian.xx[(nv + r, c)] = d.dvdq[(r, c)];
+                hessian.xx[(c, nv + r)] = d.dvdq[(r, c)];
+                hessian.xx[(nv + r, nv + c)] = d.dvdv[(r, c)];
+            }
+            let column = &d.dtaudq.as_slice()[c * nv..][..nv];
+            for k in 0..u.len() {
+                hessian.xu[(c, k)] = robot.actuation.along(k, column); // Sᵀ ∂²ψ/∂τ∂q
+                hessian.xu[(nv + c, k)] = 0.0;
+            }
+        }
+        hessian.uu.fill(0.0);
+        true
     }
 
     fn groups(&self) -> &[Range<usize>] {

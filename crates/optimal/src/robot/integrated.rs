@@ -6,7 +6,7 @@ use super::runge_kutta::RungeKutta;
 use crate::Error;
 use crate::action::ActionModel;
 use crate::error::assert_length;
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -62,6 +62,13 @@ pub trait ContinuousModel: Send + 'static {
 
     /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the node, which are overwritten.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_>;
+
+    /// The second derivatives of ψ = μᵀ a(x, u) into `hessian`, for nv numbers `mu`; says whether it did. It does not by
+    /// default: a then counts as linear, whatever [`second_order`](crate::Settings::second_order) says.
+    fn hessian(&mut self, t: usize, x: &[f64], u: &[f64], mu: &[f64], hessian: &mut Hessian) -> bool {
+        let _ = (t, x, u, mu, hessian);
+        false
+    }
 
     /// How many states [`prepare`](Self::prepare) takes at the price of few; 1 unless it uses vector lanes.
     fn lanes(&self) -> usize {
@@ -319,6 +326,19 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
             Method::Euler => euler::calc_diff(inner, None, dt, t, x, u, dq, [transport, exp], node),
             Method::RungeKutta(method) => method.calc_diff(inner, dt, t, x, u, [transport, exp], node),
         }
+    }
+
+    /// By semi-implicit Euler in a vector space: of λᵀ∂²(q⁺, v⁺) there is left Δt (λ_v + Δt λ_q)ᵀ ∂²a.
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let Self { inner, dt: Some(dt), method: Method::Euler, dq: mu, .. } = self else { return false };
+        if !inner.groups().is_empty() {
+            return false;
+        }
+        let nv = mu.len();
+        for k in 0..nv {
+            mu[k] = *dt * (lambda[nv + k] + *dt * lambda[k]);
+        }
+        inner.hessian(t, x, u, mu, hessian)
     }
 
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {

@@ -1,0 +1,212 @@
+//! Constrained problems by an augmented Lagrangian.
+#![allow(non_snake_case)]
+
+use crate::error::Error;
+use crate::fddp::Fddp;
+use crate::problem::Problem;
+use crate::settings::{ConstraintSettings, Settings};
+use crate::solution::{Solution, Status};
+use nalgebra::DVector;
+
+/// The method of multipliers around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions, with the rules
+/// of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP
+/// has them (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier, 2023).
+///
+/// ```text
+/// repeat   minimise   Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,   z = g + μ y        by FDDP, to a tolerance ω
+///          if the constraints hold to η:   y ← (z − Π z) / μ,   η and ω fall
+///          else:                           μ falls
+/// until    the constraints and the gradient of the Lagrangian ℓ + yᵀg, along the dynamics, vanish to the tolerances
+/// ```
+///
+/// Bounds of the actions' controls hold as in [`Fddp`], beside the constraints.
+///
+/// # Examples
+/// ```
+/// use condyle_optimal::{ActionModel, AugmentedLagrangian, Constrained, Constraint, LqNode, Problem, Status};
+/// use nalgebra::DMatrix;
+/// # struct Integrator { nu: usize }
+/// # impl ActionModel for Integrator {
+/// #     fn nx(&self) -> usize { 1 }
+/// #     fn nu(&self) -> usize { self.nu }
+/// #     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+/// #         let u: f64 = u.iter().sum();
+/// #         next[0] = x[0] + u;
+/// #         0.5 * u * u
+/// #     }
+/// #     fn calc_diff(&mut self, _: usize, _: &[f64], u: &[f64], node: &mut LqNode) {
+/// #         node.A[0] = 1.0;
+/// #         node.Q.fill(0.0);
+/// #         node.q.fill(0.0);
+/// #         node.B.fill(1.0);
+/// #         node.S.fill(0.0);
+/// #         node.R.fill(1.0);
+/// #         node.r.copy_from_slice(u);
+/// #     }
+/// # }
+/// /// x = 3.
+/// struct Arrive;
+/// impl Constraint for Arrive {
+///     fn size(&self) -> usize { 1 }
+///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[3.0], &[3.0]) }
+///     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) { g[0] = x[0]; }
+///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+///         gx.fill(1.0);
+///         gu.fill(0.0);
+///     }
+/// }
+///
+/// // x⁺ = x + u, ℓ = ½ u², from 0 to 3 in 6 knots: u = ½ at each, and the multiplier is −½.
+/// let end = Constrained::new(Box::new(Integrator { nu: 0 }), Box::new(Arrive));
+/// let mut problem = Problem::new(vec![0.0], vec![Box::new(Integrator { nu: 1 })], vec![0; 6], Box::new(end))?;
+/// let mut solver = AugmentedLagrangian::new(&problem);
+/// let solution = solver.solve(&mut problem, &[0.0; 7], &[0.0; 6])?;
+/// assert_eq!(solution.status, Status::Converged);
+/// assert!(solution.us.iter().all(|u| (u - 0.5).abs() < 1e-6));
+/// assert!((solver.outcome().multipliers[6][0] + 0.5).abs() < 1e-5);
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct AugmentedLagrangian {
+    /// May be changed between solves.
+    pub settings: ConstraintSettings,
+    /// The settings of the inner solves; their tolerances are chosen.
+    pub inner: Settings,
+    solver: Fddp,
+    outcome: Outcome,
+    /// The adjoint state, and its predecessor.
+    adjoint: [DVector<f64>; 2],
+}
+
+/// What a constrained solve says beside its [`Solution`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Outcome {
+    /// The cost Σ ℓ without the terms of the constraints.
+    pub cost: f64,
+    /// The largest distance of a constraint from its bounds, or gap of the dynamics.
+    pub primal: f64,
+    /// The largest entry of the gradient of the Lagrangian by the controls, projected on their bounds.
+    pub dual: f64,
+    /// The multipliers y of each knot: positive at an upper bound, negative at a lower one, none where there is no
+    /// constraint.
+    pub multipliers: Vec<Vec<f64>>,
+    /// 1/μ at the end.
+    pub penalty: f64,
+    /// Inner solves.
+    pub solves: usize,
+    /// Iterations of all of them.
+    pub iterations: usize,
+}
+
+impl AugmentedLagrangian {
+    /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
+    pub fn new(problem: &Problem) -> Self {
+        let adjoint = [(); 2].map(|()| DVector::zeros(problem.ndx()));
+        let (settings, inner) = (ConstraintSettings::default(), Settings::default());
+        Self { settings, inner, solver: Fddp::new(problem), outcome: Outcome::default(), adjoint }
+    }
+
+    /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of zero.
+    ///
+    /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances,
+    /// [`Status::Infeasible`] if the penalty reached its limit and the constraints do not hold, or that of the inner solve
+    /// that stopped early. The cost of the solution contains the terms of the constraints, the outcome's does not.
+    ///
+    /// # Errors
+    /// [`Error`] as for [`Fddp::solve`], or if a constraint's bounds leave no value.
+    pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
+        let Self { settings, inner, solver, .. } = self;
+        settings.check()?;
+        problem.start_constraints(1.0 / settings.penalty_start)?;
+        solver.settings = inner.clone();
+        self.outcome = Outcome { penalty: settings.penalty_start, ..Outcome::default() };
+        let (tolerance, tolerance_dual) = (self.settings.tolerance, self.settings.tolerance_dual);
+        let mut mu = 1.0 / self.settings.penalty_start;
+        // the tolerances of one inner solve, which follow μ
+        let (mut eta, mut omega) = (mu.powf(0.1), mu);
+        let mut status = Status::MaxIterations;
+        for solve in 0..self.settings.max_solves {
+            // the expected decrease of an inner solve is about the square of its gradient
+            let dual = omega.max(0.1 * tolerance_dual);
+            (self.solver.settings.tolerance, self.solver.settings.tolerance_bounded) = (dual * dual, dual * dual);
+            let result = match solve {
+                0 => self.solver.solve(problem, xs, us)?,
+                _ => self.solver.resume(problem)?,
+            };
+            self.outcome.solves += 1;
+            self.outcome.iterations += result.trace.len();
+            if matches!(result.status, Status::NotFinite | Status::TimeLimit) {
+                status = result.status;
+                break;
+            }
+            // z − Π z at the iterate, and how far it is from a solution
+            self.measure(problem);
+            if self.outcome.primal <= eta.max(tolerance) {
+                problem.update_multipliers(&self.solver.solution.xs, &self.solver.solution.us);
+                if self.outcome.primal <= tolerance && self.outcome.dual <= tolerance_dual {
+                    status = Status::Converged;
+                    break;
+                }
+                eta = (eta * mu.powf(0.9)).max(0.1 * tolerance);
+                omega *= mu;
+            } else {
+                if mu <= 1.0 / self.settings.penalty_max {
+                    status = Status::Infeasible;
+                    break;
+                }
+                mu = (mu / self.settings.penalty_factor).max(1.0 / self.settings.penalty_max);
+                (eta, omega) = (mu.powf(0.1), mu);
+                problem.set_penalty(mu);
+            }
+        }
+        self.outcome.penalty = 1.0 / mu;
+        self.outcome.multipliers = (0..=problem.horizon()).map(|t| problem.multipliers(t)).collect();
+        self.solver.solution.status = status;
+        Ok(&self.solver.solution)
+    }
+
+    /// The result of the last solve.
+    pub fn solution(&self) -> &Solution {
+        &self.solver.solution
+    }
+
+    /// What the last solve says of the constraints.
+    pub fn outcome(&self) -> &Outcome {
+        &self.outcome
+    }
+
+    /// Cost and residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺, whose q and r hold the constraints' terms, which
+    /// are yᵀ∂g of the multipliers that an update would give.
+    fn measure(&mut self, problem: &mut Problem) {
+        let Self { solver, outcome, adjoint: [lambda, before], .. } = self;
+        let horizon = problem.horizon();
+        let Solution { xs, us, gap, cost, .. } = &solver.solution;
+        problem.calc_diff(xs, us, &mut solver.nodes);
+        (outcome.primal, outcome.cost, outcome.dual) = (*gap, *cost, 0.0);
+        lambda.copy_from(&solver.nodes[horizon].q);
+        for t in (0..horizon).rev() {
+            let node = &solver.nodes[t];
+            let u = &us[problem.control_range(t)];
+            for (j, u) in u.iter().enumerate() {
+                let slope = node.r[j] + node.B.column(j).dot(lambda);
+                let (lower, upper) = match problem.action(t).bounds(t) {
+                    Some((lower, upper)) => (lower[j], upper[j]),
+                    None => (f64::NEG_INFINITY, f64::INFINITY),
+                };
+                // u = the projection of u − ∂L/∂u into its bounds
+                outcome.dual = outcome.dual.max((u - (u - slope).min(upper).max(lower)).abs());
+            }
+            before.copy_from(&node.q);
+            before.gemv_tr(1.0, &node.A, lambda, 1.0);
+            std::mem::swap(lambda, before);
+        }
+        for t in 0..=horizon {
+            let (x, u) = (solver.solution.shape().x(t), solver.solution.shape().u(t));
+            if let Some(constrained) = problem.constrained(t) {
+                let (violation, term) = constrained.evaluate(t, &xs[x], &us[u]);
+                outcome.primal = outcome.primal.max(violation);
+                outcome.cost -= term;
+            }
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! One step of the Riccati recursion, of a dense knot or of one of semi-implicit Euler.
+#![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
+
+use crate::box_qp::BoxQp;
+use crate::dense::{SLACK, View, add_product_lower, add_scaled_product, copy, copy_symmetric, product, transpose};
+use crate::euler::Euler;
+use crate::factor::{eliminate, solve_right};
+use crate::lq::{DIVERGED, Hessian, LqKnot, LqNode};
+use crate::sweep::SweepError;
+use crate::vector::Vector;
+
+/// The least ndx for which the form of Euler steps is worth its bookkeeping, as `benches/riccati.rs` measured.
+const EULER_FROM: usize = 16;
+
+/// Scratch of a step. Matrices are column-major with slack rows; P has the stride n + SLACK, the others `ld`.
+#[derive(Debug, Clone)]
+pub(crate) struct Work {
+    /// Vxx⁺, symmetric and full.
+    pub(crate) P: Vec<f64>,
+    /// Vx⁺, and then Vx⁺ + Vxx⁺ f.
+    pub(crate) p: Vec<f64>,
+    /// [B A]ᵀ, or of their last rows, as the columns of H are ordered.
+    pub(crate) F: Vec<f64>,
+    /// (P [B A] and so on)ᵀ.
+    pub(crate) W: Vec<f64>,
+    /// The quadratic form.
+    pub(crate) H: Vec<f64>,
+    /// Lᵀ for the back substitution.
+    upper: Vec<f64>,
+    pub(crate) euler: Euler,
+    qp: BoxQp,
+    /// The curvature of the dynamics, one for each number of controls.
+    hessians: Vec<Hessian>,
+}
+
+/// The stride of F, W and H with their m + n + 1 rows.
+pub(crate) fn stride(n: usize, m: usize) -> usize {
+    m + n + 1 + SLACK
+}
+
+impl Work {
+    /// Room for knots with n states and at most m controls.
+    pub(crate) fn new(nodes: &[LqNode], n: usize, m: usize) -> Self {
+        let mut sizes: Vec<_> = nodes.iter().map(LqNode::nu).collect();
+        sizes.sort_unstable();
+        sizes.dedup();
+        Self {
+            P: vec![0.0; (n + SLACK) * n],
+            p: vec![0.0; n],
+            F: vec![0.0; stride(n, m) * n],
+            W: vec![0.0; stride(n, m) * n],
+            H: vec![0.0; stride(n, m) * (m + n)],
+            upper: vec![0.0; (m + SLACK) * m],
+            euler: Euler::new(n),
+            qp: BoxQp::new(m),
+            hessians: sizes.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
+        }
+    }
+
+    /// V = ½ δxᵀ Q δx + qᵀ δx at the terminal knot.
+    #[inline(always)]
+    pub(crate) fn start(&mut self, node: &LqNode) {
+        let n = node.ndx();
+        self.p.copy_from_slice(node.q.as_slice());
+        for j in 0..n {
+            self.P[j * (n + SLACK)..][..n].copy_from_slice(&node.Q.as_slice()[j * n..][..n]);
+        }
+    }
+
+    /// One Riccati step: P, p of knot t + 1 become those of knot t, and the gains of knot t are written.
+    #[inline(always)]
+    pub(crate) fn step<V: Vector, const NR: usize>(
+        &mut self,
+        t: usize,
+        node: &LqNode,
+        knot: &mut LqKnot,
+        regularisation: f64,
+        curvature: &mut impl FnMut(usize, &[f64], &mut Hessian) -> bool,
+    ) -> Result<(), SweepError> {
+        let (n, m) = (node.ndx(), node.nu());
+        let (ld, rows, last) = (stride(n, m), m + n + 1, m + n);
+        // P f + p, the gradient at the predicted state
+        for k in 0..n {
+            if node.f[k] != 0.0 {
+                add_scaled_product(&mut self.p, node.f[k], &self.P[k * (n + SLACK)..][..n], &[1.0]);
+            }
+        }
+        let euler = node.structure.euler().filter(|_| n >= EULER_FROM);
+        // The order of the states in H: the i-th is the (i + shift)-th of x, counted around.
+        let shift = if euler.is_some() { n / 2 } else { 0 };
+        self.fill::<V>(node, shift);
+        let hessian = self.hessians.iter_mut().find(|hessian| hessian.uu.nrows() == m).expect("one for each size");
+        if curvature(t, &self.p, hessian) {
+            self.add_hessian(shift, m);
+        }
+        match euler {
+            Some((dt, blocks)) => self.add_euler::<V, NR>(m, dt, blocks, node),
+            None => self.add_dense::<V, NR>(node),
+        }
+        let Self { P, p, H, upper, qp, .. } = self;
+
+        // Quu += ϱ I
+        for j in 0..m {
+            H[j * ld + j] += regularisation;
+            knot.Qu[j] = H[j * ld + last];
+        }
+        copy_symmetric::<V>(knot.Quu.as_mut_slice(), m, H, ld, m);
+
+        let failed = |row: usize, pivot: f64| match pivot.is_finite() {
+            true => SweepError::NotPositive { knot: t, row, pivot },
+            false => SweepError::NotFinite { knot: t },
+        };
+        // The controls that are eliminated: those not at a bound.
+        let bounded = node.is_bounded();
+        let free = if bounded {
+            let (lower, upper) = (node.lower.as_slice(), node.upper.as_slice());
+            let start = knot.k.iter().map(|k| -k);
+            qp.solve::<V, NR>(&knot.Quu, knot.Qu.as_slice(), lower, upper, start)
+                .map_err(|(row, pivot)| failed(row, pivot))?;
+            keep_free(H, ld, rows, m, n, &qp.free);
+            qp.free.len()
+        } else {
+            m
+        };
+
+        // L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y
+        let rows = free + n + 1;
+        if let Err((row, pivot)) = eliminate::<V, NR>(H, ld, rows, free + n, free) {
+            return Err(failed(if bounded { qp.free[row] } else { row }, pivot));
+        }
+        let (split, stride) = (n - shift, n + SLACK); // states in H before and after the turn
+        copy_symmetric::<V>(&mut P[shift * stride + shift..], stride, &H[free * ld + free..], ld, split);
+        for j in 0..split {
+            p[shift + j] = H[(free + j) * ld + free + n];
+        }
+        if shift > 0 {
+            copy_symmetric::<V>(P, stride, &H[(free + split) * ld + free + split..], ld, shift);
+            transpose(P, stride, shift, &H[free * ld..], ld, free + split..free + n, 0..split);
+            for j in 0..split {
+                copy::<V>(&mut P[(shift + j) * stride..], &H[(free + j) * ld + free + split..][..shift]);
+            }
+            for j in 0..shift {
+                p[j] = H[(free + split + j) * ld + free + n];
+            }
+        }
+
+        // [K k]ᵀ = −[X; yᵀ] L⁻¹
+        solve_right::<V, NR>(H, ld, free, rows, free, upper);
+        if bounded {
+            knot.K.fill(0.0);
+            knot.k.copy_from_slice(&qp.x[..m]);
+            for j in 0..m {
+                if qp.free.binary_search(&j).is_err() {
+                    knot.Qu[j] = 0.0;
+                }
+            }
+        }
+        let K = knot.K.as_mut_slice();
+        if bounded {
+            for i in 0..n {
+                let state = if i < split { i + shift } else { i - split };
+                for j in 0..free {
+                    K[state * m + qp.free[j]] = -H[j * ld + free + i];
+                }
+            }
+        } else {
+            transpose(&mut K[shift * m..], m, 0, H, ld, m..m + split, 0..m);
+            transpose(K, m, 0, H, ld, m + split..m + n, 0..m);
+            for K in K {
+                *K = -*K;
+            }
+        }
+        if !bounded {
+            for j in 0..m {
+                knot.k[j] = -H[j * ld + free + n];
+            }
+        }
+        Ok(())
+    }
+
+    /// H = [R ·; S Q; rᵀ qᵀ], the states turned by `shift`.
+    #[inline(always)]
+    fn fill<V: Vector>(&mut self, node: &LqNode, shift: usize) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (ld, split) = (stride(n, m), n - shift);
+        for j in 0..m {
+            let column = &mut self.H[j * ld..][..ld];
+            copy::<V>(column, &node.R.as_slice()[j * m..][..m]);
+            turn::<V>(&mut column[m..], &node.S.as_slice()[j * n..][..n], shift);
+            column[m + n] = node.r[j];
+        }
+        for j in 0..n {
+            let state = if j < split { j + shift } else { j - split };
+            let column = &mut self.H[(m + j) * ld..][..ld];
+            turn::<V>(&mut column[m..], &node.Q.as_slice()[state * n..][..n], shift);
+            column[m + n] = node.q[state];
+        }
+    }
+
+    /// H += [ψuu ·; ψxu ψxx; 0 0], the states turned by `shift`.
+    fn add_hessian(&mut self, shift: usize, m: usize) {
+        let n = self.p.len();
+        let (ld, state) = (stride(n, m), |i: usize| (i + shift) % n);
+        let Some(Hessian { xx, xu, uu }) = self.hessians.iter().find(|hessian| hessian.uu.nrows() == m) else { return };
+        for j in 0..m {
+            for i in 0..m {
+                self.H[j * ld + i] += uu[(i, j)];
+            }
+            for i in 0..n {
+                self.H[j * ld + m + i] += xu[(state(i), j)];
+            }
+        }
+        for j in 0..n {
+            for i in j..n {
+                self.H[(m + j) * ld + m + i] += xx[(state(i), state(j))];
+            }
+        }
+    }
+
+    /// H += W [B A],   W = [P B, P A, P f + p]ᵀ.
+    #[inline(always)]
+    fn add_dense<V: Vector, const NR: usize>(&mut self, node: &LqNode) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (ld, rows) = (stride(n, m), m + n);
+        let Self { P, p, F, W, H, .. } = self;
+        transpose(F, ld, 0, node.B.as_slice(), n, 0..n, 0..m);
+        transpose(F, ld, m, node.A.as_slice(), n, 0..n, 0..n);
+        let F = View { data: F, stride: ld };
+        product::<V, NR>(W, ld, [rows, n, n], F, View { data: P, stride: n + SLACK });
+        for k in 0..n {
+            W[k * ld + rows] = p[k];
+        }
+        add_product_lower::<V, NR>(H, ld, [rows + 1, rows, n], View { data: W, stride: ld }, F);
+    }
+
+    /// Vxx += ϱ I, and out to the knot with both if they are finite.
+    #[inline(always)]
+    pub(crate) fn finish_value<V: Vector>(
+        &mut self,
+        t: usize,
+        knot: &mut LqKnot,
+        regularisation: f64,
+    ) -> Result<(), SweepError> {
+        let n = self.p.len();
+        knot.Vx.as_mut_slice().copy_from_slice(&self.p);
+        let mut finite = all_bounded(&self.p);
+        for j in 0..n {
+            let column = &mut self.P[j * (n + SLACK)..][..n];
+            column[j] += regularisation;
+            copy::<V>(&mut knot.Vxx.as_mut_slice()[j * n..], column);
+            finite &= all_bounded(column);
+        }
+        if finite { Ok(()) } else { Err(SweepError::NotFinite { knot: t }) }
+    }
+}
+
+/// `to` = x[shift..], x[..shift].
+#[inline(always)]
+fn turn<V: Vector>(to: &mut [f64], x: &[f64], shift: usize) {
+    copy::<V>(to, &x[shift..]);
+    copy::<V>(&mut to[x.len() - shift..], &x[..shift]);
+}
+
+/// Whether no entry has diverged; false for a NaN.
+#[inline(always)]
+fn all_bounded(x: &[f64]) -> bool {
+    let mut bounded = true;
+    for x in x {
+        bounded &= x.abs() < DIVERGED;
+    }
+    bounded
+}
+
+/// Moves the rows and columns of the `free` ones of m controls to the front of H, and what follows up behind them.
+#[inline(always)]
+fn keep_free(H: &mut [f64], stride: usize, rows: usize, m: usize, n: usize, free: &[usize]) {
+    let kept = free.len();
+    for (to, from) in free.iter().copied().chain(m..m + n).enumerate() {
+        for (row, &i) in free.iter().enumerate() {
+            H[to * stride + row] = H[from * stride + i];
+        }
+        H.copy_within(from * stride + m..from * stride + rows, to * stride + kept);
+    }
+}

@@ -1,0 +1,48 @@
+//! Receding horizons: the solution of one problem as the warm start of the next.
+
+use crate::error::Error;
+use crate::fddp::Fddp;
+use crate::lq::LqNode;
+use crate::problem::Problem;
+use crate::sweep::Sweep;
+
+impl Fddp {
+    /// Makes the solution a warm start for a problem that was [shifted](Problem::shift) by a knot since: states, controls
+    /// and gains move one knot to the front, the last control stays (where the number of controls changes, it is zero),
+    /// and the last state follows from it. Allocates nothing unless numbers of controls differ along the horizon.
+    ///
+    /// # Errors
+    /// [`Error`] if the problem is not the one solved before, shifted once.
+    pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
+        let (old, new) = (self.solution.shape(), problem.shape());
+        let (horizon, ndx) = (new.horizon(), new.ndx);
+        if old.horizon() != horizon {
+            return Err(Error::Length { name: "stages", expected: old.horizon(), found: horizon });
+        }
+        for t in 0..horizon - 1 {
+            if old.nu(t + 1) != new.nu(t) {
+                return Err(Error::Dimension { node: t, name: "nu", expected: old.nu(t + 1), found: new.nu(t) });
+            }
+        }
+        for (name, expected, found) in [("nx", old.nx, new.nx), ("ndx", old.ndx, new.ndx)] {
+            if expected != found {
+                return Err(Error::Dimension { node: 0, name, expected, found });
+            }
+        }
+        self.solution.shift(new);
+        if (0..horizon).any(|t| self.nodes[t].nu() != new.nu(t)) {
+            self.nodes[..horizon].rotate_left(1);
+            self.nodes[horizon - 1] = LqNode::zeros(ndx, new.nu(horizon - 1));
+            self.sweep = Sweep::new(&self.nodes);
+        }
+        self.trials.reshape(problem);
+        // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
+        let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
+        let next = &mut self.next[..end.len()];
+        problem.action_mut(horizon - 1).calc(horizon - 1, &self.solution.xs[x], &self.solution.us[u], next);
+        if next.iter().all(|x| x.is_finite()) {
+            self.solution.xs[end].copy_from_slice(next);
+        }
+        Ok(())
+    }
+}

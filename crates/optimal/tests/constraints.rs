@@ -1,0 +1,231 @@
+//! Constrained problems: the optima of IPOPT, the conditions of optimality, and what has no solution.
+
+#![allow(non_snake_case)] // Q
+
+mod common;
+
+use common::{Linear, Unicycle, cartpole_action, random, random_matrix, random_node};
+use condyle_optimal::{
+    ActionModel, AugmentedLagrangian, Constrained, Constraint, ConstraintSettings, LqNode, NumDiff, Problem, Status,
+};
+use nalgebra::{DMatrix, DVector};
+use serde_json::Value;
+
+/// Both solvers stop at residuals of 1e-7 or less; the cost is flat there, states and controls follow the residuals.
+const COST: f64 = 1e-6;
+const TRAJECTORY: f64 = 1e-4;
+
+/// lower ≤ C (x, u) + distance ≤ upper, where `disc` replaces the first row by the squared distance from a point.
+struct Rows {
+    c: DMatrix<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    disc: Option<[f64; 2]>,
+}
+
+impl Rows {
+    fn new(rows: &[(&[f64], f64, f64)]) -> Self {
+        Self {
+            c: DMatrix::from_fn(rows.len(), rows[0].0.len(), |i, j| rows[i].0[j]),
+            lower: rows.iter().map(|row| row.1).collect(),
+            upper: rows.iter().map(|row| row.2).collect(),
+            disc: None,
+        }
+    }
+}
+
+impl Constraint for Rows {
+    fn size(&self) -> usize {
+        self.lower.len()
+    }
+    fn bounds(&self, _: usize) -> (&[f64], &[f64]) {
+        (&self.lower, &self.upper)
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], g: &mut [f64]) {
+        let z = DVector::from_iterator(x.len() + u.len(), x.iter().chain(u).copied());
+        g.copy_from_slice((&self.c * z).as_slice());
+        if let Some([a, b]) = self.disc {
+            g[0] = (x[0] - a).powi(2) + (x[1] - b).powi(2);
+        }
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+        let n = x.len();
+        gx.copy_from(&self.c.columns(0, n));
+        gu.copy_from(&self.c.columns(n, self.c.ncols() - n));
+        if let Some([a, b]) = self.disc {
+            (gx[(0, 0)], gx[(0, 1)]) = (2.0 * (x[0] - a), 2.0 * (x[1] - b));
+        }
+    }
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let of = |v: &Value| if v.is_array() { numbers(v) } else { vec![v.as_f64().unwrap()] };
+    value.as_array().unwrap().iter().flat_map(of).collect()
+}
+
+fn reference(name: &str) -> Value {
+    let data: Value = serde_json::from_str(include_str!("data/ipopt.json")).unwrap();
+    data[name].clone()
+}
+
+/// Solves and compares with IPOPT.
+fn compare(reference: &Value, running: Constrained, terminal: Constrained) {
+    let (x0, horizon) = (numbers(&reference["x0"]), reference["horizon"].as_u64().unwrap() as usize);
+    let mut problem = Problem::new(x0.clone(), vec![Box::new(running)], vec![0; horizon], Box::new(terminal)).unwrap();
+    let xs = common::straight(&x0, &vec![0.0; x0.len()], horizon);
+    let us = vec![0.0; problem.control_range(horizon).end];
+    let mut solver = AugmentedLagrangian::new(&problem);
+    solver.settings = ConstraintSettings { tolerance: 1e-7, tolerance_dual: 1e-6, ..ConstraintSettings::default() };
+    let solution = solver.solve(&mut problem, &xs, &us).unwrap().clone();
+    let outcome = solver.outcome();
+    println!(
+        "{:?}: primal {:e}, dual {:e}, penalty {:e}, {} solves, {} iterations, cost {}",
+        solution.status,
+        outcome.primal,
+        outcome.dual,
+        outcome.penalty,
+        outcome.solves,
+        outcome.iterations,
+        outcome.cost
+    );
+    assert_eq!(solution.status, Status::Converged);
+    assert!(outcome.primal <= 1e-7 && outcome.dual <= 1e-6);
+    let cost = reference["cost"].as_f64().unwrap();
+    assert!((outcome.cost - cost).abs() < COST * (1.0 + cost.abs()), "{} {cost}", outcome.cost);
+    for (name, ours, theirs) in [("xs", &solution.xs, &reference["xs"]), ("us", &solution.us, &reference["us"])] {
+        let theirs = numbers(theirs);
+        assert_eq!(ours.len(), theirs.len());
+        let error = ours.iter().zip(&theirs).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+        assert!(error < TRAJECTORY, "{name} differs by {error:e}");
+    }
+}
+
+/// Around a disc to rest at the origin: an inequality of the state that is not convex, bounds, equalities at the end.
+#[test]
+fn parking_is_ipopts() {
+    let reference = reference("park");
+    let disc = numbers(&reference["disc"]);
+    let infinite = f64::INFINITY;
+    let mut rows = Rows::new(&[
+        (&[0.0; 5], disc[2] * disc[2], infinite),
+        (&[0.0, 0.0, 0.0, 1.0, 0.0], -2.0, 2.0),
+        (&[0.0, 0.0, 0.0, 0.0, 1.0], -1.5, 1.5),
+    ]);
+    rows.disc = Some([disc[0], disc[1]]);
+    let end = Rows::new(&[(&[1.0, 0.0, 0.0], 0.0, 0.0), (&[0.0, 1.0, 0.0], 0.0, 0.0), (&[0.0, 0.0, 1.0], 0.0, 0.0)]);
+    let running = Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows));
+    let terminal = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(end));
+    compare(&reference, running, terminal);
+}
+
+/// A falling pole is caught on a short track with little force.
+#[test]
+fn catching_a_pole_is_ipopts() {
+    let rows = Rows::new(&[(&[1.0, 0.0, 0.0, 0.0, 0.0], -0.42, 0.3), (&[0.0, 0.0, 0.0, 0.0, 1.0], -11.0, 8.0)]);
+    let unit = |i: usize| -> Vec<f64> { (0..4).map(|j| f64::from(u8::from(i == j))).collect() };
+    let units: Vec<Vec<f64>> = (0..4).map(unit).collect();
+    let end: Vec<(&[f64], f64, f64)> = units.iter().map(|row| (row.as_slice(), 0.0, 0.0)).collect();
+    let running = Constrained::new(Box::new(cartpole_action()), Box::new(rows));
+    let last = common::Cartpole { nu: 0, lanes: 1, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
+    compare(&reference("catch"), running, Constrained::new(Box::new(last), Box::new(Rows::new(&end))));
+}
+
+/// Of a linear-quadratic problem with equalities at the end the optimum is the solution of one linear system.
+#[test]
+fn equalities_of_a_linear_problem_are_a_linear_system() {
+    let mut random = random();
+    let (n, m, horizon) = (4, 2, 5);
+    let mut node = random_node(&mut random, n, m);
+    node.A *= 0.5;
+    let end = random_node(&mut random, n, 0);
+    let c = random_matrix(&mut random, 2, n);
+    let d = [0.3, -0.7];
+    let rows = Rows { c: c.clone(), lower: d.to_vec(), upper: d.to_vec(), disc: None };
+    let x0 = random_matrix(&mut random, n, 1).column(0).into_owned();
+    let terminal = Constrained::new(Box::new(Linear(end.clone())), Box::new(rows));
+    let models: Vec<Box<dyn ActionModel>> = vec![Box::new(Linear(node.clone()))];
+    let mut problem = Problem::new(x0.as_slice().to_vec(), models, vec![0; horizon], Box::new(terminal)).unwrap();
+    let mut solver = AugmentedLagrangian::new(&problem);
+    let solution = solver.solve(&mut problem, &vec![0.0; n * (horizon + 1)], &vec![0.0; m * horizon]).unwrap();
+    assert_eq!(solution.status, Status::Converged);
+
+    // unknowns: u₀, x₁, u₁, …, x_N, then the multipliers of the dynamics, then y
+    let (block, primal) = (n + m, (n + m) * horizon);
+    let size = primal + n * horizon + 2;
+    let (mut kkt, mut rhs) = (DMatrix::zeros(size, size), DVector::zeros(size));
+    for t in 0..horizon {
+        let (u, next, lambda) = (t * block, t * block + m, primal + t * n);
+        kkt.view_mut((u, u), (m, m)).copy_from(&node.R);
+        rhs.rows_mut(u, m).copy_from(&-&node.r);
+        kkt.view_mut((u, lambda), (m, n)).copy_from(&node.B.transpose());
+        kkt.view_mut((next, lambda), (n, n)).copy_from(&-DMatrix::identity(n, n));
+        rhs.rows_mut(lambda, n).copy_from(&-&node.f);
+        let (Q, q) = if t + 1 < horizon { (&node.Q, &node.q) } else { (&end.Q, &end.q) };
+        kkt.view_mut((next, next), (n, n)).copy_from(Q);
+        rhs.rows_mut(next, n).copy_from(&-q);
+        if t == 0 {
+            let moved = rhs.rows(u, m) - node.S.transpose() * &x0;
+            rhs.rows_mut(u, m).copy_from(&moved);
+            let moved = rhs.rows(lambda, n) - &node.A * &x0;
+            rhs.rows_mut(lambda, n).copy_from(&moved);
+        } else {
+            let x = u - n;
+            kkt.view_mut((x, u), (n, m)).copy_from(&node.S);
+            kkt.view_mut((x, lambda), (n, n)).copy_from(&node.A.transpose());
+        }
+    }
+    let last = primal - n;
+    kkt.view_mut((last, size - 2), (n, 2)).copy_from(&c.transpose());
+    rhs.rows_mut(size - 2, 2).copy_from_slice(&d);
+    kkt.fill_lower_triangle_with_upper_triangle();
+    let exact = kkt.lu().solve(&rhs).unwrap();
+    for t in 0..horizon {
+        for j in 0..m {
+            assert!((solution.u(t)[j] - exact[t * block + j]).abs() < 1e-5, "u{t}[{j}]");
+        }
+    }
+    for i in 0..2 {
+        assert!((solver.outcome().multipliers[horizon][i] - exact[size - 2 + i]).abs() < 1e-4);
+    }
+}
+
+/// The terms of the augmented Lagrangian are differentiated rightly, whatever side of its bounds a constraint is on.
+#[test]
+fn derivatives_are_those_of_the_terms() {
+    let rows = || {
+        let mut rows =
+            Rows::new(&[(&[0.0; 5], 1.5, 2.0), (&[1.0, 0.5, 0.0, 2.0, 0.0], -0.1, 0.1), (&[0.3; 5], 0.0, 0.0)]);
+        rows.disc = Some([0.4, 0.1]);
+        rows
+    };
+    let action = || Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows()));
+    for x in [[0.3, -0.2, 0.7], [1.7, -0.2, 0.7], [2.7, 0.2, 0.7]] {
+        let (mut ours, mut numeric) = (LqNode::zeros(3, 2), LqNode::zeros(3, 2));
+        action().calc_diff(0, &x, &[0.5, -1.5], &mut ours);
+        NumDiff(action()).calc_diff(0, &x, &[0.5, -1.5], &mut numeric);
+        assert!((&ours.q - &numeric.q).amax() < 1e-5 && (&ours.r - &numeric.r).amax() < 1e-5);
+    }
+}
+
+#[test]
+fn what_cannot_be_met_is_said() {
+    let solve = |lower: f64, upper: f64, u: f64| {
+        // x after 10 steps of 0.1 at u ≤ 1 is at most 1 further on
+        let rows = Rows::new(&[(&[0.0, 0.0, 0.0, 1.0, 0.0], -u, u)]);
+        let end = Rows::new(&[(&[1.0, 0.0, 0.0], lower, upper)]);
+        let running = Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows));
+        let terminal = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(end));
+        let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(running)], vec![0; 10], Box::new(terminal)).unwrap();
+        let mut solver = AugmentedLagrangian::new(&problem);
+        let result = solver.solve(&mut problem, &[0.0; 33], &[0.0; 20]).map(|solution| solution.status);
+        (result, solver.outcome().clone())
+    };
+    let (status, outcome) = solve(3.0, 3.0, 1.0);
+    assert_eq!(status, Ok(Status::Infeasible));
+    assert!(outcome.primal > 0.1);
+    let (status, outcome) = solve(0.5, 0.8, 1.0);
+    assert_eq!(status, Ok(Status::Converged));
+    assert!(outcome.multipliers[10][0] < 0.0); // the lower bound holds it
+    let error = solve(2.0, 1.0, 1.0).0.unwrap_err().to_string();
+    assert_eq!(error, "knot 10: constraint 0 must be at least 2 and at most 1");
+}
