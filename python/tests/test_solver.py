@@ -1,0 +1,55 @@
+"""Solvers from Python: horizons that move on, time budgets, bounds and methods."""
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, ProblemError
+
+KNOTS = 12
+
+
+def reach():
+    arm = condyle.robots.arm7()
+    x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+    rest = Cost.state("rest", 1e-1, x0)
+    running = FreeDynamics(arm, 0.05, [rest, Cost.control("effort", 1e-4, np.zeros(7))])
+    terminal = FreeDynamics(arm, None, [rest, Cost.frame_translation("reach", 1e3, arm, "tool", [0.4, 0.2, 0.5])])
+    problem = Problem(x0, [running], [0] * KNOTS, terminal)
+    return problem, np.tile(x0, (KNOTS + 1, 1)), np.tile(running.quasi_static(x0), (KNOTS, 1))
+
+
+def test_a_horizon_moves_on_with_its_solution() -> None:
+    problem, xs, us = reach()
+    solver = Fddp(problem, max_iterations=3, tolerance=0)
+    first = solver.solve(xs, us)
+    solver.shift(0)
+    problem.set_x0(first.xs[1] + 1e-3)
+    second = solver.resume()
+    assert second.status == "max_iterations" and len(second.trace) == 3
+    np.testing.assert_allclose(second.xs[0], first.xs[1] + 1e-3, atol=1e-12)
+    with pytest.raises(ProblemError, match="there is no action model 4"):
+        solver.shift(4)
+
+
+def test_without_time_a_solve_returns_what_it_has() -> None:
+    problem, xs, us = reach()
+    solution = Fddp(problem, time_budget=0.0).solve(xs, us)
+    assert solution.status == "time_limit" and not solution.trace
+    np.testing.assert_array_equal(solution.us, us)
+    with pytest.raises(ValueError, match="time_budget: expected at least 0 seconds"):
+        Fddp(problem, time_budget=-1.0)
+
+
+def test_bounds_and_method() -> None:
+    problem, xs, us = reach()
+    optimum = Fddp(problem).solve(xs, us)
+    again = Fddp(problem, method="ddp").solve(optimum.xs, optimum.us)
+    assert again.status == "converged" and abs(again.cost - optimum.cost) < 1e-9
+    with pytest.raises(ValueError, match="method: expected 'fddp' or 'ddp', found 'newton'"):
+        Fddp(problem, method="newton")
+    arm = condyle.robots.arm7()
+    wrong = FreeDynamics(arm, 0.05, [], lower=np.ones(7), upper=np.zeros(7))
+    problem = Problem(xs[0], [wrong], [0], FreeDynamics(arm, None, []))
+    with pytest.raises(ProblemError, match="control 0 must be at least 1 and at most 0"):
+        Fddp(problem).solve(xs[:2], us[:1])
