@@ -204,7 +204,7 @@ impl AugmentedLagrangian {
             let (x, u) = (solver.solution.shape().x(t), solver.solution.shape().u(t));
             if let Some(constrained) = problem.constrained(t) {
                 let (violation, term) = constrained.evaluate(t, &xs[x], &us[u]);
-                outcome.primal = outcome.primal.max(violation);
+                outcome.primal = if violation.is_nan() { f64::INFINITY } else { outcome.primal.max(violation) };
                 outcome.cost -= term;
             }
         }

@@ -102,7 +102,11 @@ impl Constrained {
         for i in 0..size {
             let (g, y) = (self.g[i], y.map_or(0.0, |y| y[i]));
             let z = g + self.mu * y;
-            let outside = |z: f64| (z - upper[i]).max(0.0) + (z - lower[i]).min(0.0);
+            let outside = |z: f64| match z {
+                z if z > upper[i] => z - upper[i],
+                z if z >= lower[i] => 0.0,
+                z => z - lower[i], // a NaN stays one
+            };
             violation = violation.max(outside(g).abs());
             self.g[i] = outside(z);
             term += 0.5 * (self.g[i] * self.g[i] / self.mu - self.mu * y * y);

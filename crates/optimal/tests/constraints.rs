@@ -207,6 +207,38 @@ fn derivatives_are_those_of_the_terms() {
     }
 }
 
+/// NaN once the state has moved.
+struct Broken;
+
+impl Constraint for Broken {
+    fn size(&self) -> usize {
+        1
+    }
+    fn bounds(&self, _: usize) -> (&[f64], &[f64]) {
+        (&[0.5], &[1.0])
+    }
+    fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) {
+        g[0] = if x[0] < 0.1 { x[0] } else { f64::NAN };
+    }
+    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+        gx.copy_from_slice(&[1.0, 0.0, 0.0]);
+        gu.fill(0.0);
+    }
+}
+
+#[test]
+fn a_constraint_that_is_not_a_number_never_counts_as_met() {
+    let running = Box::new(Unicycle { nu: 2, lanes: 1 });
+    let terminal = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(Broken));
+    let mut problem = Problem::new(vec![0.0; 3], vec![running], vec![0; 5], Box::new(terminal)).unwrap();
+    let mut solver = AugmentedLagrangian::new(&problem);
+    let solution = solver.solve(&mut problem, &[0.0; 18], &[0.0; 10]).unwrap();
+    assert!(solution.xs.iter().chain(&solution.us).all(|x| x.is_finite()));
+    assert_ne!(solution.status, Status::Converged);
+    let at_start = solver.solve(&mut problem, &[0.2; 18], &[0.0; 10]).unwrap();
+    assert_eq!(at_start.status, Status::NotFinite);
+}
+
 #[test]
 fn what_cannot_be_met_is_said() {
     let solve = |lower: f64, upper: f64, u: f64| {
