@@ -5,12 +5,14 @@
 //! when the model is built, so that inside, S is the same for all of them.
 
 mod group;
+mod motion;
 
 use crate::dispatch::Kernel;
 use crate::layout::Layout;
 use crate::model::Mimic;
 use condyle_spatial::{Act, Force, Mat3, Motion, Quaternion, Scalar, Se3, Vec3};
 pub(crate) use group::GroupJacobian;
+pub(crate) use motion::{JointMotion, Turning};
 use serde::{Deserialize, Serialize};
 
 /// The kind of a joint, with what it needs to know.
@@ -52,17 +54,6 @@ pub enum Joint {
 /// How far from 1 rounding takes the length of a vector that was divided by it.
 const UNIT: f64 = 1e-15;
 
-/// A joint's velocity S q̇ or acceleration S q̈ in the body's frame, in the form that costs least to compute with.
-#[derive(Clone, Copy)]
-pub(crate) enum JointMotion<S> {
-    /// About z.
-    Turn(S),
-    /// Along z.
-    Slide(S),
-    /// Along several axes.
-    Any(Motion<S>),
-}
-
 /// Of each body's joint: see [`Joint::turns`]. What stands behind the last body has no meaning.
 #[derive(Clone, Debug)]
 #[repr(C)]
@@ -77,60 +68,6 @@ impl<S: Scalar> Turns<S> {
     pub(crate) fn new(bodies: usize) -> Self {
         let n = bodies.next_multiple_of(4);
         Self { sin: vec![S::zero(); n], cos: vec![S::zero(); n] }
-    }
-}
-
-impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(mut self, vJ: JointMotion<S>) -> Self {
-        match vJ {
-            JointMotion::Turn(x) => self.angular.z += x,
-            JointMotion::Slide(x) => self.linear.z += x,
-            JointMotion::Any(m) => self += m,
-        }
-        self
-    }
-}
-
-/// How a body turns, and how its origin accelerates: what the equations of Newton and Euler need.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct Turning<S> {
-    /// ω.
-    pub w: Vec3<S>,
-    /// ω̇.
-    pub dw: Vec3<S>,
-    /// The classical acceleration.
-    pub a: Vec3<S>,
-}
-
-impl<S: Scalar> JointMotion<S> {
-    fn motion(self) -> Motion<S> {
-        Motion::zero() + self
-    }
-
-    /// Adds a joint that moves with this velocity and with the acceleration aJ to what the body would do without it:
-    /// ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J.
-    #[inline(always)]
-    pub(crate) fn added_to(self, aJ: Self, Turning { mut w, mut dw, mut a }: Turning<S>) -> Turning<S> {
-        match (self, aJ) {
-            (Self::Turn(x), Self::Turn(xx)) => {
-                dw = Vec3::new(w.y.mul_add(x, dw.x), (-w.x).mul_add(x, dw.y), dw.z + xx);
-                w.z += x;
-            }
-            (Self::Slide(x), Self::Slide(xx)) => {
-                let twice = x + x;
-                a = Vec3::new(w.y.mul_add(twice, a.x), (-w.x).mul_add(twice, a.y), a.z + xx);
-            }
-            (vJ, aJ) => {
-                let (vJ, aJ) = (vJ.motion(), aJ.motion());
-                dw = w.cross_add(vJ.angular, dw + aJ.angular);
-                a = (w + w + vJ.angular).cross_add(vJ.linear, a + aJ.linear);
-                w += vJ.angular;
-            }
-        }
-        Turning { w, dw, a }
     }
 }
 

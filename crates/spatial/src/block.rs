@@ -75,9 +75,7 @@ impl<S: Block> Kernel for Scatter<'_, S> {
         let (n, mut i) = (from.len(), 0);
         let mut block = [S::zero(); MOST];
         while i + S::LANES <= n {
-            for k in 0..S::LANES {
-                block[k] = from[i + k];
-            }
+            block[..S::LANES].copy_from_slice(&from[i..i + S::LANES]);
             S::transpose(&mut block[..S::LANES]);
             for k in 0..rows {
                 block[k].store(&mut to[k * n + i..][..S::LANES]);

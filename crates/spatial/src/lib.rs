@@ -20,6 +20,7 @@
 #[doc(hidden)]
 pub mod block;
 mod dual;
+mod fused;
 mod inertia;
 #[doc(hidden)]
 pub mod lanes;

@@ -1,4 +1,5 @@
 //! A pass over steps of four bodies.
+#![allow(unsafe_code)]
 
 use super::steps::{Parents, Source};
 use super::{LANES, Plan};
@@ -74,15 +75,13 @@ struct Limbs<'a> {
 /// # Safety
 /// `T` is made of nothing else: a struct of spatial algebra or of kinematics, all `repr(C)`.
 #[inline(always)]
-#[allow(unsafe_code)]
 unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
-    const { assert!(size_of::<T>() % size_of::<Four>() == 0 && align_of::<T>() == align_of::<Four>()) };
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
     // SAFETY: by the caller.
     unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(x).cast(), size_of::<T>() / size_of::<Four>()) }
 }
 
 #[inline(always)]
-#[allow(unsafe_code)]
 fn moved<T: Copy>(mut x: T, by: &Move) -> T {
     // SAFETY: passes keep structs of vectors.
     let numbers = unsafe { vectors(&mut x) };
@@ -128,10 +127,8 @@ impl Layout for Limbs<'_> {
     }
     #[inline(always)]
     fn force(&self, f_ext: &[Force<Four>], i: usize) -> Option<Force<Four>> {
-        match f_ext.get(i) {
-            None => None,
-            Some(&f) => Some(Se3::new(self.plan.steps[i].reframing.lift(), Vec3::zero()).act_inv(f)),
-        }
+        let &f = f_ext.get(i)?; // not by `map`, which would not be inlined
+        Some(Se3::new(self.plan.steps[i].reframing.lift(), Vec3::zero()).act_inv(f))
     }
 
     #[inline(always)]
@@ -143,7 +140,6 @@ impl Layout for Limbs<'_> {
                 for (step, by) in &from[1..] {
                     let mut y = moved(of[*step], by);
                     // SAFETY: passes keep structs of vectors.
-                    #[allow(unsafe_code)]
                     let (x, y) = unsafe { (vectors(&mut x), vectors(&mut y)) };
                     for k in 0..x.len() {
                         x[k] += y[k];
@@ -182,7 +178,6 @@ impl Layout for Limbs<'_> {
         self.push(onto, i, x);
     }
     #[inline(always)]
-    #[allow(unsafe_code)]
     fn whole<T: Copy>(&self, i: usize, mut x: T) -> T {
         let [first, others @ ..] = &self.plan.steps[i].bodies;
         if others.iter().all(|other| other == first) {
@@ -312,7 +307,6 @@ impl Kernel for Call<'_> {
 /// `aba` if it is `forward`, else `rnea`, with the limbs side by side, where this model and `data` have them; whether they
 /// have.
 #[inline]
-#[allow(unsafe_code)]
 pub(crate) fn run<S: Scalar, R: Constant<S>>(
     forward: bool,
     model: &Model<R>,

@@ -27,7 +27,7 @@ fn many_limbs(seed: u64, root: Joint) -> Model {
         for joint in &joints[..2 + (seed as usize + limb) % 4] {
             last = tree.add(&mut rng, last, *joint);
         }
-        if seed % 3 == 0 {
+        if seed.is_multiple_of(3) {
             tree.follow(first + 1, first, -0.5, 0.2);
         }
         if limb == 1 {

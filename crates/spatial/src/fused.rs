@@ -1,0 +1,103 @@
+//! A single number that computes as a lane does.
+
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::Lanes;
+use crate::lanes::operators;
+use crate::scalar::Scalar;
+use crate::sin_cos;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// An `f64` whose products and sums are fused: what a lane is, alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
+pub struct Fused(pub f64);
+
+macro_rules! fused_operators {
+    ($($trait:ident $name:ident),*) => {$(
+        impl $trait for Fused {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, o: Self) -> Self {
+                Self(self.0.$name(o.0))
+            }
+        }
+    )*};
+}
+fused_operators!(Add add, Sub sub, Mul mul, Div div);
+operators!(Fused);
+
+impl Neg for Fused {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl Scalar for Fused {
+    type Mask = bool;
+    const LANES: usize = 1;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(self.0.mul_add(b.0, c.0))
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self(1.0 / self.0)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        if self.0.abs() <= sin_cos::LARGEST {
+            return sin_cos::double(self);
+        }
+        let (sin, cos) = self.0.sin_cos();
+        (Self(sin), Self(cos))
+    }
+    /// Four at a time: where products are fused, there are vectors of four.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
+        let (angles, others) = angles.as_chunks_mut::<4>();
+        let (cosines, other_cosines) = cosines.as_chunks_mut::<4>();
+        for (x, y) in angles.iter_mut().zip(cosines) {
+            let (sin, cos) = Lanes::<f64, 4>::from_array([x[0].0, x[1].0, x[2].0, x[3].0]).sin_cos();
+            (*x, *y) = (sin.to_array().map(Self), cos.to_array().map(Self));
+        }
+        for (sin, cos) in others.iter_mut().zip(other_cosines) {
+            (*sin, *cos) = sin.sin_cos();
+        }
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        Self(self.0.atan2(x.0))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs())
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self.0 < other.0
+    }
+    #[inline(always)]
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+    #[inline(always)]
+    fn and(a: bool, b: bool) -> bool {
+        a && b
+    }
+    #[inline(always)]
+    fn or(a: bool, b: bool) -> bool {
+        a || b
+    }
+}
