@@ -2214,8 +2214,8 @@ class InverseDynamics:
 class Lqr:
     """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
 
-    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no bound;
-    without R and B it has no controls, as at a terminal knot.
+    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
+    bound; without R and B it has no controls, as at a terminal knot.
 
     >>> from condyle.optimal import Lqr
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
