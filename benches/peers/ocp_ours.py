@@ -57,7 +57,7 @@ def our_contact(contact, gains):
     return condyle.Constraint(contact["frame"], kind, reference=axes, kp=gains[0], kd=gains[1], placement=placement)
 
 
-def our_action(stage, model, spec, terminal, bounded, others=()):
+def our_action(stage, model, spec, bounded, terminal=False, others=()):
     """An action; `others` are knots and the stages of those that differ from this one in their costs alone."""
     kind = stage["kind"]
     if kind == "unicycle":
@@ -99,7 +99,7 @@ class Ours:
         self.spec, bounded = spec, solver.startswith("box")
         model = our_robot(robot) if robot else None
         models, stages = self.phases(model, bounded)
-        terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, True, bounded)
+        terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, bounded, terminal=True)
         self.problem = optimal.Problem(spec["x0"], models, stages, terminal)
         settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
         if spec["init_reg"] is not None:
@@ -119,8 +119,7 @@ class Ours:
             serves.append(list(first).index(key))
 
         def action(stage, knots):
-            others = [(t, s) for t, s in knots if s is not stage]
-            return our_action(stage, model, self.spec, False, bounded, others)
+            return our_action(stage, model, self.spec, bounded, others=[(t, s) for t, s in knots if s is not stage])
 
         return [action(*phase) for phase in first.values()], serves
 

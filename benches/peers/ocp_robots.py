@@ -15,7 +15,7 @@ FRAMES = {
 
 
 class NotRunError(Exception):
-    """One of the libraries has not what a problem needs."""
+    """One of the libraries has not what a problem needs, or there is nothing to compare."""
 
 
 def bounds(numbers, infinite):

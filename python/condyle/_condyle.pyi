@@ -2195,7 +2195,7 @@ class InverseDynamics:
     model: the robot.
     dt: Δt in seconds.
     costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
-    integrator: as of `FreeDynamics`.
+    integrator, lower, upper: as of `FreeDynamics`.
 
     Raises `ProblemError` for a cost that does not fit.
     """
@@ -2206,14 +2206,16 @@ class InverseDynamics:
         dt: float,
         costs: Sequence[Cost],
         integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
     ) -> InverseDynamics: ...
 
 @final
 class Lqr:
-    """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu.
+    """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
 
-    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r: nu. What is None is zero; without R and B it has
-    no controls, as at a terminal knot.
+    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
+    bound; without R and B it has no controls, as at a terminal knot.
 
     >>> from condyle.optimal import Lqr
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -2229,6 +2231,8 @@ class Lqr:
         R: ArrayLike | None = None,
         q: ArrayLike | None = None,
         r: ArrayLike | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
     ) -> Lqr: ...
 
 @final

@@ -1,4 +1,4 @@
-"""Optimal control from Python: what is not the peers' business."""
+"""Solvers from Python: horizons that move on, time budgets, bounds and methods."""
 
 import numpy as np
 import pytest

@@ -12,8 +12,8 @@
 //!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
-//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
 //! - [`AugmentedLagrangian`] repeats that until general constraints hold, those of [`Constrained`] actions.
+//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
 //! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖

@@ -9,7 +9,7 @@ use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Contacts, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
     Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
 };
-use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status};
+use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
@@ -21,6 +21,8 @@ const DIFFERENCES: f64 = 1e-6;
 const OPTIMUM: f64 = 1e-7;
 /// A sum of some dozen products in another order.
 const ROUNDING: f64 = 1e-13;
+/// Two orders of the same sums, through a factorisation.
+const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
 fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
@@ -479,6 +481,41 @@ fn check_group(mut action: impl ActionModel, model: &Model, rng: &mut StdRng) {
             assert_eq!(alone, next[t * nx..][..nx]);
             action.calc_diff(t, x, u, &mut node);
             assert!(node == nodes[t], "knot {t} of {count} has other derivatives");
+        }
+    }
+}
+
+/// What knots in contact and impacts say of the form of A and B is true: a sweep finds the same without knowing it.
+#[test]
+fn derivatives_have_the_form_of_euler_steps() {
+    let mut rng = StdRng::seed_from_u64(9);
+    for model in [robots::quadruped(), robots::humanoid()].map(Arc::new) {
+        let (ndx, nu) = (2 * model.nv(), model.nv() - 6);
+        let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+        let mut stand = ContactDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
+        let mut impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
+        let mut nodes = [nu, 0, nu, 0].map(|nu| LqNode::zeros(ndx, nu));
+        for (t, node) in nodes.iter_mut().enumerate() {
+            let (x, u) = (random_state(&model, &mut rng), random(node.nu(), 5.0, &mut rng));
+            match t {
+                1 => impact.calc_diff(t, &x, &u, node),
+                3 => {}
+                _ => stand.calc_diff(t, &x, &u, node),
+            }
+            assert!(t == 3 || node.structure != Structure::default());
+            node.Q.fill_with_identity();
+            node.R.fill_with_identity();
+        }
+        let mut sweep = Sweep::new(&nodes);
+        sweep.run(&nodes, 1e-6).unwrap();
+        let structured = sweep.knots().to_vec();
+        nodes.iter_mut().for_each(|node| node.structure.set_dense());
+        sweep.run(&nodes, 1e-6).unwrap();
+        for (a, b) in structured.iter().zip(sweep.knots()) {
+            for (name, a, b) in [("K", a.K.as_slice(), b.K.as_slice()), ("Vxx", a.Vxx.as_slice(), b.Vxx.as_slice())] {
+                let error = largest_difference(a, b);
+                assert!(error < SAME, "{}: {name} is off by {error:e}", model.name());
+            }
         }
     }
 }

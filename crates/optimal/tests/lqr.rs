@@ -197,3 +197,15 @@ fn an_lqr_is_its_node() {
     }
     assert!((&written.q - &numeric.q).amax() < DIFFERENCES && (&written.r - &numeric.r).amax() < DIFFERENCES);
 }
+
+/// Where the best control is far beyond its bound, it is the bound.
+#[test]
+fn bounds_of_a_node_are_those_of_its_action() {
+    let (mut knot, mut end) = (LqNode::zeros(1, 1), LqNode::zeros(1, 0));
+    (knot.A[0], knot.B[0], knot.Q[0], knot.R[0], end.Q[0]) = (1.0, 1.0, 1.0, 1.0, 1.0);
+    knot.lower[0] = -0.1;
+    let mut problem =
+        Problem::new(vec![1.0], vec![Box::new(Lqr::new(knot))], vec![0; 5], Box::new(Lqr::new(end))).unwrap();
+    let solution = Fddp::new(&problem).solve(&mut problem, &[0.0; 6], &[0.0; 5]).unwrap().clone();
+    assert_eq!((solution.status, solution.us), (Status::Converged, vec![-0.1; 5]));
+}

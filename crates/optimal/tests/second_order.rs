@@ -5,7 +5,7 @@ mod common;
 
 use common::{Circle, HANGING, cartpole_action, random, random_matrix, straight};
 use condyle_dynamics::{neutral, robots};
-use condyle_optimal::robot::FreeDynamics;
+use condyle_optimal::robot::{Actuation, Free, FreeDynamics, Integrator};
 use condyle_optimal::{ActionModel, Fddp, Hessian, LqNode, NumDiff, Problem, Status, Sweep};
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -96,34 +96,39 @@ fn convergence_is_quadratic() {
 fn robots_give_theirs_exactly() {
     let mut random = random();
     let arm = Arc::new(robots::arm7());
-    let mut action = FreeDynamics::running(arm.clone(), 0.05, vec![]).unwrap();
-    let mut node = LqNode::zeros(14, 7);
-    for _ in 0..3 {
-        let numbers = random_matrix(&mut random, 35, 1);
-        let (z, lambda) = numbers.as_slice().split_at(21);
-        let mut ours = Hessian::zeros(14, 7);
-        assert!(action.dynamics_hessian(0, &z[..14], &z[14..], lambda, &mut ours));
-        let lambda = DVector::from_column_slice(lambda);
-        let mut gradient = |z: &[f64]| {
-            action.calc_diff(0, &z[..14], &z[14..], &mut node);
-            (node.A.transpose() * &lambda, node.B.transpose() * &lambda)
-        };
-        let largest = 1.0 + ours.xx.amax();
-        for j in 0..21 {
-            let mut moved = z.to_vec();
-            moved[j] = z[j] + STEP;
-            let above = gradient(&moved);
-            moved[j] = z[j] - STEP;
-            let below = gradient(&moved);
-            // Both slopes are differences of numbers that carry a rounding of a few bits.
-            let rounding = ROUNDING * (above.0.amax() + above.1.amax()) / STEP;
-            let (x, u) = ((above.0 - below.0) / (2.0 * STEP), (above.1 - below.1) / (2.0 * STEP));
-            let (ours_x, ours_u) = match j < 14 {
-                true => (ours.xx.column(j).into_owned(), ours.xu.row(j).transpose()),
-                false => (ours.xu.column(j - 14).into_owned(), ours.uu.column(j - 14).into_owned()),
+    let map = Actuation::matrix(&arm, random_matrix(&mut random, 7, 3)).unwrap();
+    let few = Free::new(arm.clone(), map, vec![]).unwrap();
+    let few = FreeDynamics::new(few, Integrator::SemiImplicitEuler, 0.05).unwrap();
+    for mut action in [FreeDynamics::running(arm.clone(), 0.05, vec![]).unwrap(), few] {
+        let nu = action.nu();
+        let mut node = LqNode::zeros(14, nu);
+        for _ in 0..3 {
+            let numbers = random_matrix(&mut random, 28 + nu, 1);
+            let (z, lambda) = numbers.as_slice().split_at(14 + nu);
+            let mut ours = Hessian::zeros(14, nu);
+            assert!(action.dynamics_hessian(0, &z[..14], &z[14..], lambda, &mut ours));
+            let lambda = DVector::from_column_slice(lambda);
+            let mut gradient = |z: &[f64]| {
+                action.calc_diff(0, &z[..14], &z[14..], &mut node);
+                (node.A.transpose() * &lambda, node.B.transpose() * &lambda)
             };
-            assert!((&ours_x - &x).amax() < SLOPES * largest + rounding, "{j}: {ours_x} {x}");
-            assert!((&ours_u - &u).amax() < SLOPES * largest + rounding, "{j}: {ours_u} {u}");
+            let largest = 1.0 + ours.xx.amax();
+            for j in 0..14 + nu {
+                let mut moved = z.to_vec();
+                moved[j] = z[j] + STEP;
+                let above = gradient(&moved);
+                moved[j] = z[j] - STEP;
+                let below = gradient(&moved);
+                // Both slopes are differences of numbers that carry a rounding of a few bits.
+                let rounding = ROUNDING * (above.0.amax() + above.1.amax()) / STEP;
+                let (x, u) = ((above.0 - below.0) / (2.0 * STEP), (above.1 - below.1) / (2.0 * STEP));
+                let (ours_x, ours_u) = match j < 14 {
+                    true => (ours.xx.column(j).into_owned(), ours.xu.row(j).transpose()),
+                    false => (ours.xu.column(j - 14).into_owned(), ours.uu.column(j - 14).into_owned()),
+                };
+                assert!((&ours_x - &x).amax() < SLOPES * largest + rounding, "{j}: {ours_x} {x}");
+                assert!((&ours_u - &u).amax() < SLOPES * largest + rounding, "{j}: {ours_u} {u}");
+            }
         }
     }
     // On a group there is more to it; so it says.

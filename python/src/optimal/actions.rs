@@ -160,9 +160,7 @@ pub(crate) struct FreeDynamics(pub(super) robot::FreeDynamics);
 #[pymethods]
 impl FreeDynamics {
     #[new]
-    #[pyo3(signature = (
-        model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None
-    ))]
+    #[pyo3(signature = (model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
     fn new(
         model: &Bound<'_, Robot>,
         dt: Option<f64>,
@@ -218,10 +216,7 @@ pub(crate) struct ContactDynamics(pub(super) robot::ContactDynamics);
 #[pymethods]
 impl ContactDynamics {
     #[new]
-    #[pyo3(signature = (
-        model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler",
-        lower=None, upper=None
-    ))]
+    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
     fn new(
         model: &Bound<'_, Robot>,
         contacts: &Bound<'_, PyDict>,
@@ -290,7 +285,7 @@ impl ImpulseDynamics {
 /// model: the robot.
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
-/// integrator: as of `FreeDynamics`.
+/// integrator, lower, upper: as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a cost that does not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
@@ -299,19 +294,26 @@ pub(crate) struct InverseDynamics(pub(super) robot::InverseDynamics);
 #[pymethods]
 impl InverseDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs, integrator="semi_implicit_euler"))]
-    fn new(model: &Bound<'_, Robot>, dt: f64, costs: Vec<PyRef<'_, Cost>>, integrator: &str) -> PyResult<Self> {
+    #[pyo3(signature = (model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None))]
+    fn new(
+        model: &Bound<'_, Robot>,
+        dt: f64,
+        costs: Vec<PyRef<'_, Cost>>,
+        integrator: &str,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
         let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
         let action = robot::Inverse::new(model, terms(&costs))
             .and_then(|inner| robot::InverseDynamics::new(inner, integrator, dt));
-        Ok(Self(action.map_err(exception)?))
+        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
     }
 }
 
-/// Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu.
+/// Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
 ///
-/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r: nu. What is None is zero; without R and B it has
-/// no controls, as at a terminal knot.
+/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
+/// bound; without R and B it has no controls, as at a terminal knot.
 ///
 /// >>> from condyle.optimal import Lqr
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -321,7 +323,7 @@ pub(crate) struct Lqr(rust::Lqr);
 #[pymethods]
 impl Lqr {
     #[new]
-    #[pyo3(signature = (A, B=None, f=None, Q=None, S=None, R=None, q=None, r=None))]
+    #[pyo3(signature = (A, B=None, f=None, Q=None, S=None, R=None, q=None, r=None, lower=None, upper=None))]
     #[allow(non_snake_case, clippy::too_many_arguments)]
     fn new(
         A: &Bound<'_, PyAny>,
@@ -332,6 +334,8 @@ impl Lqr {
         R: Option<&Bound<'_, PyAny>>,
         q: Option<&Bound<'_, PyAny>>,
         r: Option<&Bound<'_, PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let nx = A.len()?;
         let nu = match (R, B) {
@@ -351,7 +355,13 @@ impl Lqr {
                 *to = matrix(name, given, shape)?.to_matrix();
             }
         }
-        for (name, given, to) in [("f", f, &mut node.f), ("q", q, &mut node.q), ("r", r, &mut node.r)] {
+        for (name, given, to) in [
+            ("f", f, &mut node.f),
+            ("q", q, &mut node.q),
+            ("r", r, &mut node.r),
+            ("lower", lower, &mut node.lower),
+            ("upper", upper, &mut node.upper),
+        ] {
             if let Some(given) = given {
                 let length = to.len();
                 to.copy_from_slice(&vector(name, given, length)?);

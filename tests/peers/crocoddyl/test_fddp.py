@@ -79,7 +79,7 @@ def our_problem(bounded=False):
         model,
         SPEC["dt"],
         [pose(run["pose"]), Cost.state("state", run["state"], X0), Cost.control("u", run["control"], np.zeros(NV))],
-        *((LOWER, UPPER) if bounded else ()),
+        **({"lower": LOWER, "upper": UPPER} if bounded else {}),
     )
     velocity = Cost.state("velocity", end["velocity"], X0, Activation.weighted(ONLY_VELOCITY))
     terminal = FreeDynamics(model, None, [pose(end["pose"]), velocity])

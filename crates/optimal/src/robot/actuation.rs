@@ -88,6 +88,14 @@ impl Actuation {
         }
     }
 
+    /// (Sᵀ τ)ₖ.
+    pub(super) fn along(&self, k: usize, tau: &[f64]) -> f64 {
+        match &self.map {
+            Map::After(passive) => tau[passive + k],
+            Map::Matrix(S) => S.column(k).iter().zip(tau).map(|(s, tau)| s * tau).sum(),
+        }
+    }
+
     /// g_u += c S_row: the gradient of the effort of one coordinate, times c.
     pub(super) fn add_row(&self, row: usize, c: f64, g_u: &mut [f64]) {
         match &self.map {

@@ -23,8 +23,6 @@ pub struct Free {
     still: bool,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
     da_du: Vec<f64>,
-    /// A row of ∂²q̈/∂q∂u. Shape: nu.
-    du: Vec<f64>,
     /// Zeros, at the end of a horizon. Shape: nv × nv.
     zeros: DMatrix<f64>,
 }
@@ -71,7 +69,6 @@ impl Free {
             data: Data::new(&model),
             lanes: if still { None } else { SideBySide::new(&model, None) },
             da_du: actuation.scratch(),
-            du: vec![0.0; actuation.nu()],
             robot: Robot::new(model, actuation, offer, costs)?,
             still,
             zeros: DMatrix::zeros(nv, nv),
@@ -157,33 +154,6 @@ impl ContinuousModel for Free {
         Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
     }
 
-    /// By the contracted second derivatives of `aba`.
-    fn hessian(&mut self, _: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
-        let Self { robot, data, du, .. } = self;
-        robot.actuation.effort(u, &mut robot.tau);
-        let (q, v) = x.split_at(robot.model.nq());
-        let d = aba_hessian(&robot.model, data, q, v, &robot.tau, &[], lambda);
-        let nv = v.len();
-        for c in 0..nv {
-            for r in 0..nv {
-                hessian.xx[(r, c)] = d.dqdq[(r, c)];
-                hessian.xx[(nv + r, c)] = d.dvdq[(r, c)];
-                hessian.xx[(c, nv + r)] = d.dvdq[(r, c)];
-                hessian.xx[(nv + r, nv + c)] = d.dvdv[(r, c)];
-            }
-            du.fill(0.0);
-            for i in 0..nv {
-                robot.actuation.add_row(i, d.dtaudq[(i, c)], du); // ∂²q̈/∂q∂u = ∂²q̈/∂q∂τ S
-            }
-            for (k, &x) in du.iter().enumerate() {
-                hessian.xu[(c, k)] = x;
-                hessian.xu[(nv + c, k)] = 0.0;
-            }
-        }
-        hessian.uu.fill(0.0);
-        true
-    }
-
     fn lanes(&self) -> usize {
         self.lanes.as_ref().map_or(1, SideBySide::lanes)
     }
@@ -219,6 +189,28 @@ impl ContinuousModel for Free {
         robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
         let da_du = robot.actuation.columns(&da[2], &mut self.da_du);
         Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
+    }
+
+    fn hessian(&mut self, _: usize, x: &[f64], u: &[f64], mu: &[f64], hessian: &mut Hessian) -> bool {
+        let Self { robot, data, .. } = self;
+        robot.actuation.effort(u, &mut robot.tau);
+        let (nv, (q, v)) = (robot.model.nv(), x.split_at(robot.model.nq()));
+        let d = aba_hessian(&robot.model, data, q, v, &robot.tau, &[], mu);
+        for c in 0..nv {
+            for r in 0..nv {
+                hessian.xx[(r, c)] = d.dqdq[(r, c)];
+                hessian.xx[(nv + r, c)] = d.dvdq[(r, c)];
+                hessian.xx[(c, nv + r)] = d.dvdq[(r, c)];
+                hessian.xx[(nv + r, nv + c)] = d.dvdv[(r, c)];
+            }
+            let column = &d.dtaudq.as_slice()[c * nv..][..nv];
+            for k in 0..u.len() {
+                hessian.xu[(c, k)] = robot.actuation.along(k, column); // Sᵀ ∂²ψ/∂τ∂q
+                hessian.xu[(nv + c, k)] = 0.0;
+            }
+        }
+        hessian.uu.fill(0.0);
+        true
     }
 
     fn groups(&self) -> &[Range<usize>] {

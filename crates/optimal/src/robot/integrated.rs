@@ -63,10 +63,10 @@ pub trait ContinuousModel: Send + 'static {
     /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the node, which are overwritten.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_>;
 
-    /// The second derivatives of λᵀ a by x and u, for nv numbers λ; says whether it knows them, which by default it does
-    /// not. Asked for where positions are a vector space.
-    fn hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
-        let _ = (t, x, u, lambda, hessian);
+    /// The second derivatives of ψ = μᵀ a(x, u) into `hessian`, for nv numbers `mu`; says whether it did. It does not by
+    /// default: a then counts as linear, whatever [`second_order`](crate::Settings::second_order) says.
+    fn hessian(&mut self, t: usize, x: &[f64], u: &[f64], mu: &[f64], hessian: &mut Hessian) -> bool {
+        let _ = (t, x, u, mu, hessian);
         false
     }
 
@@ -101,7 +101,8 @@ pub trait ContinuousModel: Send + 'static {
         self.calc_diff(t, x, u, scale, node)
     }
 
-    /// The coordinates of each group of positions that is no vector space: elsewhere q ⊕ δ is a sum. None by default.
+    /// The coordinates of each group of positions that is no vector space, at most six a group: elsewhere q ⊕ δ is a sum.
+    /// None by default.
     fn groups(&self) -> &[Range<usize>] {
         &[]
     }
@@ -327,17 +328,17 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         }
     }
 
-    /// For semi-implicit Euler and positions that are a vector space: of λᵀ∂²(q⁺, v⁺) there is left
-    /// Δt (λ_v + Δt λ_q)ᵀ ∂²a.
+    /// By semi-implicit Euler in a vector space: of λᵀ∂²(q⁺, v⁺) there is left Δt (λ_v + Δt λ_q)ᵀ ∂²a.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
-        let (Some(dt), Method::Euler, true) = (self.dt, &self.method, self.inner.groups().is_empty()) else {
+        let Self { inner, dt: Some(dt), method: Method::Euler, dq: mu, .. } = self else { return false };
+        if !inner.groups().is_empty() {
             return false;
-        };
-        let nv = self.inner.nv();
-        for k in 0..nv {
-            self.dq[k] = dt * (lambda[nv + k] + dt * lambda[k]);
         }
-        self.inner.hessian(t, x, u, &self.dq, hessian)
+        let nv = mu.len();
+        for k in 0..nv {
+            mu[k] = *dt * (lambda[nv + k] + *dt * lambda[k]);
+        }
+        inner.hessian(t, x, u, mu, hessian)
     }
 
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {

@@ -1,0 +1,174 @@
+//! How the derivatives by hand grow with the size and shape of a tree, against dual numbers and central differences:
+//! `cargo bench --bench derivatives`.
+//!
+//! The throughput is in pairs of a joint and one of those before it or itself, n · depth of them (depth the mean number of
+//! joints on the way to the world): where it stays the same, the cost grows as O(n · depth).
+//!
+//! By hand at n = 8, 32, 128, on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`: µs (ns a pair), how many times as long
+//! dual numbers take, how many times as long differences:
+//!
+//! | | chain | binary tree | star |
+//! | --- | --- | --- | --- |
+//! | ∂τ | 1.2, 8.1, 103 (32, 15, 13) 19–56, 17–46 | 1.1, 4.9, 30 (51, 36, 38) 21–196, 17–147 | 1.0, 4.2, 23 (69, 66, 88) 21–245, 17–182 |
+//! | ∂q̈ | 2.4, 17, 273 (67, 32, 33) 22–59, 22–39 | 2.3, 15, 106 (108, 111, 136) 24–153, 24–90 | 2.2, 9.1, 66 (147, 144, 260) 24–232, 20–157 |
+//! | λᵀ∂²τ | 2.6, 19, 253 (72, 36, 31) 22–271, 15–176 | 2.2, 11, 91 (107, 80, 117) 23–218, 16–193 | 2.3, 8.8, 48 (152, 139, 190) 25–325, 15–243 |
+//! | λᵀ∂²q̈ | 4.3, 52, 1227 (120, 98, 149) 27–233, 19–110 | 4.1, 26, 360 (196, 189, 464) 25–315, 18–143 | 4.0, 20, 259 (264, 323, 1017) 23–233, 17–132 |
+//!
+//! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. So does ∂q̈ on chains, where it is solved for; on
+//! other trees it is a product, as what λᵀ∂²q̈ has beside λᵀ∂²τ is everywhere, and grows faster.
+use condyle::{
+    BodyId, Data, Inertia, Joint, Mat3, Model, ModelBuilder, Scalar, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives,
+    aba_hessian, integrate, random_configuration, rnea, rnea_derivatives, rnea_hessian,
+};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use num_dual::Dual64;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::hint::black_box;
+use std::time::Duration;
+
+const SIZES: [usize; 5] = [8, 16, 32, 64, 128];
+
+/// n hinges, each body on the one that `parent` names.
+fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
+    let mut rng = StdRng::seed_from_u64(7);
+    let mut builder = ModelBuilder::new("tree");
+    let mut ids: Vec<BodyId> = vec![WORLD];
+    for i in 1..=n {
+        let mut r = || 0.2 * rng.random::<f64>() - 0.1;
+        let inertia = Inertia::from_com(1.0, Vec3::new(r(), r(), r()), Sym3::diagonal(0.01));
+        let placement = Se3::new(Mat3::identity(), Vec3::new(r(), r(), 0.2));
+        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
+        ids.push(builder.body(&format!("b{i}"), ids[parent(i)], Joint::Revolute { axis }, placement, inertia));
+    }
+    builder.build().expect("a tree is well-formed")
+}
+
+/// Pairs of a joint and one of those before it or itself.
+fn pairs(model: &Model) -> u64 {
+    let mut depth = vec![0; model.bodies().len()];
+    for (i, body) in model.bodies().iter().enumerate().skip(1) {
+        depth[i] = depth[body.parent] + 1;
+    }
+    depth.iter().sum()
+}
+
+/// q, v, a or τ, and λ.
+struct State {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    x: Vec<f64>,
+    lambda: Vec<f64>,
+}
+
+impl State {
+    fn random(model: &Model) -> Self {
+        let mut rng = StdRng::seed_from_u64(1);
+        let q = random_configuration(model, &mut rng);
+        let mut vector = || (0..model.nv()).map(|_| 2.0 * rng.random::<f64>() - 1.0).collect();
+        Self { q, v: vector(), x: vector(), lambda: vector() }
+    }
+}
+
+/// Calls `f` at (q ⊕ δ, v + δ, x + δ), with a step in one direction after the other: of q, of v and of x.
+fn along_each<S: Scalar>(
+    model: &Model,
+    s: &State,
+    directions: usize,
+    steps: &[S],
+    mut f: impl FnMut(&[S], &[S], &[S]),
+) {
+    let lift = |x: &[f64]| -> Vec<S> { x.iter().map(|&x| S::splat(x)).collect() };
+    let (n, q0) = (model.nv(), lift(&s.q));
+    let (mut q, mut v, mut x, mut delta) = (q0.clone(), lift(&s.v), lift(&s.x), lift(&vec![0.0; n]));
+    for direction in 0..directions {
+        let k = direction % n;
+        for &step in steps {
+            match direction / n {
+                0 => {
+                    delta[k] = step;
+                    integrate(model, &q0, &delta, &mut q);
+                    delta[k] = S::zero();
+                }
+                1 => v[k] = S::splat(s.v[k]) + step,
+                _ => x[k] = S::splat(s.x[k]) + step,
+            }
+            f(&q, &v, &x);
+        }
+        match direction / n {
+            0 => q.copy_from_slice(&q0),
+            1 => v[k] = S::splat(s.v[k]),
+            _ => x[k] = S::splat(s.x[k]),
+        }
+    }
+}
+
+type Group<'c> = BenchmarkGroup<'c, WallTime>;
+
+/// One way of all derivatives, on numbers of which `steps` is enough for a derivative by one direction.
+fn by_steps<S: Scalar>(group: &mut Group<'_>, way: &str, n: usize, model: &Model, s: &State, steps: &[S]) {
+    let (mut data, nv) = (Data::<S>::new(model), model.nv());
+    group.bench_function(BenchmarkId::new(format!("∂τ {way}"), n), |b| {
+        b.iter(|| along_each(model, s, 3 * nv, steps, |q, v, a| _ = black_box(rnea(model, &mut data, q, v, a, &[]))));
+    });
+    group.bench_function(BenchmarkId::new(format!("∂q̈ {way}"), n), |b| {
+        b.iter(|| {
+            along_each(model, s, 3 * nv, steps, |q, v, tau| _ = black_box(aba(model, &mut data, q, v, tau, &[])))
+        });
+    });
+    // of the first derivatives by hand: what ∂²/∂a∂a is known to be need not be computed
+    group.bench_function(BenchmarkId::new(format!("λᵀ∂²τ {way}"), n), |b| {
+        let mut call = |q: &[S], v: &[S], a: &[S]| _ = black_box(rnea_derivatives(model, &mut data, q, v, a, &[]));
+        b.iter(|| along_each(model, s, 2 * nv, steps, &mut call));
+    });
+    group.bench_function(BenchmarkId::new(format!("λᵀ∂²q̈ {way}"), n), |b| {
+        let mut call = |q: &[S], v: &[S], tau: &[S]| _ = black_box(aba_derivatives(model, &mut data, q, v, tau, &[]));
+        b.iter(|| along_each(model, s, 2 * nv, steps, &mut call));
+    });
+}
+
+fn by_hand(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
+    let (mut data, State { q, v, x, lambda }) = (Data::new(model), s);
+    group.bench_function(BenchmarkId::new("∂τ by hand", n), |b| {
+        b.iter(|| _ = black_box(rnea_derivatives(model, &mut data, black_box(q), v, x, &[])));
+    });
+    group.bench_function(BenchmarkId::new("∂q̈ by hand", n), |b| {
+        b.iter(|| _ = black_box(aba_derivatives(model, &mut data, black_box(q), v, x, &[])));
+    });
+    group.bench_function(BenchmarkId::new("λᵀ∂²τ by hand", n), |b| {
+        b.iter(|| _ = black_box(rnea_hessian(model, &mut data, black_box(q), v, x, &[], lambda)));
+    });
+    group.bench_function(BenchmarkId::new("λᵀ∂²q̈ by hand", n), |b| {
+        b.iter(|| _ = black_box(aba_hessian(model, &mut data, black_box(q), v, x, &[], lambda)));
+    });
+}
+
+type Parent = fn(usize) -> usize;
+
+fn derivatives(c: &mut Criterion) {
+    let shapes: [(&str, Parent); 3] =
+        [("chain", |i| i - 1), ("binary tree", |i| i / 2), ("star", |i| usize::from(i > 1))];
+    for (shape, parent) in shapes {
+        let mut group = c.benchmark_group(format!("derivatives/{shape}"));
+        for n in SIZES {
+            let model = tree(n, parent);
+            let state = State::random(&model);
+            group.throughput(Throughput::Elements(pairs(&model)));
+            by_hand(&mut group, n, &model, &state);
+            by_steps(&mut group, "by duals", n, &model, &state, &[Dual64::new(0.0, 1.0)]);
+            by_steps(&mut group, "by differences", n, &model, &state, &[1e-5, -1e-5]);
+        }
+        group.finish();
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .warm_up_time(Duration::from_millis(50))
+        .measurement_time(Duration::from_millis(200))
+        .sample_size(10);
+    targets = derivatives
+}
+criterion_main!(benches);
