@@ -28,6 +28,7 @@ COST = 1e-6
 """How near the costs of an iteration must be, relatively: Crocoddyl repeats its own when perturbed by 1e-12."""
 CHAOTIC = {
     ("arm_kinova_cold", "fddp"): 3,
+    ("arm_kinova_cold", "ddp"): 3,
     ("arm_kinova_box", "boxfddp"): 1,
     ("arm_talos", "ddp"): 2,
     ("cartpole_swingup", "ddp"): 37,

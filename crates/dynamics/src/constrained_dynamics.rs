@@ -16,6 +16,7 @@ use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::crba;
 use crate::data::{Data, Size, check, check_forces};
+use crate::dispatch::Kernel;
 use crate::kinematics::{World, place};
 use crate::layout::{Pairs, Single};
 use crate::ltdl::Ltdl;
@@ -152,9 +153,7 @@ impl<S: Scalar> ConstraintSet<S> {
     #[inline(always)]
     pub(crate) fn residual(&self) -> S {
         let mut largest = S::zero();
-        for &x in &self.error {
-            largest = S::select(largest.lt(x.abs()), x.abs(), largest);
-        }
+        S::enter(Largest(&self.error, &mut largest));
         largest
     }
 
@@ -277,4 +276,20 @@ pub(crate) fn pass<L: Pairs>(
         }
     }
     constraints.solve(&d.factor, &d.effort, &mut d.qdd);
+}
+
+/// The largest absolute value of some numbers.
+struct Largest<'a, S>(&'a [S], &'a mut S);
+
+impl<S: Scalar> Kernel for Largest<'_, S> {
+    #[inline(always)]
+    fn run(self) {
+        for &x in self.0 {
+            *self.1 = S::select(self.1.lt(x.abs()), x.abs(), *self.1);
+        }
+    }
+    #[inline(always)]
+    fn run_fused(self) {
+        self.run();
+    }
 }

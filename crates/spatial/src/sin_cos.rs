@@ -52,27 +52,29 @@ const SINGLE: Precision<3> = Precision {
     cos: [2.443_315_711_809_948e-5, -1.388_731_625_493_765e-3, 4.166_664_568_298_827e-2],
 };
 
+/// The polynomial of z with these coefficients, the highest power's first.
+#[inline(always)]
+fn polynomial<S: Scalar, const T: usize>(c: &[f64; T], z: S) -> S {
+    let mut sum = S::splat(c[0]);
+    for &c in &c[1..] {
+        sum = sum.mul_add(z, S::splat(c));
+    }
+    sum
+}
+
 #[inline(always)]
 fn reduced<S: Scalar, const T: usize>(x: S, of: &Precision<T>) -> (S, S) {
     let magic = S::splat(of.magic);
-    let round = |x: S| (x + magic) - magic;
-    let n = round(x * S::splat(core::f64::consts::FRAC_2_PI));
+    let n = (x * S::splat(core::f64::consts::FRAC_2_PI) + magic) - magic; // rounded
     let mut r = x;
     for part in of.parts {
         r = n.mul_add(S::splat(-part), r); // r = x − n π/2
     }
     let z = r * r;
-    let polynomial = |c: &[f64; T]| {
-        let mut sum = S::splat(c[0]);
-        for &c in &c[1..] {
-            sum = sum.mul_add(z, S::splat(c));
-        }
-        sum
-    };
-    let sin = (polynomial(&of.sin) * z).mul_add(r, r); // r + r³ P(r²)
-    let cos = (polynomial(&of.cos) * z).mul_add(z, z.mul_add(S::splat(-0.5), S::one())); // 1 − r²/2 + r⁴ Q(r²)
+    let sin = (polynomial(&of.sin, z) * z).mul_add(r, r); // r + r³ P(r²)
+    let cos = (polynomial(&of.cos, z) * z).mul_add(z, z.mul_add(S::splat(-0.5), S::one())); // 1 − r²/2 + r⁴ Q(r²)
     // the quadrant, n modulo 4, between −2 and 2: (sin, cos), (cos, −sin), (−sin, −cos), (−cos, sin) for 0, 1, ±2, −1
-    let quadrant = n - round(n * S::splat(0.25)) * S::splat(4.0);
+    let quadrant = n - ((n * S::splat(0.25) + magic) - magic) * S::splat(4.0);
     let odd = (quadrant.abs() - S::one()).abs().lt(S::splat(0.5));
     let (s, c) = (S::select(odd, cos, sin), S::select(odd, sin, cos));
     let (half, past) = (S::splat(0.5), S::splat(1.5));
