@@ -85,7 +85,7 @@ class Projection:
         if np.linalg.matrix_rank(M) < self.ours.nv:
             return
         d = condyle.aba_derivatives(*ours, q, v, tau, f_ext)
-        assert np.array_equal(d.a, condyle.aba(*ours, q, v, tau, f_ext))
+        pair.expect("mimic: aba of aba_derivatives", d.a, condyle.aba(*ours, q, v, tau, f_ext))
         assert np.array_equal(d.da_dtau, condyle.minv(*ours, q))
         # M q̈ + h = τ and what follows from it, M ∂q̈/∂· = −∂τ/∂·, M M⁻¹ = 1
         dtau_dq, dtau_dv, _ = derivatives(d.a)
