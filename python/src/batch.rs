@@ -28,6 +28,9 @@ pub(crate) fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<u
 pub(crate) fn agreed(arguments: &[(&str, Option<usize>)]) -> PyResult<Option<usize>> {
     let mut all = arguments.iter().filter_map(|(name, states)| Some((name, (*states)?)));
     let Some((first, n)) = all.next() else { return Ok(None) };
+    if n == 0 {
+        return Err(PyValueError::new_err(format!("{first}: expected at least one state, found none")));
+    }
     match all.find(|(_, states)| *states != n) {
         None => Ok(Some(n)),
         Some((name, found)) => {
@@ -76,9 +79,7 @@ pub(crate) fn stack<'py>(
     out: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let numpy = py.import("numpy")?;
-    let Some(first) = results.first() else {
-        return Err(PyValueError::new_err("expected at least one state, found none"));
-    };
+    let first = &results[0];
     let Ok(tuple) = first.cast::<PyTuple>() else {
         let options = PyDict::new(py);
         options.set_item("out", out)?;

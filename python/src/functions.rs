@@ -71,35 +71,26 @@ pub(crate) enum Speed {}
 /// A word, which the function itself understands.
 pub(crate) enum Word {}
 
-impl<'a, 'py: 'a> Argument<'a, 'py> for Position {
-    type Given = &'a Bound<'py, PyAny>;
-    type Read = Input<'py, Ix1>;
-    type All = Input<'py, Ix2>;
-    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
-        vector(name, &batch::at(given, 1, state)?, model.nq())
-    }
-    fn states(given: &Self::Given) -> PyResult<Option<usize>> {
-        batch::states(given, 1)
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
-        batch::all(name, given, 1, states, model.nq())
-    }
+/// Kinds that are one vector a state.
+macro_rules! vectors {
+    ($($kind:ident: $length:ident),*) => {$(
+        impl<'a, 'py: 'a> Argument<'a, 'py> for $kind {
+            type Given = &'a Bound<'py, PyAny>;
+            type Read = Input<'py, Ix1>;
+            type All = Input<'py, Ix2>;
+            fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
+                vector(name, &batch::at(given, 1, state)?, model.$length())
+            }
+            fn states(given: &Self::Given) -> PyResult<Option<usize>> {
+                batch::states(given, 1)
+            }
+            fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
+                batch::all(name, given, 1, states, model.$length())
+            }
+        }
+    )*};
 }
-
-impl<'a, 'py: 'a> Argument<'a, 'py> for Tangent {
-    type Given = &'a Bound<'py, PyAny>;
-    type Read = Input<'py, Ix1>;
-    type All = Input<'py, Ix2>;
-    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
-        vector(name, &batch::at(given, 1, state)?, model.nv())
-    }
-    fn states(given: &Self::Given) -> PyResult<Option<usize>> {
-        batch::states(given, 1)
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
-        batch::all(name, given, 1, states, model.nv())
-    }
-}
+vectors!(Position: nq, Tangent: nv);
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for Tangents {
     type Given = &'a Bound<'py, PyAny>;

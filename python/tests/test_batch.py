@@ -122,6 +122,8 @@ def test_errors(robot: Robot) -> None:
         condyle.nonlinear_effects(model, data, q, np.zeros((3, model.nv)))
     with pytest.raises(ValueError, match=rf"^q: expected shape \({N}, {model.nq}\), found \({N}, {model.nq + 1}\)$"):
         condyle.gravity(model, data, np.zeros((N, model.nq + 1)))
+    with pytest.raises(ValueError, match="^q: expected at least one state, found none$"):
+        condyle.gravity(model, data, np.zeros((0, model.nq)))
     with pytest.raises(ValueError, match="^threads: expected at least 1, found 0$"):
         condyle.Data(model, threads=0)
 

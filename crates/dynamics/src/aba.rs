@@ -172,7 +172,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
-    check_all(model, data, q, v, tau, f_ext);
+    check_arguments(model, data, q, v, tau, f_ext);
     #[cfg(target_arch = "x86_64")]
     if !model.has_mimic() && crate::limbs::run(true, model, data, q, v, tau, f_ext) {
         return &data.aba.qdd;
@@ -180,9 +180,10 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     one_by_one(model, data, q, v, tau, f_ext)
 }
 
+/// Panics unless the arguments of forward dynamics fit.
 #[inline]
 #[track_caller]
-fn check_all<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) {
+pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) {
     data.check(model);
     model.check_regular();
     check("q", q.len(), model.nq);
@@ -191,7 +192,7 @@ fn check_all<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S]
     check_forces(f_ext.len(), model.nodes.len());
 }
 
-/// Body by body, which leaves what depends on q behind.
+/// Body by body, for arguments that fit; leaves what depends on q behind.
 pub(crate) fn one_by_one<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -200,7 +201,6 @@ pub(crate) fn one_by_one<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
-    check_all(model, data, q, v, tau, f_ext);
     if model.has_mimic() {
         return forward_dynamics(model, data, q, v, tau, f_ext, Some(Method::Sparse));
     }

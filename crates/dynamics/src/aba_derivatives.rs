@@ -7,7 +7,7 @@
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
 
-use crate::aba::one_by_one;
+use crate::aba::{check_arguments, one_by_one};
 use crate::articulated_solve::{self, minus_solve};
 use crate::data::{Data, Size};
 use crate::dispatch::kernel;
@@ -233,6 +233,7 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S, R> {
+    check_arguments(model, data, q, v, tau, f_ext);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(one_by_one(model, data, q, v, tau, f_ext));
     rnea_derivatives::run(model, data, v, &a_kept, f_ext, &[]);

@@ -40,7 +40,7 @@ use pass::{
 /// let mut data = Data::new(&arm);
 /// assert_eq!(tau[63..70], *rnea(&arm, &mut data, &q[63..70], &v[63..70], &a[63..70], &[])); // the tenth
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Batch<T: Real = f64> {
     states: usize,
     lanes: InLanes<T>,
@@ -49,7 +49,7 @@ pub struct Batch<T: Real = f64> {
 }
 
 /// Of the vectors that the level has.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
     Short(Group<T::Short>),
@@ -88,6 +88,11 @@ impl<T: Real> Batch<T> {
         from: Arguments<'_, T>,
         has_vectors: bool,
     ) -> usize {
+        match &self.lanes {
+            InLanes::Single(g) => g.check(model),
+            InLanes::Short(g) => g.check(model),
+            InLanes::Long(g) => g.check(model),
+        }
         let states = from.q.len() / model.nq.max(1);
         assert!(
             states * model.nq == from.q.len() && states <= self.states,

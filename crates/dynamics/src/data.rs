@@ -4,7 +4,7 @@ use crate::kinematics::{Moving, World};
 use crate::model::Model;
 use crate::{
     aba, aba_derivatives, aba_hessian, all_terms, centroidal, centroidal_derivatives, constrained_derivatives,
-    constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, limbs, minv, regressor, rnea,
+    constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, minv, regressor, rnea,
     rnea_derivatives, rnea_hessian, statics,
 };
 use condyle_spatial::Scalar;
@@ -49,7 +49,7 @@ pub struct Data<S> {
     pub(crate) regressor: regressor::Workspace<S>,
     /// Of single calls on robots with limbs.
     #[cfg(target_arch = "x86_64")]
-    pub(crate) limbs: Option<Box<limbs::Scratch>>,
+    pub(crate) limbs: Option<Box<crate::limbs::Scratch>>,
 }
 
 /// How large the arrays of a workspace are.
@@ -102,7 +102,7 @@ impl<S: Scalar> Data<S> {
             forward_dynamics: forward_dynamics::Workspace::new(model),
             regressor: regressor::Workspace::new(size),
             #[cfg(target_arch = "x86_64")]
-            limbs: limbs::Scratch::new::<S, R>(model),
+            limbs: crate::limbs::Scratch::new::<S, R>(model),
         }
     }
 }

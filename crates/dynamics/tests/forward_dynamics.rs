@@ -1,15 +1,15 @@
 //! All ways of forward dynamics are one.
-#![allow(unsafe_code)] // a counting allocator cannot be written without
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
 use common::{State, Worst, all_models, lift, lift_forces, rng};
 use condyle_dynamics::{Cholesky, Data, DivideConquer, Ltdl, Method, aba, crba, forward_dynamics};
+use counting::allocations;
 use nalgebra::DMatrix;
 use num_dual::Dual64;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 
 /// Some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in these robots.
 const INVERTED: f64 = 1e-10;
@@ -64,35 +64,9 @@ fn what_is_fastest() {
     }
 }
 
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
-// and allocates nothing itself.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.set(COUNT.get() + 1);
-        // SAFETY: the caller's promise about `layout` is the one that is asked for.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
 #[track_caller]
 fn allocates_nothing(f: impl FnOnce()) {
-    let before = COUNT.get();
-    f();
-    assert_eq!(COUNT.get(), before);
+    assert_eq!(allocations(f), 0);
 }
 
 /// Every method, both factors, and divide and conquer (on one thread: what rayon allocates to share work is its own).

@@ -1,8 +1,9 @@
 //! Integrators: their order, and what they conserve.
-#![allow(unsafe_code)] // a counting allocator cannot be written without
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
 use common::{State, Tree, lift, moved, normal, relative, rng};
 use condyle_dynamics::simulation::{Integrator, Settings, Simulation, Status};
@@ -11,9 +12,8 @@ use condyle_dynamics::{
     forward_kinematics, forward_velocities, joint_torque_regressor, kinetic_energy_regressor, lie, neutral,
     passive_torque, potential_energy_regressor, robots,
 };
+use counting::allocations;
 use num_dual::Dual64;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 
 const ALL: [(Integrator, f64); 3] =
     [(Integrator::SemiImplicitEuler, 1.0), (Integrator::RungeKutta4, 4.0), (Integrator::Variational, 2.0)];
@@ -341,40 +341,9 @@ fn wrong_shape() {
     let _ = Simulation::new(&arm, Settings::default()).step(&[0.0; 6], &[]);
 }
 
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
-// and allocates nothing itself.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.set(COUNT.get() + 1);
-        // SAFETY: the caller's promise about `layout` is the one that is asked for.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(f: impl FnOnce()) -> usize {
-    let before = COUNT.get();
-    f();
-    COUNT.get() - before
-}
-
 /// Nothing is allocated after construction: by steps and runs, by regressors, by passive torques.
 #[test]
 fn nothing_is_allocated() {
-    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(7)))), 1);
     for (seed, model) in common::all_models(1).iter().enumerate() {
         let State { q, v, a, tau, f_ext } = State::random(model, &mut rng(seed as u64));
         for (integrator, _) in ALL {

@@ -27,7 +27,6 @@ pub mod lanes;
 pub mod level;
 pub mod lie;
 mod motion;
-#[cfg(target_arch = "x86_64")]
 #[doc(hidden)]
 pub mod moves;
 mod scalar;

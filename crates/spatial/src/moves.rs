@@ -1,11 +1,14 @@
 //! Numbers that change their lane, in vectors of four.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
 use crate::lanes::Lanes;
+#[cfg(target_arch = "x86_64")]
 use core::arch::x86_64::*;
 
 /// Which lane's number goes to which lane; a lane to which none goes becomes 0.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 pub struct Move {
     /// Of each lane, the two halves of the number that it gets.
     from: [i32; 8],
@@ -25,6 +28,7 @@ impl Move {
     }
 
     /// The numbers in their new lanes.
+    #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub fn apply(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the level is supported; the arrays have 32 bytes each.
@@ -38,6 +42,7 @@ impl Move {
 }
 
 /// The sum of the numbers, in every lane.
+#[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn sum(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
     // SAFETY: a vector of this kind exists, so the level is supported.

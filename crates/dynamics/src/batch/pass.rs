@@ -14,7 +14,7 @@ use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter
 use core::mem::swap;
 use nalgebra::{DMatrix, DMatrixView};
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Group<S: Block> {
     /// One for each thread.
     workers: Vec<Worker<S>>,
@@ -30,10 +30,10 @@ pub(super) const DA: [usize; 2] = [5, 6];
 const KINDS: usize = 7;
 
 /// One thread's scratch.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Worker<S: Block> {
     data: Data<S>,
-    /// The arguments, a state in each lane. Shape: nq, nv, nv, bodies or none. Written by: `group`.
+    /// The arguments, a state in each lane. Shape: nq, nv, nv, bodies or none. Written by: `one_by_one`.
     q: Vec<S>,
     v: Vec<S>,
     x: Vec<S>,
@@ -57,7 +57,7 @@ impl<S: Block> Group<S> {
         let square = || DMatrix::from_element(model.nv, model.nv, S::zero());
         let matrices = |_| core::array::from_fn(|_| square());
         Self {
-            workers: vec![Worker::new(model); threads],
+            workers: (0..threads).map(|_| Worker::new(model)).collect(),
             matrices: (0..states.div_ceil(S::LANES)).map(matrices).collect(),
         }
     }
@@ -210,6 +210,11 @@ matrices! {
 }
 
 impl<S: Block> Group<S> {
+    /// Panics unless this was made for a model of the same tree.
+    pub(super) fn check(&self, model: &Model) {
+        self.workers[0].data.check(model);
+    }
+
     pub(super) fn run<T: Real>(
         &mut self,
         pass: impl Pass<T>,

@@ -24,12 +24,13 @@ type Four = Lanes<f64, LANES>;
 /// What passes in lanes write.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// The arguments. Shape: positions, coordinates, coordinates of the plan, steps or none. Written by: `load`.
+    /// The arguments. Shape: positions, coordinates, coordinates, steps of the plan. Written by: `load`.
     q: Vec<Four>,
     v: Vec<Four>,
     x: Vec<Four>,
     f_ext: Vec<Force<Four>>,
-    /// An argument, with a 0 for the lanes that have no joint. Shape: nq + 1. Written by: `gather`.
+    /// An argument, with a 0 for the lanes that have no joint. Shape: the larger of nq and nv, + 1.
+    /// Written by: `gather`.
     padded: Vec<Fused>,
     world: World<Four>,
     rnea: rnea::Workspace<Four>,
@@ -48,7 +49,7 @@ impl Scratch {
             q: vec![Four::zero(); plan.positions.len()],
             v: zeros.clone(),
             x: zeros,
-            f_ext: Vec::with_capacity(steps),
+            f_ext: vec![Force::zero(); steps],
             padded: vec![Fused(0.0); model.nq.max(model.nv) + 1],
             world: World::new(size),
             rnea: rnea::Workspace::new(size),
@@ -58,7 +59,7 @@ impl Scratch {
 
     /// Whether it was made for this plan, or one of the same shape.
     fn fits(&self, plan: &Plan) -> bool {
-        (self.q.len(), self.v.len(), self.f_ext.capacity())
+        (self.q.len(), self.v.len(), self.f_ext.len())
             == (plan.positions.len(), plan.coordinates.len(), plan.steps.len())
     }
 }
@@ -227,7 +228,6 @@ fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
     gather(&plan.positions, &mut to.padded, from.q, &mut to.q);
     gather(&plan.coordinates, &mut to.padded, from.v, &mut to.v);
     gather(&plan.coordinates, &mut to.padded, from.x, &mut to.x);
-    to.f_ext.clear();
     if from.f_ext.is_empty() {
         return;
     }
@@ -245,10 +245,11 @@ fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
         for r in 0..6 {
             six[r] = Four::from_array(numbers[r]);
         }
-        to.f_ext.push(six.into());
+        to.f_ext[s] = six.into();
     }
 }
 
+/// A vector of the robot's, lane by lane.
 #[inline(always)]
 fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]) {
     padded[..x.len()].copy_from_slice(x);
@@ -287,6 +288,7 @@ impl Kernel for Call<'_> {
         let Data { limbs: Some(scratch), rnea, aba, .. } = data else { return };
         load(plan, scratch, arguments);
         let Scratch { q, v, x, f_ext, world, rnea: limbs_rnea, aba: limbs_aba, .. } = &mut **scratch;
+        let f_ext = if arguments.f_ext.is_empty() { &[] } else { &f_ext[..] };
         let l = Limbs { plan, armature: &model.armature, gravity: model.gravity };
         if forward {
             place(&l, world, q);

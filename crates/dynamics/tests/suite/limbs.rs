@@ -92,6 +92,19 @@ fn of_the_model_that_is_given() {
     }
 }
 
+/// Scratch that was cloned, before a force was ever given, computes the same way.
+#[test]
+fn with_cloned_data() {
+    let quadruped = robots::quadruped();
+    let State { q, v, a, f_ext, .. } = State::random(&quadruped, &mut rng(0));
+    let mut data = Data::new(&quadruped);
+    let mut clone = data.clone();
+    for f_ext in [&f_ext[..], &[]] {
+        let expected = rnea(&quadruped, &mut data, &q, &v, &a, f_ext);
+        assert_eq!(rnea(&quadruped, &mut clone, &q, &v, &a, f_ext), expected);
+    }
+}
+
 /// A number that is not one comes out at the limb that holds it and at the base, and nowhere else.
 #[test]
 fn what_is_not_a_number_stays_in_its_limb() {

@@ -147,3 +147,10 @@ fn too_few_velocities() {
     let model = &models(0)[0];
     _ = Batch::<f64>::new(model, 2, 1).nonlinear_effects(model, &[0.0; 14], &[0.0; 7]);
 }
+
+#[test]
+#[should_panic(expected = "data: made for a model of (8, 7, 7) bodies, joint axes and coordinates, found (14, 18, 18)")]
+fn another_robot() {
+    let [arm, quadruped, _] = crate::common::embedded();
+    _ = Batch::<f64>::new(&arm, 2, 1).gravity(&quadruped, &condyle_dynamics::neutral(&quadruped));
+}

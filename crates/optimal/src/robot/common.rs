@@ -182,3 +182,30 @@ macro_rules! robot_knot {
     };
 }
 pub(super) use robot_knot;
+
+/// The methods of a [`ContinuousModel`](super::ContinuousModel) that a robot's positions answer.
+macro_rules! robot_positions {
+    () => {
+        fn groups(&self) -> &[core::ops::Range<usize>] {
+            &self.robot.groups
+        }
+
+        fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
+            condyle_dynamics::integrate(&self.robot.model, q, dq, out);
+        }
+
+        fn difference(&self, q0: &[f64], q1: &[f64], out: &mut [f64]) {
+            condyle_dynamics::difference(&self.robot.model, q0, q1, out);
+        }
+
+        fn integrate_jacobians(
+            &self,
+            dq: &[f64],
+            by_q: &mut nalgebra::DMatrix<f64>,
+            by_dq: &mut nalgebra::DMatrix<f64>,
+        ) {
+            self.robot.integrate_jacobians(dq, by_q, by_dq);
+        }
+    };
+}
+pub(super) use robot_positions;

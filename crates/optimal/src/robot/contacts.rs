@@ -1,7 +1,7 @@
 //! The dynamics of a robot in contact with the world.
 
 use super::actuation::Actuation;
-use super::common::{Robot, robot_knot};
+use super::common::{Robot, robot_knot, robot_positions};
 use super::contact::{Contact, constraint_set, offer};
 use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
@@ -9,10 +9,7 @@ use super::lanes::{Held, Outcome, SideBySide};
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
-use condyle_dynamics::{
-    ConstraintSet, Data, Model, constrained_dynamics, constrained_dynamics_derivatives, difference, gravity, integrate,
-};
-use core::ops::Range;
+use condyle_dynamics::{ConstraintSet, Data, Model, constrained_dynamics, constrained_dynamics_derivatives, gravity};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -182,21 +179,7 @@ impl ContinuousModel for Contacts {
         Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
     }
 
-    fn groups(&self) -> &[Range<usize>] {
-        &self.robot.groups
-    }
-
-    fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
-        integrate(&self.robot.model, q, dq, out);
-    }
-
-    fn difference(&self, q0: &[f64], q1: &[f64], out: &mut [f64]) {
-        difference(&self.robot.model, q0, q1, out);
-    }
-
-    fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
-        self.robot.integrate_jacobians(dq, by_q, by_dq);
-    }
+    robot_positions!();
 }
 
 struct ContactSlopes<'a> {

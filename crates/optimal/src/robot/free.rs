@@ -1,15 +1,14 @@
 //! The dynamics of a robot that touches nothing.
 
 use super::actuation::Actuation;
-use super::common::{Robot, robot_knot};
+use super::common::{Robot, robot_knot, robot_positions};
 use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::lanes::{Outcome, SideBySide};
 use super::watch::{NoSlopes, Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
-use condyle_dynamics::{Data, Model, aba, aba_derivatives, aba_hessian, difference, gravity, integrate};
-use core::ops::Range;
+use condyle_dynamics::{Data, Model, aba, aba_derivatives, aba_hessian, gravity};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -213,21 +212,7 @@ impl ContinuousModel for Free {
         true
     }
 
-    fn groups(&self) -> &[Range<usize>] {
-        &self.robot.groups
-    }
-
-    fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
-        integrate(&self.robot.model, q, dq, out);
-    }
-
-    fn difference(&self, q0: &[f64], q1: &[f64], out: &mut [f64]) {
-        difference(&self.robot.model, q0, q1, out);
-    }
-
-    fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
-        self.robot.integrate_jacobians(dq, by_q, by_dq);
-    }
+    robot_positions!();
 }
 
 struct FreeSlopes<'a> {

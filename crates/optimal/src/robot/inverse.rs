@@ -1,14 +1,13 @@
 //! A robot whose accelerations are the controls, and whose efforts follow by inverse dynamics.
 
 use super::actuation::Actuation;
-use super::common::{Robot, robot_knot};
+use super::common::{Robot, robot_knot, robot_positions};
 use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
-use condyle_dynamics::{Data, Model, RneaDerivatives, difference, integrate, rnea, rnea_derivatives};
-use core::ops::Range;
+use condyle_dynamics::{Data, Model, RneaDerivatives, rnea, rnea_derivatives};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -108,21 +107,7 @@ impl ContinuousModel for Inverse {
         Derivatives { a, da_dq: zeros, da_dv: zeros, da_du: identity.as_slice() }
     }
 
-    fn groups(&self) -> &[Range<usize>] {
-        &self.robot.groups
-    }
-
-    fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
-        integrate(&self.robot.model, q, dq, out);
-    }
-
-    fn difference(&self, q0: &[f64], q1: &[f64], out: &mut [f64]) {
-        difference(&self.robot.model, q0, q1, out);
-    }
-
-    fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
-        self.robot.integrate_jacobians(dq, by_q, by_dq);
-    }
+    robot_positions!();
 }
 
 struct InverseSlopes<'a> {

@@ -9,9 +9,9 @@ use super::contact::Contact;
 #[cfg(target_arch = "x86_64")]
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
-    ConstraintSet, Data, Model, Proximal, Scalar, aba, aba_derivatives, constrained_dynamics,
-    constrained_dynamics_derivatives,
+    ConstraintSet, Data, Model, Proximal, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
 };
+use condyle_spatial::block::Block;
 use condyle_spatial::lanes::Kernel;
 #[cfg(target_arch = "x86_64")]
 use condyle_spatial::lanes::Lanes;
@@ -19,32 +19,6 @@ use nalgebra::DMatrix;
 
 /// Most lanes that there are.
 const WIDEST: usize = 8;
-
-/// A scalar of several numbers.
-trait Packed: Scalar {
-    fn pack(x: &[f64; WIDEST]) -> Self;
-    fn unpack(self) -> [f64; WIDEST];
-}
-
-#[cfg(target_arch = "x86_64")]
-macro_rules! packed {
-    ($($n:literal)*) => {$(
-        impl Packed for Lanes<f64, $n> {
-            #[inline(always)]
-            fn pack(x: &[f64; WIDEST]) -> Self {
-                Self::from_array(core::array::from_fn(|k| x[k]))
-            }
-            #[inline(always)]
-            fn unpack(self) -> [f64; WIDEST] {
-                let (x, mut out) = (self.to_array(), [0.0; WIDEST]);
-                out[..$n].copy_from_slice(&x);
-                out
-            }
-        }
-    )*};
-}
-#[cfg(target_arch = "x86_64")]
-packed! { 4 8 }
 
 /// What the dynamics of one knot give.
 #[derive(Clone, Debug)]
@@ -75,7 +49,7 @@ struct Pack<'a, S> {
     to: &'a mut [S],
 }
 
-impl<S: Packed> Kernel for Pack<'_, S> {
+impl<S: Block<Number = f64>> Kernel for Pack<'_, S> {
     #[inline(always)]
     fn run(self) {
         for (i, to) in self.to.iter_mut().enumerate() {
@@ -83,7 +57,7 @@ impl<S: Packed> Kernel for Pack<'_, S> {
             for k in 1..self.count {
                 x[k] = self.from[k * self.stride + i];
             }
-            *to = S::pack(&x);
+            *to = S::load(&x);
         }
     }
     #[inline(always)]
@@ -98,14 +72,14 @@ struct Unpack<'a, 'b, S> {
     to: &'a mut [&'b mut [f64]],
 }
 
-impl<S: Packed> Kernel for Unpack<'_, '_, S> {
+impl<S: Block<Number = f64>> Kernel for Unpack<'_, '_, S> {
     #[inline(always)]
     fn run(self) {
         let (blocks, rest) = self.from.as_chunks::<WIDEST>();
         for (b, block) in blocks.iter().enumerate() {
             let mut x = [[0.0; WIDEST]; WIDEST];
             for i in 0..WIDEST {
-                x[i] = block[i].unpack();
+                block[i].store(&mut x[i]);
             }
             for (k, to) in self.to.iter_mut().enumerate() {
                 let mut lane = [0.0; WIDEST];
@@ -116,7 +90,8 @@ impl<S: Packed> Kernel for Unpack<'_, '_, S> {
             }
         }
         for (i, from) in rest.iter().enumerate() {
-            let x = from.unpack();
+            let mut x = [0.0; WIDEST];
+            from.store(&mut x);
             for (k, to) in self.to.iter_mut().enumerate() {
                 to[blocks.len() * WIDEST + i] = x[k];
             }
@@ -129,7 +104,7 @@ impl<S: Packed> Kernel for Unpack<'_, '_, S> {
 }
 
 /// Unpacks to the part of each outcome that `part` names.
-fn unpack<S: Packed>(from: &[S], to: &mut [Outcome], part: impl Fn(&mut Outcome) -> &mut [f64]) {
+fn unpack<S: Block<Number = f64>>(from: &[S], to: &mut [Outcome], part: impl Fn(&mut Outcome) -> &mut [f64]) {
     let mut places: [&mut [f64]; WIDEST] = Default::default();
     let count = to.len();
     for (place, outcome) in places.iter_mut().zip(to) {
@@ -138,7 +113,7 @@ fn unpack<S: Packed>(from: &[S], to: &mut [Outcome], part: impl Fn(&mut Outcome)
     S::enter(Unpack { from, to: &mut places[..count] });
 }
 
-impl<S: Packed> Group<S> {
+impl<S: Block<Number = f64>> Group<S> {
     fn new(model: &Model, set: Option<ConstraintSet<S>>) -> Self {
         let o = S::zero();
         let (q, v) = (vec![o; model.nq()], vec![o; model.nv()]);
@@ -210,7 +185,7 @@ pub(super) struct Held<'a> {
 pub(super) const WORTHWHILE: usize = 3;
 
 #[cfg(target_arch = "x86_64")]
-fn group<S: Packed>(model: &Model, held: Option<Held<'_>>) -> Group<S> {
+fn group<S: Block<Number = f64>>(model: &Model, held: Option<Held<'_>>) -> Group<S> {
     let set = held.map(|held| {
         let constraints: Vec<_> = held.contacts.iter().map(|contact| contact.constraint).collect();
         let mut set = ConstraintSet::new(model, &constraints).expect("a set of the same was made before");
