@@ -18,6 +18,8 @@ import statistics
 import sys
 from pathlib import Path
 
+os.environ["OMP_NUM_THREADS"] = "1"  # before Crocoddyl is loaded: several threads wait for each other on one core
+
 import numpy as np
 from ocp_ours import Ours
 from ocp_problems import PROBLEMS

@@ -89,6 +89,7 @@ class Theirs:
         stages = [self.stage(stage) for stage in spec["stage_models"]]
         running = [stages[k] for k in spec["stages"]]
         self.problem = crocoddyl.ShootingProblem(np.array(spec["x0"], float), running, stages[spec["terminal"]])
+        self.problem.nthreads = 1  # those of Eigen's products are OMP_NUM_THREADS'
 
     def actuation(self):
         kind = self.spec["actuation"]["type"]
