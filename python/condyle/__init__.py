@@ -22,6 +22,12 @@ interpreter's lock released, on as many threads as the `Data` was made for:
 >>> data = condyle.Data(arm, threads=2)
 >>> condyle.crba(arm, data, np.zeros((100, 7))).shape
 (100, 7, 7)
+
+Derivatives of one's own function of the state are exact, by `HyperDual` numbers in arrays of objects:
+
+>>> def effort(x):
+...     return (condyle.rnea(arm, data, x[:7], x[7:], np.zeros(7)) ** 2).sum()
+>>> value, by_q_and_v = condyle.gradient(arm, np.full(14, 0.3), effort)
 """
 
 from . import inertial_parameters, optimal, robots, simulation
@@ -33,6 +39,7 @@ from ._condyle import (
     Data,
     DivideConquer,
     Error,
+    HyperDual,
     Joint,
     Ltdl,
     Model,
@@ -110,6 +117,7 @@ from ._condyle import (
     static_torque_derivative,
     transport,
 )
+from ._differentiate import gradient, hessian, jacobian
 from ._types import (
     AbaDerivatives,
     AbaHessian,
@@ -155,6 +163,7 @@ __all__ = [
     "EnergyDerivatives",
     "Error",
     "Frame",
+    "HyperDual",
     "Impulse",
     "ImpulseDerivatives",
     "Inertia",
@@ -212,13 +221,16 @@ __all__ = [
     "frame_placement",
     "frame_velocity",
     "frame_velocity_derivative",
+    "gradient",
     "gravity",
+    "hessian",
     "impulse_dynamics",
     "impulse_dynamics_derivatives",
     "inertial_parameters",
     "integrate",
     "integrate_jacobian",
     "interpolate",
+    "jacobian",
     "joint_torque_regressor",
     "kinetic_energy",
     "kinetic_energy_regressor",

@@ -51,6 +51,7 @@ __all__ = [
     "Fddp",
     "FreeDynamics",
     "FrictionCone",
+    "HyperDual",
     "ImpulseDynamics",
     "InverseDynamics",
     "Joint",
@@ -1665,6 +1666,133 @@ class Simulation:
         control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
             efforts, then other threads run meanwhile.
         """
+
+@final
+class HyperDual:
+    """re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂, ε₁² = ε₂² = 0: a number that knows its derivatives in two directions,
+    and the second one by both.
+
+    Arrays of them are NumPy arrays of objects; arithmetic and NumPy's elementary functions work on these, and so do
+    all functions of a model and a state, which then return such arrays. Comparisons look at `re`. `condyle.jacobian`,
+    `gradient` and `hessian` make them and read the derivatives.
+
+    Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
+
+    >>> x = np.array([condyle.HyperDual(0.5, eps1=1.0), condyle.HyperDual(2.0, eps2=1.0)])
+    >>> y = np.sin(x[0]) * x[1] ** 2
+    >>> bool(abs(y.eps1eps2 - 2.0 * np.cos(0.5) * 2.0) < 1e-15)  # ∂²y/∂x₀∂x₁
+    True
+    """
+
+    def __new__(cls, re: float, eps1: float = 0.0, eps2: float = 0.0, eps1eps2: float = 0.0) -> HyperDual: ...
+    @property
+    def re(self) -> float:
+        """The value."""
+
+    @property
+    def eps1(self) -> float:
+        """The derivative in the first direction."""
+
+    @property
+    def eps2(self) -> float:
+        """The derivative in the second direction."""
+
+    @property
+    def eps1eps2(self) -> float:
+        """The second derivative by both."""
+
+    def arctan2(self, x: HyperDual | float) -> HyperDual:
+        """The angle of the point (x, self) in the plane."""
+
+    def hypot(self, other: HyperDual | float) -> HyperDual:
+        """√(self² + other²)."""
+
+    def fabs(self) -> HyperDual:
+        """|self|."""
+
+    def sqrt(self) -> HyperDual:
+        """√self."""
+
+    def cbrt(self) -> HyperDual:
+        """The cubic root of self."""
+
+    def exp(self) -> HyperDual:
+        """e to the power of self."""
+
+    def exp2(self) -> HyperDual:
+        """2 to the power of self."""
+
+    def expm1(self) -> HyperDual:
+        """e to the power of self, minus 1."""
+
+    def log(self) -> HyperDual:
+        """The natural logarithm of self."""
+
+    def log2(self) -> HyperDual:
+        """The logarithm of self to the base 2."""
+
+    def log10(self) -> HyperDual:
+        """The logarithm of self to the base 10."""
+
+    def log1p(self) -> HyperDual:
+        """The natural logarithm of 1 + self."""
+
+    def sin(self) -> HyperDual:
+        """The sine of self."""
+
+    def cos(self) -> HyperDual:
+        """The cosine of self."""
+
+    def tan(self) -> HyperDual:
+        """The tangent of self."""
+
+    def arcsin(self) -> HyperDual:
+        """The angle whose sine is self."""
+
+    def arccos(self) -> HyperDual:
+        """The angle whose cosine is self."""
+
+    def arctan(self) -> HyperDual:
+        """The angle whose tangent is self."""
+
+    def sinh(self) -> HyperDual:
+        """The hyperbolic sine of self."""
+
+    def cosh(self) -> HyperDual:
+        """The hyperbolic cosine of self."""
+
+    def tanh(self) -> HyperDual:
+        """The hyperbolic tangent of self."""
+
+    def arcsinh(self) -> HyperDual:
+        """The number whose hyperbolic sine is self."""
+
+    def arccosh(self) -> HyperDual:
+        """The number whose hyperbolic cosine is self."""
+
+    def arctanh(self) -> HyperDual:
+        """The number whose hyperbolic tangent is self."""
+
+    def __add__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __radd__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __sub__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __rsub__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __mul__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __rmul__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __truediv__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __rtruediv__(self, other: HyperDual | float, /) -> HyperDual: ...
+    def __pow__(self, exponent: HyperDual | float, mod: None = None, /) -> HyperDual: ...
+    def __rpow__(self, base: HyperDual | float, mod: None = None, /) -> HyperDual: ...
+    def __neg__(self) -> HyperDual: ...
+    def __pos__(self) -> HyperDual: ...
+    def __abs__(self) -> HyperDual: ...
+    def __bool__(self) -> bool: ...
+    def __lt__(self, other: HyperDual | float, /) -> bool: ...
+    def __le__(self, other: HyperDual | float, /) -> bool: ...
+    def __gt__(self, other: HyperDual | float, /) -> bool: ...
+    def __ge__(self, other: HyperDual | float, /) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
 
 @final
 class Joint:

@@ -1,9 +1,11 @@
 //! NumPy arrays in and out.
 //!
 //! In: a float64 C-contiguous array is read where it lies; other dtypes and strides are converted; a wrong shape is a
-//! `ValueError`. Out: a new array, or the caller's. Matrices are column-major in nalgebra and row-major here.
+//! `ValueError`. Out: a new array, or the caller's. Matrices are column-major in nalgebra and row-major here. Arrays of
+//! hyper-dual numbers are arrays of objects, see `hyper_dual.rs`.
 
-use condyle::{Force, Inertia, Mat3, Motion, Se3, Vec3};
+use crate::data::Data;
+use condyle::{Force, Inertia, Mat3, Model, Motion, Scalar, Se3, Vec3};
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
 use numpy::ndarray::Dimension;
 use numpy::{Element, Ix1, Ix2, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
@@ -14,7 +16,57 @@ use pyo3::types::{PyFloat, PyType};
 use std::fmt::Write;
 use std::ops::Deref;
 
-/// The numbers of an argument, in C order.
+/// A number that functions of the library can be called with.
+pub(crate) trait Number: Scalar {
+    /// The numbers of an argument, in C order.
+    type Input<'py, D: Dimension>: Deref<Target = [Self]>;
+
+    /// Reads an argument of some shape.
+    fn read<'py, D: Dimension>(
+        argument: &str,
+        value: &Bound<'py, PyAny>,
+        shape: &[usize],
+    ) -> PyResult<Self::Input<'py, D>>;
+    /// Reads a number.
+    fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
+    /// Gives an array in C order, the caller's or a new one, when it is filled.
+    fn output<'py>(
+        py: Python<'py>,
+        out: Option<&Bound<'py, PyAny>>,
+        shape: &[usize],
+        fill: impl FnOnce(&mut [Self]),
+    ) -> PyResult<Bound<'py, PyAny>>;
+    /// The algorithms' scratch.
+    fn scratch<'d>(data: &'d mut Data, model: &Model) -> &'d mut condyle::Data<Self>;
+}
+
+impl Number for f64 {
+    type Input<'py, D: Dimension> = Input<'py, D>;
+
+    fn read<'py, D: Dimension>(
+        argument: &str,
+        value: &Bound<'py, PyAny>,
+        shape: &[usize],
+    ) -> PyResult<Self::Input<'py, D>> {
+        input(argument, value, shape)
+    }
+    fn read_one(_: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        value.extract()
+    }
+    fn output<'py>(
+        py: Python<'py>,
+        out: Option<&Bound<'py, PyAny>>,
+        shape: &[usize],
+        fill: impl FnOnce(&mut [Self]),
+    ) -> PyResult<Bound<'py, PyAny>> {
+        output(py, out, shape, fill)
+    }
+    fn scratch<'d>(data: &'d mut Data, _: &Model) -> &'d mut condyle::Data<Self> {
+        &mut data.inner
+    }
+}
+
+/// The doubles of an argument, in C order.
 pub(crate) struct Input<'py, D: Dimension>(PyReadonlyArray<'py, f64, D>);
 
 impl<D: Dimension> Deref for Input<'_, D> {
@@ -77,7 +129,7 @@ fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> P
     array.call_method1("astype", (f64::get_dtype(py), "C"))
 }
 
-fn check_shape(argument: &str, found: &[usize], expected: &[usize]) -> PyResult<()> {
+pub(crate) fn check_shape(argument: &str, found: &[usize], expected: &[usize]) -> PyResult<()> {
     if found == expected {
         return Ok(());
     }
@@ -134,27 +186,31 @@ fn type_name(value: &Bound<'_, PyAny>) -> String {
 
 /// An array, as Python will see it.
 pub(crate) trait Array {
+    /// What it is made of.
+    type Number: Number;
     /// Its shape.
     fn shape(&self) -> impl AsRef<[usize]>;
     /// Writes its numbers in C order.
-    fn write(&self, x: &mut [f64]);
+    fn write(&self, x: &mut [Self::Number]);
 }
 
-impl Array for [f64] {
+impl<S: Number> Array for [S] {
+    type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
         [self.len()]
     }
-    fn write(&self, x: &mut [f64]) {
+    fn write(&self, x: &mut [S]) {
         x.copy_from_slice(self);
     }
 }
 
 /// Column-major in Rust, row-major in Python.
-impl<R: Dim, C: Dim, S: RawStorage<f64, R, C>> Array for Matrix<f64, R, C, S> {
+impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C, S> {
+    type Number = N;
     fn shape(&self) -> impl AsRef<[usize]> {
         [self.nrows(), self.ncols()]
     }
-    fn write(&self, x: &mut [f64]) {
+    fn write(&self, x: &mut [N]) {
         let columns = self.ncols();
         for (c, column) in self.column_iter().enumerate() {
             for (r, &number) in column.iter().enumerate() {
@@ -165,28 +221,30 @@ impl<R: Dim, C: Dim, S: RawStorage<f64, R, C>> Array for Matrix<f64, R, C, S> {
 }
 
 /// A homogeneous matrix.
-impl Array for Se3<f64> {
+impl<S: Number> Array for Se3<S> {
+    type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
         [4, 4]
     }
-    fn write(&self, out: &mut [f64]) {
+    fn write(&self, out: &mut [S]) {
         let Mat3 { x, y, z } = self.rotation;
-        let p = self.translation;
+        let (p, o, e) = (self.translation, S::zero(), S::one());
         out.copy_from_slice(&[
             x.x, y.x, z.x, p.x, //
             x.y, y.y, z.y, p.y, //
             x.z, y.z, z.z, p.z, //
-            0.0, 0.0, 0.0, 1.0,
+            o, o, o, e,
         ]);
     }
 }
 
 /// Homogeneous matrices, one for each body.
-impl Array for [Se3<f64>] {
+impl<S: Number> Array for [Se3<S>] {
+    type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
         [self.len(), 4, 4]
     }
-    fn write(&self, x: &mut [f64]) {
+    fn write(&self, x: &mut [S]) {
         for (X, x) in self.iter().zip(x.chunks_exact_mut(16)) {
             X.write(x);
         }
@@ -194,12 +252,13 @@ impl Array for [Se3<f64>] {
 }
 
 /// [m 1, 0; 0, Ī]: of a whole robot about its centre of mass.
-impl Array for Inertia<f64> {
+impl<S: Number> Array for Inertia<S> {
+    type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
         [6, 6]
     }
-    fn write(&self, x: &mut [f64]) {
-        x.fill(0.0);
+    fn write(&self, x: &mut [S]) {
+        x.fill(S::zero());
         for (k, column) in self.rotational.full().columns().into_iter().enumerate() {
             x[7 * k] = self.mass;
             x[6 * (3 + k) + 3..6 * (4 + k)].copy_from_slice(&column.to_array()); // symmetric: a column is a row
@@ -210,11 +269,12 @@ impl Array for Inertia<f64> {
 /// Those that are a row of numbers.
 macro_rules! rows {
     ($($type:ident: $n:literal),*) => {$(
-        impl Array for $type<f64> {
+        impl<S: Number> Array for $type<S> {
+            type Number = S;
             fn shape(&self) -> impl AsRef<[usize]> {
                 [$n]
             }
-            fn write(&self, x: &mut [f64]) {
+            fn write(&self, x: &mut [S]) {
                 x.copy_from_slice(&self.to_array());
             }
         }
@@ -230,7 +290,7 @@ pub(crate) trait Give {
 
 impl<T: Array + ?Sized> Give for T {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        output(py, out, self.shape().as_ref(), |x| self.write(x))
+        T::Number::output(py, out, self.shape().as_ref(), |x| self.write(x))
     }
 }
 
@@ -243,7 +303,10 @@ impl Give for f64 {
 /// A struct of the library as the named tuple of `condyle._types` with the same name and members.
 macro_rules! named_tuples {
     ($($type:ident { $($member:ident),* })*) => {$(
-        impl $crate::arrays::Give for condyle::$type<'_, f64> {
+        impl<S: $crate::arrays::Number> $crate::arrays::Give for condyle::$type<'_, S>
+        where
+            S: $crate::arrays::Give,
+        {
             fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
                 static CLASS: pyo3::sync::PyOnceLock<Py<pyo3::types::PyType>> = pyo3::sync::PyOnceLock::new();
                 let names = [$(stringify!($member)),*];

@@ -4,7 +4,7 @@
 //! interpreter's lock released (`Batched`); everything else is called state after state.
 
 use crate::arrays::{Array, Input, matrix, named_tuple, output};
-use condyle::{BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices};
+use condyle::{BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices, Scalar};
 use numpy::{Ix2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -68,7 +68,7 @@ pub(crate) fn all<'py>(
 }
 
 /// A force on each body for each state.
-pub(crate) fn forces(numbers: &[f64]) -> Vec<Force<f64>> {
+pub(crate) fn forces<S: Scalar>(numbers: &[S]) -> Vec<Force<S>> {
     numbers.as_chunks::<6>().0.iter().map(|&six| six.into()).collect()
 }
 

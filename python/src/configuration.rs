@@ -3,7 +3,7 @@
 use crate::arrays::Give;
 use crate::functions::{functions, wrong_word};
 use crate::model::Model;
-use condyle::{DifferenceArgument, IntegrateArgument};
+use condyle::{DifferenceArgument, IntegrateArgument, Scalar};
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
 use rand::SeedableRng;
@@ -39,7 +39,7 @@ fn neutral(model;) {
 /// >>> np.allclose(condyle.difference(quadruped, q0, q1), 0.1)
 /// True
 fn integrate(model; q: Position, v: Tangent; out) {
-    let mut moved = vec![0.0; model.nq()];
+    let mut moved = vec![Scalar::zero(); model.nq()];
     condyle::integrate(model, &q, &v, &mut moved);
     moved
 }
@@ -48,7 +48,7 @@ fn integrate(model; q: Position, v: Tangent; out) {
 ///
 /// q0, q1: nq numbers.
 fn difference(model; q0: Position, q1: Position; out) {
-    let mut v = vec![0.0; model.nv()];
+    let mut v = vec![Scalar::zero(); model.nv()];
     condyle::difference(model, &q0, &q1, &mut v);
     v
 }
@@ -59,8 +59,8 @@ fn difference(model; q0: Position, q1: Position; out) {
 ///
 /// >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
 /// array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
-fn interpolate(model; q0: Position, q1: Position, t: Number; out) {
-    let (mut tangent, mut q) = (vec![0.0; model.nv()], vec![0.0; model.nq()]);
+fn interpolate(model; q0: Position, q1: Position, t: Real; out) {
+    let (mut tangent, mut q) = (vec![Scalar::zero(); model.nv()], vec![Scalar::zero(); model.nq()]);
     condyle::interpolate(model, &q0, &q1, t, &mut tangent, &mut q);
     q
 }
@@ -69,7 +69,7 @@ fn interpolate(model; q0: Position, q1: Position, t: Number; out) {
 ///
 /// q0, q1: nq numbers.
 fn distance(model; q0: Position, q1: Position) {
-    condyle::distance(model, &q0, &q1, &mut vec![0.0; model.nv()])
+    condyle::distance(model, &q0, &q1, &mut vec![Scalar::zero(); model.nv()])
 }
 
 /// q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
@@ -99,7 +99,7 @@ fn normalize(model; q: Position; out) {
 /// >>> np.allclose(condyle.transport(quadruped, v, J), np.eye(18))
 /// True
 fn transport(model; v: Tangent, X: Tangents; out) {
-    let mut moved = X.to_matrix();
+    let mut moved = X;
     condyle::transport(model, &v, &mut moved);
     moved
 }

@@ -1,11 +1,12 @@
 //! Dynamics under constraints: the library's types and functions one to one.
 
-use crate::arrays::{Give, members, named_tuple, pose, vector};
+use crate::arrays::{Give, Number, members, named_tuple, pose, vector};
 use crate::data::{Data, scratch};
 use crate::exceptions::exception;
-use crate::functions::{Argument, Forces, Number, Position, Reference, Tangent, regular, wrong_word};
+use crate::functions::{Argument, Coefficient, Forces, Position, Reference, Tangent, regular, wrong_word};
+use crate::hyper_dual::Hyper;
 use crate::model::{Model, frame_index};
-use condyle::{Motion, Proximal, Target};
+use condyle::{Constraint, Error, Motion, Proximal, Scalar, Target};
 use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -16,7 +17,7 @@ use pyo3::types::{PySlice, PyTuple, PyType};
 /// `lambda_`.
 macro_rules! results {
     ($($type:ident { $($member:ident),* })*) => {$(
-        impl Give for condyle::$type<'_, f64> {
+        impl<S: Number + Give> Give for condyle::$type<'_, S> {
             fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
                 static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
                 let names = [$(stringify!($member)),*].map(|name| if name == "lambda" { "lambda_" } else { name });
@@ -97,6 +98,10 @@ fn aim(
 #[pyclass(module = "condyle")]
 pub(crate) struct ConstraintSet {
     inner: condyle::ConstraintSet<f64>,
+    /// For hyper-dual numbers, once they were asked for since the targets last changed.
+    dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
+    /// With their present targets.
+    constraints: Vec<Constraint>,
     nv: usize,
     structure: u64,
 }
@@ -106,6 +111,34 @@ impl ConstraintSet {
         let n = self.inner.len();
         let error = || PyIndexError::new_err(format!("k: expected less than {n}, found {k}"));
         (k < n).then_some(k).ok_or_else(error)
+    }
+}
+
+/// The set for one kind of number.
+trait Constrain: Number {
+    fn set<'s>(
+        set: &'s mut ConstraintSet,
+        model: &condyle::Model,
+    ) -> Result<&'s mut condyle::ConstraintSet<Self>, Error>;
+}
+
+impl Constrain for f64 {
+    fn set<'s>(set: &'s mut ConstraintSet, _: &condyle::Model) -> Result<&'s mut condyle::ConstraintSet<Self>, Error> {
+        Ok(&mut set.inner)
+    }
+}
+
+impl Constrain for Hyper {
+    fn set<'s>(
+        set: &'s mut ConstraintSet,
+        model: &condyle::Model,
+    ) -> Result<&'s mut condyle::ConstraintSet<Self>, Error> {
+        if set.dual.is_none() {
+            let mut dual = condyle::ConstraintSet::new(model, &set.constraints)?;
+            dual.proximal = set.inner.proximal;
+            set.dual = Some(Box::new(dual));
+        }
+        Ok(set.dual.as_mut().expect("was just made"))
     }
 }
 
@@ -121,7 +154,7 @@ impl ConstraintSet {
         let constraints = constraints.iter().map(|c| constraint(model, c)).collect::<PyResult<Vec<_>>>()?;
         let mut inner = condyle::ConstraintSet::new(model, &constraints).map_err(exception)?;
         inner.proximal = Proximal { mu, iterations };
-        Ok(Self { inner, nv: model.nv(), structure: *structure })
+        Ok(Self { inner, dual: None, constraints, nv: model.nv(), structure: *structure })
     }
 
     /// How many constraints there are.
@@ -152,7 +185,10 @@ impl ConstraintSet {
         acceleration: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let k = self.checked(k)?;
-        aim(self.inner.target_mut(k), placement, velocity, acceleration)
+        aim(self.inner.target_mut(k), placement, velocity, acceleration)?;
+        self.constraints[k].target = *self.inner.target_mut(k);
+        self.dual = None;
+        Ok(())
     }
 
     /// J, (rows, nv), as the last call left it.
@@ -194,13 +230,24 @@ macro_rules! constrained {
         ) -> PyResult<Bound<'py, PyAny>> {
             let (py, robot) = ($model.py(), $model.get());
             let (mut scratch, mut set) = (scratch(robot, $data)?, set(robot, $constraints)?);
-            regular(&robot.inner)?;
-            let ($model, $data, $constraints) = (&robot.inner, &mut scratch.inner, &mut set.inner);
-            let result = {
-                $(let $arg = <$kind as Argument<'_, '_>>::read(stringify!($arg), $arg, $model)?;)*
-                $body
-            };
-            result.give(py, $out)
+            let $model = &robot.inner;
+            regular($model)?;
+            let dual = [$(<$kind as Argument<'_, '_>>::is_dual(&$arg)),*].contains(&true);
+            // the same source for doubles and for hyper-dual numbers
+            macro_rules! call {
+                ($S:ty) => {{
+                    let $data = <$S>::scratch(&mut scratch, $model);
+                    let $constraints = <$S>::set(&mut set, $model).map_err(exception)?;
+                    let result = {
+                        $(let $arg = <$kind as Argument<'_, '_>>::read_at::<$S>(
+                            stringify!($arg), &$arg, $model, None,
+                        )?;)*
+                        $body
+                    };
+                    result.give(py, $out)
+                }};
+            }
+            if dual { call!(Hyper) } else { call!(f64) }
         }
     )*};
 }
@@ -252,8 +299,8 @@ fn constrained_dynamics_derivatives(model, data, constraints;
 /// >>> after = condyle.impulse_dynamics(quadruped, condyle.Data(quadruped), touchdown, q, falling)
 /// >>> bool(after.lambda_[2] > 0.0)  # the ground pushes upwards
 /// True
-fn impulse_dynamics(model, data, constraints; q: Position, v: Tangent, restitution: Number = 0.0; out) {
-    condyle::impulse_dynamics(model, data, constraints, &q, &v, restitution)
+fn impulse_dynamics(model, data, constraints; q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
+    condyle::impulse_dynamics(model, data, constraints, &q, &v, Scalar::splat(restitution))
 }
 
 /// `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
@@ -268,7 +315,7 @@ fn impulse_dynamics(model, data, constraints; q: Position, v: Tangent, restituti
 /// >>> np.allclose(d.dv_dv @ d.dv_dv, d.dv_dv)  # an impact that sticks is a projection
 /// True
 fn impulse_dynamics_derivatives(model, data, constraints;
-    q: Position, v: Tangent, restitution: Number = 0.0; out) {
-    condyle::impulse_dynamics_derivatives(model, data, constraints, &q, &v, restitution)
+    q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
+    condyle::impulse_dynamics_derivatives(model, data, constraints, &q, &v, Scalar::splat(restitution))
 }
 }

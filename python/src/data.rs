@@ -1,5 +1,6 @@
 //! The scratch of the algorithms.
 
+use crate::hyper_dual::Hyper;
 use crate::model::Model;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -22,6 +23,8 @@ pub(crate) struct Data {
     structure: u64,
     name: String,
     threads: usize,
+    /// For hyper-dual numbers, once they were asked for.
+    pub(crate) dual: Option<Box<condyle::Data<Hyper>>>,
     /// For as many states as were asked for at most.
     batch: Option<Box<condyle::Batch>>,
 }
@@ -36,7 +39,7 @@ impl Data {
         }
         let Model { inner, structure } = model.get();
         let (structure, name) = (*structure, inner.name().to_owned());
-        Ok(Self { inner: condyle::Data::new(inner), structure, name, threads, batch: None })
+        Ok(Self { inner: condyle::Data::new(inner), structure, name, threads, dual: None, batch: None })
     }
 
     /// The robot's name.

@@ -1,8 +1,8 @@
 //! Derivatives beyond the first ones of `rnea` and `aba`: the library's functions one to one.
 
-use crate::arrays::{Array, Give, members, named_tuple, named_tuples};
+use crate::arrays::{Array, Give, Number, members, named_tuple, named_tuples};
 use crate::functions::{functions, regular};
-use condyle::{Model, RneaSecondDerivatives};
+use condyle::{Model, RneaSecondDerivatives, Scalar};
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -19,18 +19,19 @@ named_tuples! {
 }
 
 /// Matrices of one shape, one after the other.
-impl Array for [DMatrix<f64>] {
+impl<S: Number> Array for [DMatrix<S>] {
+    type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
         let (rows, columns) = self.first().map_or((0, 0), DMatrix::shape);
         [self.len(), rows, columns]
     }
-    fn write(&self, x: &mut [f64]) {
+    fn write(&self, x: &mut [S]) {
         let size = self.first().map_or(1, DMatrix::len).max(1);
         self.iter().zip(x.chunks_exact_mut(size)).for_each(|(matrix, x)| matrix.write(x));
     }
 }
 
-impl Give for RneaSecondDerivatives<f64> {
+impl<S: Number> Give for RneaSecondDerivatives<S> {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let mut out = members(out, &["dqdq", "dvdq", "dvdv", "dadq"])?.into_iter();
@@ -42,19 +43,19 @@ impl Give for RneaSecondDerivatives<f64> {
 }
 
 /// The derivatives of an acceleration by q and by v.
-struct Both(DMatrix<f64>, DMatrix<f64>);
+struct Both<S>(DMatrix<S>, DMatrix<S>);
 
-impl Give for Both {
+impl<S: Number> Give for Both<S> {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let mut out = members(out, &["da_dq", "da_dv"])?.into_iter();
-        let mut give = |matrix: &DMatrix<f64>| matrix.give(py, out.next().flatten().as_ref());
+        let mut give = |matrix: &DMatrix<S>| matrix.give(py, out.next().flatten().as_ref());
         let both = [give(&self.0)?, give(&self.1)?];
         Ok(PyTuple::new(py, both)?.into_any())
     }
 }
 
-fn six(model: &Model) -> DMatrix<f64> {
-    DMatrix::zeros(6, model.nv())
+fn six<S: Number>(model: &Model) -> DMatrix<S> {
+    DMatrix::from_element(6, model.nv(), S::zero())
 }
 
 functions! {
@@ -72,7 +73,7 @@ functions! {
 /// >>> np.allclose(dtau_dg @ [0.0, 0.0, -9.81], condyle.gravity(arm, data, q))  # τ is linear in g
 /// True
 fn rnea_input_derivative(model, data; q: Position, v: Tangent, a: Tangent, wrt: InputOf, f_ext: Forces = None; out) {
-    let mut dtau = DMatrix::zeros(model.nv(), wrt.len(model));
+    let mut dtau = DMatrix::from_element(model.nv(), wrt.len(model), Scalar::zero());
     condyle::rnea_derivatives(model, data, &q, &v, &a, &f_ext).with_respect_to(wrt, &mut dtau);
     dtau
 }
@@ -89,7 +90,7 @@ fn rnea_input_derivative(model, data; q: Position, v: Tangent, a: Tangent, wrt: 
 /// True
 fn aba_input_derivative(model, data; q: Position, v: Tangent, tau: Tangent, wrt: InputOf, f_ext: Forces = None; out) {
     regular(model)?;
-    let mut da = DMatrix::zeros(model.nv(), wrt.len(model));
+    let mut da = DMatrix::from_element(model.nv(), wrt.len(model), Scalar::zero());
     condyle::aba_derivatives(model, data, &q, &v, &tau, &f_ext).with_respect_to(wrt, &mut da);
     da
 }

@@ -67,7 +67,7 @@ macro_rules! factor {
                 out: Option<&Bound<'py, PyAny>>,
             ) -> PyResult<Bound<'py, PyAny>> {
                 let factor = self.factor()?;
-                let mut X = rows("B", B, self.size)?.to_matrix();
+                let mut X = rows("B", B, self.size)?;
                 factor.solve_matrix(&mut X);
                 X.give(B.py(), out)
             }

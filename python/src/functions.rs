@@ -15,12 +15,14 @@
 //! to `out`, which may be one of them. Positions, tangent vectors and forces may be given for many states, with one axis
 //! more: then so are the results, see `batch.rs`.
 
-use crate::arrays::{Input, matrix, vector};
+use crate::arrays::{Input, Number};
 use crate::batch;
 use crate::exceptions::ModelError;
+use crate::hyper_dual;
 use crate::model::{body_index, frame_index};
 use condyle::{Force, Method, Model, ReferenceFrame};
-use numpy::{Ix1, Ix2, PyUntypedArray, PyUntypedArrayMethods};
+use nalgebra::DMatrix;
+use numpy::{Ix1, Ix2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -29,15 +31,24 @@ pub(crate) trait Argument<'a, 'py> {
     /// What Python gives.
     type Given;
     /// What the library takes.
-    type Read;
+    type Read<S: Number>;
     /// What the library takes for many states.
     type All;
     /// Reads the argument of this name of a function of this model.
-    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read> {
+    fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read<f64>> {
         Self::read_at(name, &given, model, None)
     }
-    /// The same for one of many states, if it is given for many.
-    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read>;
+    /// The same for one of many states, if it is given for many, and for any number.
+    fn read_at<S: Number>(
+        name: &str,
+        given: &Self::Given,
+        model: &Model,
+        state: Option<usize>,
+    ) -> PyResult<Self::Read<S>>;
+    /// Whether there are hyper-dual numbers in it.
+    fn is_dual(_given: &Self::Given) -> bool {
+        false
+    }
     /// For how many states it is given; none for a single one, or if it is no part of a state.
     fn states(_given: &Self::Given) -> PyResult<Option<usize>> {
         Ok(None)
@@ -65,7 +76,9 @@ pub(crate) enum MethodOf {}
 /// An input of the dynamics beside q, v, a and τ: a word, or a word with a body or a number.
 pub(crate) enum InputOf {}
 /// A number.
-pub(crate) enum Number {}
+pub(crate) enum Real {}
+/// A number that belongs to no state.
+pub(crate) enum Coefficient {}
 /// A positive speed.
 pub(crate) enum Speed {}
 /// A word, which the function itself understands.
@@ -76,10 +89,18 @@ macro_rules! vectors {
     ($($kind:ident: $length:ident),*) => {$(
         impl<'a, 'py: 'a> Argument<'a, 'py> for $kind {
             type Given = &'a Bound<'py, PyAny>;
-            type Read = Input<'py, Ix1>;
+            type Read<S: Number> = S::Input<'py, Ix1>;
             type All = Input<'py, Ix2>;
-            fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
-                vector(name, &batch::at(given, 1, state)?, model.$length())
+            fn read_at<S: Number>(
+                name: &str,
+                given: &Self::Given,
+                model: &Model,
+                state: Option<usize>,
+            ) -> PyResult<Self::Read<S>> {
+                S::read(name, &batch::at(given, 1, state)?, &[model.$length()])
+            }
+            fn is_dual(given: &Self::Given) -> bool {
+                hyper_dual::within(given)
             }
             fn states(given: &Self::Given) -> PyResult<Option<usize>> {
                 batch::states(given, 1)
@@ -92,26 +113,22 @@ macro_rules! vectors {
 }
 vectors!(Position: nq, Tangent: nv);
 
-impl<'a, 'py: 'a> Argument<'a, 'py> for Tangents {
-    type Given = &'a Bound<'py, PyAny>;
-    type Read = Input<'py, Ix2>;
-    type All = Input<'py, Ix2>;
-    fn read_at(name: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<Self::Read> {
-        let given = *given;
-        rows(name, given, model.nv())
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
-}
-
 impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     type Given = Option<&'a Bound<'py, PyAny>>;
-    type Read = Vec<Force<f64>>;
+    type Read<S: Number> = Vec<Force<S>>;
     type All = Vec<Force<f64>>;
-    fn read_at(name: &str, given: &Self::Given, model: &Model, state: Option<usize>) -> PyResult<Self::Read> {
+    fn read_at<S: Number>(
+        name: &str,
+        given: &Self::Given,
+        model: &Model,
+        state: Option<usize>,
+    ) -> PyResult<Self::Read<S>> {
         let Some(given) = given else { return Ok(Vec::new()) };
-        Ok(batch::forces(&matrix(name, &batch::at(given, 2, state)?, [model.bodies().len(), 6])?))
+        let numbers = S::read::<Ix2>(name, &batch::at(given, 2, state)?, &[model.bodies().len(), 6])?;
+        Ok(batch::forces(&numbers))
+    }
+    fn is_dual(given: &Self::Given) -> bool {
+        given.is_some_and(hyper_dual::within)
     }
     fn states(given: &Self::Given) -> PyResult<Option<usize>> {
         given.map_or(Ok(None), |given| batch::states(given, 2))
@@ -122,75 +139,58 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     }
 }
 
-impl<'a, 'py: 'a> Argument<'a, 'py> for FrameOf {
-    type Given = &'a Bound<'py, PyAny>;
-    type Read = usize;
-    type All = usize;
-    fn read_at(_: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<usize> {
-        let given = *given;
-        frame_index(model, given)
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
+/// Kinds that all states share: how one is read from what Python gives.
+macro_rules! shared {
+    ($($kind:ident<$S:ident>: $given:ty => $read:ty {
+        |$name:pat_param, $from:pat_param, $model:pat_param| $body:expr $(, $is_dual:expr)?
+    })*) => {$(
+        impl<'a, 'py: 'a> Argument<'a, 'py> for $kind {
+            type Given = $given;
+            type Read<$S: Number> = $read;
+            type All = ();
+            fn read_at<$S: Number>(
+                $name: &str,
+                $from: &Self::Given,
+                $model: &Model,
+                _: Option<usize>,
+            ) -> PyResult<Self::Read<$S>> {
+                $body
+            }
+            $(fn is_dual(given: &Self::Given) -> bool {
+                $is_dual(given)
+            })?
+            fn read_all(_: &str, _: &Self::Given, _: &Model, _: usize) -> PyResult<Self::All> {
+                unreachable!("{}: not an argument of what runs in lanes", stringify!($kind))
+            }
+        }
+    )*};
 }
+shared! {
+    Tangents<S>: &'a Bound<'py, PyAny> => DMatrix<S> { |name, given, model| rows(name, given, model.nv()),
+        |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
-impl<'a, 'py: 'a> Argument<'a, 'py> for BodyOf {
-    type Given = &'a Bound<'py, PyAny>;
-    type Read = usize;
-    type All = usize;
-    fn read_at(_: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<usize> {
-        let given = *given;
+    FrameOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| frame_index(model, given) }
+
+    BodyOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| {
         body_index("body: expected a joint's name", model, given, 0)
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
-}
+    } }
 
-impl<'a> Argument<'a, '_> for Reference {
-    type Given = &'a str;
-    type Read = ReferenceFrame;
-    type All = ReferenceFrame;
-    fn read_at(name: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<ReferenceFrame> {
-        let given = *given;
-        match given {
-            "local" => Ok(ReferenceFrame::Local),
-            "world" => Ok(ReferenceFrame::World),
-            "local_world_aligned" => Ok(ReferenceFrame::LocalWorldAligned),
-            other => Err(wrong_word(name, "'local', 'world' or 'local_world_aligned'", other)),
-        }
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
-}
+    Reference<S>: &'a str => ReferenceFrame { |name, given, _| match *given {
+        "local" => Ok(ReferenceFrame::Local),
+        "world" => Ok(ReferenceFrame::World),
+        "local_world_aligned" => Ok(ReferenceFrame::LocalWorldAligned),
+        other => Err(wrong_word(name, "'local', 'world' or 'local_world_aligned'", other)),
+    } }
 
-impl<'a> Argument<'a, '_> for MethodOf {
-    type Given = Option<&'a str>;
-    type Read = Option<Method>;
-    type All = Option<Method>;
-    fn read_at(name: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<Self::Read> {
-        let given = *given;
-        match given {
-            None => Ok(None),
-            Some("aba") => Ok(Some(Method::ArticulatedBody)),
-            Some("dense") => Ok(Some(Method::Dense)),
-            Some("sparse") => Ok(Some(Method::Sparse)),
-            Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
-        }
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
-}
+    MethodOf<S>: Option<&'a str> => Option<Method> { |name, given, _| match *given {
+        None => Ok(None),
+        Some("aba") => Ok(Some(Method::ArticulatedBody)),
+        Some("dense") => Ok(Some(Method::Dense)),
+        Some("sparse") => Ok(Some(Method::Sparse)),
+        Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
+    } }
 
-impl<'a, 'py: 'a> Argument<'a, 'py> for InputOf {
-    type Given = &'a Bound<'py, PyAny>;
-    type Read = condyle::Input;
-    type All = condyle::Input;
-    fn read_at(name: &str, given: &Self::Given, model: &Model, _: Option<usize>) -> PyResult<Self::Read> {
-        let given = *given;
+    InputOf<S>: &'a Bound<'py, PyAny> => condyle::Input { |name, given, model| {
         use condyle::Input;
         if let Ok((word, of)) = given.extract::<(String, Bound<'py, PyAny>)>() {
             let body = || body_index("wrt: expected a joint's name", model, &of, 0);
@@ -210,49 +210,16 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for InputOf {
             "damping" => Ok(Input::Damping),
             other => Err(wrong_word(name, "'gravity', 'armature', 'damping' or a pair", other)),
         }
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
-}
+    } }
 
-impl Argument<'_, '_> for Number {
-    type Given = f64;
-    type Read = f64;
-    type All = f64;
-    fn read_at(_: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<f64> {
-        let given = *given;
-        Ok(given)
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
-}
+    Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
+        |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
-impl Argument<'_, '_> for Speed {
-    type Given = f64;
-    type Read = f64;
-    type All = f64;
-    fn read_at(name: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<f64> {
-        let given = *given;
-        positive_speed(name, given)
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
-}
+    Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given) }
 
-impl<'a> Argument<'a, '_> for Word {
-    type Given = &'a str;
-    type Read = &'a str;
-    type All = &'a str;
-    fn read_at(_: &str, given: &Self::Given, _: &Model, _: Option<usize>) -> PyResult<&'a str> {
-        let given = *given;
-        Ok(given)
-    }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, _: usize) -> PyResult<Self::All> {
-        Self::read_at(name, given, model, None)
-    }
+    Speed<S>: f64 => f64 { |name, given, _| positive_speed(name, *given) }
+
+    Word<S>: &'a str => &'a str { |_, given, _| Ok(*given) }
 }
 
 /// A number that must be a positive speed.
@@ -264,11 +231,10 @@ pub(crate) fn positive_speed(name: &str, found: f64) -> PyResult<f64> {
 }
 
 /// A matrix of so many rows and any number of columns.
-pub(crate) fn rows<'py>(name: &str, given: &Bound<'py, PyAny>, rows: usize) -> PyResult<Input<'py, Ix2>> {
-    let numpy = given.py().import("numpy")?;
-    let array = numpy.call_method1("asarray", (given,)).unwrap_or_else(|_| given.clone()); // `matrix` says why not
-    let columns = array.cast::<PyUntypedArray>().ok().and_then(|x| x.shape().get(1).copied()).unwrap_or(1);
-    matrix(name, &array, [rows, columns])
+pub(crate) fn rows<S: Number>(name: &str, given: &Bound<'_, PyAny>, rows: usize) -> PyResult<DMatrix<S>> {
+    let shape = given.py().import("numpy")?.call_method1("shape", (given,));
+    let columns = shape.and_then(|shape| shape.get_item(1)?.extract()).unwrap_or(1); // `read` says what is wrong
+    Ok(DMatrix::from_row_slice(rows, columns, &S::read::<Ix2>(name, given, &[rows, columns])?))
 }
 
 /// That a word is none of those that are understood.
@@ -312,9 +278,10 @@ macro_rules! functions {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
+            let dual = [$(<$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::is_dual(&$arg)),*].contains(&true);
             let states = [$((stringify!($arg), <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::states(&$arg)?)),*];
             let states = $crate::batch::agreed(&states)?;
-            $(if let Some(states) = states {
+            $(if let (Some(states), false) = (states, dual) {
                 use $crate::batch::Batched as _;
                 $check($model)?;
                 $(let $all = <$crate::functions::$all_kind as $crate::functions::Argument<'_, '_>>::read_all(
@@ -327,16 +294,22 @@ macro_rules! functions {
                 };
                 return in_lanes.give_all(py, states, out);
             })?
+            // the same source for doubles and for hyper-dual numbers
+            macro_rules! call {
+                ($S:ty, $state:expr, $to:expr) => {{
+                    $(let $data = <$S as $crate::arrays::Number>::scratch(&mut scratch, $model);)?
+                    let result = {
+                        $(let $arg = <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::read_at::<$S>(
+                            stringify!($arg), &$arg, $model, $state,
+                        )?;)*
+                        $body
+                    };
+                    result.give(py, $to)
+                }};
+            }
             #[allow(unused_mut, unused_variables)] // by functions without a `Data` or without arguments
             let mut call = |state: Option<usize>, out: Option<&Bound<'py, PyAny>>| {
-                $(let $data = &mut scratch.inner;)?
-                let result = {
-                    $(let $arg = <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::read_at(
-                        stringify!($arg), &$arg, $model, state,
-                    )?;)*
-                    $body
-                };
-                result.give(py, out)
+                if dual { call!($crate::hyper_dual::Hyper, state, out) } else { call!(f64, state, out) }
             };
             match states {
                 None => call(None, out),

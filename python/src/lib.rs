@@ -20,6 +20,7 @@ mod derivatives;
 mod exceptions;
 mod factorisation;
 mod functions;
+mod hyper_dual;
 mod inertial_parameters;
 mod kinematics;
 mod model;
@@ -70,6 +71,8 @@ mod _condyle {
     use exceptions::{Error, ModelError, NotPhysicalError, ParseError, ProblemError};
     #[pymodule_export]
     use factorisation::{Cholesky, DivideConquer, Ltdl};
+    #[pymodule_export]
+    use hyper_dual::HyperDual;
     #[pymodule_export]
     use inertial_parameters::{
         check, from_inertia, from_log_cholesky, log_cholesky, log_cholesky_jacobian, pseudo_inertia, to_inertia,

@@ -2,6 +2,7 @@
 //! functions one to one.
 
 use crate::functions::functions;
+use condyle::Scalar;
 use pyo3::prelude::*;
 
 functions! {
@@ -46,7 +47,7 @@ fn potential_energy_regressor(model, data; q: Position; out) {
 /// >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
 /// True
 fn passive_torque(model; v: Tangent, smoothing: Speed; out) {
-    let mut tau = vec![0.0; model.nv()];
+    let mut tau = vec![Scalar::zero(); model.nv()];
     condyle::passive_torque(model, &v, smoothing, &mut tau);
     tau
 }
@@ -56,7 +57,7 @@ fn passive_torque(model; v: Tangent, smoothing: Speed; out) {
 ///
 /// v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
 fn passive_torque_derivative(model; v: Tangent, smoothing: Speed; out) {
-    let mut slope = vec![0.0; model.nv()];
+    let mut slope = vec![Scalar::zero(); model.nv()];
     condyle::passive_torque_derivative(model, &v, smoothing, &mut slope);
     slope
 }
