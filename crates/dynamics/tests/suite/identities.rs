@@ -4,8 +4,8 @@ use crate::common;
 
 use common::{State, Tree, Worst, all_models, embedded, joint_placement, own_position, rng};
 use condyle_dynamics::{
-    Act, Data, Force, Joint, Mat3, Model, Se3, Vec3, aba, crba, forward_kinematics, gravity, minv, nonlinear_effects,
-    rnea,
+    Act, Data, Force, Joint, Mat3, Model, Quaternion, Se3, Vec3, aba, aba_derivatives, crba, forward_kinematics,
+    gravity, minv, nonlinear_effects, rnea, rnea_derivatives,
 };
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -21,13 +21,15 @@ fn vector(x: &[f64]) -> DVector<f64> {
     DVector::from_column_slice(x)
 }
 
-/// rnea = M a + h, h = rnea(q, v, 0), g = rnea(q, 0, 0), M M⁻¹ = 1, aba = M⁻¹ (τ − h), rnea ∘ aba = 1.
+/// rnea = M a + h, h = rnea(q, v, 0), g = rnea(q, 0, 0), M M⁻¹ = 1, aba = M⁻¹ (τ − h), rnea ∘ aba = 1, ∂q̈ = −M⁻¹ ∂τ.
 fn check(model: &Model, states: usize, seed: u64) {
     let mut inverse = Worst::new("M a + h = rnea", ROUNDING);
     let mut identity = Worst::new("M M⁻¹ = 1", INVERTED);
     let mut forward = Worst::new("aba = M⁻¹ (τ − h)", INVERTED);
     let mut round = Worst::new("rnea(aba(τ)) = τ", INVERTED);
     let mut forced = Worst::new("the same with external forces", INVERTED);
+    let mut slopes = Worst::new("∂q̈ = −M⁻¹ ∂τ at q̈", INVERTED);
+    let mut symmetric = Worst::new("M⁻¹ = M⁻ᵀ", ROUNDING);
     let (nv, zero) = (model.nv(), vec![0.0; model.nv()]);
     let (mut data, mut rng) = (Data::new(model), rng(seed));
     for _ in 0..states {
@@ -46,6 +48,12 @@ fn check(model: &Model, states: usize, seed: u64) {
         round.see(model, rnea(model, &mut data, &q, &v, &qdd, &[]), &tau);
         let qdd = aba(model, &mut data, &q, &v, &tau, &f_ext).to_vec();
         forced.see(model, rnea(model, &mut data, &q, &v, &qdd, &f_ext), &tau);
+        let d = rnea_derivatives(model, &mut data, &q, &v, &qdd, &f_ext);
+        let products = [-&Minv * d.dtau_dq, -&Minv * d.dtau_dv];
+        let d = aba_derivatives(model, &mut data, &q, &v, &tau, &f_ext);
+        slopes.see(model, d.da_dq.as_slice(), products[0].as_slice());
+        slopes.see(model, d.da_dv.as_slice(), products[1].as_slice());
+        symmetric.see(model, d.da_dtau.as_slice(), d.da_dtau.transpose().as_slice());
     }
 }
 
@@ -125,6 +133,8 @@ fn frames_do_not_matter() {
     let mut efforts = Worst::new("rnea in other frames", ROUNDING);
     let mut accelerations = Worst::new("aba in other frames", INVERTED);
     let mut places = Worst::new("frames in other frames", ROUNDING);
+    let mut slopes = ["∂τ/∂q", "∂τ/∂v", "∂τ/∂a"].map(|name| Worst::new(name, ROUNDING));
+    let mut inverse_slopes = ["∂q̈/∂q", "∂q̈/∂v", "∂q̈/∂τ"].map(|name| Worst::new(name, INVERTED));
     for seed in 0..2 * TREES {
         let rng = &mut rng(seed);
         let tree = if seed % 2 == 0 { Tree::random(rng) } else { Tree::random_with_mimics(rng) };
@@ -165,11 +175,53 @@ fn frames_do_not_matter() {
         efforts.see(&one, rnea(&two, &mut data.1, &q, &v, &a, &f_other), expected);
         let expected = aba(&one, &mut data.0, &q, &v, &tau, &f_ext);
         accelerations.see(&one, aba(&two, &mut data.1, &q, &v, &tau, &f_other), expected);
+        let expected = rnea_derivatives(&one, &mut data.0, &q, &v, &a, &f_ext);
+        let found = rnea_derivatives(&two, &mut data.1, &q, &v, &a, &f_other);
+        let pairs =
+            [(found.dtau_dq, expected.dtau_dq), (found.dtau_dv, expected.dtau_dv), (found.dtau_da, expected.dtau_da)];
+        slopes.iter_mut().zip(pairs).for_each(|(slope, (x, y))| slope.see(&one, x.as_slice(), y.as_slice()));
+        let expected = aba_derivatives(&one, &mut data.0, &q, &v, &tau, &f_ext);
+        let found = aba_derivatives(&two, &mut data.1, &q, &v, &tau, &f_other);
+        let pairs = [(found.da_dq, expected.da_dq), (found.da_dv, expected.da_dv), (found.da_dtau, expected.da_dtau)];
+        inverse_slopes.iter_mut().zip(pairs).for_each(|(slope, (x, y))| slope.see(&one, x.as_slice(), y.as_slice()));
         let expected = forward_kinematics(&one, &mut data.0, &q);
         let found = forward_kinematics(&two, &mut data.1, &q);
         for f in 0..one.frames().len() {
             places.see(&one, &common::flat(found.frame(f)), &common::flat(expected.frame(f)));
         }
+    }
+}
+
+/// A floating robot and gravity turned and moved together: what is measured from the robot's own frames stays as it is.
+#[test]
+fn moved_as_a_whole() {
+    let mut slopes = ["∂τ/∂q", "∂τ/∂v", "∂τ/∂a"].map(|name| Worst::new(name, ROUNDING));
+    let mut inverse_slopes = ["∂q̈/∂q", "∂q̈/∂v", "∂q̈/∂τ"].map(|name| Worst::new(name, INVERTED));
+    let floats = |m: &&Model| m.bodies()[1].joint == Joint::FreeFlyer && m.bodies()[2..].iter().all(|b| b.parent > 0);
+    let models = all_models(TREES);
+    assert!(models.iter().filter(floats).count() > 3);
+    for (seed, model) in models.iter().filter(floats).enumerate() {
+        let rng = &mut rng(seed as u64);
+        let State { q, v, a, tau, f_ext } = State::random(model, rng);
+        let (by, place) = (Se3::new(common::random_rotation(rng), common::normal3(rng)), model.bodies()[1].placement);
+        let turned = model.clone().with_gravity(by.rotation * *model.gravity());
+        let base = Se3::new(Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(q[0], q[1], q[2]));
+        let moved = place.inverse() * by * place * base;
+        let mut q_moved = q.clone();
+        q_moved[..3].copy_from_slice(&moved.translation.to_array());
+        let quaternion = Quaternion::from_rotation(moved.rotation);
+        q_moved[3..6].copy_from_slice(&quaternion.vector.to_array());
+        q_moved[6] = quaternion.scalar;
+        let mut data = (Data::new(model), Data::new(model));
+        let expected = rnea_derivatives(model, &mut data.0, &q, &v, &a, &f_ext);
+        let found = rnea_derivatives(&turned, &mut data.1, &q_moved, &v, &a, &f_ext);
+        let pairs =
+            [(found.dtau_dq, expected.dtau_dq), (found.dtau_dv, expected.dtau_dv), (found.dtau_da, expected.dtau_da)];
+        slopes.iter_mut().zip(pairs).for_each(|(slope, (x, y))| slope.see(model, x.as_slice(), y.as_slice()));
+        let expected = aba_derivatives(model, &mut data.0, &q, &v, &tau, &f_ext);
+        let found = aba_derivatives(&turned, &mut data.1, &q_moved, &v, &tau, &f_ext);
+        let pairs = [(found.da_dq, expected.da_dq), (found.da_dv, expected.da_dv), (found.da_dtau, expected.da_dtau)];
+        inverse_slopes.iter_mut().zip(pairs).for_each(|(slope, (x, y))| slope.see(model, x.as_slice(), y.as_slice()));
     }
 }
 
