@@ -2410,6 +2410,19 @@ class Problem:
         stages: Sequence[int],
         terminal: _Action,
     ) -> Problem: ...
+    @staticmethod
+    def from_json(text: str) -> Problem:
+        """A problem of a robot from the text that `to_json` gave.
+
+        Raises `ProblemError` for a text that is none, and for what does not fit together in it.
+        """
+
+    def to_json(self) -> str:
+        """The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
+
+        Raises `ProblemError` if an action is an `Lqr` or an `Action`, or knots are of different robots.
+        """
+
     @property
     def horizon(self) -> int:
         """The number of knots before the terminal one, N."""

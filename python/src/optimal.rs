@@ -6,7 +6,7 @@ mod costs;
 use crate::arrays::{matrix, named_tuple, output, vector};
 use crate::exceptions::ProblemError;
 pub(crate) use actions::{Action, ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics, Lqr};
-use actions::{Fault, Model};
+use actions::{Boxed, Described, Fault, Model, Part};
 use condyle::optimal as rust;
 pub(crate) use costs::{Activation, Cost, FrictionCone, WrenchCone};
 use nalgebra::DMatrix;
@@ -14,7 +14,7 @@ use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyList, PyTuple, PyType};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 fn exception(error: rust::Error) -> PyErr {
     ProblemError::new_err(error.to_string())
@@ -93,6 +93,8 @@ pub(crate) struct Problem {
     inner: Mutex<rust::Problem>,
     models: Vec<Model>,
     terminal: Model,
+    /// The models and the terminal one as data, where they are a robot's.
+    described: Mutex<Vec<Option<Described>>>,
     /// What the actions written in Python raised.
     faults: Vec<Fault>,
 }
@@ -107,16 +109,63 @@ impl Problem {
         terminal: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let mut faults = Vec::new();
-        let mut boxed = Vec::new();
-        let mut kinds = Vec::new();
-        for model in models.iter().chain([terminal]) {
-            let (action, kind) = actions::boxed(model, &mut faults)?;
-            boxed.push(action);
-            kinds.push(kind);
+        let all = models.iter().chain([terminal]).map(|model| actions::boxed(model, &mut faults));
+        let all = all.collect::<PyResult<Vec<_>>>()?;
+        Self::make(numbers("x0", x0)?, all, stages, faults)
+    }
+
+    /// A problem of a robot from the text that `to_json` gave.
+    ///
+    /// Raises `ProblemError` for a text that is none, and for what does not fit together in it.
+    #[staticmethod]
+    fn from_json(text: &str) -> PyResult<Self> {
+        let data: rust::robot::RobotProblem =
+            serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("no problem: {error}")))?;
+        let robot = Arc::new(data.model);
+        let knots = data.knots.into_iter().map(|knot| Part::Knot(Box::new(knot)));
+        let parts = knots.chain([Part::Terminal(data.terminal)]);
+        let all = parts.map(|part| Described { robot: robot.clone(), part }.boxed()).collect::<PyResult<Vec<_>>>()?;
+        Self::make(data.x0, all, data.stages, Vec::new())
+    }
+
+    /// The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
+    ///
+    /// Raises `ProblemError` if an action is an `Lqr` or an `Action`, or knots are of different robots.
+    fn to_json(&self) -> PyResult<String> {
+        let problem = lock("problem", &self.inner)?;
+        let described = lock("problem", &self.described)?;
+        let wrong = |k: usize, what: &str| {
+            let name = if k < self.models.len() { format!("models[{k}]") } else { "terminal".to_owned() };
+            ProblemError::new_err(format!("{name}: {what}"))
+        };
+        let (mut knots, mut terminal) = (Vec::new(), Vec::new());
+        let mut first: Option<(&Arc<condyle::Model>, Vec<u8>)> = None;
+        for (k, described) in described.iter().enumerate() {
+            let Some(Described { robot, part }) = described else {
+                return Err(wrong(k, "expected an action of a robot, which alone can be JSON"));
+            };
+            let bytes = postcard::to_allocvec(&**robot).map_err(|error| ProblemError::new_err(error.to_string()))?;
+            match &first {
+                None => first = Some((robot, bytes)),
+                Some((_, other)) if *other == bytes => {}
+                Some(_) => return Err(wrong(k, "expected the robot of the first model, found another one")),
+            }
+            match (part, k < self.models.len()) {
+                (Part::Knot(knot), true) => knots.push((**knot).clone()),
+                (Part::Terminal(costs), false) => terminal.clone_from(costs),
+                (Part::Terminal(_), true) => return Err(wrong(k, "expected a knot with a duration")),
+                (Part::Knot(_), false) => return Err(wrong(k, "expected a knot without a duration")),
+            }
         }
-        let (end, terminal) = boxed.pop().zip(kinds.pop()).expect("the terminal one is there");
-        let problem = rust::Problem::new(numbers("x0", x0)?, boxed, stages, end).map_err(exception)?;
-        Ok(Self { inner: Mutex::new(problem), models: kinds, terminal, faults })
+        let (model, _) = first.expect("the terminal one is there");
+        let (x0, stages) = (problem.x0().to_vec(), problem.stages().to_vec());
+        let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, stages, terminal };
+        serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
+    }
+
+    /// For `pickle`: by way of JSON.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        Ok((slf.get_type().getattr("from_json")?, (slf.get().to_json()?,)))
     }
 
     /// The number of knots before the terminal one, N.
@@ -144,6 +193,9 @@ impl Problem {
             found |= kind.set_weight(&mut problem, Some(k), name, weight);
         }
         found |= self.terminal.set_weight(&mut problem, None, name, weight);
+        for described in lock("problem", &self.described)?.iter_mut().flatten() {
+            described.set_weight(name, weight);
+        }
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
     }
 
@@ -160,6 +212,15 @@ impl Problem {
 }
 
 impl Problem {
+    /// Of models, the terminal one last.
+    fn make(x0: Vec<f64>, mut all: Vec<Boxed>, stages: Vec<usize>, faults: Vec<Fault>) -> PyResult<Self> {
+        let described = Mutex::new(all.iter().map(|boxed| boxed.described.clone()).collect());
+        let Boxed { action: end, kind: terminal, .. } = all.pop().expect("the terminal one is there");
+        let (actions, models) = all.into_iter().map(|boxed| (boxed.action, boxed.kind)).unzip();
+        let problem = rust::Problem::new(x0, actions, stages, end).map_err(exception)?;
+        Ok(Self { inner: Mutex::new(problem), models, terminal, described, faults })
+    }
+
     /// Raises what an action written in Python raised.
     fn raise(&self) -> PyResult<()> {
         self.faults.iter().find_map(|fault| fault.lock().ok()?.take()).map_or(Ok(()), Err)

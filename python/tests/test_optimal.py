@@ -1,5 +1,6 @@
 """Optimal control: actions of one's own, costs by name and by knot, what is refused."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -135,3 +136,45 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
         Problem(X0, [], [], end())
     with pytest.raises(TypeError, match="models: expected an action, found 'int'"):
         Problem(X0, [3], [0], end())  # type: ignore[list-item]
+
+
+def every_kind_of_knot() -> Problem:
+    feet = {foot: condyle.Constraint(foot, "point", kd=20.0) for foot in ("LF_foot", "RH_foot")}
+    cone = Cost.friction_cone("cone", 1e-2, "LF_foot", FrictionCone(0.7, greatest=200.0))
+    rest, still = Cost.state("rest", 1.0, STANDING), Cost.control("still", 1e-2, np.zeros(12))
+    lower = np.full(12, -30.0)
+    models = [
+        ContactDynamics(QUADRUPED, feet, 0.02, [rest, still, cone], costs_at={1: [rest, still]}, lower=lower),
+        ImpulseDynamics(QUADRUPED, feet, [Cost.impulse_center_of_mass("landing", 1e-3)], restitution=0.1),
+        FreeDynamics(QUADRUPED, 0.02, [still], actuation=np.eye(18)[:, 6:], integrator="runge_kutta_2"),
+    ]
+    return Problem(STANDING, models, [0, 0, 2, 1, 0], FreeDynamics(QUADRUPED, None, [rest]))
+
+
+@pytest.mark.parametrize("again", [lambda p: Problem.from_json(p.to_json()), lambda p: pickle.loads(pickle.dumps(p))])
+def test_a_problem_in_a_file(again: Any) -> None:
+    problem = every_kind_of_knot()
+    problem.set_weight("rest", 3.0)
+    problem.set_x0(STANDING + np.r_[0.0, 0.0, 0.1, np.zeros(34)])
+    us = [np.zeros(12)] * 3 + [np.zeros(0)] + [np.zeros(12)]
+    one, other = (Fddp(p).solve(np.tile(STANDING, (6, 1)), us) for p in (problem, again(problem)))
+    np.testing.assert_array_equal(one.xs, other.xs)
+    assert [i.cost for i in one.trace] == [i.cost for i in other.trace]
+    assert len(one.trace) > 1
+
+
+def test_what_no_file_can_hold() -> None:
+    rest = Cost.state("rest", 1.0, X0)
+    knot, last = FreeDynamics(ARM, 0.1, [rest]), FreeDynamics(ARM, None, [rest])
+    own = Action(14, 0, lambda t, x, u: (x, 0.0))
+    with pytest.raises(ProblemError, match=r"models\[1\]: expected an action of a robot"):
+        Problem(X0, [knot, own], [0, 1], last).to_json()
+    with pytest.raises(ProblemError, match="terminal: expected the robot of the first model"):
+        Problem(X0, [knot], [0], FreeDynamics(ARM.with_gravity([0.0, 0.0, -1.6]), None, [rest])).to_json()
+    with pytest.raises(ProblemError, match=r"models\[1\]: expected a knot with a duration"):
+        Problem(X0, [knot, last], [0, 1], last).to_json()
+    text = Problem(X0, [knot], [0], last).to_json()
+    with pytest.raises(ProblemError, match="no problem: missing field `stages`"):
+        Problem.from_json(text.replace('"stages":[0],', ""))
+    with pytest.raises(ProblemError, match="there is no action model 3"):
+        Problem.from_json(text.replace('"stages":[0]', '"stages":[3]'))

@@ -4,9 +4,11 @@ use crate::error::Error;
 use crate::frames::ReferenceFrame;
 use crate::model::Model;
 use condyle_spatial::{Constant, Motion, Scalar, Se3};
+use serde::{Deserialize, Serialize};
 
 /// What a constraint holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ConstraintKind {
     /// The origin of a frame: three rows, a force.
     Point,
@@ -25,7 +27,7 @@ impl ConstraintKind {
 }
 
 /// Where a constraint wants its frame to be and how it should move there.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Target<S> {
     /// The wanted pose of the frame in the other frame (the world for a contact); of a point, the translation alone.
@@ -84,7 +86,8 @@ impl<S: Scalar> Target<S> {
 /// assert_eq!(contact.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Constraint {
     /// The number of the frame that is held.
     pub frame: usize,

@@ -15,9 +15,11 @@ use crate::model::Model;
 use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3};
 use core::ops::Deref;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// In which frame what is asked about a frame (or a body, whose frame is then meant) is expressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ReferenceFrame {
     /// In the frame itself.
     Local,

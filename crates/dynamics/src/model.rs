@@ -75,39 +75,17 @@ pub enum FrameKind {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Least position, nq numbers (rad, m).
-    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_minus_infinity")]
+    #[serde(with = "condyle_spatial::finite::lower")]
     pub lower: Vec<f64>,
     /// Greatest position, nq numbers (rad, m).
-    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_infinity")]
+    #[serde(with = "condyle_spatial::finite::upper")]
     pub upper: Vec<f64>,
     /// Greatest speed, nv numbers (rad/s, m/s).
-    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_infinity")]
+    #[serde(with = "condyle_spatial::finite::upper")]
     pub velocity: Vec<f64>,
     /// Greatest effort, nv numbers (N m, N).
-    #[serde(serialize_with = "finite::serialize", deserialize_with = "finite::or_infinity")]
+    #[serde(with = "condyle_spatial::finite::upper")]
     pub effort: Vec<f64>,
-}
-
-/// Limits as files have them: JSON knows no infinity, so where there is no limit stands nothing.
-mod finite {
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub(super) fn serialize<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
-        to.collect_seq(limits.iter().map(|x| x.is_finite().then_some(*x)))
-    }
-
-    fn or<'de, D: Deserializer<'de>>(from: D, otherwise: f64) -> Result<Vec<f64>, D::Error> {
-        let limits = Vec::<Option<f64>>::deserialize(from)?;
-        Ok(limits.into_iter().map(|x| x.unwrap_or(otherwise)).collect())
-    }
-
-    pub(super) fn or_infinity<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
-        or(from, f64::INFINITY)
-    }
-
-    pub(super) fn or_minus_infinity<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
-        or(from, f64::NEG_INFINITY)
-    }
 }
 
 /// A body as the algorithms see it: the axis of its joint turned to z, all that a pass needs side by side.

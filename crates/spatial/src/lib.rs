@@ -20,6 +20,8 @@
 #[doc(hidden)]
 pub mod block;
 mod dual;
+#[doc(hidden)]
+pub mod finite;
 mod fused;
 mod inertia;
 #[doc(hidden)]

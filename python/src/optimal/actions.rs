@@ -11,13 +11,95 @@ use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rust::robot::{self, Actuation, Integrator};
+use rust::robot::{self, Actuation, ControlBounds, Dynamics, Integrator, Knot};
 use rust::{ActionModel, LqNode, NumDiff};
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 /// What an action written in Python raised during a solve.
 pub(super) type Fault = Arc<Mutex<Option<PyErr>>>;
+
+/// A robot's action as data, if it can be put into a file.
+#[derive(Clone)]
+pub(super) struct Described {
+    pub robot: Arc<condyle::Model>,
+    pub part: Part,
+}
+
+#[derive(Clone)]
+pub(super) enum Part {
+    Knot(Box<robot::Knot>),
+    Terminal(Vec<robot::Cost>),
+}
+
+/// A robot's action, as it is and as data.
+struct RobotAction<A> {
+    action: A,
+    described: Described,
+}
+
+impl<A: ActionModel + Clone> RobotAction<A> {
+    fn new(robot: &Bound<'_, Robot>, part: impl FnOnce(&condyle::Model) -> PyResult<Part>) -> PyResult<Self> {
+        let robot = Arc::new(robot.get().inner.clone());
+        let described = Described { part: part(&robot)?, robot };
+        let action: Box<dyn Any> = described.build()?;
+        Ok(Self { action: *action.downcast().expect("the class asks for its own kind of knot"), described })
+    }
+
+    fn boxed(&self) -> Boxed {
+        Boxed {
+            action: Box::new(self.action.clone()),
+            kind: self.described.kind(),
+            described: Some(self.described.clone()),
+        }
+    }
+}
+
+impl Described {
+    /// With its action.
+    pub(super) fn boxed(self) -> PyResult<Boxed> {
+        Ok(Boxed { action: self.build()?, kind: self.kind(), described: Some(self) })
+    }
+
+    fn build(&self) -> PyResult<Box<dyn ActionModel>> {
+        match &self.part {
+            Part::Knot(knot) => knot.build(&self.robot),
+            Part::Terminal(costs) => {
+                robot::FreeDynamics::terminal(self.robot.clone(), costs.clone()).map(|end| Box::new(end) as _)
+            }
+        }
+        .map_err(exception)
+    }
+
+    /// Changes the weights of the terms called `name`.
+    pub(super) fn set_weight(&mut self, name: &str, weight: f64) {
+        let all: &mut dyn Iterator<Item = &mut robot::Cost> = match &mut self.part {
+            Part::Terminal(costs) => &mut costs.iter_mut(),
+            Part::Knot(knot) => &mut knot.costs.iter_mut().chain(knot.costs_at.values_mut().flatten()),
+        };
+        all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
+    }
+
+    fn kind(&self) -> Model {
+        match &self.part {
+            Part::Terminal(_) => Model::Free,
+            Part::Knot(knot) => match knot.dynamics {
+                Dynamics::Free { .. } => Model::Free,
+                Dynamics::Contact { .. } => Model::Contact,
+                Dynamics::Impulse { .. } => Model::Impulse,
+                Dynamics::Inverse { .. } => Model::Inverse,
+            },
+        }
+    }
+}
+
+/// An action of a problem.
+pub(super) struct Boxed {
+    pub action: Box<dyn ActionModel>,
+    pub kind: Model,
+    pub described: Option<Described>,
+}
 
 /// What kind of action a model of a problem is.
 #[derive(Clone, Copy)]
@@ -49,29 +131,30 @@ impl Model {
 }
 
 /// A copy of any action.
-pub(super) fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<(Box<dyn ActionModel>, Model)> {
+pub(super) fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<Boxed> {
     if let Ok(free) = model.cast::<FreeDynamics>() {
-        return Ok((Box::new(free.get().0.clone()), Model::Free));
+        return Ok(free.get().0.boxed());
     }
     if let Ok(contact) = model.cast::<ContactDynamics>() {
-        return Ok((Box::new(contact.get().0.clone()), Model::Contact));
+        return Ok(contact.get().0.boxed());
     }
     if let Ok(impulse) = model.cast::<ImpulseDynamics>() {
-        return Ok((Box::new(impulse.get().0.clone()), Model::Impulse));
+        return Ok(impulse.get().0.boxed());
     }
     if let Ok(inverse) = model.cast::<InverseDynamics>() {
-        return Ok((Box::new(inverse.get().0.clone()), Model::Inverse));
+        return Ok(inverse.get().0.boxed());
     }
+    let own = |action| Boxed { action, kind: Model::Own, described: None };
     if let Ok(lqr) = model.cast::<Lqr>() {
-        return Ok((Box::new(lqr.get().0.clone()), Model::Own));
+        return Ok(own(Box::new(lqr.get().0.clone())));
     }
-    let Ok(own) = model.cast::<Action>() else {
+    let Ok(action) = model.cast::<Action>() else {
         let found = model.get_type().name()?;
         return Err(PyTypeError::new_err(format!("models: expected an action, found '{found}'")));
     };
-    let own = own.get().copy(model.py());
-    faults.push(own.fault.clone());
-    Ok(if own.calc_diff.is_some() { (Box::new(own), Model::Own) } else { (Box::new(NumDiff(own)), Model::Own) })
+    let written = action.get().copy(model.py());
+    faults.push(written.fault.clone());
+    Ok(own(if written.calc_diff.is_some() { Box::new(written) } else { Box::new(NumDiff(written)) }))
 }
 
 fn integrator(name: &str) -> PyResult<Integrator> {
@@ -87,14 +170,14 @@ fn integrator(name: &str) -> PyResult<Integrator> {
     }
 }
 
-/// The drives: of every joint but a free-flyer at the root, or the map S given.
-fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult<Actuation> {
-    let Some(map) = map else { return Ok(Actuation::joints(model)) };
+/// S, if one is given: otherwise every joint but a free-flyer at the root is driven; and the number of controls.
+fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult<(Option<DMatrix<f64>>, usize)> {
+    let Some(map) = map else { return Ok((None, Actuation::joints(model).nu())) };
     let shape: Vec<usize> = map.getattr("shape").and_then(|shape| shape.extract()).unwrap_or_default();
     let &[_, nu] = shape.as_slice() else {
         return Err(PyValueError::new_err("actuation: expected an array of shape (nv, nu)"));
     };
-    Actuation::matrix(model, matrix("actuation", map, [model.nv(), nu])?.to_matrix()).map_err(exception)
+    Ok((Some(matrix("actuation", map, [model.nv(), nu])?.to_matrix()), nu))
 }
 
 fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
@@ -128,16 +211,16 @@ fn bounds(
     Ok(Some([bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?]))
 }
 
-/// A knot with bounds on its controls.
-fn bounded<M: robot::ContinuousModel>(
-    knot: robot::Integrated<M>,
-    lower: Option<&Bound<'_, PyAny>>,
-    upper: Option<&Bound<'_, PyAny>>,
-) -> PyResult<robot::Integrated<M>> {
-    Ok(match bounds(knot.nu(), lower, upper)? {
-        Some([lower, upper]) => knot.with_bounds(lower, upper),
-        None => knot,
-    })
+/// A knot as data.
+fn knot(
+    dynamics: Dynamics,
+    costs: &[PyRef<'_, Cost>],
+    costs_at: CostsAt<'_>,
+    bounds: Option<[Vec<f64>; 2]>,
+) -> PyResult<Part> {
+    let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(&costs))).collect();
+    let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
+    Ok(Part::Knot(Box::new(Knot { dynamics, costs: terms(costs), costs_at, bounds })))
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.
@@ -155,7 +238,7 @@ fn bounded<M: robot::ContinuousModel>(
 ///
 /// Raises `ProblemError` for a cost or drives that do not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct FreeDynamics(pub(super) robot::FreeDynamics);
+pub(crate) struct FreeDynamics(RobotAction<robot::FreeDynamics>);
 
 #[pymethods]
 impl FreeDynamics {
@@ -171,27 +254,21 @@ impl FreeDynamics {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
-        let drives = self::actuation(&model, actuation)?;
-        let costs = terms(&costs);
-        let action = match dt {
-            Some(dt) => {
-                robot::Free::new(model, drives, costs).and_then(|free| robot::FreeDynamics::new(free, integrator, dt))
-            }
-            None => robot::FreeDynamics::terminal(model, costs),
+        let Some(dt) = dt else {
+            return Ok(Self(RobotAction::new(model, |_| Ok(Part::Terminal(terms(&costs))))?));
         };
-        let mut action = action.map_err(exception)?;
-        for (t, costs) in costs_at.into_iter().flatten() {
-            action.set_costs(t, terms(&costs)).map_err(exception)?;
-        }
-        Ok(Self(bounded(action, lower, upper)?))
+        let integrator = self::integrator(integrator)?;
+        Ok(Self(RobotAction::new(model, |model| {
+            let (actuation, nu) = self::actuation(model, actuation)?;
+            knot(Dynamics::Free { actuation, integrator, dt }, &costs, costs_at, bounds(nu, lower, upper)?)
+        })?))
     }
 
     /// The efforts that hold the robot still at the state x, nu numbers.
     fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let model = self.0.model();
+        let model = &self.0.described.robot;
         let x = vector("x", x, model.nq() + model.nv())?;
-        self.0.clone().quasi_static(&x).give(py, None)
+        self.0.action.clone().quasi_static(&x).give(py, None)
     }
 }
 
@@ -211,7 +288,7 @@ impl FreeDynamics {
 /// >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
 /// >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct ContactDynamics(pub(super) robot::ContactDynamics);
+pub(crate) struct ContactDynamics(RobotAction<robot::ContactDynamics>);
 
 #[pymethods]
 impl ContactDynamics {
@@ -229,22 +306,19 @@ impl ContactDynamics {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
-        let (drives, contacts) = (self::actuation(&model, actuation)?, self::contacts(&model, contacts)?);
-        let action = robot::Contacts::new(model, drives, &contacts, damping, terms(&costs))
-            .and_then(|inner| robot::ContactDynamics::new(inner, integrator, dt));
-        let mut action = action.map_err(exception)?;
-        for (t, costs) in costs_at.into_iter().flatten() {
-            action.set_costs(t, terms(&costs)).map_err(exception)?;
-        }
-        Ok(Self(bounded(action, lower, upper)?))
+        let integrator = self::integrator(integrator)?;
+        Ok(Self(RobotAction::new(model, |model| {
+            let ((actuation, nu), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);
+            let dynamics = Dynamics::Contact { contacts, damping, actuation, integrator, dt };
+            knot(dynamics, &costs, costs_at, bounds(nu, lower, upper)?)
+        })?))
     }
 
     /// The smallest controls and forces that hold the robot still at the state x: nu controls of them.
     fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let model = self.0.model();
+        let model = &self.0.described.robot;
         let x = vector("x", x, model.nq() + model.nv())?;
-        self.0.clone().quasi_static(&x).give(py, None)
+        self.0.action.clone().quasi_static(&x).give(py, None)
     }
 }
 
@@ -260,7 +334,7 @@ impl ContactDynamics {
 ///
 /// Raises `ProblemError` as `ContactDynamics` does.
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct ImpulseDynamics(pub(super) robot::ImpulseDynamics);
+pub(crate) struct ImpulseDynamics(RobotAction<robot::ImpulseDynamics>);
 
 #[pymethods]
 impl ImpulseDynamics {
@@ -273,10 +347,10 @@ impl ImpulseDynamics {
         restitution: f64,
         damping: f64,
     ) -> PyResult<Self> {
-        let model = Arc::new(model.get().inner.clone());
-        let contacts = self::contacts(&model, contacts)?;
-        let action = robot::ImpulseDynamics::new(model, &contacts, restitution, damping, terms(&costs));
-        Ok(Self(action.map_err(exception)?))
+        Ok(Self(RobotAction::new(model, |model| {
+            let contacts = self::contacts(model, contacts)?;
+            knot(Dynamics::Impulse { contacts, restitution, damping }, &costs, None, None)
+        })?))
     }
 }
 
@@ -289,7 +363,7 @@ impl ImpulseDynamics {
 ///
 /// Raises `ProblemError` for a cost that does not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct InverseDynamics(pub(super) robot::InverseDynamics);
+pub(crate) struct InverseDynamics(RobotAction<robot::InverseDynamics>);
 
 #[pymethods]
 impl InverseDynamics {
@@ -303,10 +377,10 @@ impl InverseDynamics {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let (model, integrator) = (Arc::new(model.get().inner.clone()), self::integrator(integrator)?);
-        let action = robot::Inverse::new(model, terms(&costs))
-            .and_then(|inner| robot::InverseDynamics::new(inner, integrator, dt));
-        Ok(Self(bounded(action.map_err(exception)?, lower, upper)?))
+        let integrator = self::integrator(integrator)?;
+        Ok(Self(RobotAction::new(model, |model| {
+            knot(Dynamics::Inverse { integrator, dt }, &costs, None, bounds(model.nv(), lower, upper)?)
+        })?))
     }
 }
 

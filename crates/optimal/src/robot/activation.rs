@@ -1,5 +1,7 @@
 //! Activations: how much a residual costs.
 
+use serde::{Deserialize, Serialize};
+
 /// How much a residual r costs: a(r).
 ///
 /// ```
@@ -7,7 +9,8 @@
 /// let barrier = Activation::Barrier { lower: vec![-1.0, -1.0], upper: vec![1.0, f64::INFINITY] };
 /// assert_eq!(barrier.value(&[3.0, 3.0]), 2.0); // ½ (3 − 1)², and nothing for the second
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Activation {
     /// ½ Σ rᵢ².
     Quadratic,
@@ -19,15 +22,19 @@ pub enum Activation {
     /// ½ Σ (excess of rᵢ over its bounds)²: nothing inside them.
     Barrier {
         /// Least values; −∞ for none.
+        #[serde(with = "condyle_spatial::finite::lower")]
         lower: Vec<f64>,
         /// Greatest values; ∞ for none.
+        #[serde(with = "condyle_spatial::finite::upper")]
         upper: Vec<f64>,
     },
     /// ½ Σ wᵢ (excess of rᵢ over its bounds)². (Crocoddyl has the square of wᵢ in its value.)
     WeightedBarrier {
         /// Least values; −∞ for none.
+        #[serde(with = "condyle_spatial::finite::lower")]
         lower: Vec<f64>,
         /// Greatest values; ∞ for none.
+        #[serde(with = "condyle_spatial::finite::upper")]
         upper: Vec<f64>,
         /// w.
         weights: Vec<f64>,

@@ -4,6 +4,7 @@
 //! z) into those. Rows are in Crocoddyl's order, so that its residuals are the same numbers.
 
 use condyle_dynamics::{Mat3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: rows A with lower ≤ A f ≤ upper.
 ///
@@ -14,7 +15,8 @@ use condyle_dynamics::{Mat3, Vec3};
 /// assert_eq!(rows.len(), 5); // ±x, ±y, and the normal force
 /// assert_eq!(rows[0], [1.0, 0.0, -0.5]); // f_x ≤ 0.5 f_z
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FrictionCone {
     /// R: the surface's axes along the contact's.
     pub rotation: Mat3<f64>,
@@ -27,6 +29,7 @@ pub struct FrictionCone {
     /// Least normal force (N).
     pub least: f64,
     /// Greatest normal force (N).
+    #[serde(with = "condyle_spatial::finite::greatest")]
     pub greatest: f64,
 }
 
@@ -41,7 +44,8 @@ pub struct FrictionCone {
 /// let cone = WrenchCone { friction: FrictionCone::new(0.7), size: [0.2, 0.1] };
 /// assert_eq!(cone.rows().len(), 17);
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct WrenchCone {
     /// What the force must obey.
     pub friction: FrictionCone,

@@ -3,6 +3,7 @@
 use super::watch::Offer;
 use crate::Error;
 use condyle_dynamics::{Constraint, ConstraintKind, ConstraintSet, Model, Proximal};
+use serde::{Deserialize, Serialize};
 
 /// A contact of a frame with the world, and the name by which residuals call it.
 ///
@@ -19,7 +20,8 @@ use condyle_dynamics::{Constraint, ConstraintKind, ConstraintSet, Model, Proxima
 /// assert_eq!(contact.constraint.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Contact {
     /// How it is called.
     pub name: String,

@@ -12,10 +12,12 @@ use condyle_dynamics::{
     lie,
 };
 use core::ops::Range;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A term w · a(r(x, u)) of a cost.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Cost {
     /// How it is called.
     pub name: String,

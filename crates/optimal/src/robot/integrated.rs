@@ -9,6 +9,7 @@ use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use core::ops::Range;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// Dynamics in continuous time: q̈ = a(q, v, u), ℓ̇ = ℓ(x, u), with x = (q, v).
 ///
@@ -140,15 +141,19 @@ pub struct Derivatives<'d> {
 ///
 /// The stages of the Runge–Kutta methods add velocities of different points as if positions were a vector space, as
 /// Crocoddyl's do; for a free-flyer they are therefore of first order in its rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Integrator {
     /// v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): one evaluation; symplectic. Crocoddyl's `IntegratedActionModelEuler`.
     SemiImplicitEuler,
     /// The midpoint rule, 2 evaluations.
+    #[serde(rename = "runge_kutta_2")]
     RungeKutta2,
     /// Heun's rule of third order, 3 evaluations.
+    #[serde(rename = "runge_kutta_3")]
     RungeKutta3,
     /// The classical rule, 4 evaluations.
+    #[serde(rename = "runge_kutta_4")]
     RungeKutta4,
 }
 

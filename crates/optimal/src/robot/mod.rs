@@ -4,6 +4,7 @@
 //! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name.
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
 //!   [`InverseDynamics`] the accelerations are the controls. What drives a robot is its [`Actuation`]; how a knot steps through its time, its [`Integrator`].
+//! - A [`RobotProblem`] is a problem as data, in a file for example.
 //! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
 //!
 //! ```
@@ -47,6 +48,7 @@ mod cones;
 mod contact;
 mod contacts;
 mod costs;
+mod description;
 mod euler;
 mod free;
 mod impulse;
@@ -65,6 +67,7 @@ pub use cones::{FrictionCone, WrenchCone};
 pub use contact::Contact;
 pub use contacts::{ContactDynamics, Contacts};
 pub use costs::{Cost, Costs};
+pub use description::{ControlBounds, Dynamics, Knot, RobotProblem};
 pub use free::{Free, FreeDynamics};
 pub use impulse::ImpulseDynamics;
 pub use integrated::{ContinuousModel, Derivatives, Integrated, Integrator};

@@ -3,11 +3,13 @@
 use super::cones::{FrictionCone, WrenchCone};
 use super::watch::{Offer, Signal};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// What a cost looks at: a vector r(x, u) that should be small.
 ///
 /// Frames are numbers of the model's frames; contacts and impulses are called by the name that the action gives them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Residual {
     /// x ⊖ x_ref, 2 nv numbers.
     State {

@@ -1,0 +1,199 @@
+//! A robot's problem as data: what a file has of it.
+
+use super::{
+    Actuation, Contact, Contacts, ContinuousModel, Cost, Free, FreeDynamics, ImpulseDynamics, Integrated, Integrator,
+    Inverse,
+};
+use crate::action::ActionModel;
+use crate::{Error, Problem};
+use condyle_dynamics::Model;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// An optimal control problem of a robot as data, with the robot in it: to keep it in a file, to send it, to solve it
+/// again. [`build`](Self::build) makes the [`Problem`]; what is wrong in it is found there.
+///
+/// Any format of serde serves. In JSON a bound that is infinite is `null`.
+///
+/// ```
+/// use condyle_dynamics::robots;
+/// use condyle_optimal::robot::{Activation, Cost, Dynamics, Integrator, Knot, Residual, RobotProblem};
+/// let rest = Cost::new("rest", 1.0, Residual::State { reference: vec![0.0; 14] }, Activation::Quadratic);
+/// let step = Dynamics::Free { actuation: None, integrator: Integrator::SemiImplicitEuler, dt: 0.05 };
+/// let knot = Knot { dynamics: step, costs: vec![rest.clone()], costs_at: Default::default(), bounds: None };
+/// let data = RobotProblem {
+///     model: robots::arm7(),
+///     x0: vec![0.1; 14],
+///     knots: vec![knot],
+///     stages: vec![0; 20],
+///     terminal: vec![rest],
+/// };
+/// let text = serde_json::to_string(&data)?;
+/// let problem = serde_json::from_str::<RobotProblem>(&text)?.build()?;
+/// assert_eq!(problem.horizon(), 20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotProblem {
+    /// The robot.
+    pub model: Model,
+    /// The initial state (q, v).
+    pub x0: Vec<f64>,
+    /// The knots that there are.
+    pub knots: Vec<Knot>,
+    /// For each knot of the horizon the index of one of them.
+    pub stages: Vec<usize>,
+    /// The costs after the last knot.
+    pub terminal: Vec<Cost>,
+}
+
+/// A knot as data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Knot {
+    /// How the state goes on.
+    pub dynamics: Dynamics,
+    /// Its costs.
+    pub costs: Vec<Cost>,
+    /// Other costs in their place, by the number of a knot of the horizon.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub costs_at: BTreeMap<usize, Vec<Cost>>,
+    /// Bounds on its controls, if there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<ControlBounds>,
+}
+
+/// Bounds on the controls of a knot, nu numbers each, infinite where there is none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControlBounds {
+    /// Least values.
+    #[serde(with = "condyle_spatial::finite::lower")]
+    pub lower: Vec<f64>,
+    /// Greatest values.
+    #[serde(with = "condyle_spatial::finite::upper")]
+    pub upper: Vec<f64>,
+}
+
+/// How the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Dynamics {
+    /// [`FreeDynamics`].
+    Free {
+        /// S.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        actuation: Option<DMatrix<f64>>,
+        /// How it steps.
+        integrator: Integrator,
+        /// Δt (s).
+        dt: f64,
+    },
+    /// [`ContactDynamics`](super::ContactDynamics).
+    Contact {
+        /// What is held.
+        contacts: Vec<Contact>,
+        /// μ (1/kg).
+        damping: f64,
+        /// S.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        actuation: Option<DMatrix<f64>>,
+        /// How it steps.
+        integrator: Integrator,
+        /// Δt (s).
+        dt: f64,
+    },
+    /// [`ImpulseDynamics`].
+    Impulse {
+        /// What sets in.
+        contacts: Vec<Contact>,
+        /// ε, from 0 to 1.
+        restitution: f64,
+        /// μ (1/kg).
+        damping: f64,
+    },
+    /// [`InverseDynamics`](super::InverseDynamics).
+    Inverse {
+        /// How it steps.
+        integrator: Integrator,
+        /// Δt (s).
+        dt: f64,
+    },
+}
+
+impl RobotProblem {
+    /// The problem. Allocates.
+    ///
+    /// # Errors
+    /// Those of the knots' constructors and of [`Problem::new`].
+    pub fn build(&self) -> Result<Problem, Error> {
+        let model = Arc::new(self.model.clone());
+        let knots = self.knots.iter().map(|knot| knot.build(&model)).collect::<Result<_, _>>()?;
+        let terminal = FreeDynamics::terminal(model, self.terminal.clone())?;
+        Problem::new(self.x0.clone(), knots, self.stages.clone(), Box::new(terminal))
+    }
+}
+
+/// An action with the costs of single knots.
+macro_rules! with_costs_at {
+    ($knot:expr, $action:expr) => {{
+        let mut action = $action;
+        for (&t, costs) in &$knot.costs_at {
+            action.set_costs(t, costs.clone())?;
+        }
+        action
+    }};
+}
+
+impl Knot {
+    /// The action. Allocates.
+    ///
+    /// # Errors
+    /// Those of its constructor; [`Error::Length`] for bounds of another length than nu.
+    pub fn build(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
+        let (model, costs) = (model.clone(), self.costs.clone());
+        let drives = |actuation: &Option<DMatrix<f64>>| match actuation {
+            None => Ok(Actuation::joints(&model)),
+            Some(S) => Actuation::matrix(&model, S.clone()),
+        };
+        match &self.dynamics {
+            Dynamics::Free { actuation, integrator, dt } => {
+                let inner = Free::new(model.clone(), drives(actuation)?, costs)?;
+                self.bounded(with_costs_at!(self, Integrated::new(inner, *integrator, *dt)?))
+            }
+            Dynamics::Contact { contacts, damping, actuation, integrator, dt } => {
+                let inner = Contacts::new(model.clone(), drives(actuation)?, contacts, *damping, costs)?;
+                self.bounded(with_costs_at!(self, Integrated::new(inner, *integrator, *dt)?))
+            }
+            Dynamics::Inverse { integrator, dt } => {
+                let inner = Inverse::new(model.clone(), costs)?;
+                self.bounded(with_costs_at!(self, Integrated::new(inner, *integrator, *dt)?))
+            }
+            Dynamics::Impulse { contacts, restitution, damping } => {
+                let action = ImpulseDynamics::new(model.clone(), contacts, *restitution, *damping, costs)?;
+                self.check_bounds(0)?;
+                Ok(Box::new(with_costs_at!(self, action)))
+            }
+        }
+    }
+
+    fn check_bounds(&self, nu: usize) -> Result<(), Error> {
+        for (name, bounds) in self.bounds.iter().flat_map(|b| [("lower", &b.lower), ("upper", &b.upper)]) {
+            if bounds.len() != nu {
+                return Err(Error::Length { name, expected: nu, found: bounds.len() });
+            }
+        }
+        Ok(())
+    }
+
+    fn bounded<M: ContinuousModel>(&self, action: Integrated<M>) -> Result<Box<dyn ActionModel>, Error> {
+        self.check_bounds(action.nu())?;
+        Ok(match &self.bounds {
+            Some(ControlBounds { lower, upper }) => Box::new(action.with_bounds(lower.clone(), upper.clone())),
+            None => Box::new(action),
+        })
+    }
+}

@@ -1,0 +1,90 @@
+//! Limits as files have them: JSON knows no infinity, so where there is no limit stands nothing.
+//!
+//! ```
+//! use serde::{Deserialize, Serialize};
+//!
+//! #[derive(Serialize, Deserialize)]
+//! struct Bounds {
+//!     #[serde(with = "condyle_spatial::finite::lower")]
+//!     least: Vec<f64>,
+//! }
+//!
+//! let text = serde_json::to_string(&Bounds { least: vec![-1.0, f64::NEG_INFINITY] })?;
+//! assert_eq!(text, r#"{"least":[-1.0,null]}"#);
+//! assert_eq!(serde_json::from_str::<Bounds>(&text)?.least[1], f64::NEG_INFINITY);
+//! # Ok::<(), serde_json::Error>(())
+//! ```
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+fn vector<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_seq(limits.iter().map(|x| x.is_finite().then_some(*x)))
+}
+
+fn vector_or<'de, D: Deserializer<'de>>(from: D, otherwise: f64) -> Result<Vec<f64>, D::Error> {
+    let limits = Vec::<Option<f64>>::deserialize(from)?;
+    Ok(limits.into_iter().map(|x| x.unwrap_or(otherwise)).collect())
+}
+
+/// Least values, −∞ where there is none.
+pub mod lower {
+    use super::*;
+
+    /// Writes nothing for what is not finite.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
+        vector(limits, to)
+    }
+
+    /// Reads −∞ for nothing.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        vector_or(from, f64::NEG_INFINITY)
+    }
+}
+
+/// Greatest values, ∞ where there is none.
+pub mod upper {
+    use super::*;
+
+    /// Writes nothing for what is not finite.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
+        vector(limits, to)
+    }
+
+    /// Reads ∞ for nothing.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        vector_or(from, f64::INFINITY)
+    }
+}
+
+/// A greatest value, ∞ if there is none.
+pub mod greatest {
+    use super::*;
+
+    /// Writes nothing for what is not finite.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(limit: &f64, to: S) -> Result<S::Ok, S::Error> {
+        limit.is_finite().then_some(*limit).serialize(to)
+    }
+
+    /// Reads ∞ for nothing.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::INFINITY))
+    }
+}
