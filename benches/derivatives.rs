@@ -17,8 +17,8 @@
 //! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. So does ∂q̈ on chains, where it is solved for; on
 //! other trees it is a product, as what λᵀ∂²q̈ has beside λᵀ∂²τ is everywhere, and grows faster.
 use condyle::{
-    BodyId, Data, Inertia, Joint, Mat3, Model, ModelBuilder, Scalar, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives,
-    aba_hessian, integrate, random_configuration, rnea, rnea_derivatives, rnea_hessian,
+    BodyId, Data, Inertia, Joint, LaneJacobian, Mat3, Model, ModelBuilder, Scalar, Se3, StateFunction, Sym3, Vec3,
+    WORLD, aba, aba_derivatives, aba_hessian, integrate, random_configuration, rnea, rnea_derivatives, rnea_hessian,
 };
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -144,6 +144,35 @@ fn by_hand(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
     });
 }
 
+/// `rnea` or `aba` of (q, v, x).
+struct Dynamics<'m> {
+    model: &'m Model,
+    forward: bool,
+}
+
+impl StateFunction for Dynamics<'_> {
+    fn len(&self) -> usize {
+        self.model.nv()
+    }
+    fn call<S: Scalar>(&mut self, data: &mut Data<S>, x: &[S], y: &mut [S]) {
+        let (q, rest) = x.split_at(self.model.nq());
+        let (v, x) = rest.split_at(self.model.nv());
+        let of = if self.forward { aba(self.model, data, q, v, x, &[]) } else { rnea(self.model, data, q, v, x, &[]) };
+        y.copy_from_slice(of);
+    }
+}
+
+/// As many directions at a time as a vector has lanes.
+fn by_lanes(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
+    let x = [&s.q[..], &s.v, &s.x].concat();
+    let mut jacobian = LaneJacobian::new(model, x.len(), model.nv());
+    for (what, forward) in [("∂τ", false), ("∂q̈", true)] {
+        group.bench_function(BenchmarkId::new(format!("{what} by duals in lanes"), n), |b| {
+            b.iter(|| _ = black_box(jacobian.of(model, black_box(&x), &mut Dynamics { model, forward })));
+        });
+    }
+}
+
 type Parent = fn(usize) -> usize;
 
 fn derivatives(c: &mut Criterion) {
@@ -158,6 +187,7 @@ fn derivatives(c: &mut Criterion) {
             by_hand(&mut group, n, &model, &state);
             by_steps(&mut group, "by duals", n, &model, &state, &[Dual64::new(0.0, 1.0)]);
             by_steps(&mut group, "by differences", n, &model, &state, &[1e-5, -1e-5]);
+            by_lanes(&mut group, n, &model, &state);
         }
         group.finish();
     }

@@ -105,7 +105,7 @@ pub use constraint_set::{ConstraintSet, Proximal};
 pub use coriolis::coriolis_matrix;
 pub use crba::crba;
 pub use data::Data;
-pub use differentiate::{gradient, hessian, jacobian};
+pub use differentiate::{LaneJacobian, StateFunction, gradient, hessian, jacobian};
 pub use divide_conquer::DivideConquer;
 pub use energy::{EnergyDerivatives, energy_derivatives};
 pub use error::Error;

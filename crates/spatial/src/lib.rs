@@ -25,6 +25,8 @@ pub mod finite;
 mod fused;
 mod inertia;
 #[doc(hidden)]
+pub mod lane_dual;
+#[doc(hidden)]
 pub mod lanes;
 pub mod level;
 pub mod lie;

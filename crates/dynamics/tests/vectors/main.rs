@@ -8,6 +8,7 @@ mod common;
 mod counting;
 
 mod batch;
+mod duals;
 mod lanes;
 
 use condyle_dynamics::Model;

@@ -1,0 +1,65 @@
+//! Derivatives in several directions at a time: those by hand.
+
+use crate::common::table::Input;
+use crate::common::{Worst, rng};
+use crate::{each_level, models};
+use condyle_dynamics::{
+    Data, Force, LaneJacobian, Model, Scalar, StateFunction, aba, aba_derivatives, rnea, rnea_derivatives,
+};
+use nalgebra::DMatrix;
+
+/// Two exact ways, some thousand roundings each; forward dynamics times the condition number of M.
+const EXACT: f64 = 1e-11;
+const TREES: u64 = 5;
+
+/// `rnea` or `aba` of (q, v, x).
+struct Dynamics<'m> {
+    model: &'m Model,
+    f_ext: &'m [Force<f64>],
+    forward: bool,
+}
+
+impl StateFunction for Dynamics<'_> {
+    fn len(&self) -> usize {
+        self.model.nv()
+    }
+    fn call<S: Scalar>(&mut self, data: &mut Data<S>, x: &[S], y: &mut [S]) {
+        let (q, rest) = x.split_at(self.model.nq());
+        let (v, x) = rest.split_at(self.model.nv());
+        let lift = |f: &Force<f64>| Force::from(f.to_array().map(S::splat));
+        let f_ext: Vec<_> = self.f_ext.iter().map(lift).collect();
+        let of =
+            if self.forward { aba(self.model, data, q, v, x, &f_ext) } else { rnea(self.model, data, q, v, x, &f_ext) };
+        y.copy_from_slice(of);
+    }
+}
+
+fn beside<'m>(matrices: impl IntoIterator<Item = &'m DMatrix<f64>>) -> Vec<f64> {
+    matrices.into_iter().flat_map(|matrix| matrix.iter().copied()).collect()
+}
+
+#[test]
+fn of_dynamics() {
+    let models = models(TREES);
+    each_level(|level| {
+        let mut inverse = Worst::new("∂τ by duals in lanes", EXACT);
+        let mut forward = Worst::new("∂q̈ by duals in lanes", EXACT);
+        let mut values = Worst::new("values by duals in lanes", EXACT);
+        for (seed, model) in models.iter().enumerate() {
+            let Input { q, v, x, f_ext, .. } = Input::random(model, &mut rng(seed as u64));
+            let (state, mut data) = ([&q[..], &v, &x].concat(), Data::new(model));
+            let mut jacobian = LaneJacobian::new(model, state.len(), model.nv());
+            let mut f = Dynamics { model, f_ext: &f_ext, forward: false };
+            let (tau, J) = jacobian.of(model, &state, &mut f);
+            values.see(model, tau.as_slice(), rnea(model, &mut data, &q, &v, &x, &f_ext));
+            let d = rnea_derivatives(model, &mut data, &q, &v, &x, &f_ext);
+            inverse.see(model, J.as_slice(), &beside([d.dtau_dq, d.dtau_dv, d.dtau_da]));
+            f.forward = true;
+            let (qdd, J) = jacobian.of(model, &state, &mut f);
+            values.see(model, qdd.as_slice(), aba(model, &mut data, &q, &v, &x, &f_ext));
+            let d = aba_derivatives(model, &mut data, &q, &v, &x, &f_ext);
+            forward.see(model, J.as_slice(), &beside([d.da_dq, d.da_dv, d.da_dtau]));
+        }
+        println!("{level:?}");
+    });
+}
