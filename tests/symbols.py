@@ -14,8 +14,8 @@ import zipfile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-OUTLINED = re.compile(r"core_arch::x86::(avx|fma)\w*::(\w+)")
-FILLING = re.compile(r"_set1_")
+OUTLINED = re.compile(r"core_arch::(?:x86::(?:avx|fma)\w*|(?:aarch64|arm_shared)::neon)::(?:\w+::)*(\w+)")
+FILLING = re.compile(r"_set1_|^vdupq_n_")
 """Of a new `Data`, with zeros."""
 
 
@@ -24,7 +24,7 @@ def outlined(library: Path) -> list[str]:
     symbols = subprocess.run(["nm", "-C", library], check=True, capture_output=True, text=True).stdout
     if "condyle" not in symbols:
         sys.exit(f"{library}: expected symbols of condyle, found none")
-    found = {match[2] for match in OUTLINED.finditer(symbols)}
+    found = {match[1] for match in OUTLINED.finditer(symbols)}
     return sorted(name for name in found if not FILLING.search(name))
 
 

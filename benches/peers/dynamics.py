@@ -219,7 +219,8 @@ def main() -> None:
         print(json.dumps(rows, indent=1))
         return
     flags = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-    vectors = "AVX-512" if "avx512f" in flags else "AVX2" if "avx2" in flags else "no AVX2"
+    names = {"avx512f": "AVX-512", "avx2": "AVX2", "asimd": "NEON"}
+    vectors = next((name for flag, name in names.items() if flag in flags), "no vectors")
     print(f"{processor()} ({vectors}), one core, {options.rounds} rounds\n")
     print(table(rows))
 

@@ -173,7 +173,6 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     check_arguments(model, data, q, v, tau, f_ext);
-    #[cfg(target_arch = "x86_64")]
     if !model.has_mimic() && crate::limbs::run(true, model, data, q, v, tau, f_ext) {
         return &data.aba.qdd;
     }

@@ -67,7 +67,7 @@ impl<T: Real> Batch<T> {
             states,
             lanes: match level() {
                 Level::Baseline => InLanes::Single(Group::new(model, states, threads)),
-                Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
+                Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
                 Level::Avx512 => InLanes::Long(Group::new(model, states, threads)),
             },
             vectors: vec![T::zero(); states * model.nv],

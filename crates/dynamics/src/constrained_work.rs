@@ -4,7 +4,7 @@
 
 use crate::constraint_set::ConstraintSet;
 use crate::data::Data;
-use crate::dispatch::{Kernel, avx2, fused, is_f64, same, slice};
+use crate::dispatch::{Kernel, fused, is_f64, same, short, slice};
 use crate::model::Model;
 use condyle_spatial::lanes::Fused;
 use condyle_spatial::{Constant, Force, Scalar};
@@ -56,7 +56,7 @@ impl<A: Algorithm, S: Scalar, R: Constant<S>> Kernel for Work<'_, A, S, R> {
             let model: &Model<f64> = same(self.model);
             let constraints: &mut ConstraintSet<Fused> = &mut *core::ptr::from_mut(self.constraints).cast();
             let inputs = Inputs { q: slice(q), v: slice(v), tau: slice(tau), f_ext: slice(f_ext) };
-            avx2(Work { algorithm: self.algorithm, model, data: fused(self.data), constraints, inputs });
+            short(Work { algorithm: self.algorithm, model, data: fused(self.data), constraints, inputs });
         }
     }
 }

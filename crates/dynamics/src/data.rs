@@ -48,7 +48,6 @@ pub struct Data<S> {
     pub(crate) forward_dynamics: forward_dynamics::Workspace<S>,
     pub(crate) regressor: regressor::Workspace<S>,
     /// Of single calls on robots with limbs.
-    #[cfg(target_arch = "x86_64")]
     pub(crate) limbs: Option<Box<crate::limbs::Scratch>>,
 }
 
@@ -101,7 +100,6 @@ impl<S: Scalar> Data<S> {
             all_terms: all_terms::Workspace::new(size),
             forward_dynamics: forward_dynamics::Workspace::new(model),
             regressor: regressor::Workspace::new(size),
-            #[cfg(target_arch = "x86_64")]
             limbs: crate::limbs::Scratch::new::<S, R>(model),
         }
     }

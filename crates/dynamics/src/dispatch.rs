@@ -11,7 +11,7 @@
 
 use crate::data::Data;
 use condyle_spatial::lanes::Fused;
-pub(crate) use condyle_spatial::lanes::{Kernel, avx2};
+pub(crate) use condyle_spatial::lanes::{Kernel, short};
 use condyle_spatial::{Constant, Scalar};
 use core::any::TypeId;
 
@@ -70,7 +70,7 @@ macro_rules! kernel {
             fn body<S: Scalar, R: Constant<S>>($model: &Model<R>, $data: &mut Data<S> $(, $arg: $type)*) $body
 
             #[allow(unused_imports)] // by kernels without slices
-            use $crate::dispatch::{Kernel, avx2, fused, is_f64, same, slice};
+            use $crate::dispatch::{Kernel, fused, is_f64, same, short, slice};
 
             struct Work<M, D, T>(M, D, T);
             impl<S: Scalar, R: Constant<S>> Kernel for Work<&Model<R>, &mut Data<S>, ($($type,)*)> {
@@ -88,7 +88,7 @@ macro_rules! kernel {
                     // SAFETY: S and R are f64, and by contract the processor has the level.
                     unsafe {
                         let model: &Model<f64> = same(model);
-                        avx2(Work(model, fused(data), ($(slice($arg),)*)));
+                        short(Work(model, fused(data), ($(slice($arg),)*)));
                     }
                 }
             }

@@ -7,15 +7,12 @@
 //!
 //! All four must have joints of one kind, but whatever their axes: these are turned to z already. Robots with less than two
 //! bodies a step, chains above all, are computed one body after the other.
-#![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // plans are made everywhere, and run where there are lanes
 
-#[cfg(target_arch = "x86_64")]
 mod pass;
 mod steps;
 
 use crate::joint::Joint;
 use crate::model::{Model, Node};
-#[cfg(target_arch = "x86_64")]
 pub(crate) use pass::{Scratch, run};
 
 /// How many bodies stand side by side.
@@ -132,7 +129,7 @@ impl Model {
     /// The same robot, with its limbs side by side in single calls or one body after the other.
     ///
     /// Where it has limbs enough (four legs, two legs and two arms, fingers), [`rnea`](crate::rnea()) and
-    /// [`aba`](crate::aba()) of one state compute four bodies at a time if the processor has AVX2, twice as fast. A
+    /// [`aba`](crate::aba()) of one state compute four bodies at a time if the processor has AVX2 or NEON, twice as fast. A
     /// [`Batch`](crate::Batch) never does, since its lanes hold states. The two ways add up in different orders, so their
     /// results differ in the last digits; without limbs a single call gives the bits of a batch.
     ///

@@ -115,7 +115,6 @@ kernel! {
 /// With the limbs side by side where there are some, else body by body.
 #[inline(always)]
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
-    #[cfg(target_arch = "x86_64")]
     if crate::limbs::run(false, model, data, q, v, a, f_ext) {
         return;
     }

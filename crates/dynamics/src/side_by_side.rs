@@ -50,7 +50,7 @@ impl<S: Scalar> Rows<S> {
 /// another one.
 #[inline(always)]
 pub(crate) fn pays<S: Scalar, R>(model: &Model<R>) -> bool {
-    let single = cfg!(target_arch = "x86_64") && TypeId::of::<S>() == TypeId::of::<Fused>();
+    let single = TypeId::of::<S>() == TypeId::of::<Fused>();
     single && !model.has_mimic() && model.support.len() > LONG * model.columns.len()
 }
 
@@ -64,12 +64,6 @@ pub(crate) fn pairs<S: Scalar, R>(model: &Model<R>, w: &World<S>, d: &mut Worksp
     }
 }
 
-#[cfg(not(target_arch = "x86_64"))]
-mod vectors {
-    pub(super) fn pairs<M, W, D>(_: &M, _: &W, _: &mut D) {}
-}
-
-#[cfg(target_arch = "x86_64")]
 mod vectors {
     use super::*;
     use condyle_spatial::Motion;

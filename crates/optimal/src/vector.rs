@@ -1,10 +1,10 @@
 //! Vector registers for the dense kernels, and the choice of those that this machine has.
 
 use condyle_spatial::Scalar;
-#[cfg(target_arch = "x86_64")]
-use condyle_spatial::lanes::{Kernel, Lanes};
-#[cfg(target_arch = "x86_64")]
+use condyle_spatial::block::Real;
+use condyle_spatial::lanes::{Element, Kernel, Lanes};
 use condyle_spatial::level::{Level, level};
+use core::marker::PhantomData;
 
 /// N numbers in a register.
 pub(crate) trait Vector: Copy {
@@ -56,43 +56,39 @@ impl Vector for Pair {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-macro_rules! lanes {
-    ($($n:literal)*) => {$(
-        impl Vector for Lanes<f64, $n> {
-            const N: usize = $n;
+impl<const N: usize> Vector for Lanes<f64, N>
+where
+    f64: Element<N>,
+{
+    const N: usize = N;
 
-            #[inline(always)]
-            fn load(x: &[f64]) -> Self {
-                let mut numbers = [0.0; $n];
-                numbers.copy_from_slice(&x[..$n]);
-                Self::from_array(numbers)
-            }
-            #[inline(always)]
-            fn store(self, x: &mut [f64]) {
-                x[..$n].copy_from_slice(&self.to_array());
-            }
-            #[inline(always)]
-            fn splat(x: f64) -> Self {
-                Scalar::splat(x)
-            }
-            #[inline(always)]
-            fn mul_add(self, b: Self, c: Self) -> Self {
-                Scalar::mul_add(self, b, c)
-            }
-            #[inline(always)]
-            fn add(self, b: Self) -> Self {
-                self + b
-            }
-            #[inline(always)]
-            fn sub(self, b: Self) -> Self {
-                self - b
-            }
-        }
-    )*};
+    #[inline(always)]
+    fn load(x: &[f64]) -> Self {
+        let mut numbers = [0.0; N];
+        numbers.copy_from_slice(&x[..N]);
+        Self::from_array(numbers)
+    }
+    #[inline(always)]
+    fn store(self, x: &mut [f64]) {
+        x[..N].copy_from_slice(&self.to_array());
+    }
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Scalar::splat(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Scalar::mul_add(self, b, c)
+    }
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        self + b
+    }
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        self - b
+    }
 }
-#[cfg(target_arch = "x86_64")]
-lanes!(4 8);
 
 /// Work on dense matrices, generic over the registers and over the columns of a tile, NR, that suit their number.
 pub(crate) trait Dense: Sized {
@@ -100,36 +96,27 @@ pub(crate) trait Dense: Sized {
 }
 
 /// Runs `work` with the vector instructions in use (see [`level`]).
-#[cfg(target_arch = "x86_64")]
 pub(crate) fn at_level(work: impl Dense) {
-    struct At<W, const N: usize>(W);
-    macro_rules! kernel {
-        ($n:literal, $nr:literal) => {
-            impl<W: Dense> Kernel for At<W, $n> {
-                #[inline(always)]
-                fn run(self) {
-                    self.0.run::<Lanes<f64, $n>, $nr>();
-                }
-                #[inline(always)]
-                fn run_fused(self) {
-                    self.run();
-                }
-            }
-        };
+    struct At<W, V, const NR: usize>(W, PhantomData<V>);
+    impl<W: Dense, V: Vector, const NR: usize> Kernel for At<W, V, NR> {
+        #[inline(always)]
+        fn run(self) {
+            self.0.run::<V, NR>();
+        }
+        #[inline(always)]
+        fn run_fused(self) {
+            self.run();
+        }
     }
-    kernel!(4, 4);
-    kernel!(8, 8);
+    /// On vectors V.
+    fn with<V: Vector + Scalar, const NR: usize>(work: impl Dense) {
+        V::enter(At::<_, V, NR>(work, PhantomData));
+    }
     match level() {
-        Level::Avx512 => Lanes::<f64, 8>::enter(At::<_, 8>(work)),
-        Level::Avx2 => Lanes::<f64, 4>::enter(At::<_, 4>(work)),
+        Level::Avx512 => with::<<f64 as Real>::Long, 8>(work),
+        Level::Avx2 | Level::Neon => with::<<f64 as Real>::Short, 4>(work),
         Level::Baseline => work.run::<Pair, 4>(),
     }
-}
-
-/// Runs `work` with the vector instructions that every processor has.
-#[cfg(not(target_arch = "x86_64"))]
-pub(crate) fn at_level(work: impl Dense) {
-    work.run::<Pair, 4>();
 }
 
 #[cfg(test)]

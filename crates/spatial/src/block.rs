@@ -4,9 +4,7 @@
 //! of which keeps one half of a vector and takes the other from its partner.
 #![allow(unsafe_code)]
 
-use crate::lanes::Kernel;
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::Lanes;
+use crate::lanes::{Element, Kernel, Lanes};
 use crate::motion::Force;
 use crate::scalar::Scalar;
 
@@ -138,124 +136,34 @@ macro_rules! single {
 }
 single!(f64, f32);
 
+impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
+    type Number = T;
+    #[inline(always)]
+    fn load(from: &[T]) -> Self {
+        Self::from_array(*from.first_chunk().expect("a number for each lane"))
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [T]) {
+        *to.first_chunk_mut().expect("a place for each lane") = self.to_array();
+    }
+    #[inline(always)]
+    fn transpose(rows: &mut [Self]) {
+        Self::transpose(rows.try_into().expect("a row for each lane"));
+    }
+}
+
 /// A number with its vectors.
 pub trait Real: Block<Number = Self> {
-    /// Those of [`Level::Avx2`](crate::level::Level::Avx2).
+    /// Those of [`Level::Avx2`](crate::level::Level::Avx2), or of [`Level::Neon`](crate::level::Level::Neon).
     type Short: Block<Number = Self>;
-    /// Those of [`Level::Avx512`](crate::level::Level::Avx512).
+    /// Those of [`Level::Avx512`](crate::level::Level::Avx512), or the same as short ones where there is none.
     type Long: Block<Number = Self>;
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-mod vectors {
-    use super::Real;
-
-    impl Real for f64 {
-        type Short = Self;
-        type Long = Self;
-    }
-    impl Real for f32 {
-        type Short = Self;
-        type Long = Self;
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-mod vectors {
-    use super::{Block, Lanes, Real};
-    use core::arch::x86_64::*;
-
-    impl Real for f64 {
-        type Short = Lanes<Self, 4>;
-        type Long = Lanes<Self, 8>;
-    }
-    impl Real for f32 {
-        type Short = Lanes<Self, 8>;
-        type Long = Lanes<Self, 16>;
-    }
-
-    macro_rules! block {
-        ($float:ident by $n:literal, |$rows:ident| $transpose:expr) => {
-            impl Block for Lanes<$float, $n> {
-                type Number = $float;
-                #[inline(always)]
-                fn load(from: &[$float]) -> Self {
-                    Self::from_array(*from.first_chunk().expect("a number for each lane"))
-                }
-                #[inline(always)]
-                fn store(self, to: &mut [$float]) {
-                    *to.first_chunk_mut().expect("a place for each lane") = self.to_array();
-                }
-                #[inline(always)]
-                fn transpose(rows: &mut [Self]) {
-                    let $rows: &mut [Self; $n] = rows.try_into().expect("a row for each lane");
-                    $transpose
-                }
-            }
-        };
-    }
-
-    block!(f64 by 4, |r| {
-        // SAFETY: vectors of this kind exist, so the level is supported.
-        unsafe {
-            let [a, b, c, d] = [r[0].0, r[1].0, r[2].0, r[3].0];
-            let (even, odd) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b)); // numbers 0, 2 and 1, 3 of rows 0, 1
-            let (even2, odd2) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d)); // of rows 2, 3
-            r[0] = Self(_mm256_permute2f128_pd::<0x20>(even, even2));
-            r[1] = Self(_mm256_permute2f128_pd::<0x20>(odd, odd2));
-            r[2] = Self(_mm256_permute2f128_pd::<0x31>(even, even2));
-            r[3] = Self(_mm256_permute2f128_pd::<0x31>(odd, odd2));
-        }
-    });
-    block!(f64 by 8, |r| {
-        // SAFETY: vectors of this kind exist, so the level is supported.
-        unsafe {
-            let [a, b, c, d] = [r[0].0, r[1].0, r[2].0, r[3].0];
-            let [e, f, g, h] = [r[4].0, r[5].0, r[6].0, r[7].0];
-            let even = [_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d), _mm512_unpacklo_pd(e, f), _mm512_unpacklo_pd(g, h)];
-            let odd = [_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d), _mm512_unpackhi_pd(e, f), _mm512_unpackhi_pd(g, h)];
-            let ([a, c, e, g], [b, d, f, h]) = (columns(even), columns(odd));
-            *r = [Self(a), Self(b), Self(c), Self(d), Self(e), Self(f), Self(g), Self(h)];
-        }
-    });
-    /// Numbers k, k + 2, k + 4, k + 6 of eight rows, from (k, k + 2, …) of two rows each.
-    #[inline(always)]
-    unsafe fn columns(x: [__m512d; 4]) -> [__m512d; 4] {
-        // SAFETY: by the caller.
-        unsafe {
-            let (low, high) = (_mm512_shuffle_f64x2::<0x88>(x[0], x[1]), _mm512_shuffle_f64x2::<0x88>(x[2], x[3]));
-            let (low2, high2) = (_mm512_shuffle_f64x2::<0xdd>(x[0], x[1]), _mm512_shuffle_f64x2::<0xdd>(x[2], x[3]));
-            [
-                _mm512_shuffle_f64x2::<0x88>(low, high),
-                _mm512_shuffle_f64x2::<0x88>(low2, high2),
-                _mm512_shuffle_f64x2::<0xdd>(low, high),
-                _mm512_shuffle_f64x2::<0xdd>(low2, high2),
-            ]
-        }
-    }
-    macro_rules! by_number {
-        ($rows:ident, $n:literal) => {{
-            let mut to = [[0.0; $n]; $n];
-            for k in 0..$n {
-                let from = $rows[k].to_array();
-                for i in 0..$n {
-                    to[i][k] = from[i];
-                }
-            }
-            for i in 0..$n {
-                $rows[i] = Self::from_array(to[i]);
-            }
-        }};
-    }
-    block!(f32 by 8, |r| by_number!(r, 8));
-    block!(f32 by 16, |r| by_number!(r, 16));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{Kernel, avx2, avx512};
-    use crate::level::Level;
+    use crate::level::{Level, Unsupported};
 
     /// Rows there and back, with some rows and numbers over.
     struct Back<S>(core::marker::PhantomData<S>);
@@ -288,25 +196,22 @@ mod tests {
         fn kernel<S>() -> Back<S> {
             Back(core::marker::PhantomData)
         }
-        kernel::<f64>().run();
-        kernel::<f32>().run();
-        if Level::Avx2.is_supported() {
-            // SAFETY: asked just now.
-            unsafe {
-                avx2(kernel::<<f64 as Real>::Short>());
-                avx2(kernel::<<f32 as Real>::Short>());
+        for level in Level::ALL {
+            match level {
+                _ if !level.is_supported() => eprintln!("NOT RUN: {}", Unsupported(level)),
+                Level::Baseline => {
+                    f64::enter(kernel::<f64>());
+                    f32::enter(kernel::<f32>());
+                }
+                Level::Neon | Level::Avx2 => {
+                    <f64 as Real>::Short::enter(kernel::<<f64 as Real>::Short>());
+                    <f32 as Real>::Short::enter(kernel::<<f32 as Real>::Short>());
+                }
+                Level::Avx512 => {
+                    <f64 as Real>::Long::enter(kernel::<<f64 as Real>::Long>());
+                    <f32 as Real>::Long::enter(kernel::<<f32 as Real>::Long>());
+                }
             }
-        } else {
-            eprintln!("NOT RUN: this processor has no AVX2");
-        }
-        if Level::Avx512.is_supported() {
-            // SAFETY: asked just now.
-            unsafe {
-                avx512(kernel::<<f64 as Real>::Long>());
-                avx512(kernel::<<f32 as Real>::Long>());
-            }
-        } else {
-            eprintln!("NOT RUN: this processor has no AVX-512");
         }
     }
 }

@@ -1,10 +1,7 @@
 //! A single number that computes as a lane does.
 
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::Lanes;
-use crate::lanes::operators;
+use crate::lanes::{Lanes, Number, operators};
 use crate::scalar::Scalar;
-use crate::sin_cos;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// An `f64` whose products and sums are fused: what a lane is, alone.
@@ -56,21 +53,20 @@ impl Scalar for Fused {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        if self.0.abs() <= sin_cos::LARGEST {
-            return sin_cos::double(self);
+        if self.0.abs() <= f64::LARGEST {
+            return f64::near(self);
         }
-        let (sin, cos) = self.0.sin_cos();
+        let (sin, cos) = self.0.far();
         (Self(sin), Self(cos))
     }
     /// Four at a time: where products are fused, there are vectors of four.
-    #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
         let (angles, others) = angles.as_chunks_mut::<4>();
         let (cosines, other_cosines) = cosines.as_chunks_mut::<4>();
         for (x, y) in angles.iter_mut().zip(cosines) {
-            let (sin, cos) = Lanes::<f64, 4>::from_array([x[0].0, x[1].0, x[2].0, x[3].0]).sin_cos();
-            (*x, *y) = (sin.to_array().map(Self), cos.to_array().map(Self));
+            let (sin, cos) = Lanes::<f64, 4>::from_fused(x).sin_cos();
+            (*x, *y) = (sin.to_fused(), cos.to_fused());
         }
         for (sin, cos) in others.iter_mut().zip(other_cosines) {
             (*sin, *cos) = sin.sin_cos();

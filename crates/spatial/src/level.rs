@@ -1,7 +1,7 @@
 //! Which vector instructions this machine has, and which of them are used.
 //!
 //! A build holds code for every level; the best that the processor has is chosen at the first call. The environment
-//! variable `CONDYLE_LEVEL` (`baseline`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that results can be repeated
+//! variable `CONDYLE_LEVEL` (`baseline`, `neon`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that results can be repeated
 //! to the last bit on machines that differ: a level decides where products and sums are fused.
 
 use core::fmt;
@@ -10,22 +10,25 @@ use core::sync::atomic::{AtomicU8, Ordering};
 /// A set of vector instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// What every processor of its architecture has: SSE2, or NEON with fused products on Arm.
+    /// One number at a time, with what every processor of its architecture has: SSE2, or fused products on Arm.
     Baseline = 1,
+    /// NEON, which every 64-bit Arm has: four numbers at once in two registers, fused products; the bits of AVX2.
+    Neon = 2,
     /// AVX2 and FMA: four numbers at once, fused products.
-    Avx2 = 2,
+    Avx2 = 3,
     /// AVX-512 (F, DQ, VL, BW): eight numbers at once.
-    Avx512 = 3,
+    Avx512 = 4,
 }
 
 impl Level {
     /// All of them, the lowest first.
-    pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
+    pub const ALL: [Self; 4] = [Self::Baseline, Self::Neon, Self::Avx2, Self::Avx512];
 
     /// Whether this processor can run it.
     pub fn is_supported(self) -> bool {
         match self {
             Self::Baseline => true,
+            Self::Neon => cfg!(target_arch = "aarch64"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
@@ -45,6 +48,7 @@ impl Level {
     pub fn name(self) -> &'static str {
         match self {
             Self::Baseline => "baseline",
+            Self::Neon => "neon",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
         }
@@ -91,8 +95,9 @@ static LEVEL: AtomicU8 = AtomicU8::new(0);
 #[inline]
 pub fn level() -> Level {
     match LEVEL.load(Ordering::Relaxed) {
-        2 => Level::Avx2,
-        3 => Level::Avx512,
+        2 => Level::Neon,
+        3 => Level::Avx2,
+        4 => Level::Avx512,
         1 => Level::Baseline,
         _ => choose(),
     }
@@ -104,7 +109,7 @@ fn choose() -> Level {
         Ok(name) => {
             let level = Level::ALL.into_iter().find(|level| level.name() == name);
             let level =
-                level.unwrap_or_else(|| panic!("CONDYLE_LEVEL: expected baseline, avx2 or avx512, found {name}"));
+                level.unwrap_or_else(|| panic!("CONDYLE_LEVEL: expected baseline, neon, avx2 or avx512, found {name}"));
             assert!(level.is_supported(), "CONDYLE_LEVEL: {}", Unsupported(level));
             level
         }

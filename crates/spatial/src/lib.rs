@@ -31,14 +31,14 @@ pub mod lanes;
 pub mod level;
 pub mod lie;
 mod motion;
-#[doc(hidden)]
-pub mod moves;
 mod scalar;
 mod se3;
 mod sin_cos;
 mod vector;
 
 pub use inertia::{ArticulatedInertia, Inertia};
+#[doc(hidden)]
+pub use lanes::moves;
 pub use lie::Quaternion;
 pub use motion::{Cross, Force, Motion};
 pub use scalar::{Constant, Scalar};

@@ -1,8 +1,7 @@
 //! The numbers an algorithm can run on.
 
-use crate::lanes::Kernel;
+use crate::lanes::{Kernel, Number};
 use crate::level::{Level, level};
-use crate::sin_cos;
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -113,14 +112,14 @@ impl<S: Scalar> Constant<S> for f64 {
 }
 
 macro_rules! impl_float {
-    ($($float:ident $sin_cos:ident up to $largest:ident),*) => {$(
+    ($($float:ident),*) => {$(
         impl Scalar for $float {
             type Mask = bool;
             const LANES: usize = 1;
 
             #[inline(always)]
             fn enter(kernel: impl Kernel) {
-                if level() >= Level::Avx2 { kernel.run_fused() } else { kernel.run() }
+                if level() > Level::Baseline { kernel.run_fused() } else { kernel.run() }
             }
             #[inline(always)]
             fn splat(x: f64) -> Self {
@@ -145,10 +144,10 @@ macro_rules! impl_float {
             }
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
-                if $float::abs(self) <= sin_cos::$largest as $float {
-                    return sin_cos::$sin_cos(self);
+                if $float::abs(self) <= Self::LARGEST as $float {
+                    return Self::near(self);
                 }
-                $float::sin_cos(self)
+                self.far()
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {
@@ -177,4 +176,4 @@ macro_rules! impl_float {
         }
     )*};
 }
-impl_float!(f64 double up to LARGEST, f32 single up to LARGEST_SINGLE);
+impl_float!(f64, f32);

@@ -3,14 +3,10 @@
 //!
 //! x = n π/2 + r with |r| ≤ π/4, n π/2 subtracted in three parts (Cody and Waite, *Software manual for the elementary
 //! functions*, 1980), each but the last short enough that its product with n is exact; then a polynomial for each of the
-//! two, with the coefficients of Moshier's Cephes library. In `f64`, for |x| up to [`LARGEST`], the error is at most 2.3e-16.
+//! two, with the coefficients of Moshier's Cephes library. In `f64`, for |x| up to 1e5, the error is at most 2.3e-16.
 
+use crate::lanes::Number;
 use crate::scalar::Scalar;
-
-/// How large an angle may be for the parts of π/2 to suffice.
-pub(crate) const LARGEST: f64 = 1e5;
-/// The same in single precision.
-pub(crate) const LARGEST_SINGLE: f64 = 8192.0;
 
 /// What a precision needs to know.
 struct Precision<const T: usize> {
@@ -83,14 +79,22 @@ fn reduced<S: Scalar, const T: usize>(x: S, of: &Precision<T>) -> (S, S) {
     (S::select(sin_is_minus, -s, s), S::select(cos_is_minus, -c, c))
 }
 
-/// (sin x, cos x) in double precision, for |x| up to [`LARGEST`].
-#[inline(always)]
-pub(crate) fn double<S: Scalar>(x: S) -> (S, S) {
-    reduced(x, &DOUBLE)
-}
+macro_rules! number {
+    ($float:ident: $precision:ident up to $largest:literal) => {
+        impl Number for $float {
+            /// The parts of π/2 suffice.
+            const LARGEST: f64 = $largest;
 
-/// (sin x, cos x) in single precision, for |x| up to [`LARGEST_SINGLE`].
-#[inline(always)]
-pub(crate) fn single<S: Scalar>(x: S) -> (S, S) {
-    reduced(x, &SINGLE)
+            #[inline(always)]
+            fn near<S: Scalar>(x: S) -> (S, S) {
+                reduced(x, &$precision)
+            }
+            #[inline(always)]
+            fn far(self) -> (Self, Self) {
+                $float::sin_cos(self)
+            }
+        }
+    };
 }
+number!(f64: DOUBLE up to 1e5);
+number!(f32: SINGLE up to 8192.0);

@@ -12,7 +12,7 @@ use crate::layout::{Layout, Single};
 use crate::model::Model;
 use crate::rnea;
 use condyle_spatial::block::lanes;
-use condyle_spatial::lanes::{Fused, Kernel, Lanes, avx2};
+use condyle_spatial::lanes::{Fused, Kernel, Lanes, short};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};
@@ -41,7 +41,7 @@ impl Scratch {
     /// For a model with limbs, on a processor that can.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
         let plan =
-            model.limbs.as_ref().filter(|_| TypeId::of::<S>() == TypeId::of::<f64>() && level() >= Level::Avx2)?;
+            model.limbs.as_ref().filter(|_| TypeId::of::<S>() == TypeId::of::<f64>() && level() > Level::Baseline)?;
         let (steps, nv) = (plan.steps.len(), plan.coordinates.len());
         let size = Size { bodies: steps, columns: nv, depth: 0, levels: steps, nv };
         let zeros = vec![Four::zero(); nv];
@@ -319,14 +319,14 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> bool {
     let (Some(plan), Some(scratch)) = (&model.limbs, &data.limbs) else { return false };
-    if !is_f64::<S, R>() || !scratch.fits(plan) || level() < Level::Avx2 {
+    if !is_f64::<S, R>() || !scratch.fits(plan) || level() == Level::Baseline {
         return false;
     }
     // SAFETY: S and R are f64, and the processor has the level.
     unsafe {
         let arguments = Arguments { q: slice(q), v: slice(v), x: slice(x), f_ext: slice(f_ext) };
         let (model, data) = (same(model), fused(data));
-        avx2(Call { forward, model, plan, data, arguments });
+        short(Call { forward, model, plan, data, arguments });
     }
     true
 }

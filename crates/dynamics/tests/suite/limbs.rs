@@ -1,4 +1,4 @@
-//! The limbs of one robot side by side: the numbers of body after body. (Where the processor has no AVX2, both are that.)
+//! The limbs of one robot side by side: the numbers of body after body. (At the baseline, both are that.)
 
 use crate::common::{State, Tree, Worst, all_models, rng};
 use condyle_dynamics::{

@@ -5,7 +5,8 @@ use crate::common::{long_branches, rng};
 use crate::{each_level, models};
 use condyle_dynamics::level::Level;
 use condyle_dynamics::{Data, Force, Model, Scalar};
-use condyle_spatial::lanes::Lanes;
+use condyle_spatial::block::Real;
+use condyle_spatial::lanes::{Element, Lanes};
 
 /// A vector of numbers as the tests see it.
 trait Vector: Scalar {
@@ -13,20 +14,17 @@ trait Vector: Scalar {
     fn unpack(self) -> Vec<f64>;
 }
 
-macro_rules! vector {
-    ($n:literal) => {
-        impl Vector for Lanes<f64, $n> {
-            fn pack(x: &[f64]) -> Self {
-                Self::from_array(x.try_into().unwrap())
-            }
-            fn unpack(self) -> Vec<f64> {
-                self.to_array().to_vec()
-            }
-        }
-    };
+impl<const N: usize> Vector for Lanes<f64, N>
+where
+    f64: Element<N>,
+{
+    fn pack(x: &[f64]) -> Self {
+        Self::from_array(x.try_into().unwrap())
+    }
+    fn unpack(self) -> Vec<f64> {
+        self.to_array().to_vec()
+    }
 }
-vector!(4);
-vector!(8);
 
 fn side_by_side<S: Vector>(knots: &[Input<f64>]) -> Input<S> {
     let pack = |part: fn(&Input<f64>) -> &[f64]| -> Vec<S> {
@@ -78,7 +76,7 @@ fn every_lane_is_a_single_call() {
     let all: Vec<Model> = models(4).into_iter().chain(long).collect();
     each_level(|level| match level {
         Level::Baseline => {}
-        Level::Avx2 => knots_are_single_calls::<Lanes<f64, 4>>(&all),
-        Level::Avx512 => knots_are_single_calls::<Lanes<f64, 8>>(&all),
+        Level::Neon | Level::Avx2 => knots_are_single_calls::<<f64 as Real>::Short>(&all),
+        Level::Avx512 => knots_are_single_calls::<<f64 as Real>::Long>(&all),
     });
 }

@@ -1,5 +1,4 @@
 //! Several states in a vector register, on every level that this processor has.
-#![cfg(target_arch = "x86_64")]
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]

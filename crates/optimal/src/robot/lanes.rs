@@ -3,19 +3,19 @@
 //! A robot's coordinates are packed so that each number has a lane for each knot; the algorithms of dynamics then run
 //! once for all of them, with the bits of single calls. What they give is unpacked in blocks, since the costs and the
 //! sweep look at one knot after the other.
-#![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 
 use super::contact::Contact;
-#[cfg(target_arch = "x86_64")]
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
     ConstraintSet, Data, Model, Proximal, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
 };
-use condyle_spatial::block::Block;
+use condyle_spatial::Scalar;
+use condyle_spatial::block::{Block, Real};
 use condyle_spatial::lanes::Kernel;
-#[cfg(target_arch = "x86_64")]
-use condyle_spatial::lanes::Lanes;
 use nalgebra::DMatrix;
+
+type Short = <f64 as Real>::Short;
+type Long = <f64 as Real>::Long;
 
 /// Most lanes that there are.
 const WIDEST: usize = 8;
@@ -158,12 +158,8 @@ impl<S: Block<Number = f64>> Group<S> {
 
 #[derive(Clone, Debug)]
 enum Width {
-    #[cfg(target_arch = "x86_64")]
-    Four(Group<Lanes<f64, 4>>),
-    #[cfg(target_arch = "x86_64")]
-    Eight(Group<Lanes<f64, 8>>),
-    #[cfg(not(target_arch = "x86_64"))]
-    Never(core::convert::Infallible),
+    Short(Group<Short>),
+    Long(Group<Long>),
 }
 
 /// The dynamics of as many knots as this processor has lanes.
@@ -184,7 +180,6 @@ pub(super) struct Held<'a> {
 /// Fewer knots than this are computed one by one.
 pub(super) const WORTHWHILE: usize = 3;
 
-#[cfg(target_arch = "x86_64")]
 fn group<S: Block<Number = f64>>(model: &Model, held: Option<Held<'_>>) -> Group<S> {
     let set = held.map(|held| {
         let constraints: Vec<_> = held.contacts.iter().map(|contact| contact.constraint).collect();
@@ -196,13 +191,12 @@ fn group<S: Block<Number = f64>>(model: &Model, held: Option<Held<'_>>) -> Group
 }
 
 impl SideBySide {
-    /// None where there are no lanes.
-    #[cfg(target_arch = "x86_64")]
+    /// None at the level without lanes.
     pub(super) fn new(model: &Model, held: Option<Held<'_>>) -> Option<Self> {
         let (lanes, width) = match level() {
             Level::Baseline => return None,
-            Level::Avx2 => (4, Width::Four(group(model, held))),
-            Level::Avx512 => (8, Width::Eight(group(model, held))),
+            Level::Neon | Level::Avx2 => (Short::LANES, Width::Short(group(model, held))),
+            Level::Avx512 => (Long::LANES, Width::Long(group(model, held))),
         };
         let nv = model.nv();
         let rows = held.map_or(0, |held| held.contacts.iter().map(|c| c.constraint.kind.rows()).sum());
@@ -215,12 +209,6 @@ impl SideBySide {
             dlambda: [wide(), wide(), wide()],
         };
         Some(Self { width: Box::new(width), taus: vec![0.0; lanes * nv], outcomes: vec![outcome; lanes] })
-    }
-
-    /// There are none on this processor.
-    #[cfg(not(target_arch = "x86_64"))]
-    pub(super) fn new(_: &Model, _: Option<Held<'_>>) -> Option<Self> {
-        None
     }
 
     /// How many knots it takes.
@@ -238,12 +226,8 @@ impl SideBySide {
     pub(super) fn run(&mut self, model: &Model, count: usize, xs: &[f64], forces: bool, slopes: bool) {
         let Self { width, taus, outcomes } = self;
         match &mut **width {
-            #[cfg(target_arch = "x86_64")]
-            Width::Four(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
-            #[cfg(target_arch = "x86_64")]
-            Width::Eight(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
-            #[cfg(not(target_arch = "x86_64"))]
-            Width::Never(never) => match *never {},
+            Width::Short(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
+            Width::Long(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
         }
     }
 }
