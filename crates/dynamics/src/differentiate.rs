@@ -11,9 +11,9 @@
 use crate::configuration::integrate;
 use crate::data::{Data, check};
 use crate::model::Model;
-use condyle_spatial::block::Block;
+use condyle_spatial::block::{Block, Real};
 use condyle_spatial::lane_dual::LaneDual;
-use condyle_spatial::lanes::{Kernel, Lanes};
+use condyle_spatial::lanes::Kernel;
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::{DMatrix, DVector};
@@ -86,7 +86,7 @@ pub trait StateFunction {
 }
 
 /// Jacobians of functions of one robot's state, exact, as by [`jacobian`], but in one evaluation of f for each eight
-/// (AVX-512) or four (AVX2) directions, and without allocating beyond what f does.
+/// (AVX-512) or four (AVX2, NEON) directions, and without allocating beyond what f does.
 ///
 /// Results differ in their last digits from level to level ([`level`](mod@crate::level)).
 ///
@@ -118,10 +118,8 @@ pub struct LaneJacobian {
 
 #[derive(Debug)]
 enum Width {
-    #[cfg(target_arch = "x86_64")]
-    Eight(Box<Directions<Lanes<f64, 8>>>),
-    #[cfg(target_arch = "x86_64")]
-    Four(Box<Directions<Lanes<f64, 4>>>),
+    Long(Box<Directions<<f64 as Real>::Long>>),
+    Short(Box<Directions<<f64 as Real>::Short>>),
     One(Box<Directions<f64>>),
 }
 
@@ -133,11 +131,9 @@ impl LaneJacobian {
     pub fn new<R>(model: &Model<R>, n: usize, results: usize) -> Self {
         assert!(n >= model.nq, "n: expected at least {}, found {n}", model.nq);
         let width = match level() {
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx512 => Width::Eight(Box::new(Directions::new(model, n, results))),
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => Width::Four(Box::new(Directions::new(model, n, results))),
-            _ => Width::One(Box::new(Directions::new(model, n, results))),
+            Level::Avx512 => Width::Long(Box::new(Directions::new(model, n, results))),
+            Level::Avx2 | Level::Neon => Width::Short(Box::new(Directions::new(model, n, results))),
+            Level::Baseline => Width::One(Box::new(Directions::new(model, n, results))),
         };
         Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq + model.nv) }
     }
@@ -155,10 +151,8 @@ impl LaneJacobian {
         let Self { width, value, J } = self;
         assert!(f.len() == value.len(), "f: expected {} results, found {}", value.len(), f.len());
         match width {
-            #[cfg(target_arch = "x86_64")]
-            Width::Eight(d) => d.run(model, x, f, value, J),
-            #[cfg(target_arch = "x86_64")]
-            Width::Four(d) => d.run(model, x, f, value, J),
+            Width::Long(d) => d.run(model, x, f, value, J),
+            Width::Short(d) => d.run(model, x, f, value, J),
             Width::One(d) => d.run(model, x, f, value, J),
         }
         (value, J)
