@@ -1,8 +1,9 @@
 //! Which vector instructions this machine has, and which of them are used.
 //!
-//! A build holds code for every level; the best that the processor has is chosen at the first call. The environment
-//! variable `CONDYLE_LEVEL` (`baseline`, `neon`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that results can be repeated
-//! to the last bit on machines that differ: a level decides where products and sums are fused.
+//! A build holds code for every level of its architecture; the best that the processor has is chosen at the first call. The
+//! environment variable `CONDYLE_LEVEL` (`baseline`, `neon`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that
+//! results can be repeated to the last bit on machines of one architecture that differ: a level decides where products and
+//! sums are fused. (On Arm they are wherever an algorithm asks for it, at the baseline too.)
 
 use core::fmt;
 use core::sync::atomic::{AtomicU8, Ordering};
@@ -12,7 +13,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 pub enum Level {
     /// One number at a time, with what every processor of its architecture has: SSE2, or fused products on Arm.
     Baseline = 1,
-    /// NEON, which every 64-bit Arm has: four numbers at once in two registers, fused products; the bits of AVX2.
+    /// NEON, which every 64-bit Arm has: four numbers at once in two registers, fused products.
     Neon = 2,
     /// AVX2 and FMA: four numbers at once, fused products.
     Avx2 = 3,
