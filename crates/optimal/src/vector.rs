@@ -2,6 +2,8 @@
 
 use condyle_spatial::Scalar;
 #[cfg(target_arch = "x86_64")]
+use condyle_spatial::block::Block;
+#[cfg(target_arch = "x86_64")]
 use condyle_spatial::lanes::{Kernel, Lanes};
 #[cfg(target_arch = "x86_64")]
 use condyle_spatial::level::{Level, level};
@@ -20,6 +22,8 @@ pub(crate) trait Vector: Copy {
     fn mul_add(self, b: Self, c: Self) -> Self;
     fn add(self, b: Self) -> Self;
     fn sub(self, b: Self) -> Self;
+    /// Of N registers, number i of register k becomes number k of register i.
+    fn transpose(rows: &mut [Self]);
 }
 
 /// Two numbers, which the compiler keeps in a register of the kind that every processor has.
@@ -54,6 +58,11 @@ impl Vector for Pair {
     fn sub(self, b: Self) -> Self {
         Self([self.0[0] - b.0[0], self.0[1] - b.0[1]])
     }
+    #[inline(always)]
+    fn transpose(rows: &mut [Self]) {
+        let (a, b) = (rows[0].0, rows[1].0);
+        (rows[0], rows[1]) = (Self([a[0], b[0]]), Self([a[1], b[1]]));
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -87,6 +96,10 @@ macro_rules! lanes {
             #[inline(always)]
             fn sub(self, b: Self) -> Self {
                 self - b
+            }
+            #[inline(always)]
+            fn transpose(rows: &mut [Self]) {
+                Block::transpose(rows);
             }
         }
     )*};
