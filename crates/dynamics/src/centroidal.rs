@@ -112,7 +112,7 @@ fn shift_map<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> Cen
     let I = d.IC[0];
     let per_mass = I.mass.recip();
     let com = I.mass_com.scale(per_mass);
-    d.Ag.fill(S::zero());
+    d.Ag.as_mut_slice().fill(S::zero());
     for (c, &F) in d.F.iter().enumerate() {
         add(model, &mut d.Ag, c, about(com, F));
     }
@@ -132,7 +132,7 @@ pub(crate) fn shift_rate<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspac
     let (I, momentum) = (d.IC[0], d.BC[0].momentum);
     let per_mass = I.mass.recip();
     let (com, com_velocity) = (I.mass_com.scale(per_mass), momentum.linear.scale(per_mass));
-    d.dAg.fill(S::zero());
+    d.dAg.as_mut_slice().fill(S::zero());
     for (c, (&F, &dF)) in d.F.iter().zip(&d.dF).enumerate() {
         let mut dA = about(com, dF); // d/dt [f; n − c × f] = [ḟ; ṅ − c × ḟ − ċ × f]
         dA.angular -= com_velocity.cross(F.linear);

@@ -115,7 +115,7 @@ fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> Centroi
     let (p, f) = (d.BC[0].momentum.linear, d.F[0].linear);
     let moved = |dcom: Vec3<S>, x: Vec3<S>| Force::new(Vec3::zero(), -dcom.cross(x)); // −∂c × f
     for matrix in [&mut d.dh_dq, &mut d.drate_dq, &mut d.drate_dv, &mut d.drate_da] {
-        matrix.fill(S::zero());
+        matrix.as_mut_slice().fill(S::zero());
     }
     for (c, &Column { h_q, F_q, F_v, F_a }) in d.columns.iter().enumerate() {
         let dcom = F_a.linear.scale(per_mass); // m ∂c/∂q_e is the linear momentum of S_e

@@ -250,7 +250,7 @@ fn block_diagonal<S: Scalar, R>(
 ) {
     check(name, v.len(), model.nv);
     assert!(J.shape() == (model.nv, model.nv), "J: expected {0} × {0}, found {1:?}", model.nv, J.shape());
-    J.fill(S::zero());
+    J.as_mut_slice().fill(S::zero());
     for (joint, _, iv) in model.coordinates() {
         let mut signed = [S::zero(); 6];
         for (signed, &v) in signed.iter_mut().zip(&v[iv.clone()]) {

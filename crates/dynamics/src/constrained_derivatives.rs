@@ -20,9 +20,8 @@ use crate::constrained_dynamics;
 use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint::ConstraintKind;
 use crate::constraint_motion::{Columns, Ends};
-use crate::constraint_set::{ConstraintSet, Proximal};
+use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, Size, check, check_forces};
-use crate::delassus::Delassus;
 use crate::frames::Placements;
 use crate::kinematics::World;
 use crate::layout::{Layout, Single};
@@ -199,8 +198,8 @@ struct Equations<'e, S> {
     Jbar: &'e DMatrix<S>,
     /// −J̄ᵀ.
     dlambda_dtau: &'e DMatrix<S>,
-    delassus: &'e mut Delassus<S>,
-    proximal: Proximal,
+    /// Λ.
+    inertia: &'e DMatrix<S>,
     r: &'e DMatrix<S>,
     c: &'e DMatrix<S>,
     coupled: &'e [Coupled],
@@ -212,14 +211,8 @@ impl<S: Scalar> Equations<'_, S> {
     fn solve(self, da: &mut DMatrix<S>, dlambda: &mut DMatrix<S>) {
         minus_product(self.P.as_slice(), self.r.as_slice(), da.as_mut_slice(), self.coupled); // −P r − J̄ c
         subtract_product(self.Jbar, self.c, da, self.touching);
-        let rows = self.c.nrows();
-        for j in 0..self.coupled.len() {
-            let (c, out) = (&self.c.as_slice()[j * rows..], &mut dlambda.as_mut_slice()[j * rows..(j + 1) * rows]);
-            for r in 0..rows {
-                out[r] = -c[r];
-            }
-            self.delassus.solve(self.proximal, out);
-        }
+        dlambda.as_mut_slice().fill(S::zero());
+        subtract_product(self.inertia, self.c, dlambda, self.touching);
         subtract_product(self.dlambda_dtau, self.r, dlambda, self.coupled); // J̄ᵀ r − Λ c
     }
 }
@@ -229,16 +222,16 @@ impl<S: Scalar> ConstraintSet<S> {
     #[inline(always)]
     pub(crate) fn respond_to_q(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
         let Self { Jbar, dlambda_dtau, delassus, coupled, touching, dgamma_dq, dlambda_dq, .. } = self;
-        let (c, proximal) = (dgamma_dq, self.proximal);
-        Equations { P, Jbar, dlambda_dtau, delassus, proximal, r, c, coupled, touching }.solve(da, dlambda_dq);
+        let (c, inertia) = (dgamma_dq, &delassus.inverse);
+        Equations { P, Jbar, dlambda_dtau, inertia, r, c, coupled, touching }.solve(da, dlambda_dq);
     }
 
     /// The same with respect to v, for r and `dgamma_dv`.
     #[inline(always)]
     fn respond_to_v(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
         let Self { Jbar, dlambda_dtau, delassus, coupled, touching, dgamma_dv, dlambda_dv, .. } = self;
-        let (c, proximal) = (dgamma_dv, self.proximal);
-        Equations { P, Jbar, dlambda_dtau, delassus, proximal, r, c, coupled, touching }.solve(da, dlambda_dv);
+        let (c, inertia) = (dgamma_dv, &delassus.inverse);
+        Equations { P, Jbar, dlambda_dtau, inertia, r, c, coupled, touching }.solve(da, dlambda_dv);
     }
 }
 
@@ -361,8 +354,8 @@ fn pass<S: Scalar, R: Constant<S>>(
     constraints.add_turning(world, &mut id.dtau_dq);
     let columns = Columns { S: &world.S, Psid: &id.Psid, Psidd: &id.Psidd, PsidSd: &id.PsidSd };
     let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = &mut *constraints;
-    dgamma_dq.fill(S::zero());
-    dgamma_dv.fill(S::zero());
+    dgamma_dq.as_mut_slice().fill(S::zero());
+    dgamma_dv.as_mut_slice().fill(S::zero());
     for (plan, target) in plans.iter().zip(targets.iter()) {
         let ends = Ends::new(plan, target, world, &id.v, &id.a);
         let error = &error[plan.row..plan.row + plan.rows()];

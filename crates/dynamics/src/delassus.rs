@@ -131,7 +131,7 @@ impl<S: Scalar> Delassus<S> {
     pub(crate) fn invert(&mut self, proximal: Proximal) {
         let (n, mu) = (self.b.len(), S::splat(proximal.mu));
         let Self { C, E_inv, inverse, .. } = self;
-        inverse.fill(S::zero());
+        inverse.as_mut_slice().fill(S::zero());
         for j in 0..n {
             let column = &mut inverse.as_mut_slice()[j * n..(j + 1) * n];
             column[j] = S::one();

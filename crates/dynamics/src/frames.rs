@@ -101,7 +101,7 @@ pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, 
 /// Fills a Jacobian with zeros, if it is 6 × nv.
 pub(crate) fn clear<S: Scalar>(name: &str, J: &mut DMatrix<S>, nv: usize) {
     assert!(J.shape() == (6, nv), "{name}: expected 6 × {nv}, found {:?}", J.shape());
-    J.fill(S::zero());
+    J.as_mut_slice().fill(S::zero());
 }
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {

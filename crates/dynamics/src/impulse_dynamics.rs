@@ -156,7 +156,7 @@ impl Algorithm for ImpactDerivatives {
         rnea_derivatives::pass(&l, world, id, &out.zero, change, &d.forces, Vec3::zero(), false); // ∂(M Δ − Jᵀ Λ)/∂q
         constraints.add_turning(world, &mut id.dtau_dq);
         spread(&l, world, out);
-        constraints.dgamma_dq.fill(S::zero());
+        constraints.dgamma_dq.as_mut_slice().fill(S::zero());
         for (plan, target) in constraints.plans.iter().zip(&constraints.targets) {
             let ends = Ends::new(plan, target, world, &out.velocity, &out.velocity);
             let value = &constraints.error[plan.row..plan.row + plan.rows()];

@@ -11,7 +11,7 @@ pub(crate) const SLACK: usize = 8;
 
 /// tile = a[i.., ..length] · b[j.., ..length]ᵀ, with S registers of rows.
 #[inline(always)]
-fn tile_rows<V: Vector, const S: usize, const NR: usize>(
+pub(crate) fn tile_rows<V: Vector, const S: usize, const NR: usize>(
     a: &[f64],
     lda: usize,
     i: usize,
@@ -190,7 +190,7 @@ pub(crate) fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
 
 /// Aᵀ into `out` (stride `ldo`) from its row `at` on, for the rows `rows` of A (stride `lda`) and its columns `columns`.
 #[inline(always)]
-pub(crate) fn transpose(
+pub(crate) fn transpose<V: Vector>(
     out: &mut [f64],
     ldo: usize,
     at: usize,
@@ -199,55 +199,60 @@ pub(crate) fn transpose(
     rows: core::ops::Range<usize>,
     columns: core::ops::Range<usize>,
 ) {
-    const BLOCK: usize = 8;
     let (height, width) = (rows.len(), columns.len());
     if width == 0 {
         return;
     }
     let a = &a[columns.start * lda + rows.start..];
-    let mut j = 0;
-    while j + BLOCK <= width {
-        for i in 0..height {
-            let mut block = [0.0; BLOCK];
-            for jj in 0..BLOCK {
-                block[jj] = a[(j + jj) * lda + i];
+    if height < V::N || width < V::N {
+        for j in 0..width {
+            for i in 0..height {
+                out[i * ldo + at + j] = a[j * lda + i];
             }
-            out[i * ldo + at + j..][..BLOCK].copy_from_slice(&block);
         }
-        j += BLOCK;
+        return;
     }
-    while j < width {
-        for i in 0..height {
-            out[i * ldo + at + j] = a[j * lda + i];
+    // In square blocks, of which the last ones overlap those before.
+    let mut j = 0;
+    loop {
+        let mut i = 0;
+        loop {
+            let mut block = [V::splat(0.0); SLACK];
+            for k in 0..V::N {
+                block[k] = V::load(&a[(j + k) * lda + i..]);
+            }
+            V::transpose(&mut block[..V::N]);
+            for k in 0..V::N {
+                block[k].store(&mut out[(i + k) * ldo + at + j..]);
+            }
+            if i + V::N >= height {
+                break;
+            }
+            i = (i + V::N).min(height - V::N);
         }
-        j += 1;
+        if j + V::N >= width {
+            break;
+        }
+        j = (j + V::N).min(width - V::N);
     }
 }
 
 /// Copies the lower triangle of A to both triangles of `out`.
 #[inline(always)]
 pub(crate) fn copy_symmetric<V: Vector>(out: &mut [f64], ldo: usize, a: &[f64], lda: usize, size: usize) {
-    const BLOCK: usize = 8;
     let mut j = 0;
     while j < size {
-        let (width, end) = (BLOCK.min(size - j), size.min(j + BLOCK));
+        let end = size.min(j + V::N);
         for jj in j..end {
             copy::<V>(&mut out[jj * ldo + jj..], &a[jj * lda + jj..jj * lda + size]);
             for i in j..jj {
                 out[jj * ldo + i] = a[i * lda + jj];
             }
         }
-        // the rows below the block, as columns beside it
-        if width == BLOCK {
-            for i in end..size {
-                let mut block = [0.0; BLOCK];
-                for jj in 0..BLOCK {
-                    block[jj] = a[(j + jj) * lda + i];
-                }
-                out[i * ldo + j..][..BLOCK].copy_from_slice(&block);
-            }
+        if end < size {
+            transpose::<V>(&mut out[end * ldo..], ldo, j, a, lda, end..size, j..end); // the rows below, as columns beside
         }
-        j += BLOCK;
+        j = end;
     }
 }
 
@@ -356,7 +361,7 @@ mod tests {
             for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
                 assert!(out[j * (n + SLACK) + i] == a[(i, j)] && out[i * (n + SLACK) + j] == a[(i, j)]);
             }
-            transpose(&mut out, n + SLACK, 2, a.as_slice(), n, 1..n, 0..n);
+            transpose::<Pair>(&mut out, n + SLACK, 2, a.as_slice(), n, 1..n, 0..n);
             for (i, j) in (1..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
                 assert_eq!(out[(i - 1) * (n + SLACK) + 2 + j], a[(i, j)]);
             }

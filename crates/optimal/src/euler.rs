@@ -69,9 +69,9 @@ impl Work {
         }
 
         // W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
-        transpose(F, ld, 0, node.B.as_slice(), n, nv..n, 0..m);
-        transpose(F, ld, m, node.A.as_slice(), n, nv..n, nv..n);
-        transpose(F, ld, m + nv, node.A.as_slice(), n, nv..n, 0..nv);
+        transpose::<V>(F, ld, 0, node.B.as_slice(), n, nv..n, 0..m);
+        transpose::<V>(F, ld, m, node.A.as_slice(), n, nv..n, nv..n);
+        transpose::<V>(F, ld, m + nv, node.A.as_slice(), n, nv..n, 0..nv);
         let all = View { data: F, stride: ld };
         product::<V, NR>(W, ld, [rows, nv, nv], all, View { data: Pi, stride: ldn });
         for k in 0..nv {

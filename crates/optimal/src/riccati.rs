@@ -135,7 +135,7 @@ impl Work {
         }
         if shift > 0 {
             copy_symmetric::<V>(P, stride, &H[(free + split) * ld + free + split..], ld, shift);
-            transpose(P, stride, shift, &H[free * ld..], ld, free + split..free + n, 0..split);
+            transpose::<V>(P, stride, shift, &H[free * ld..], ld, free + split..free + n, 0..split);
             for j in 0..split {
                 copy::<V>(&mut P[(shift + j) * stride..], &H[(free + j) * ld + free + split..][..shift]);
             }
@@ -164,8 +164,8 @@ impl Work {
                 }
             }
         } else {
-            transpose(&mut K[shift * m..], m, 0, H, ld, m..m + split, 0..m);
-            transpose(K, m, 0, H, ld, m + split..m + n, 0..m);
+            transpose::<V>(&mut K[shift * m..], m, 0, H, ld, m..m + split, 0..m);
+            transpose::<V>(K, m, 0, H, ld, m + split..m + n, 0..m);
             for K in K {
                 *K = -*K;
             }
@@ -178,21 +178,27 @@ impl Work {
         Ok(())
     }
 
-    /// H = [R ·; S Q; rᵀ qᵀ], the states turned by `shift`.
+    /// H = [R ·; S Q; rᵀ qᵀ], the states turned by `shift`: its lower triangle.
     #[inline(always)]
     fn fill<V: Vector>(&mut self, node: &LqNode, shift: usize) {
         let (n, m) = (node.ndx(), node.nu());
         let (ld, split) = (stride(n, m), n - shift);
         for j in 0..m {
             let column = &mut self.H[j * ld..][..ld];
-            copy::<V>(column, &node.R.as_slice()[j * m..][..m]);
+            copy::<V>(&mut column[j..], &node.R.as_slice()[j * m + j..][..m - j]);
             turn::<V>(&mut column[m..], &node.S.as_slice()[j * n..][..n], shift);
             column[m + n] = node.r[j];
         }
         for j in 0..n {
             let state = if j < split { j + shift } else { j - split };
             let column = &mut self.H[(m + j) * ld..][..ld];
-            turn::<V>(&mut column[m..], &node.Q.as_slice()[state * n..][..n], shift);
+            let (below, Q) = (&mut column[m + j..], &node.Q.as_slice()[state * n..][..n]);
+            if j < split {
+                copy::<V>(below, &Q[state..]);
+                copy::<V>(&mut below[split - j..], &Q[..shift]);
+            } else {
+                copy::<V>(below, &Q[state..shift]);
+            }
             column[m + n] = node.q[state];
         }
     }
@@ -223,8 +229,8 @@ impl Work {
         let (n, m) = (node.ndx(), node.nu());
         let (ld, rows) = (stride(n, m), m + n);
         let Self { P, p, F, W, H, .. } = self;
-        transpose(F, ld, 0, node.B.as_slice(), n, 0..n, 0..m);
-        transpose(F, ld, m, node.A.as_slice(), n, 0..n, 0..n);
+        transpose::<V>(F, ld, 0, node.B.as_slice(), n, 0..n, 0..m);
+        transpose::<V>(F, ld, m, node.A.as_slice(), n, 0..n, 0..n);
         let F = View { data: F, stride: ld };
         product::<V, NR>(W, ld, [rows, n, n], F, View { data: P, stride: n + SLACK });
         for k in 0..n {

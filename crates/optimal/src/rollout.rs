@@ -3,6 +3,7 @@
 use crate::dense::add_scaled_product;
 use crate::lq::{DIVERGED, LqKnot};
 use crate::problem::{Problem, Shape};
+use crate::vector::{Dense, Vector, at_level};
 
 /// Trial trajectories, one per step length, that go through the horizon together: at each knot the trials are one
 /// group. Storage is knot after knot and, within a knot, trial after trial.
@@ -34,6 +35,23 @@ pub(crate) struct Nominal<'a> {
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` when there are none.
     pub(crate) gaps: Option<&'a [f64]>,
     pub(crate) knots: &'a [LqKnot],
+}
+
+/// u += α k + K δx.
+struct Feedback<'a> {
+    u: &'a mut [f64],
+    gains: &'a LqKnot,
+    step: f64,
+    dx: &'a [f64],
+}
+
+impl Dense for Feedback<'_> {
+    #[inline(always)]
+    fn run<V: Vector, const NR: usize>(self) {
+        let Self { u, gains, step, dx } = self;
+        add_scaled_product(u, step, gains.k.as_slice(), &[1.0]);
+        add_scaled_product(u, 1.0, gains.K.as_slice(), dx);
+    }
 }
 
 impl Trials {
@@ -105,8 +123,7 @@ impl Trials {
                 }
                 action.difference(x_nominal, x, dx);
                 let gains = &nominal.knots[t];
-                add_scaled_product(u, step, gains.k.as_slice(), &[1.0]);
-                add_scaled_product(u, 1.0, gains.K.as_slice(), dx);
+                at_level(Feedback { u, gains, step, dx });
                 if let Some((lower, upper)) = action.bounds(t) {
                     for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
                         *u = if *u < *lower { *lower } else { *u }; // a NaN stays one

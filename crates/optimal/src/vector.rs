@@ -1,7 +1,7 @@
 //! Vector registers for the dense kernels, and the choice of those that this machine has.
 
 use condyle_spatial::Scalar;
-use condyle_spatial::block::Real;
+use condyle_spatial::block::{Block, Real};
 use condyle_spatial::lanes::{Element, Kernel, Lanes};
 use condyle_spatial::level::{Level, level};
 use core::marker::PhantomData;
@@ -20,6 +20,8 @@ pub(crate) trait Vector: Copy {
     fn mul_add(self, b: Self, c: Self) -> Self;
     fn add(self, b: Self) -> Self;
     fn sub(self, b: Self) -> Self;
+    /// Of N registers, number i of register k becomes number k of register i.
+    fn transpose(rows: &mut [Self]);
 }
 
 /// Two numbers, which the compiler keeps in a register of the kind that every processor has.
@@ -54,6 +56,11 @@ impl Vector for Pair {
     fn sub(self, b: Self) -> Self {
         Self([self.0[0] - b.0[0], self.0[1] - b.0[1]])
     }
+    #[inline(always)]
+    fn transpose(rows: &mut [Self]) {
+        let (a, b) = (rows[0].0, rows[1].0);
+        (rows[0], rows[1]) = (Self([a[0], b[0]]), Self([a[1], b[1]]));
+    }
 }
 
 impl<const N: usize> Vector for Lanes<f64, N>
@@ -87,6 +94,10 @@ where
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
         self - b
+    }
+    #[inline(always)]
+    fn transpose(rows: &mut [Self]) {
+        Block::transpose(rows);
     }
 }
 

@@ -79,7 +79,7 @@ pub(super) struct Schedule {
 impl Schedule {
     fn new(model: Arc<Model>, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
         let costs = Costs::new(model.clone(), offer.clone(), costs)?;
-        let watch = Watch::new(&model, offer.nu, costs.longest(), costs.needs());
+        let watch = Watch::new(&model, offer.nu, costs.longest(), costs.rows(), costs.needs());
         Ok(Self { variants: vec![costs], of: Vec::new(), watch, offer, model })
     }
 
@@ -117,7 +117,8 @@ impl Schedule {
         }
         let longest = self.variants.iter().map(Costs::longest).max().unwrap_or(0);
         let needs = self.variants.iter().map(Costs::needs).fold(Needs::default(), |a, b| a | b);
-        self.watch.resize(longest, needs);
+        let most = self.variants.iter().map(Costs::rows).fold([0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        self.watch.resize(self.offer.nu, longest, most, needs);
         Ok(())
     }
 

@@ -1,8 +1,8 @@
 //! Costs of a robot's state and control: weighted sums of activations of residuals.
 
 use super::activation::Activation;
-use super::quadratic::{Filled, add_diagonal, add_positions, add_row, mirror};
-use super::residual::Residual;
+use super::quadratic::add_diagonal;
+use super::residual::{Part, Residual};
 use super::state::{groups, state_difference};
 use super::watch::{Needs, Offer, Scene, Scratch, Signal, Slopes, Watch, add_matrix_row};
 use crate::Error;
@@ -122,7 +122,8 @@ impl Costs {
         let k = self.terms.iter().position(|t| t.name == name).ok_or_else(|| wrong("there is no such term"))?;
         let term = Cost { residual, ..self.terms[k].clone() };
         let plan = Plan::new(&self.model, &self.offer, &term)?;
-        if plan.n != self.plans[k].n || Self::needs_of(&term) != Self::needs_of(&self.terms[k]) {
+        let kind = |term: &Cost| (Self::needs_of(term), term.residual.part());
+        if plan.n != self.plans[k].n || kind(&term) != kind(&self.terms[k]) {
             return Err(wrong("its residual is of another kind than before"));
         }
         (self.terms[k], self.plans[k]) = (term, plan);
@@ -132,6 +133,15 @@ impl Costs {
     /// The most numbers that one of its residuals has.
     pub(super) fn longest(&self) -> usize {
         self.plans.iter().map(|plan| plan.n).max().unwrap_or(0)
+    }
+
+    /// How many rows there may be of Jacobians with respect to (q, v, u), and to q alone.
+    pub(super) fn rows(&self) -> [usize; 2] {
+        let rows = |part| {
+            let of = |(term, plan): (&Cost, &Plan)| if term.residual.part() == part { plan.n } else { 0 };
+            self.terms.iter().zip(&self.plans).map(of).sum()
+        };
+        [rows(Part::All), rows(Part::Positions)]
     }
 
     /// Whether a residual looks at forces.
@@ -177,34 +187,21 @@ impl Costs {
         scale: f64,
         node: &mut LqNode,
     ) {
-        node.q.fill(0.0);
-        node.r.fill(0.0);
-        node.Q.fill(0.0);
-        node.S.fill(0.0);
-        node.R.fill(0.0);
         let (placements, velocities, s) = watch.look(&self.model, self.needs(), scene, true);
-        let (nv, mut filled) = (self.model.nv(), Filled::Diagonal);
-        for (term, plan) in self.terms.iter().zip(&self.plans).filter(|(term, _)| term.weight != 0.0) {
-            self.residual(term, plan, scene, placements, velocities, s);
+        s.rows.clear();
+        let terms = || self.terms.iter().zip(&self.plans).filter(|(term, _)| term.weight != 0.0);
+        for (term, plan) in terms().filter(|(term, _)| term.residual.part() != Part::Diagonal) {
+            self.slopes_of(term, plan, scene, placements, velocities, scale, s);
             let n = plan.n;
-            term.activation.derivatives(&s.r[..n], &mut s.d, &mut s.dd);
-            let weight = scale * term.weight;
-            s.d[..n].iter_mut().chain(&mut s.dd[..n]).for_each(|d| *d *= weight);
             match &term.residual {
-                Residual::State { .. } => self.add_state(s, node),
-                Residual::Control { .. } => {
-                    add_diagonal(node.r.as_mut_slice(), node.R.as_mut_slice(), 0..n, &s.d, &s.dd);
-                }
                 Residual::CenterOfMass { .. } => {
-                    add_positions(node, &s.com[0], &self.all, &s.d[..n], &s.dd[..n]);
-                    filled = filled.max(Filled::Positions);
+                    s.rows.push_positions(s.com[0].as_slice(), 3, &self.all, &s.d[..n], &s.dd[..n]);
                 }
                 Residual::FramePlacement { .. }
                 | Residual::FrameTranslation { .. }
                 | Residual::FrameRotation { .. } => {
-                    self.frame_jacobian(term, placements, s);
-                    add_positions(node, &s.J, &plan.columns, &s.d[..n], &s.dd[..n]);
-                    filled = filled.max(Filled::Positions);
+                    self.frame_jacobian(term, plan, placements, s);
+                    s.rows.push_positions(s.J.as_slice(), 6, &plan.columns, &s.d[..n], &s.dd[..n]);
                 }
                 residual => {
                     if let (Residual::FrameVelocity { frame, reference, .. }, Some(motion)) = (residual, velocities) {
@@ -212,18 +209,39 @@ impl Costs {
                         motion.frame_jacobian(*frame, *reference, &mut s.Jv);
                     }
                     for i in 0..n {
-                        let (d, dd) = (s.d[i], s.dd[i]);
-                        if d == 0.0 && dd == 0.0 {
+                        if s.d[i] == 0.0 && s.dd[i] == 0.0 {
                             continue; // a cone's row that is not active
                         }
-                        add_slope_row(residual, plan, i, slopes, nv, s);
-                        add_row(node, &s.g, d, dd);
-                        filled = Filled::All;
+                        add_slope_row(residual, plan, i, slopes, self.model.nv(), s);
                     }
                 }
             }
         }
-        mirror(node, nv, filled);
+        s.rows.write(node);
+        for (term, plan) in terms().filter(|(term, _)| term.residual.part() == Part::Diagonal) {
+            self.slopes_of(term, plan, scene, placements, velocities, scale, s);
+            match term.residual {
+                Residual::State { .. } => self.add_state(s, node),
+                _ => add_diagonal(node.r.as_mut_slice(), node.R.as_mut_slice(), 0..plan.n, &s.d, &s.dd),
+            }
+        }
+    }
+
+    /// The residual of a term and `scale` · w times the derivatives of its activation, in `s.r`, `s.d`, `s.dd`.
+    fn slopes_of(
+        &self,
+        term: &Cost,
+        plan: &Plan,
+        scene: &Scene<'_>,
+        placements: Option<Placements<'_, f64>>,
+        velocities: Option<Velocities<'_, f64>>,
+        scale: f64,
+        s: &mut Scratch,
+    ) {
+        self.residual(term, plan, scene, placements, velocities, s);
+        term.activation.derivatives(&s.r[..plan.n], &mut s.d, &mut s.dd);
+        let weight = scale * term.weight;
+        s.d[..plan.n].iter_mut().chain(&mut s.dd[..plan.n]).for_each(|d| *d *= weight);
     }
 
     /// r of one term, in `s.r`.
@@ -294,12 +312,20 @@ impl Costs {
         }
         difference_jacobian(&self.model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
         for group in &self.groups {
-            for i in group.clone() {
-                for a in group.clone() {
-                    node.q[a] += s.D[(i, a)] * s.d[i]; // Dᵀ a′
-                    let da = s.D[(i, a)] * s.dd[i];
-                    for b in group.clone() {
-                        node.Q[(b, a)] += da * s.D[(i, b)]; // Dᵀ a″ D
+            let (start, size) = (group.start, group.len());
+            let mut D = [[0.0; 6]; 6]; // row by row
+            for i in 0..size {
+                for a in 0..size {
+                    D[i][a] = s.D[(start + i, start + a)];
+                }
+            }
+            for i in 0..size {
+                let (d, dd) = (s.d[start + i], s.dd[start + i]);
+                for a in 0..size {
+                    node.q[start + a] += D[i][a] * d; // Dᵀ a′
+                    let column = &mut node.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
+                    for b in 0..size {
+                        column[b] += dd * (D[i][a] * D[i][b]); // Dᵀ a″ D
                     }
                 }
             }
@@ -307,14 +333,15 @@ impl Costs {
     }
 
     /// ∂r/∂q of a frame's term, whose r was just computed, in `s.J`.
-    fn frame_jacobian(&self, term: &Cost, placements: Option<Placements<'_, f64>>, s: &mut Scratch) {
+    fn frame_jacobian(&self, term: &Cost, plan: &Plan, placements: Option<Placements<'_, f64>>, s: &mut Scratch) {
         let placed = placements.expect("placements are computed where a residual needs them");
         let J = &mut s.J;
         match term.residual {
             Residual::FramePlacement { frame, .. } => {
                 placed.frame_jacobian(frame, ReferenceFrame::Local, J);
                 let Jlog = lie::jlog6(Motion::from([s.r[0], s.r[1], s.r[2], s.r[3], s.r[4], s.r[5]]));
-                for column in J.as_mut_slice().chunks_exact_mut(6) {
+                for &c in &plan.columns {
+                    let column = &mut J.as_mut_slice()[6 * c..6 * c + 6];
                     let m = [column[0], column[1], column[2], column[3], column[4], column[5]];
                     column.copy_from_slice(&(Jlog * Motion::from(m)).to_array()); // Jlog J
                 }
@@ -322,7 +349,8 @@ impl Costs {
             Residual::FrameRotation { frame, .. } => {
                 placed.frame_jacobian(frame, ReferenceFrame::Local, J);
                 let Jlog = lie::jlog3(Vec3::new(s.r[0], s.r[1], s.r[2]));
-                for column in J.as_mut_slice().chunks_exact_mut(6) {
+                for &c in &plan.columns {
+                    let column = &mut J.as_mut_slice()[6 * c..6 * c + 6];
                     let turned = Jlog * Vec3::new(column[3], column[4], column[5]);
                     column[..3].copy_from_slice(&turned.to_array());
                 }
@@ -335,10 +363,10 @@ impl Costs {
     }
 }
 
-/// Row i of ∂r/∂(q, v, u) of a residual that depends on more than q, in `s.g`.
+/// Row i of ∂r/∂(q, v, u) of a residual that depends on more than q, to the others.
 fn add_slope_row(residual: &Residual, plan: &Plan, i: usize, slopes: &dyn Slopes, nv: usize, s: &mut Scratch) {
-    let Scratch { g, J, Jv, momentum, com, surplus_slopes, .. } = s;
-    g.fill(0.0);
+    let Scratch { rows, d, dd, J, Jv, momentum, com, surplus_slopes, .. } = s;
+    let g = rows.push(d[i], dd[i]);
     match residual {
         Residual::FrameVelocity { .. } => {
             add_matrix_row(J, i, 1.0, &mut g[..nv]);

@@ -1,7 +1,10 @@
 //! Semi-implicit Euler, as Crocoddyl's: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt.
+#![allow(non_snake_case)] // E
 
 use super::integrated::{ContinuousModel, Derivatives};
 use crate::lq::LqNode;
+use crate::structure::LARGEST_BLOCK;
+use crate::vector::{Dense, Vector, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -52,17 +55,9 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     for k in 0..nv {
         dq[k] = v[k] * dt + a[k] * dt * dt;
     }
-    let (by_q, by_v) = node.A.as_mut_slice().split_at_mut(2 * nv * nv);
-    for (to, da) in [(by_q, da_dq.as_slice()), (by_v, da_dv.as_slice()), (node.B.as_mut_slice(), da_du)] {
-        for (column, da) in to.chunks_exact_mut(2 * nv).zip(da.chunks_exact(nv)) {
-            let (position, velocity) = column.split_at_mut(nv);
-            for k in 0..nv {
-                velocity[k] = da[k] * dt;
-                position[k] = velocity[k] * dt;
-            }
-        }
-    }
-    let A = node.A.as_mut_slice();
+    let (A, B) = (node.A.as_mut_slice(), node.B.as_mut_slice());
+    let (by_q, by_v) = A.split_at_mut(2 * nv * nv);
+    at_level(Steps([(da_dq.as_slice(), by_q), (da_dv.as_slice(), by_v), (da_du, B)], nv, dt));
     for k in 0..nv {
         A[(nv + k) * 2 * nv + k] += dt;
         A[(nv + k) * (2 * nv + 1)] += 1.0;
@@ -78,9 +73,12 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     }
     model.integrate_jacobians(dq, transport, exp);
     for (group, block) in model.groups().iter().zip(blocks) {
-        let (start, size) = ((group.start, group.start), (group.len(), group.len()));
-        block.T.copy_from(&transport.view(start, size));
-        block.E.copy_from(&exp.view(start, size));
+        for c in 0..group.len() {
+            for r in 0..group.len() {
+                block.T[(r, c)] = transport[(group.start + r, group.start + c)];
+                block.E[(r, c)] = exp[(group.start + r, group.start + c)];
+            }
+        }
         apply_block(exp, group, &mut node.A);
         apply_block(exp, group, &mut node.B);
         for c in group.clone() {
@@ -91,20 +89,63 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     }
 }
 
+/// Derivatives of accelerations, nv numbers a column, become those of steps: [a Δt²; a Δt].
+struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
+
+impl<const N: usize> Dense for Steps<'_, N> {
+    #[inline(always)]
+    fn run<V: Vector, const NR: usize>(self) {
+        let Self(parts, nv, dt) = self;
+        for (from, to) in parts {
+            for (column, a) in to.chunks_exact_mut(2 * nv).zip(from.chunks_exact(nv)) {
+                let (position, velocity) = column.split_at_mut(nv);
+                for k in 0..nv {
+                    velocity[k] = a[k] * dt;
+                    position[k] = a[k] * dt * dt;
+                }
+            }
+        }
+    }
+}
+
+/// The blocks of some groups from the left, in place.
+struct Blocks<'a> {
+    E: &'a DMatrix<f64>,
+    group: &'a Range<usize>,
+    X: &'a mut [f64],
+    rows: usize,
+}
+
+impl Dense for Blocks<'_> {
+    #[inline(always)]
+    fn run<V: Vector, const NR: usize>(self) {
+        let Self { E, group, X, rows } = self;
+        let (start, size) = (group.start, group.len());
+        let mut block = [[0.0; 8]; LARGEST_BLOCK]; // column by column, with zeros up to a whole register
+        for c in 0..size {
+            for r in 0..size {
+                block[c][r] = E[(start + r, start + c)];
+            }
+        }
+        for column in X.chunks_exact_mut(rows) {
+            let (mut sum, part) = ([0.0; 8], &mut column[start..start + size]);
+            for c in 0..size {
+                let x = part[c];
+                for r in 0..8 {
+                    sum[r] += block[c][r] * x;
+                }
+            }
+            for r in 0..LARGEST_BLOCK {
+                if r < size {
+                    part[r] = sum[r];
+                }
+            }
+        }
+    }
+}
+
 /// The rows of a group times its block of E, in place.
 pub(super) fn apply_block(E: &DMatrix<f64>, group: &Range<usize>, X: &mut DMatrix<f64>) {
-    let (size, rows, start) = (group.len(), X.nrows(), group.start);
-    let mut block = [[0.0; 6]; 6];
-    for (c, column) in block.iter_mut().enumerate().take(size) {
-        for (r, x) in column.iter_mut().enumerate().take(size) {
-            *x = E[(start + r, start + c)];
-        }
-    }
-    for column in X.as_mut_slice().chunks_exact_mut(rows) {
-        let (mut sum, part) = ([0.0; 6], &mut column[group.clone()]);
-        for (column, x) in block.iter().zip(part.iter()) {
-            (0..6).for_each(|r| sum[r] += column[r] * x);
-        }
-        part.copy_from_slice(&sum[..size]);
-    }
+    let rows = X.nrows();
+    at_level(Blocks { E, group, X: X.as_mut_slice(), rows });
 }

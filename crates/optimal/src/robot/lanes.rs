@@ -75,26 +75,28 @@ struct Unpack<'a, 'b, S> {
 impl<S: Block<Number = f64>> Kernel for Unpack<'_, '_, S> {
     #[inline(always)]
     fn run(self) {
-        let (blocks, rest) = self.from.as_chunks::<WIDEST>();
-        for (b, block) in blocks.iter().enumerate() {
-            let mut x = [[0.0; WIDEST]; WIDEST];
-            for i in 0..WIDEST {
-                block[i].store(&mut x[i]);
-            }
-            for (k, to) in self.to.iter_mut().enumerate() {
-                let mut lane = [0.0; WIDEST];
-                for i in 0..WIDEST {
-                    lane[i] = x[i][k];
+        let n = self.from.len();
+        if n < S::LANES {
+            for (i, from) in self.from.iter().enumerate() {
+                let mut x = [0.0; WIDEST];
+                from.store(&mut x);
+                for (k, to) in self.to.iter_mut().enumerate() {
+                    to[i] = x[k];
                 }
-                to[b * WIDEST..(b + 1) * WIDEST].copy_from_slice(&lane);
             }
+            return;
         }
-        for (i, from) in rest.iter().enumerate() {
-            let mut x = [0.0; WIDEST];
-            from.store(&mut x);
+        let (mut i, mut block) = (0, [S::zero(); WIDEST]);
+        loop {
+            block[..S::LANES].copy_from_slice(&self.from[i..i + S::LANES]);
+            S::transpose(&mut block[..S::LANES]);
             for (k, to) in self.to.iter_mut().enumerate() {
-                to[blocks.len() * WIDEST + i] = x[k];
+                block[k].store(&mut to[i..]);
             }
+            if i + S::LANES >= n {
+                return;
+            }
+            i = (i + S::LANES).min(n - S::LANES); // the last ones overlap those before
         }
     }
     #[inline(always)]

@@ -1,19 +1,11 @@
-//! How a residual's gradient and Gauss–Newton Hessian are added to a node: only where its Jacobian is not zero, and in
-//! the lower triangle alone, which is mirrored at the end.
+//! How residuals' gradients and Gauss–Newton Hessians come into a node: the rows of their Jacobians are collected, and
+//! each entry of Q, S and R is then written once, as the sum of their outer products.
+#![allow(non_snake_case)] // the names of the literature
 
+use crate::dense::{SLACK, tile_rows};
 use crate::lq::LqNode;
+use crate::vector::{Dense, Vector, at_level};
 use core::ops::Range;
-use nalgebra::DMatrix;
-
-/// Which part of Q has entries off its diagonal (beside the blocks of groups, which are written whole).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Filled {
-    Diagonal,
-    /// Of positions with positions.
-    Positions,
-    /// Any, of R too.
-    All,
-}
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
 #[inline(always)]
@@ -25,78 +17,182 @@ pub(super) fn add_diagonal(q: &mut [f64], Q: &mut [f64], entries: Range<usize>, 
     }
 }
 
-/// q += Jᵀ d, Q += Jᵀ diag(dd) J for a Jacobian with respect to q with entries in some columns alone, in order.
-#[inline(always)]
-pub(super) fn add_positions(node: &mut LqNode, J: &DMatrix<f64>, columns: &[usize], d: &[f64], dd: &[f64]) {
-    match d.len() {
-        3 => add_block::<3>(node, J, columns, d, dd),
-        _ => add_block::<6>(node, J, columns, d, dd),
+/// Some rows of Jacobians, each with the derivatives a′ and a″ of its activation.
+#[derive(Clone, Debug)]
+struct List {
+    /// How many numbers a row has, and how far it is to the next one.
+    width: usize,
+    stride: usize,
+    count: usize,
+    rows: Vec<f64>,
+    /// a′ and a″.
+    slopes: Vec<[f64; 2]>,
+}
+
+impl List {
+    fn new(width: usize, most: usize) -> Self {
+        let stride = width + SLACK;
+        Self { width, stride, count: 0, rows: vec![0.0; most * stride], slopes: vec![[0.0; 2]; most] }
+    }
+
+    fn push(&mut self, d: f64, dd: f64) -> &mut [f64] {
+        self.slopes[self.count] = [d, dd];
+        self.count += 1;
+        let row = &mut self.rows[(self.count - 1) * self.stride..][..self.width];
+        row.fill(0.0);
+        row
     }
 }
 
-#[inline(always)]
-fn add_block<const N: usize>(node: &mut LqNode, J: &DMatrix<f64>, columns: &[usize], d: &[f64], dd: &[f64]) {
-    let (rows, n) = (J.nrows(), node.q.len());
-    let J = J.as_slice();
-    let column = |c: usize| -> &[f64; N] { J[c * rows..].first_chunk().expect("a row for each entry of the residual") };
-    for (k, &b) in columns.iter().enumerate() {
-        let (J_b, mut weighted, mut slope) = (column(b), [0.0; N], 0.0);
-        for i in 0..N {
-            weighted[i] = dd[i] * J_b[i];
-            slope += d[i] * J_b[i];
-        }
-        node.q[b] += slope; // Jᵀ a′
-        let Q_b = &mut node.Q.as_mut_slice()[b * n..(b + 1) * n];
-        for &a in &columns[k..] {
-            let (J_a, mut sum) = (column(a), 0.0);
-            for i in 0..N {
-                sum += weighted[i] * J_a[i];
+/// The rows of all residuals of a knot.
+#[derive(Clone, Debug)]
+pub(super) struct Rows {
+    nv: usize,
+    /// With respect to (q, v, u).
+    whole: List,
+    /// With respect to q, of residuals that depend on nothing else.
+    positions: List,
+    /// The rows times √|a″|, those of `whole` before those of `positions`, and the same with the sign of a″. Shape: as
+    /// many rows of the stride of `whole`.
+    left: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Rows {
+    /// Room for so many rows with respect to (q, v, u), and to q alone, of a robot with nv coordinates and nu controls.
+    pub(super) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
+        let whole = List::new(2 * nv + nu, whole);
+        let positions = List::new(nv, positions);
+        let most = (whole.slopes.len() + positions.slopes.len()).max(1);
+        let scaled = vec![0.0; most * whole.stride];
+        Self { nv, whole, positions, left: scaled.clone(), right: scaled }
+    }
+
+    /// Forgets all rows.
+    pub(super) fn clear(&mut self) {
+        (self.whole.count, self.positions.count) = (0, 0);
+    }
+
+    /// A row of zeros with respect to (q, v, u), to be written.
+    pub(super) fn push(&mut self, d: f64, dd: f64) -> &mut [f64] {
+        self.whole.push(d, dd)
+    }
+
+    /// The rows of a Jacobian with respect to q that has entries in some columns alone; J has at least as many rows.
+    pub(super) fn push_positions(&mut self, J: &[f64], height: usize, columns: &[usize], d: &[f64], dd: &[f64]) {
+        for i in 0..d.len() {
+            let row = self.positions.push(d[i], dd[i]);
+            for &c in columns {
+                row[c] = J[c * height + i];
             }
-            Q_b[a] += sum; // Jᵀ a″ J
         }
+    }
+
+    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows.
+    pub(super) fn write(&mut self, node: &mut LqNode) {
+        node.q.as_mut_slice().fill(0.0);
+        node.r.as_mut_slice().fill(0.0);
+        at_level(Write { rows: self, node });
     }
 }
 
-/// q, r += d g and Q, S, R += dd g gᵀ for one row g of a Jacobian with respect to (q, v, u).
+struct Write<'a> {
+    rows: &'a mut Rows,
+    node: &'a mut LqNode,
+}
+
+impl Dense for Write<'_> {
+    #[inline(always)]
+    fn run<V: Vector, const NR: usize>(self) {
+        let Self { rows: Rows { nv, whole, positions, left, right }, node } = self;
+        let (nv, n, m, stride) = (*nv, 2 * *nv, node.r.len(), whole.stride);
+        for (list, first) in [(&*whole, 0), (&*positions, whole.count)] {
+            for k in 0..list.count {
+                let [d, dd] = list.slopes[k];
+                let row = &list.rows[k * list.stride..][..list.stride];
+                let (x, u) = row[..list.width].split_at(n.min(list.width));
+                add_multiple::<V>(node.q.as_mut_slice(), x, d);
+                add_multiple::<V>(node.r.as_mut_slice(), u, d);
+                let scale = dd.abs().sqrt();
+                let at = (first + k) * stride..(first + k) * stride + list.stride;
+                let (left, right) = (&mut left[at.clone()], &mut right[at]);
+                for i in 0..list.stride {
+                    left[i] = row[i] * scale;
+                    right[i] = if dd < 0.0 { -left[i] } else { left[i] };
+                }
+            }
+        }
+        let (some, all) = (whole.count, whole.count + positions.count);
+        let Q = node.Q.as_mut_slice();
+        let products = [left.as_slice(), right.as_slice()];
+        outer::<V, NR>(Q, n, [0..nv, 0..nv], [0, 0], products, stride, all);
+        outer::<V, NR>(Q, n, [nv..n, 0..nv], [0, 0], products, stride, some);
+        outer::<V, NR>(Q, n, [0..n, nv..n], [0, 0], products, stride, some);
+        outer::<V, NR>(node.S.as_mut_slice(), n, [0..n, 0..m], [0, n], products, stride, some);
+        outer::<V, NR>(node.R.as_mut_slice(), m, [0..m, 0..m], [n, n], products, stride, some);
+    }
+}
+
+/// y += a x on the entries of x.
 #[inline(always)]
-pub(super) fn add_row(node: &mut LqNode, g: &[f64], d: f64, dd: f64) {
-    let n = node.q.len();
-    let (g_x, g_u) = g.split_at(n);
-    let add = |out: &mut [f64], c: f64, g: &[f64]| out.iter_mut().zip(g).for_each(|(out, g)| *out += c * g);
-    add(node.q.as_mut_slice(), d, g_x);
-    add(node.r.as_mut_slice(), d, g_u);
-    if dd == 0.0 {
-        return;
-    }
-    for (b, column) in node.Q.as_mut_slice().chunks_exact_mut(n).enumerate().filter(|(b, _)| g_x[*b] != 0.0) {
-        add(&mut column[b..], dd * g_x[b], &g_x[b..]);
-    }
-    let m = g_u.len();
-    for b in (0..m).filter(|&b| g_u[b] != 0.0) {
-        add(&mut node.S.as_mut_slice()[b * n..(b + 1) * n], dd * g_u[b], g_x);
-        add(&mut node.R.as_mut_slice()[b * m + b..(b + 1) * m], dd * g_u[b], &g_u[b..]);
+fn add_multiple<V: Vector>(y: &mut [f64], x: &[f64], a: f64) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += a * x;
     }
 }
 
-/// Copies the lower triangles to the upper ones.
-pub(super) fn mirror(node: &mut LqNode, nv: usize, filled: Filled) {
-    let n = node.q.len();
-    match filled {
-        Filled::Diagonal => {}
-        Filled::Positions => mirror_square(node.Q.as_mut_slice(), n, nv),
-        Filled::All => {
-            mirror_square(node.Q.as_mut_slice(), n, n);
-            let m = node.r.len();
-            mirror_square(node.R.as_mut_slice(), m, m);
+/// C = Σ left right ᵀ over the first `length` rows of both, for some rows and columns of C, whose entries in the rows of
+/// `left` and `right` stand `shift` after their own number. The sums are the same on both sides of the diagonal.
+#[inline(always)]
+fn outer<V: Vector, const NR: usize>(
+    C: &mut [f64],
+    ldc: usize,
+    [rows, columns]: [Range<usize>; 2],
+    shift: [usize; 2],
+    [left, right]: [&[f64]; 2],
+    stride: usize,
+    length: usize,
+) {
+    let (left, right) = (&left[shift[0]..], &right[shift[1]..]);
+    let mut j = columns.start;
+    while j < columns.end {
+        let width = NR.min(columns.end - j);
+        let mut i = rows.start;
+        while i < rows.end {
+            if rows.end - i >= 2 * V::N {
+                let tile = tile_rows::<V, 2, NR>(left, stride, i, right, stride, j, length);
+                for jj in 0..NR {
+                    if jj < width {
+                        let to = &mut C[(j + jj) * ldc + i..][..2 * V::N];
+                        tile[jj][0].store(to);
+                        tile[jj][1].store(&mut to[V::N..]);
+                    }
+                }
+                i += 2 * V::N;
+                continue;
+            }
+            if rows.len() >= V::N {
+                i = i.min(rows.end - V::N); // the last strip overlaps the one before
+            }
+            let tile = tile_rows::<V, 1, NR>(left, stride, i, right, stride, j, length);
+            for jj in 0..NR {
+                if jj < width {
+                    let to = &mut C[(j + jj) * ldc + i..];
+                    if rows.len() >= V::N {
+                        tile[jj][0].store(to);
+                        continue;
+                    }
+                    let mut numbers = [0.0; SLACK];
+                    tile[jj][0].store(&mut numbers);
+                    for k in 0..V::N {
+                        if k < rows.len() {
+                            to[k] = numbers[k]; // one by one: no function call
+                        }
+                    }
+                }
+            }
+            i += V::N;
         }
-    }
-}
-
-/// Of the first `size` rows and columns of an n × n matrix.
-fn mirror_square(X: &mut [f64], n: usize, size: usize) {
-    for b in 0..size {
-        for a in b + 1..size {
-            X[a * n + b] = X[b * n + a];
-        }
+        j += NR;
     }
 }

@@ -108,7 +108,30 @@ pub enum Residual {
     ImpulseCenterOfMass,
 }
 
+/// Where the Hessian of a residual has entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// On the diagonal of Q or R, and in the blocks of groups.
+    Diagonal,
+    /// Of positions with positions.
+    Positions,
+    /// Anywhere.
+    All,
+}
+
 impl Residual {
+    /// Where its Hessian has entries.
+    pub(super) fn part(&self) -> Part {
+        match self {
+            Self::State { .. } | Self::Control { .. } => Part::Diagonal,
+            Self::CenterOfMass { .. }
+            | Self::FramePlacement { .. }
+            | Self::FrameTranslation { .. }
+            | Self::FrameRotation { .. } => Part::Positions,
+            _ => Part::All,
+        }
+    }
+
     /// Which signal of the dynamics it looks at, beside x and u.
     pub(super) fn signal(&self) -> Option<Signal> {
         match self {

@@ -1,5 +1,6 @@
 //! What the dynamics of a knot offer to its residuals, and what residuals share.
 
+use super::quadratic::Rows;
 use condyle_dynamics::{
     Data, Model, Placements, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
@@ -120,8 +121,8 @@ pub(super) struct Scratch {
     pub J: DMatrix<f64>,
     /// The same with respect to v. Shape: 6 × nv.
     pub Jv: DMatrix<f64>,
-    /// A row of the Jacobian with respect to (q, v, u). Shape: 2 nv + nu.
-    pub g: Vec<f64>,
+    /// The rows of all Jacobians.
+    pub rows: Rows,
     /// The Jacobian of the difference of configurations. Shape: nv × nv.
     pub D: DMatrix<f64>,
     /// ∂c/∂q, and ∂ċ/∂q for the change of velocity at an impact. Shape: 3 × nv.
@@ -139,8 +140,9 @@ pub(super) struct Scratch {
 }
 
 impl Watch {
-    /// For a robot with nu controls and residuals of at most `longest` numbers.
-    pub(super) fn new(model: &Model, nu: usize, longest: usize, needs: Needs) -> Self {
+    /// For a robot with nu controls, residuals of at most `longest` numbers, and at most so many rows of Jacobians with
+    /// respect to (q, v, u), and to q alone.
+    pub(super) fn new(model: &Model, nu: usize, longest: usize, most: [usize; 2], needs: Needs) -> Self {
         let nv = model.nv();
         let rows = |n| DMatrix::zeros(n, nv);
         let square = || if needs.surplus { rows(nv) } else { DMatrix::zeros(0, 0) };
@@ -150,7 +152,7 @@ impl Watch {
             dd: vec![0.0; longest],
             J: rows(6),
             Jv: rows(6),
-            g: vec![0.0; 2 * nv + nu],
+            rows: Rows::new(nv, nu, most),
             D: rows(nv),
             com: [rows(3), rows(3)],
             momentum: [rows(6), rows(6)],
@@ -163,12 +165,13 @@ impl Watch {
     }
 
     /// Makes room for other residuals.
-    pub(super) fn resize(&mut self, longest: usize, needs: Needs) {
+    pub(super) fn resize(&mut self, nu: usize, longest: usize, most: [usize; 2], needs: Needs) {
         let s = &mut self.scratch;
         for numbers in [&mut s.r, &mut s.d, &mut s.dd] {
             numbers.resize(longest, 0.0);
         }
         let nv = s.zero.len();
+        s.rows = Rows::new(nv, nu, most);
         if needs.surplus && s.surplus_slopes[0].is_empty() {
             s.surplus_slopes.fill(DMatrix::zeros(nv, nv));
         }
@@ -202,15 +205,15 @@ impl Watch {
         }
         if slopes && needs.impulse_com {
             let d = centroidal_derivatives(model, data, q, scene.a, &scratch.zero);
-            scratch.com[0].copy_from(d.dcom_dq);
-            scratch.com[1].copy_from(d.dvcom_dq);
+            scratch.com[0].as_mut_slice().copy_from_slice(d.dcom_dq.as_slice());
+            scratch.com[1].as_mut_slice().copy_from_slice(d.dvcom_dq.as_slice());
         } else if slopes && needs.com {
-            scratch.com[0].copy_from(centroidal_map(model, data, q).Jcom);
+            scratch.com[0].as_mut_slice().copy_from_slice(centroidal_map(model, data, q).Jcom.as_slice());
         }
         if slopes && needs.momentum {
             let d = centroidal_derivatives(model, data, q, v, &scratch.zero);
-            scratch.momentum[0].copy_from(d.dh_dq);
-            scratch.momentum[1].copy_from(d.dh_dv);
+            scratch.momentum[0].as_mut_slice().copy_from_slice(d.dh_dq.as_slice());
+            scratch.momentum[1].as_mut_slice().copy_from_slice(d.dh_dv.as_slice());
         }
         if needs.velocities {
             let velocities = forward_velocities(model, data, q, v);
