@@ -10,6 +10,7 @@ use crate::dispatch::kernel;
 use crate::forward_dynamics::{Method, forward_dynamics};
 use crate::kinematics::{World, positions};
 use crate::layout::{Layout, Single};
+use crate::limbs;
 use crate::model::Model;
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 
@@ -77,9 +78,9 @@ fn eliminate<L: Layout>(
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;
     for i in l.bodies() {
-        IA[l.level(i)] = w.oX[i].act(l.inertia(i)).into();
+        IA[l.level(i)] = ArticulatedInertia::from(w.oX[i].act(l.inertia(i)));
         for &j in l.finished(i) {
-            let Ia = eliminate(l, &w.S, U, D_inv, j, IA[l.level(j)]);
+            let Ia = eliminate(l, &w.S, U, D_inv, j, l.whole(j, IA[l.level(j)]));
             l.lift(IA, j, Ia); // Iᴬ_λ += Iᵃ
         }
     }
@@ -109,7 +110,7 @@ pub(crate) fn pass<L: Layout>(
             pi -= oX[i].act(external);
         }
         let here = l.level(i);
-        (v[here], IA[here], pA[here]) = (vi, I.into(), pi);
+        (v[here], IA[here], pA[here]) = (vi, ArticulatedInertia::from(I), pi);
         c[i] = vi.cross(vJ); // c_i = v_i × v_J
         for &j in l.finished(i) {
             let here = l.level(j);
@@ -173,7 +174,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     check_arguments(model, data, q, v, tau, f_ext);
-    if !model.has_mimic() && crate::limbs::run(true, model, data, q, v, tau, f_ext) {
+    if limbs::run(limbs::Task::Aba, model, data, q, v, tau, f_ext) {
         return &data.aba.qdd;
     }
     one_by_one(model, data, q, v, tau, f_ext)

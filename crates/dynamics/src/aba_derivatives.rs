@@ -12,9 +12,11 @@ use crate::articulated_solve::{self, minus_solve};
 use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::inputs::State;
+use crate::limbs;
 use crate::ltdl::axpy;
 use crate::minv;
 use crate::model::{Coupled, Model};
+use crate::product;
 use crate::rnea_derivatives;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
@@ -234,6 +236,31 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S, R> {
     check_arguments(model, data, q, v, tau, f_ext);
+    if data.minv.by_factor()
+        && !data.aba_derivatives.solve.pays()
+        && limbs::run(limbs::Task::AbaDerivatives, model, data, q, v, tau, f_ext)
+    {
+        data.aba_derivatives.a.copy_from_slice(&data.aba.qdd);
+        data.rnea_derivatives.qd.copy_from_slice(v);
+        data.rnea_derivatives.qdd.copy_from_slice(&data.aba.qdd);
+        multiply(model, data);
+        let state = rnea_derivatives::view_of_limbs(model, data).state;
+        return data.aba_derivatives.view(data.minv.matrix(), state);
+    }
+    in_turn(model, data, q, v, tau, f_ext);
+    let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
+    data.aba_derivatives.view(data.minv.matrix(), state)
+}
+
+/// Body by body, for arguments that fit; leaves what second derivatives are made of.
+pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) {
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(one_by_one(model, data, q, v, tau, f_ext));
     rnea_derivatives::run(model, data, v, &a_kept, f_ext, &[]);
@@ -246,10 +273,18 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     if data.aba_derivatives.solve.pays() {
         solves(model, data);
     } else {
+        multiply(model, data);
+    }
+}
+
+/// ∂q̈ = −M⁻¹ ∂τ, after `rnea_derivatives` and `minv`.
+fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
+    let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+    let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
+    let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
+    if !product::minus_products(data.minv.matrix().as_slice(), dtau, da, &model.coupled) {
         products(model, data);
     }
-    let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
-    data.aba_derivatives.view(data.minv.matrix(), state)
 }
 
 impl<S> Workspace<S> {

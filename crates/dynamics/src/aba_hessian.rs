@@ -11,7 +11,8 @@
 //! and nothing else, since τ is linear in a and does not mix v with a. Source: Nganga and Wensing, *Accelerating
 //! second-order differential dynamic programming for rigid-body systems* (2021).
 
-use crate::aba_derivatives::{AbaDerivatives, aba_derivatives, minus_product};
+use crate::aba::check_arguments;
+use crate::aba_derivatives::{self, AbaDerivatives, minus_product};
 use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::model::Model;
@@ -136,7 +137,8 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     lambda: &[S],
 ) -> AbaHessian<'d, S, R> {
     check("lambda", lambda.len(), model.nv);
-    aba_derivatives(model, data, q, v, tau, f_ext);
+    check_arguments(model, data, q, v, tau, f_ext);
+    aba_derivatives::in_turn(model, data, q, v, tau, f_ext);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);
     for (i, mu) in mu.iter_mut().enumerate() {
         let row = data.minv.matrix().column(i); // symmetric: a row is a column

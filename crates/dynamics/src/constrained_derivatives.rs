@@ -350,14 +350,14 @@ fn pass<S: Scalar, R: Constant<S>>(
     let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
     let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
     constraints.load(model, world, f_ext, &mut d.forces);
-    rnea_derivatives::pass(&l, world, id, v, qdd, &d.forces, l.minus_gravity(), false);
+    rnea_derivatives::pass(&l, world, id.parts(), v, qdd, &d.forces, l.minus_gravity(), false);
     constraints.add_turning(world, &mut id.dtau_dq);
-    let columns = Columns { S: &world.S, Psid: &id.Psid, Psidd: &id.Psidd, PsidSd: &id.PsidSd };
+    let columns = Columns { S: &world.S, Psid: &id.bodies.Psid, Psidd: &id.bodies.Psidd, PsidSd: &id.bodies.PsidSd };
     let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = &mut *constraints;
     dgamma_dq.as_mut_slice().fill(S::zero());
     dgamma_dv.as_mut_slice().fill(S::zero());
     for (plan, target) in plans.iter().zip(targets.iter()) {
-        let ends = Ends::new(plan, target, world, &id.v, &id.a);
+        let ends = Ends::new(plan, target, world, &id.bodies.v, &id.bodies.a);
         let error = &error[plan.row..plan.row + plan.rows()];
         ends.acceleration_derivatives(plan, target, columns, error, dgamma_dq, dgamma_dv);
     }

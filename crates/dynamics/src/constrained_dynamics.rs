@@ -88,7 +88,7 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
         let F_i = F[i];
         l.push(F, i, F_i); // F_λ += F_i
     }
-    crba::carry(l, w, IC, M);
+    crba::carry(l, w, IC, M.as_mut_slice());
 }
 
 /// M alone, for bodies that are placed.
@@ -97,7 +97,7 @@ pub(crate) fn inertia<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>)
     for i in l.bodies() {
         d.IC[i] = w.oX[i].act(l.inertia(i));
     }
-    crba::carry(l, w, &mut d.IC, &mut d.M);
+    crba::carry(l, w, &mut d.IC, d.M.as_mut_slice());
 }
 
 impl<S: Scalar> ConstraintSet<S> {

@@ -6,7 +6,8 @@
 use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Pairs, Single};
+use crate::layout::{Columns, Single};
+use crate::limbs;
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
@@ -15,7 +16,7 @@ use nalgebra::DMatrix;
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Inertia of the body and all that it carries, in the world's frame. Shape: bodies. Written by: `pass`.
-    IC: Vec<Inertia<S>>,
+    pub IC: Vec<Inertia<S>>,
     /// Shape: nv × nv. Written by: `pass`.
     pub M: DMatrix<S>,
 }
@@ -34,7 +35,7 @@ impl<S> Workspace<S> {
 
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
-fn pass<L: Pairs>(l: &L, w: &World<L::S>, Workspace { IC, M }: &mut Workspace<L::S>) {
+pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
     for i in l.bodies() {
         IC[i] = w.oX[i].act(l.inertia(i));
     }
@@ -43,23 +44,22 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, Workspace { IC, M }: &mut Workspace<L:
 
 /// M, for the inertias of the bodies, which become those of all that the joints carry.
 #[inline(always)]
-pub(crate) fn carry<L: Pairs>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut DMatrix<L::S>) {
-    let M = M.as_mut_slice();
+pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
     l.clear(M);
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
+        let IC_i = l.whole(i, IC[i]);
         for k in 0..nv {
-            let F = IC[i] * S[l.slot(i) + k]; // F = Iᶜ S
+            let F = IC_i * S[l.slot(i) + k]; // F = Iᶜ S
             let own = support.len() - nv + k;
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
-                l.put_at(M, e, support[own], x);
-                l.put_at(M, support[own], e, x);
+                l.put_right(M, i, k, e, x);
+                l.put_below(M, i, k, e, x);
             }
-            l.put_at(M, support[own], support[own], l.at(S, support[own]).dot(F));
+            l.put_below(M, i, k, support[own], l.at(S, support[own]).dot(F));
         }
-        let IC_i = IC[i];
         l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
     }
     l.add_armature(M);
@@ -67,7 +67,8 @@ pub(crate) fn carry<L: Pairs>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [In
 
 kernel! {
     fn run(model, data) {
-        pass(&Single::new(model), &data.world, &mut data.crba);
+        let Workspace { IC, M } = &mut data.crba;
+        pass(&Single::new(model), &data.world, IC, M.as_mut_slice());
     }
 }
 
@@ -90,6 +91,9 @@ kernel! {
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
     check("q", q.len(), model.nq);
+    if limbs::run(limbs::Task::Crba, model, data, q, &[], &[], &[]) {
+        return &data.crba.M;
+    }
     positions(model, data, q);
     run(model, data);
     &data.crba.M

@@ -33,6 +33,17 @@ pub(crate) unsafe fn slice<A, B>(a: &[A]) -> &[B] {
     unsafe { core::slice::from_raw_parts(a.as_ptr().cast(), a.len()) }
 }
 
+/// What is to be written, under another name of its numbers.
+///
+/// # Safety
+/// As for `slice`.
+#[inline(always)]
+pub(crate) unsafe fn slice_mut<A, B>(a: &mut [A]) -> &mut [B] {
+    assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
+    // SAFETY: as for `slice`.
+    unsafe { core::slice::from_raw_parts_mut(a.as_mut_ptr().cast(), a.len()) }
+}
+
 /// The same thing under another name.
 ///
 /// # Safety

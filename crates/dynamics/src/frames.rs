@@ -10,7 +10,7 @@
 //! (acceleration). Each question about one body or frame costs O(1), a Jacobian O(depth + nv); nothing allocates.
 
 use crate::kinematics::{Moving, World};
-use crate::layout::{Pairs, Single};
+use crate::layout::{Columns, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3};
 use core::ops::Deref;

@@ -153,7 +153,7 @@ impl Algorithm for ImpactDerivatives {
         let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
         let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
         constraints.load(model, world, &[], &mut d.forces);
-        rnea_derivatives::pass(&l, world, id, &out.zero, change, &d.forces, Vec3::zero(), false); // ∂(M Δ − Jᵀ Λ)/∂q
+        rnea_derivatives::pass(&l, world, id.parts(), &out.zero, change, &d.forces, Vec3::zero(), false); // ∂(M Δ − Jᵀ Λ)/∂q
         constraints.add_turning(world, &mut id.dtau_dq);
         spread(&l, world, out);
         constraints.dgamma_dq.as_mut_slice().fill(S::zero());

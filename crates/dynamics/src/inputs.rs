@@ -15,11 +15,11 @@ use crate::aba_derivatives::AbaDerivatives;
 use crate::elementary::tanh;
 use crate::frames::Placements;
 use crate::kinematics::World;
-use crate::layout::{Layout, Pairs, Single};
+use crate::limbs::Seen;
 use crate::model::Model;
 use crate::regressor::{PARAMETERS, effort};
 use crate::rnea_derivatives::{RneaDerivatives, Workspace};
-use condyle_spatial::{Act, Constant, Scalar};
+use condyle_spatial::{Act, Constant, Inertia, Motion, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
 /// An input of the dynamics beside position, velocity, acceleration and effort.
@@ -69,37 +69,84 @@ pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
+    /// Where what there is of the bodies stands, if they were not computed one by one.
+    pub limbs: Option<Seen<'d>>,
+}
+
+impl<'d, S, R> State<'d, S, R> {
+    /// Of bodies that were computed one by one.
+    pub(crate) fn new(model: &'d Model<R>, world: &'d World<S>, pass: &'d Workspace<S>) -> Self {
+        Self { model, world, pass, limbs: None }
+    }
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
+    /// oXb, in the body's public frame.
+    fn pose(&self, b: usize) -> Se3<S> {
+        if let Some(limbs) = self.limbs {
+            return limbs.pose(b) * Se3::new(self.model.nodes[b].reframing.transpose(), Vec3::zero()).lift();
+        }
+        Placements { model: self.model, world: self.world }.body(b)
+    }
+
+    /// S of column k of joint i.
+    fn column(&self, i: usize, k: usize) -> Motion<S> {
+        if let Some(limbs) = self.limbs {
+            return limbs.column(i, k);
+        }
+        self.world.S[self.model.nodes[i].column + k]
+    }
+
+    /// Velocity, and acceleration with gravity as the world's.
+    fn moving(&self, b: usize) -> (Motion<S>, Motion<S>) {
+        if let Some(limbs) = self.limbs {
+            return limbs.moving(b);
+        }
+        (self.pass.bodies.v[b], self.pass.bodies.a[b])
+    }
+
+    /// Iᶜ.
+    fn carried(&self, i: usize) -> Inertia<S> {
+        if let Some(limbs) = self.limbs {
+            return limbs.carried(i);
+        }
+        self.pass.bodies.IC[i]
+    }
+
+    /// The columns of body b's joint and of all before it: of which body, and the how manieth.
+    fn columns(&self, b: usize) -> impl Iterator<Item = (usize, usize)> {
+        let nodes = &self.model.nodes;
+        let way = std::iter::successors(Some(b), |&i| Some(nodes[i].parent)).take_while(|&i| i > 0);
+        way.flat_map(|i| (0..nodes[i].joint.nv()).map(move |k| (i, k)))
+    }
+
     /// Gives each entry of B other than zero: to its coordinate (row), column, summand. An entry may be given in parts.
     fn entries(&self, input: Input, mut give: impl FnMut(usize, usize, S)) {
-        let Self { model, world, pass } = *self;
-        let l = Single::<S, R>::new(model);
+        let (model, pass) = (self.model, self.pass);
         match input {
             Input::Force(b) => {
-                let oXb = Placements { model, world }.body(b);
-                for &c in l.support(b) {
-                    let column = &model.columns[c];
-                    let S_b = oXb.act_inv(world.S[c]).scale(S::splat(-column.ratio)).to_array(); // −J_bᵀ
+                let oXb = self.pose(b);
+                for (i, k) in self.columns(b) {
+                    let column = &model.columns[model.nodes[i].column + k];
+                    let S_b = oXb.act_inv(self.column(i, k)).scale(S::splat(-column.ratio)).to_array(); // −J_bᵀ
                     (0..6).for_each(|k| give(column.coordinate, k, S_b[k]));
                 }
             }
             Input::Inertia(b) => {
                 assert!(b > 0, "input: the world has no inertia");
-                let oXb = Placements { model, world }.body(b);
-                let (v_b, a_b) = (oXb.act_inv(pass.v[b]), oXb.act_inv(pass.a[b]));
-                for &c in l.support(b) {
-                    let column = &model.columns[c];
-                    let y = effort(oXb.act_inv(world.S[c]).scale(S::splat(column.ratio)), v_b, a_b);
+                let (oXb, (v, a)) = (self.pose(b), self.moving(b));
+                let (v_b, a_b) = (oXb.act_inv(v), oXb.act_inv(a));
+                for (i, k) in self.columns(b) {
+                    let column = &model.columns[model.nodes[i].column + k];
+                    let y = effort(oXb.act_inv(self.column(i, k)).scale(S::splat(column.ratio)), v_b, a_b);
                     (0..PARAMETERS).for_each(|k| give(column.coordinate, k, y[k]));
                 }
             }
             Input::Gravity => {
-                for i in l.bodies() {
-                    for k in 0..l.joint(i).nv() {
-                        let column = &model.columns[l.slot(i) + k];
-                        let weight = (pass.IC[i] * world.S[l.slot(i) + k]).linear.scale(S::splat(-column.ratio));
+                for i in 1..model.nodes.len() {
+                    for k in 0..model.nodes[i].joint.nv() {
+                        let column = &model.columns[model.nodes[i].column + k];
+                        let weight = (self.carried(i) * self.column(i, k)).linear.scale(S::splat(-column.ratio));
                         (weight.to_array().into_iter().enumerate()).for_each(|(k, x)| give(column.coordinate, k, x));
                     }
                 }

@@ -9,7 +9,8 @@
 //!
 //! The first two are [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v: several
 //! joints may share a coordinate (mimic joints), v_joint = G v with one entry in each row of G. [`load`](Layout::load)
-//! applies G, [`add`](Layout::add), [`put_at`](Pairs::put_at) and [`add_at`](Pairs::add_at) apply Gᵀ and Gᵀ · G, and no algorithm knows more.
+//! applies G, [`add`](Layout::add), [`put_below`](Columns::put_below) and their like apply Gᵀ and Gᵀ · G, and no algorithm knows
+//! more.
 
 use crate::joint::Joint;
 use crate::model::Model;
@@ -68,24 +69,39 @@ pub(crate) trait Layout {
     fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
 }
 
-/// How a pass sees pairs of columns, and matrices in coordinates.
-pub(crate) trait Pairs: Layout {
+/// How a pass sees the columns before a joint, and the entries of matrices in coordinates, stored by columns, that it has
+/// with them.
+pub(crate) trait Columns: Layout {
     /// Names a column, in the list of a body's ancestors.
     type Column: Copy;
+    /// What the matrices are made of.
+    type Number: Scalar;
 
     /// The columns of all joints from the root to joint i, its own last.
     fn support(&self, i: usize) -> &[Self::Column];
     /// The entry of a column.
     fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
-    /// Makes a matrix in coordinates, stored by columns, ready for `put_at`. What no column of a joint puts there stays 0.
-    fn clear(&self, matrix: &mut [Self::S]);
-    /// Sets the entry (row, column) of such a matrix, or adds to it if several columns share it. Once for each pair of
-    /// columns.
+    /// Takes the entries of all columns to where `at` looks for them, if that is elsewhere.
+    fn share<T: Copy>(&self, of: &mut [T]);
+    /// Makes a matrix ready for `put_below` and `put_right`. What no column of a joint puts there stays 0.
+    fn clear(&self, matrix: &mut [Self::Number]);
+    /// Sets the entry of such a matrix in the row of column k of joint i and in the column e of its support, or adds to it
+    /// if several columns share it. Once for each pair of columns; that of the first body's last column with itself comes
+    /// last of all.
+    fn put_below(&self, matrix: &mut [Self::Number], i: usize, k: usize, e: Self::Column, value: Self::S);
+    /// The same for the entry in the row of e and in the column of column k.
+    fn put_right(&self, matrix: &mut [Self::Number], i: usize, k: usize, e: Self::Column, value: Self::S);
+    /// The armature of all coordinates, added to the diagonal of such a matrix.
+    fn add_armature(&self, matrix: &mut [Self::Number]);
+}
+
+/// How a pass sees any pair of columns.
+pub(crate) trait Pairs: Columns<Number = <Self as Layout>::S> {
+    /// Sets the entry (row, column) of a matrix in coordinates after `clear`, or adds to it if several columns share it.
+    /// Once for each pair of columns.
     fn put_at(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
     /// Adds to the entry (row, column) of a matrix in coordinates, stored by columns.
     fn add_at(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
-    /// The armature of all coordinates, added to the diagonal of such a matrix.
-    fn add_armature(&self, matrix: &mut [Self::S]);
 }
 
 /// One body at a time: one state, or several knots of a horizon in the lanes of the scalar.
@@ -201,8 +217,9 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     }
 }
 
-impl<S: Scalar, R: Constant<S>> Pairs for Single<'_, S, R> {
+impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
     type Column = usize;
+    type Number = S;
 
     #[inline(always)]
     fn support(&self, i: usize) -> &[usize] {
@@ -214,11 +231,30 @@ impl<S: Scalar, R: Constant<S>> Pairs for Single<'_, S, R> {
         of[column]
     }
     #[inline(always)]
+    fn share<T: Copy>(&self, _: &mut [T]) {}
+    #[inline(always)]
     fn clear(&self, matrix: &mut [S]) {
         if self.model.has_mimic() {
             matrix.fill(S::zero());
         }
     }
+    #[inline(always)]
+    fn put_below(&self, matrix: &mut [S], i: usize, k: usize, e: usize, value: S) {
+        self.put_at(matrix, self.slot(i) + k, e, value);
+    }
+    #[inline(always)]
+    fn put_right(&self, matrix: &mut [S], i: usize, k: usize, e: usize, value: S) {
+        self.put_at(matrix, e, self.slot(i) + k, value);
+    }
+    #[inline(always)]
+    fn add_armature(&self, matrix: &mut [S]) {
+        for (k, &armature) in self.model.armature.iter().enumerate() {
+            matrix[k * (self.model.nv + 1)] += armature.lift();
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Pairs for Single<'_, S, R> {
     #[inline(always)]
     fn put_at(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
         if self.model.has_mimic() {
@@ -234,12 +270,6 @@ impl<S: Scalar, R: Constant<S>> Pairs for Single<'_, S, R> {
             matrix[r.coordinate + self.model.nv * c.coordinate] += value * S::splat(r.ratio * c.ratio);
         } else {
             matrix[row + self.model.nv * column] += value;
-        }
-    }
-    #[inline(always)]
-    fn add_armature(&self, matrix: &mut [S]) {
-        for (k, &armature) in self.model.armature.iter().enumerate() {
-            matrix[k * (self.model.nv + 1)] += armature.lift();
         }
     }
 }

@@ -66,6 +66,7 @@ mod nodes;
 mod package;
 mod parts;
 mod passive;
+mod product;
 mod regressor;
 mod rnea;
 mod rnea_derivatives;

@@ -2,18 +2,24 @@
 //!
 //! Bodies of different legs, arms or fingers do not wait for each other, so one pass can treat four of them at once, each
 //! in a lane of a vector register. The plan is a list schedule: step after step takes up to four bodies whose parents are
-//! done, those with the longest way to their tips first, and leaves each in its parent's lane where that is free. The body
-//! on which all others hang stands in all lanes, each of which adds up what its own limbs exert on it.
+//! done, those with the longest way to their tips first, and leaves each in its parent's lane, which it waits for if there
+//! is time. The body on which all others hang stands in all lanes, each of which adds up what its own limbs exert on it.
 //!
 //! All four must have joints of one kind, but whatever their axes: these are turned to z already. Robots with less than two
 //! bodies a step, chains above all, are computed one body after the other.
 
+mod inverse;
+mod lanes;
+mod links;
 mod pass;
+mod seen;
 mod steps;
 
 use crate::joint::Joint;
 use crate::model::{Model, Node};
-pub(crate) use pass::{Scratch, run};
+use condyle_spatial::moves::Move;
+pub(crate) use pass::{Scratch, Task, run};
+pub(crate) use seen::Seen;
 
 /// How many bodies stand side by side.
 pub(crate) const LANES: usize = 4;
@@ -41,6 +47,15 @@ pub(crate) struct Plan {
     pub leaders: Vec<usize>,
     /// The coordinate, the number, and the ratio, of joints that follow.
     pub followers: Vec<(usize, usize, f64)>,
+    /// The columns from the root to each step's joints, step by step.
+    pub links: Vec<links::Link>,
+    pub pairs: Vec<links::Pair>,
+    /// What stands behind the columns of all steps: copies of columns, of which steps, and how their lanes change.
+    pub copies: Vec<Vec<(usize, Move)>>,
+    /// Of each link, the one before it on the way out.
+    pub before: Vec<links::Before>,
+    /// All columns, those after one another together.
+    pub blocks: Vec<links::Block>,
 }
 
 impl Plan {
@@ -53,10 +68,21 @@ impl Plan {
         let mut plan = Self::schedule(&model.nodes)?;
         plan.leaders = vec![0; model.nv];
         plan.add_steps(model);
+        plan.add_links(model);
         Some(plan)
     }
 
     fn schedule(nodes: &[Node<f64>]) -> Option<Self> {
+        // Who has the longest way goes first: that tells how many steps there are. Then who has time to wait for a lane
+        // waits.
+        let hasty = Self::schedule_until(nodes, 0);
+        let patient = Self::schedule_until(nodes, hasty.bodies.len() - 1);
+        let plan = if patient.bodies.len() > hasty.bodies.len() { hasty } else { patient };
+        (nodes.len() > WORTH * (plan.bodies.len() - 1)).then_some(plan)
+    }
+
+    /// A schedule in which bodies that must not wait, if `last` is to be the last step, are served first.
+    fn schedule_until(nodes: &[Node<f64>], last: usize) -> Self {
         let bodies = nodes.len();
         let mut children = vec![Vec::new(); bodies];
         let mut height = vec![0; bodies]; // bodies on the longest way to a tip
@@ -75,6 +101,11 @@ impl Plan {
             coordinates: Vec::new(),
             leaders: Vec::new(),
             followers: Vec::new(),
+            links: Vec::new(),
+            pairs: Vec::new(),
+            copies: Vec::new(),
+            before: Vec::new(),
+            blocks: Vec::new(),
         };
         let mut ready = children[0].clone();
         if shared {
@@ -84,33 +115,38 @@ impl Plan {
             ready = children[root].clone();
         }
         while !ready.is_empty() {
+            let now = plan.bodies.len();
             ready.sort_by_key(|&i| (core::cmp::Reverse(height[i]), i));
             let first = nodes[ready[0]].joint;
-            let (mut chosen, mut others) = (Vec::new(), Vec::new());
-            for i in ready {
-                let fits = chosen.len() < LANES && side_by_side(nodes[i].joint, first);
-                if fits { chosen.push(i) } else { others.push(i) }
-            }
+            let fits = |i: &usize| side_by_side(nodes[*i].joint, first);
+            let urgent = |i: &usize| now + height[*i] >= last;
+            let (hurry, wait): (Vec<_>, Vec<_>) = ready.iter().copied().filter(fits).partition(urgent);
+            let hurry = &hurry[..hurry.len().min(LANES)];
+            let wanted = |lane: usize| {
+                let home = |&i: &usize| plan.place[nodes[i].parent];
+                ready.iter().any(|i| !plan.in_all_lanes(home(i).0) && home(i).1 == lane)
+            };
+            let wanted = [0, 1, 2, 3].map(wanted);
             let mut step = [0; LANES];
-            for at_home in [true, false] {
-                for &i in chosen.iter().filter(|&&i| plan.place[i].0 == 0) {
+            for (these, at_home) in [(hurry, true), (hurry, false), (&wait, true), (&wait, false)] {
+                for &i in these {
                     let (parent_step, parent_lane) = plan.place[nodes[i].parent];
                     let home = (!plan.in_all_lanes(parent_step) && step[parent_lane] == 0).then_some(parent_lane);
-                    let free = (0..LANES).find(|&lane| step[lane] == 0);
-                    if let Some(lane) = if at_home { home } else { free } {
+                    let free = (0..LANES).filter(|&lane| step[lane] == 0).min_by_key(|&lane| wanted[lane]);
+                    if let (false, Some(lane)) = (step.contains(&i), if at_home { home } else { free }) {
                         step[lane] = i;
                     }
                 }
-                for (lane, &i) in step.iter().enumerate().filter(|(_, i)| **i > 0) {
-                    plan.place[i] = (plan.bodies.len(), lane);
-                }
+            }
+            for (lane, &i) in step.iter().enumerate().filter(|(_, i)| **i > 0) {
+                plan.place[i] = (now, lane);
             }
             plan.bodies.push(step);
-            others.extend(chosen.iter().flat_map(|&i| &children[i]));
-            ready = others;
+            ready.retain(|i| !step.contains(i));
+            ready.extend(step.iter().flat_map(|&i| if i > 0 { &children[i][..] } else { &[] }));
         }
         plan.finished = (1..plan.bodies.len()).rev().collect();
-        (bodies > WORTH * (plan.bodies.len() - 1)).then_some(plan)
+        plan
     }
 
     /// Whether a step's body is the same in all lanes: the world, or the one on which all hang.
@@ -128,8 +164,9 @@ fn side_by_side(a: Joint, b: Joint) -> bool {
 impl Model {
     /// The same robot, with its limbs side by side in single calls or one body after the other.
     ///
-    /// Where it has limbs enough (four legs, two legs and two arms, fingers), [`rnea`](crate::rnea()) and
-    /// [`aba`](crate::aba()) of one state compute four bodies at a time if the processor has AVX2 or NEON, twice as fast. A
+    /// Where it has limbs enough (four legs, two legs and two arms, fingers), [`rnea`](crate::rnea()),
+    /// [`aba`](crate::aba()), [`crba`](crate::crba()), [`minv`](crate::minv()) and the derivatives of the first two compute
+    /// four bodies of one state at a time if the processor has AVX2 or NEON, up to twice as fast. A
     /// [`Batch`](crate::Batch) never does, since its lanes hold states. The two ways add up in different orders, so their
     /// results differ in the last digits; without limbs a single call gives the bits of a batch.
     ///

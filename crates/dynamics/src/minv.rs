@@ -11,6 +11,7 @@ use crate::data::{Data, Size, check};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
 use crate::layout::Single;
+use crate::limbs;
 use crate::ltdl::Ltdl;
 use crate::model::{Column, Model};
 use condyle_spatial::{Constant, Scalar};
@@ -175,6 +176,9 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     model.check_regular();
     check("q", q.len(), model.nq);
     if data.minv.by_factor {
+        if limbs::run(limbs::Task::Minv, model, data, q, &[], &[], &[]) {
+            return &data.minv.Minv;
+        }
         crba(model, data, q);
         from_crba(model, data);
         return &data.minv.Minv;

@@ -14,7 +14,7 @@
 use crate::data::{Data, Size};
 use crate::frames::Placements;
 use crate::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
-use crate::layout::{Layout, Pairs, Single};
+use crate::layout::{Columns, Layout, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Cross, Motion, Scalar};
 use nalgebra::DMatrix;

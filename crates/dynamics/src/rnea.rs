@@ -9,6 +9,7 @@ use crate::data::{Data, Size, check, check_forces};
 use crate::dispatch::kernel;
 use crate::joint::{Joint, Turning, Turns};
 use crate::layout::{Layout, Single};
+use crate::limbs;
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
@@ -115,7 +116,7 @@ kernel! {
 /// With the limbs side by side where there are some, else body by body.
 #[inline(always)]
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
-    if crate::limbs::run(false, model, data, q, v, a, f_ext) {
+    if limbs::run(limbs::Task::Rnea, model, data, q, v, a, f_ext) {
         return;
     }
     one_by_one(model, data, q, v, a, f_ext);

@@ -25,16 +25,17 @@ use crate::data::{Data, Size, check, check_forces};
 use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Pairs, Single};
+use crate::layout::{Columns, Layout, Single};
+use crate::limbs;
 use crate::model::Model;
 use crate::side_by_side::{self, Rows};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
-/// In the world's frame.
+/// What is computed of the bodies and of the columns of their joints, in the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
-pub(crate) struct Workspace<S> {
+pub(crate) struct Bodies<S> {
     /// Velocity. Shape: bodies. Written by: `pass`.
     pub v: Vec<Motion<S>>,
     /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
@@ -53,7 +54,29 @@ pub(crate) struct Workspace<S> {
     pub PsidSd: Vec<Motion<S>>,
     /// Written by: `pass`, for `side_by_side`.
     pub rows: Rows<S>,
-    /// The velocity and acceleration coordinates. Shape: nv. Written by: `pass`.
+}
+
+impl<S: Scalar> Bodies<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            v: vec![Motion::zero(); size.bodies],
+            a: vec![Motion::zero(); size.bodies],
+            IC: vec![Inertia::zero(); size.bodies],
+            BC: vec![Coriolis::zero(); size.bodies],
+            F: vec![Force::zero(); size.bodies],
+            Psid: vec![Motion::zero(); size.columns],
+            Psidd: vec![Motion::zero(); size.columns],
+            PsidSd: vec![Motion::zero(); size.columns],
+            rows: Rows::new(size.columns),
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    pub bodies: Bodies<S>,
+    /// The velocity and acceleration coordinates. Shape: nv. Written by: `rnea_derivatives`.
     pub qd: Vec<S>,
     pub qdd: Vec<S>,
     /// No acceleration. Shape: nv. Written by: `new`.
@@ -70,15 +93,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = DMatrix::from_element(size.nv, size.nv, S::zero());
         Self {
-            v: vec![Motion::zero(); size.bodies],
-            a: vec![Motion::zero(); size.bodies],
-            IC: vec![Inertia::zero(); size.bodies],
-            BC: vec![Coriolis::zero(); size.bodies],
-            F: vec![Force::zero(); size.bodies],
-            Psid: vec![Motion::zero(); size.columns],
-            Psidd: vec![Motion::zero(); size.columns],
-            PsidSd: vec![Motion::zero(); size.columns],
-            rows: Rows::new(size.columns),
+            bodies: Bodies::new(size),
             qd: vec![S::zero(); size.nv],
             qdd: vec![S::zero(); size.nv],
             still: vec![S::zero(); size.nv],
@@ -89,12 +104,21 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
+impl<S> Workspace<S> {
+    /// What `pass` writes: of the bodies, and the three matrices.
+    #[inline(always)]
+    pub(crate) fn parts(&mut self) -> (&mut Bodies<S>, [&mut [S]; 3]) {
+        let Self { bodies, dtau_dq, dtau_dv, dtau_da, .. } = self;
+        (bodies, [dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice(), dtau_da.as_mut_slice()])
+    }
+}
+
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
-pub(crate) fn pass<L: Pairs>(
+pub(crate) fn pass<L: Columns>(
     l: &L,
     w: &World<L::S>,
-    d: &mut Workspace<L::S>,
+    (d, [dq, dv, da]): (&mut Bodies<L::S>, [&mut [L::Number]; 3]),
     qd: &[L::S],
     qdd: &[L::S],
     f_ext: &[Force<L::S>],
@@ -102,9 +126,7 @@ pub(crate) fn pass<L: Pairs>(
     by_rows: bool,
 ) {
     let (oX, S) = (&w.oX, &w.S);
-    d.qd.copy_from_slice(qd);
-    d.qdd.copy_from_slice(qdd);
-    let Workspace { v, a, IC, BC, F, Psid, Psidd, PsidSd, rows, dtau_dq, dtau_dv, dtau_da, .. } = d;
+    let Bodies { v, a, IC, BC, F, Psid, Psidd, PsidSd, rows } = d;
     a[0] = Motion::new(minus_gravity, Vec3::zero());
     for i in l.bodies() {
         let (v_parent, a_parent) = (l.parent(v, i), l.parent(a, i));
@@ -129,7 +151,9 @@ pub(crate) fn pass<L: Pairs>(
             F[i] -= oX[i].act(external);
         }
     }
-    let (dq, dv, da) = (dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice(), dtau_da.as_mut_slice());
+    l.share(Psid);
+    l.share(Psidd);
+    l.share(PsidSd);
     l.clear(dq);
     l.clear(dv);
     l.clear(da);
@@ -137,9 +161,9 @@ pub(crate) fn pass<L: Pairs>(
         let support = l.support(i);
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
+        (IC[i], BC[i], F[i]) = (l.whole(i, IC[i]), l.whole(i, BC[i]), l.whole(i, F[i]));
         for k in 0..nv {
             let s = l.slot(i) + k;
-            let column = own[k];
             let IS = IC[i] * S[s]; // Iᶜ S_d
             let BS = BC[i].apply_transpose(S[s]); // 2Bᵀ S_d
             let by_q = IC[i] * Psidd[s] + BC[i].apply(Psid[s]) + S[s].cross(F[i]); // Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F
@@ -149,19 +173,22 @@ pub(crate) fn pass<L: Pairs>(
             }
             for &e in if by_rows { &[] } else { before } {
                 let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
-                l.put_at(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS))); // ∂τ_d/∂q_e
-                l.put_at(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS))); // ∂τ_d/∂q̇_e
-                l.put_at(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
-                l.put_at(dv, e, column, S_e.dot(by_v)); // ∂τ_e/∂q̇_d
-                let x = S_e.dot(IS); // M_de
-                l.put_at(da, column, e, x);
-                l.put_at(da, e, column, x);
+                let dq_de = Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)); // ∂τ_d/∂q_e
+                let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)); // ∂τ_d/∂q̇_e
+                let (dq_ed, dv_ed) = (S_e.dot(by_q), S_e.dot(by_v)); // ∂τ_e/∂q_d, ∂τ_e/∂q̇_d
+                let M_de = S_e.dot(IS);
+                l.put_below(dq, i, k, e, dq_de); // all stores after all products, which may stay in registers
+                l.put_below(dv, i, k, e, dv_de);
+                l.put_right(dq, i, k, e, dq_ed);
+                l.put_right(dv, i, k, e, dv_ed);
+                l.put_below(da, i, k, e, M_de);
+                l.put_right(da, i, k, e, M_de);
             }
             for &e in own {
                 let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
-                l.put_at(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
-                l.put_at(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
-                l.put_at(da, column, e, S_e.dot(IS));
+                l.put_below(dq, i, k, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
+                l.put_below(dv, i, k, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
+                l.put_below(da, i, k, e, S_e.dot(IS));
             }
         }
         let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
@@ -178,7 +205,9 @@ kernel! {
         let (l, w, d) = (Single::new(model), &data.world, &mut data.rnea_derivatives);
         let minus_gravity = if world.is_empty() { l.minus_gravity() } else { world[0] };
         let by_rows = side_by_side::pays::<S, R>(model);
-        pass(&l, w, d, v, a, f_ext, minus_gravity, by_rows);
+        d.qd.copy_from_slice(v);
+        d.qdd.copy_from_slice(a);
+        pass(&l, w, d.parts(), v, a, f_ext, minus_gravity, by_rows);
         if by_rows {
             side_by_side::pairs(model, w, d);
         }
@@ -222,14 +251,48 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
     f_ext: &[Force<S>],
 ) -> RneaDerivatives<'d, S, R> {
+    check_arguments(model, data, q, v, a, f_ext);
+    if limbs::run(limbs::Task::RneaDerivatives, model, data, q, v, a, f_ext) {
+        data.rnea_derivatives.qd.copy_from_slice(v);
+        data.rnea_derivatives.qdd.copy_from_slice(a);
+        return view_of_limbs(model, data);
+    }
+    positions(model, data, q);
+    run(model, data, v, a, f_ext, &[]);
+    view(model, &data.world, &data.rnea_derivatives)
+}
+
+/// Panics unless the arguments fit.
+#[inline]
+#[track_caller]
+fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
     data.check(model);
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("a", a.len(), model.nv);
     check_forces(f_ext.len(), model.nodes.len());
+}
+
+/// Body by body, so that what second derivatives are made of is left behind.
+pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+    f_ext: &[Force<S>],
+) {
+    check_arguments(model, data, q, v, a, f_ext);
     positions(model, data, q);
     run(model, data, v, a, f_ext, &[]);
-    view(model, &data.world, &data.rnea_derivatives)
+}
+
+/// What `pass` has left in the limbs' lanes.
+pub(crate) fn view_of_limbs<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
+    let mut view = view(model, &data.world, &data.rnea_derivatives);
+    view.state.limbs =
+        data.limbs.as_ref().zip(model.limbs.as_ref()).map(|(scratch, plan)| limbs::Seen::new(plan, scratch));
+    view
 }
 
 /// What `pass` has left.
@@ -238,7 +301,7 @@ pub(crate) fn view<'d, S, R>(
     world: &'d World<S>,
     d: &'d Workspace<S>,
 ) -> RneaDerivatives<'d, S, R> {
-    let state = State { model, world, pass: d };
+    let state = State::new(model, world, d);
     RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
 }
 

@@ -35,7 +35,7 @@ use crate::dispatch::kernel;
 use crate::kinematics::World;
 use crate::layout::{Pairs, Single};
 use crate::model::Model;
-use crate::rnea_derivatives::{self, RneaDerivatives, rnea_derivatives};
+use crate::rnea_derivatives::{self, RneaDerivatives};
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -82,11 +82,11 @@ impl<S: Scalar> Workspace<S> {
 fn pass<L: Pairs>(
     l: &L,
     World { oX, S, .. }: &World<L::S>,
-    first: &rnea_derivatives::Workspace<L::S>,
+    first: &rnea_derivatives::Bodies<L::S>,
     d: &mut Workspace<L::S>,
     lambda: &[L::S],
 ) {
-    let rnea_derivatives::Workspace { v, IC, BC, F, Psid, Psidd, PsidSd: Y, .. } = first;
+    let rnea_derivatives::Bodies { v, IC, BC, F, Psid, Psidd, PsidSd: Y, .. } = first;
     let Workspace { w, W, PD, Q, dqdq, dvdq, dvdv, dadq } = d;
     for i in l.bodies() {
         let w_parent = l.parent(w, i);
@@ -157,7 +157,7 @@ fn pass<L: Pairs>(
 kernel! {
     /// After `rnea_derivatives::pass`.
     pub(crate) fn run(model, data, lambda: &[S]) {
-        pass(&Single::new(model), &data.world, &data.rnea_derivatives, &mut data.rnea_hessian, lambda);
+        pass(&Single::new(model), &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
     }
 }
 
@@ -210,7 +210,7 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     lambda: &[S],
 ) -> RneaHessian<'d, S, R> {
     check("lambda", lambda.len(), model.nv);
-    rnea_derivatives(model, data, q, v, a, f_ext);
+    rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
     run(model, data, lambda);
     let first = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives);
     let Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
@@ -268,7 +268,7 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     out: &mut RneaSecondDerivatives<S>,
 ) {
     check("out", out.lambda.len(), model.nv);
-    rnea_derivatives(model, data, q, v, a, f_ext);
+    rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
     for i in 0..model.nv {
         out.lambda[i] = S::one();
         run(model, data, &out.lambda);

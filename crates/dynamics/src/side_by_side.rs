@@ -6,7 +6,7 @@
 
 use crate::kinematics::World;
 use crate::model::Model;
-use crate::rnea_derivatives::Workspace;
+use crate::rnea_derivatives::{Bodies, Workspace};
 use condyle_spatial::lanes::Fused;
 use condyle_spatial::{Force, Scalar, Vec3};
 use core::any::{Any, TypeId};
@@ -74,8 +74,7 @@ mod vectors {
     #[inline(always)]
     pub(super) fn pairs<R>(model: &Model<R>, w: &World<Fused>, d: &mut Workspace<Fused>) {
         let n = model.nv;
-        let Workspace { rows, Psid, Psidd, PsidSd, dtau_dq, dtau_dv, dtau_da, .. } = d;
-        let (dq, dv, da) = (dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice(), dtau_da.as_mut_slice());
+        let (Bodies { rows, Psid, Psidd, PsidSd, .. }, [dq, dv, da]) = d.parts();
         for node in &model.nodes[1..] {
             let nv = node.joint.nv();
             let (first, end) = (node.column + nv, model.columns[node.column].end);

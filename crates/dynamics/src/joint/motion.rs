@@ -39,6 +39,7 @@ pub(crate) struct Turning<S> {
 }
 
 impl<S: Scalar> JointMotion<S> {
+    #[inline(always)]
     fn motion(self) -> Motion<S> {
         Motion::zero() + self
     }

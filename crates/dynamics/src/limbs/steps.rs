@@ -19,6 +19,10 @@ pub(crate) struct Step {
     pub idx_q: usize,
     pub idx_v: usize,
     pub parents: Parents,
+    /// Where its links stand in `Plan::links`.
+    pub links: (usize, usize),
+    /// Nothing hangs on any of its bodies.
+    pub tip: bool,
 }
 
 /// Where the parents of a step's bodies stand.
@@ -69,6 +73,8 @@ impl Plan {
                 idx_q,
                 idx_v,
                 parents: self.parents(model, s),
+                links: (0, 0),
+                tip: false,
             });
         }
     }

@@ -1,9 +1,11 @@
 //! The limbs of one robot side by side: the numbers of body after body. (At the baseline, both are that.)
 
-use crate::common::{State, Tree, Worst, all_models, rng};
+use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
-    Data, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, WORLD, aba, nonlinear_effects, rnea, robots,
+    Data, Inertia, Input, Joint, Model, ModelBuilder, Se3, Sym3, WORLD, aba, aba_derivatives, crba, minv,
+    nonlinear_effects, rnea, rnea_derivatives, robots,
 };
+use nalgebra::DMatrix;
 
 /// Sums in another order, over at most some tens of bodies; what contains M⁻¹ also by its condition.
 const TOLERANCE: f64 = 1e-12;
@@ -41,12 +43,18 @@ fn many_limbs(seed: u64, root: Joint) -> Model {
     tree.build()
 }
 
+/// What is compared: sums, and what contains M⁻¹.
+fn sums_and_inverses() -> [Worst; 2] {
+    [Worst::new("sums", TOLERANCE), Worst::new("inverses", TOLERANCE_ABA)]
+}
+
 fn compare(model: &Model, worst: &mut [Worst; 2], seed: u64) {
     let in_turn = model.clone().with_limbs(false);
     let (mut data, mut one) = (Data::new(model), Data::new(&in_turn));
     let (m, mut rng) = (model, rng(seed));
     for _ in 0..3 {
-        let State { q, v, a, tau, f_ext, .. } = State::random(model, &mut rng);
+        let state = State::random(model, &mut rng);
+        let State { q, v, a, tau, f_ext, .. } = state.clone();
         for f_ext in [&f_ext[..], &[]] {
             let expected = rnea(&in_turn, &mut one, &q, &v, &a, f_ext).to_vec();
             worst[0].see(m, rnea(m, &mut data, &q, &v, &a, f_ext), &expected);
@@ -57,12 +65,75 @@ fn compare(model: &Model, worst: &mut [Worst; 2], seed: u64) {
         }
         let expected = nonlinear_effects(&in_turn, &mut one, &q, &v).to_vec();
         worst[0].see(m, nonlinear_effects(m, &mut data, &q, &v), &expected);
+        let expected = crba(&in_turn, &mut one, &q);
+        let found = crba(m, &mut data, &q);
+        assert_eq!(found, &found.transpose());
+        worst[0].see(m, found.as_slice(), expected.as_slice());
+        for f_ext in [&f_ext[..], &[]] {
+            let expected = rnea_derivatives(&in_turn, &mut one, &q, &v, &a, f_ext);
+            let found = rnea_derivatives(m, &mut data, &q, &v, &a, f_ext);
+            worst[0].see(m, found.dtau_dq.as_slice(), expected.dtau_dq.as_slice());
+            worst[0].see(m, found.dtau_dv.as_slice(), expected.dtau_dv.as_slice());
+            worst[0].see(m, found.dtau_da.as_slice(), expected.dtau_da.as_slice());
+            for input in inputs(m) {
+                let mut dtau = [(); 2].map(|()| DMatrix::zeros(m.nv(), input.len(m)));
+                expected.with_respect_to(input, &mut dtau[0]);
+                found.with_respect_to(input, &mut dtau[1]);
+                worst[0].see(m, dtau[1].as_slice(), dtau[0].as_slice());
+            }
+        }
+        if model.singular_joints().is_empty() {
+            compare_inverses(model, &in_turn, [&mut data, &mut one], worst, &state);
+        }
+    }
+}
+
+/// The inputs of which the derivatives are made of what a pass has left.
+fn inputs(model: &Model) -> impl Iterator<Item = Input> {
+    let last = model.bodies().len() - 1;
+    [
+        Input::Force(1),
+        Input::Force(last),
+        Input::Inertia(1),
+        Input::Inertia(last),
+        Input::Gravity,
+        Input::Armature,
+        Input::Damping,
+    ]
+    .into_iter()
+}
+
+fn compare_inverses(
+    m: &Model,
+    in_turn: &Model,
+    [data, one]: [&mut Data<f64>; 2],
+    worst: &mut [Worst; 2],
+    state: &State,
+) {
+    let State { q, v, tau, f_ext, .. } = state;
+    let expected = minv(in_turn, one, q);
+    let found = minv(m, data, q);
+    assert_eq!(found, &found.transpose());
+    worst[1].see(m, found.as_slice(), expected.as_slice());
+    for f_ext in [&f_ext[..], &[]] {
+        let expected = aba_derivatives(in_turn, one, q, v, tau, f_ext);
+        let found = aba_derivatives(m, data, q, v, tau, f_ext);
+        worst[1].see(m, found.a, expected.a);
+        worst[1].see(m, found.da_dq.as_slice(), expected.da_dq.as_slice());
+        worst[1].see(m, found.da_dv.as_slice(), expected.da_dv.as_slice());
+        worst[1].see(m, found.da_dtau.as_slice(), expected.da_dtau.as_slice());
+        for input in inputs(m) {
+            let mut da = [(); 2].map(|()| DMatrix::zeros(m.nv(), input.len(m)));
+            expected.with_respect_to(input, &mut da[0]);
+            found.with_respect_to(input, &mut da[1]);
+            worst[1].see(m, da[1].as_slice(), da[0].as_slice());
+        }
     }
 }
 
 #[test]
 fn the_numbers_of_body_after_body() {
-    let mut worst = [Worst::new("rnea", TOLERANCE), Worst::new("aba", TOLERANCE_ABA)];
+    let mut worst = sums_and_inverses();
     let axis = [0.0, 0.6, 0.8].into();
     for seed in 0..24 {
         let roots = [Joint::FreeFlyer, Joint::Revolute { axis }, Joint::Planar];
@@ -86,9 +157,12 @@ fn of_the_model_that_is_given() {
         quadruped.with_inertias(heavier),
     ] {
         let found = rnea(&other, &mut data, &q, &v, &a, &[]).to_vec();
+        let M = crba(&other, &mut data, &q).clone();
+        let Minv = minv(&other, &mut data, &q).clone();
         let in_turn = other.with_limbs(false);
-        let expected = rnea(&in_turn, &mut data, &q, &v, &a, &[]);
-        assert!(crate::common::relative(&found, expected) < TOLERANCE);
+        assert!(relative(&found, rnea(&in_turn, &mut data, &q, &v, &a, &[])) < TOLERANCE);
+        assert!(relative(M.as_slice(), crba(&in_turn, &mut data, &q).as_slice()) < TOLERANCE);
+        assert!(relative(Minv.as_slice(), minv(&in_turn, &mut data, &q).as_slice()) < TOLERANCE_ABA);
     }
 }
 
@@ -102,6 +176,9 @@ fn with_cloned_data() {
     for f_ext in [&f_ext[..], &[]] {
         let expected = rnea(&quadruped, &mut data, &q, &v, &a, f_ext);
         assert_eq!(rnea(&quadruped, &mut clone, &q, &v, &a, f_ext), expected);
+        let expected = aba_derivatives(&quadruped, &mut data, &q, &v, &a, f_ext);
+        let found = aba_derivatives(&quadruped, &mut clone, &q, &v, &a, f_ext);
+        assert_eq!((found.da_dq, found.da_dv, found.da_dtau), (expected.da_dq, expected.da_dv, expected.da_dtau));
     }
 }
 
@@ -124,6 +201,23 @@ fn a_robot_of_loose_bodies() {
         let inertia = Inertia::from_com(1.0, [0.1, 0.0, 0.0].into(), Sym3::diagonal(0.1));
         builder.body(&format!("body{k}"), WORLD, joint, Se3::identity(), inertia);
     }
-    let mut worst = [Worst::new("rnea", TOLERANCE), Worst::new("aba", TOLERANCE_ABA)];
+    let mut worst = sums_and_inverses();
     compare(&builder.build().expect("it is well-formed"), &mut worst, 0);
+}
+
+/// Bodies without any body in all lanes, of which the first ones are not those that are computed first.
+#[test]
+fn fingers_of_all_lengths() {
+    let mut worst = sums_and_inverses();
+    for (seed, lengths) in [&[1, 3, 2, 4, 1][..], &[2, 1, 5], &[1, 1, 4, 4, 4, 4, 2]].into_iter().enumerate() {
+        let mut rng = rng(seed as u64);
+        let mut tree = Tree { parts: Vec::new(), gravity: [0.0, 1.0, -9.0].into() };
+        for &length in lengths {
+            let mut last = 0;
+            for _ in 0..length {
+                last = tree.add(&mut rng, last, Joint::Revolute { axis: [0.0, 0.6, 0.8].into() });
+            }
+        }
+        compare(&tree.build(), &mut worst, seed as u64);
+    }
 }

@@ -1,0 +1,249 @@
+//! Steps in place of bodies, lanes in place of numbers.
+#![allow(unsafe_code)]
+
+use super::links::{Before, Link, Pair};
+use super::steps::{Parents, Source, Step};
+use super::{LANES, Plan};
+use crate::joint::Joint;
+use crate::layout::{Columns, Layout};
+use crate::model::Model;
+use condyle_spatial::lanes::{Fused, Lanes};
+use condyle_spatial::moves::{Move, sum};
+use condyle_spatial::{Act, Force, Inertia, Se3, Vec3};
+use core::ops::{AddAssign, Range};
+
+pub(super) type Four = Lanes<f64, LANES>;
+
+/// Steps in place of bodies, lanes in place of numbers.
+pub(super) struct Limbs<'a> {
+    pub(super) steps: &'a [Step],
+    pub(super) links: &'a [Link],
+    pairs: &'a [Pair],
+    copies: &'a [Vec<(usize, Move)>],
+    before: &'a [Before],
+    finished: &'a [usize],
+    coordinates: &'a [Source],
+    pub armature: &'a [f64],
+    pub gravity: Vec3<f64>,
+}
+
+/// The vectors that something is made of.
+///
+/// # Safety
+/// `T` is made of nothing else: a struct of spatial algebra or of kinematics, all `repr(C)`.
+#[inline(always)]
+unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
+    // SAFETY: by the caller.
+    unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(x).cast(), size_of::<T>() / size_of::<Four>()) }
+}
+
+#[inline(always)]
+fn moved<T: Copy>(mut x: T, by: &Move) -> T {
+    // SAFETY: passes keep structs of vectors.
+    let numbers = unsafe { vectors(&mut x) };
+    for k in 0..numbers.len() {
+        numbers[k] = by.apply(numbers[k]);
+    }
+    x
+}
+
+/// What comes from some steps or slots, each number into its lane.
+#[inline(always)]
+fn gathered<T: Copy>(of: &[T], from: &[(usize, Move)]) -> T {
+    let mut x = moved(of[from[0].0], &from[0].1);
+    for (at, by) in &from[1..] {
+        let mut y = moved(of[*at], by);
+        // SAFETY: passes keep structs of vectors.
+        let (x, y) = unsafe { (vectors(&mut x), vectors(&mut y)) };
+        for k in 0..x.len() {
+            x[k] += y[k];
+        }
+    }
+    x
+}
+
+impl Layout for Limbs<'_> {
+    type S = Four;
+
+    #[inline(always)]
+    fn bodies(&self) -> Range<usize> {
+        1..self.steps.len()
+    }
+    #[inline(always)]
+    fn joint(&self, i: usize) -> Joint {
+        self.steps[i].joint
+    }
+    #[inline(always)]
+    fn placement(&self, i: usize) -> Se3<Four> {
+        self.steps[i].placement.lift()
+    }
+    #[inline(always)]
+    fn inertia(&self, i: usize) -> Inertia<Four> {
+        self.steps[i].inertia.lift()
+    }
+    #[inline(always)]
+    fn minus_gravity(&self) -> Vec3<Four> {
+        -self.gravity.lift()
+    }
+    #[inline(always)]
+    fn armature(&self, i: usize, k: usize) -> Four {
+        let mut armature = [1.0; LANES]; // of a lane without a joint: nothing is divided by 0
+        let from = self.coordinates[self.steps[i].idx_v + k].from;
+        for lane in 0..LANES {
+            if from[lane] < self.armature.len() {
+                armature[lane] = self.armature[from[lane]];
+            }
+        }
+        Four::from_array(armature)
+    }
+    #[inline(always)]
+    fn force(&self, f_ext: &[Force<Four>], i: usize) -> Option<Force<Four>> {
+        let &f = f_ext.get(i)?; // not by `map`, which would not be inlined
+        Some(Se3::new(self.steps[i].reframing.lift(), Vec3::zero()).act_inv(f))
+    }
+
+    #[inline(always)]
+    fn parent<T: Copy>(&self, of: &[T], i: usize) -> T {
+        match &self.steps[i].parents {
+            Parents::Below(step) => of[*step],
+            Parents::Apart { from, .. } => gathered(of, from),
+        }
+    }
+    #[inline(always)]
+    fn push<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        match &self.steps[i].parents {
+            Parents::Below(step) => onto[*step] += x,
+            Parents::Apart { to, .. } => {
+                for (step, by) in to {
+                    onto[*step] += moved(x, by);
+                }
+            }
+        }
+    }
+    #[inline(always)]
+    fn level(&self, i: usize) -> usize {
+        i
+    }
+    /// All of them, when the pass has gone down to the last.
+    #[inline(always)]
+    fn finished(&self, i: usize) -> &[usize] {
+        if i + 1 == self.steps.len() { self.finished } else { &[] }
+    }
+    #[inline(always)]
+    fn above<T: Copy>(&self, of: &[T], i: usize) -> T {
+        self.parent(of, i)
+    }
+    #[inline(always)]
+    fn lift<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        self.push(onto, i, x);
+    }
+    #[inline(always)]
+    fn whole<T: Copy>(&self, i: usize, mut x: T) -> T {
+        let [first, others @ ..] = &self.steps[i].bodies;
+        if others.iter().all(|other| other == first) {
+            // SAFETY: passes keep structs of vectors.
+            let numbers = unsafe { vectors(&mut x) };
+            for k in 0..numbers.len() {
+                numbers[k] = sum(numbers[k]);
+            }
+        }
+        x
+    }
+
+    #[inline(always)]
+    fn position(&self, q: &[Four], i: usize, k: usize) -> Four {
+        q[self.steps[i].idx_q + k]
+    }
+    #[inline(always)]
+    fn load(&self, x: &[Four], i: usize, k: usize) -> Four {
+        x[self.steps[i].idx_v + k]
+    }
+    #[inline(always)]
+    fn add(&self, x: &mut [Four], i: usize, k: usize, value: Four) {
+        x[self.steps[i].idx_v + k] += value;
+    }
+    #[inline(always)]
+    fn slot(&self, i: usize) -> usize {
+        self.steps[i].idx_v
+    }
+    /// That is done where the lanes' efforts are put together.
+    #[inline(always)]
+    fn add_armature_torque(&self, _: &[Four], _: &mut [Four]) {}
+}
+
+impl<'a> Limbs<'a> {
+    #[inline(always)]
+    pub(super) fn new(plan: &'a Plan, model: &'a Model) -> Self {
+        let Plan { steps, links, pairs, copies, before, finished, coordinates, .. } = plan;
+        let (armature, gravity) = (&model.armature, model.gravity);
+        Self { steps, links, pairs, copies, before, finished, coordinates, armature, gravity }
+    }
+
+    /// What stands at the link before.
+    #[inline(always)]
+    pub(super) fn before<T: Copy>(&self, of: &[T], link: usize) -> T {
+        match &self.before[link] {
+            Before::Here(before) => of[*before],
+            Before::Apart(from) => gathered(of, from),
+        }
+    }
+
+    /// The places of a pair.
+    #[inline(always)]
+    pub(super) fn pair(&self, e: Link, k: usize) -> &Pair {
+        debug_assert!(e.pair + k < self.pairs.len());
+        // SAFETY: the plan has a pair for each link of a step and each column k of its joints.
+        unsafe { self.pairs.get_unchecked(e.pair + k) }
+    }
+
+    /// Sets the entries of a pair in each lane, the first lane's last.
+    #[inline(always)]
+    fn put(matrix: &mut [Fused], at: &[u32; LANES], value: Four) {
+        let value = value.to_fused();
+        for lane in (0..LANES).rev() {
+            debug_assert!((at[lane] as usize) < matrix.len());
+            // SAFETY: a plan's pairs are entries of nv × nv matrices, which all matrices here are: see `clear`.
+            unsafe { *matrix.get_unchecked_mut(at[lane] as usize) = value[lane] };
+        }
+    }
+}
+
+impl Columns for Limbs<'_> {
+    type Column = Link;
+    type Number = Fused;
+
+    #[inline(always)]
+    fn support(&self, i: usize) -> &[Link] {
+        let (first, end) = self.steps[i].links;
+        &self.links[first..end]
+    }
+    #[inline(always)]
+    fn at<T: Copy>(&self, of: &[T], column: Link) -> T {
+        of[column.slot]
+    }
+    #[inline(always)]
+    fn share<T: Copy>(&self, of: &mut [T]) {
+        for (k, from) in self.copies.iter().enumerate() {
+            of[self.coordinates.len() + k] = gathered(of, from);
+        }
+    }
+    #[inline(always)]
+    fn clear(&self, matrix: &mut [Fused]) {
+        assert!(matrix.len() == self.armature.len() * self.armature.len());
+    }
+    #[inline(always)]
+    fn put_below(&self, matrix: &mut [Fused], _: usize, k: usize, e: Link, value: Four) {
+        Self::put(matrix, &self.pair(e, k).below, value);
+    }
+    #[inline(always)]
+    fn put_right(&self, matrix: &mut [Fused], _: usize, k: usize, e: Link, value: Four) {
+        Self::put(matrix, &self.pair(e, k).right, value);
+    }
+    #[inline(always)]
+    fn add_armature(&self, matrix: &mut [Fused]) {
+        for (k, &armature) in self.armature.iter().enumerate() {
+            matrix[k * (self.armature.len() + 1)] += Fused(armature);
+        }
+    }
+}
