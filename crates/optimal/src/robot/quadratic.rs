@@ -125,11 +125,19 @@ impl Dense for Write<'_> {
         let (some, all) = (whole.count, whole.count + positions.count);
         let Q = node.Q.as_mut_slice();
         let products = [left.as_slice(), right.as_slice()];
-        outer::<V, NR>(Q, n, [0..nv, 0..nv], [0, 0], products, stride, all);
-        outer::<V, NR>(Q, n, [nv..n, 0..nv], [0, 0], products, stride, some);
-        outer::<V, NR>(Q, n, [0..n, nv..n], [0, 0], products, stride, some);
-        outer::<V, NR>(node.S.as_mut_slice(), n, [0..n, 0..m], [0, n], products, stride, some);
-        outer::<V, NR>(node.R.as_mut_slice(), m, [0..m, 0..m], [n, n], products, stride, some);
+        if some == 0 {
+            Q.fill(0.0);
+            node.S.as_mut_slice().fill(0.0);
+            node.R.as_mut_slice().fill(0.0);
+        } else {
+            outer::<V, NR>(Q, n, [nv..n, 0..nv], [0, 0], products, stride, some);
+            outer::<V, NR>(Q, n, [0..n, nv..n], [0, 0], products, stride, some);
+            outer::<V, NR>(node.S.as_mut_slice(), n, [0..n, 0..m], [0, n], products, stride, some);
+            outer::<V, NR>(node.R.as_mut_slice(), m, [0..m, 0..m], [n, n], products, stride, some);
+        }
+        if all > 0 {
+            outer::<V, NR>(Q, n, [0..nv, 0..nv], [0, 0], products, stride, all);
+        }
     }
 }
 
