@@ -47,9 +47,9 @@ mod vectors {
     use crate::aba;
     use crate::kinematics::World;
     use crate::layout::Layout;
-    use crate::limbs::LANES;
     use crate::limbs::lanes::{Four, Limbs};
     use crate::limbs::links::Block as Rows;
+    use crate::limbs::{LANES, Plan};
     use crate::model::Model;
     use condyle_spatial::block::Block;
     use condyle_spatial::lanes::Fused;
@@ -82,6 +82,11 @@ mod vectors {
                 Zt,
                 rows: vec![0.0; sizes.wide_behind()],
             }
+        }
+
+        /// Whether it was made for this plan, or one of the same shape.
+        pub(in crate::limbs) fn fits(&self, plan: &Plan) -> bool {
+            self.T.len() == plan.links.len()
         }
 
         /// M⁻¹, after `aba::factorize` or `aba::pass`, for columns that are shared.

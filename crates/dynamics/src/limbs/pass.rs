@@ -66,6 +66,7 @@ impl Scratch {
     fn fits(&self, plan: &Plan) -> bool {
         (self.q.len(), self.v.len(), self.f_ext.len(), self.world.S.len())
             == (plan.positions.len(), plan.coordinates.len(), plan.steps.len(), self.v.len() + plan.copies.len())
+            && self.inverted.fits(plan)
     }
 }
 
