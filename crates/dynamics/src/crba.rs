@@ -49,17 +49,18 @@ pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
-        let IC_i = l.whole(i, IC[i]);
+        l.make_whole(IC, i);
         for k in 0..nv {
-            let F = IC_i * S[l.slot(i) + k]; // F = Iᶜ S
-            let own = support.len() - nv + k;
+            let F = IC[i] * S[l.slot(i) + k]; // F = Iᶜ S
+            let (own, column) = (support.len() - nv + k, l.own(i, k));
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
-                l.put_right(M, i, k, e, x);
-                l.put_below(M, i, k, e, x);
+                l.put_right(M, column, e, x);
+                l.put_below(M, column, e, x);
             }
-            l.put_below(M, i, k, support[own], l.at(S, support[own]).dot(F));
+            l.put_below(M, column, support[own], l.at(S, support[own]).dot(F));
         }
+        let IC_i = IC[i];
         l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
     }
     l.add_armature(M);

@@ -55,6 +55,11 @@ pub(crate) trait Layout {
 
     /// What the copies of body i hold together: a body may stand in several lanes, each with a part of what it carries.
     fn whole<T: Copy>(&self, i: usize, x: T) -> T;
+    /// The same in an array by bodies, in its place.
+    #[inline(always)]
+    fn make_whole<T: Copy>(&self, of: &mut [T], i: usize) {
+        of[i] = self.whole(i, of[i]);
+    }
 
     /// The k-th number of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
@@ -74,23 +79,27 @@ pub(crate) trait Layout {
 pub(crate) trait Columns: Layout {
     /// Names a column, in the list of a body's ancestors.
     type Column: Copy;
+    /// Names a column of a body's own joint.
+    type Own: Copy;
     /// What the matrices are made of.
     type Number: Scalar;
 
     /// The columns of all joints from the root to joint i, its own last.
     fn support(&self, i: usize) -> &[Self::Column];
+    /// Column k of joint i.
+    fn own(&self, i: usize, k: usize) -> Self::Own;
     /// The entry of a column.
     fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
     /// Takes the entries of all columns to where `at` looks for them, if that is elsewhere.
     fn share<T: Copy>(&self, of: &mut [T]);
     /// Makes a matrix ready for `put_below` and `put_right`. What no column of a joint puts there stays 0.
     fn clear(&self, matrix: &mut [Self::Number]);
-    /// Sets the entry of such a matrix in the row of column k of joint i and in the column e of its support, or adds to it
+    /// Sets the entry of such a matrix in the row of a joint's own column and in the column e of its support, or adds to it
     /// if several columns share it. Once for each pair of columns; that of the first body's last column with itself comes
     /// last of all.
-    fn put_below(&self, matrix: &mut [Self::Number], i: usize, k: usize, e: Self::Column, value: Self::S);
-    /// The same for the entry in the row of e and in the column of column k.
-    fn put_right(&self, matrix: &mut [Self::Number], i: usize, k: usize, e: Self::Column, value: Self::S);
+    fn put_below(&self, matrix: &mut [Self::Number], own: Self::Own, e: Self::Column, value: Self::S);
+    /// The same for the entry in the row of e and in the own column.
+    fn put_right(&self, matrix: &mut [Self::Number], own: Self::Own, e: Self::Column, value: Self::S);
     /// The armature of all coordinates, added to the diagonal of such a matrix.
     fn add_armature(&self, matrix: &mut [Self::Number]);
 }
@@ -179,6 +188,8 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     fn whole<T: Copy>(&self, _: usize, x: T) -> T {
         x
     }
+    #[inline(always)]
+    fn make_whole<T: Copy>(&self, _: &mut [T], _: usize) {}
 
     #[inline(always)]
     fn position(&self, q: &[S], i: usize, k: usize) -> S {
@@ -219,12 +230,17 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
 
 impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
     type Column = usize;
+    type Own = usize;
     type Number = S;
 
     #[inline(always)]
     fn support(&self, i: usize) -> &[usize] {
         let node = &self.model.nodes[i];
         &self.model.support[node.support..node.support + node.depth]
+    }
+    #[inline(always)]
+    fn own(&self, i: usize, k: usize) -> usize {
+        self.slot(i) + k
     }
     #[inline(always)]
     fn at<T: Copy>(&self, of: &[T], column: usize) -> T {
@@ -239,12 +255,12 @@ impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
         }
     }
     #[inline(always)]
-    fn put_below(&self, matrix: &mut [S], i: usize, k: usize, e: usize, value: S) {
-        self.put_at(matrix, self.slot(i) + k, e, value);
+    fn put_below(&self, matrix: &mut [S], own: usize, e: usize, value: S) {
+        self.put_at(matrix, own, e, value);
     }
     #[inline(always)]
-    fn put_right(&self, matrix: &mut [S], i: usize, k: usize, e: usize, value: S) {
-        self.put_at(matrix, e, self.slot(i) + k, value);
+    fn put_right(&self, matrix: &mut [S], own: usize, e: usize, value: S) {
+        self.put_at(matrix, e, own, value);
     }
     #[inline(always)]
     fn add_armature(&self, matrix: &mut [S]) {

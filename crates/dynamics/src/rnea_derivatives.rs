@@ -161,9 +161,11 @@ pub(crate) fn pass<L: Columns>(
         let support = l.support(i);
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
-        (IC[i], BC[i], F[i]) = (l.whole(i, IC[i]), l.whole(i, BC[i]), l.whole(i, F[i]));
+        l.make_whole(IC, i);
+        l.make_whole(BC, i);
+        l.make_whole(F, i);
         for k in 0..nv {
-            let s = l.slot(i) + k;
+            let (s, column) = (l.slot(i) + k, l.own(i, k));
             let IS = IC[i] * S[s]; // Iᶜ S_d
             let BS = BC[i].apply_transpose(S[s]); // 2Bᵀ S_d
             let by_q = IC[i] * Psidd[s] + BC[i].apply(Psid[s]) + S[s].cross(F[i]); // Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F
@@ -177,18 +179,18 @@ pub(crate) fn pass<L: Columns>(
                 let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)); // ∂τ_d/∂q̇_e
                 let (dq_ed, dv_ed) = (S_e.dot(by_q), S_e.dot(by_v)); // ∂τ_e/∂q_d, ∂τ_e/∂q̇_d
                 let M_de = S_e.dot(IS);
-                l.put_below(dq, i, k, e, dq_de); // all stores after all products, which may stay in registers
-                l.put_below(dv, i, k, e, dv_de);
-                l.put_right(dq, i, k, e, dq_ed);
-                l.put_right(dv, i, k, e, dv_ed);
-                l.put_below(da, i, k, e, M_de);
-                l.put_right(da, i, k, e, M_de);
+                l.put_below(dq, column, e, dq_de); // all stores after all products, which may stay in registers
+                l.put_below(dv, column, e, dv_de);
+                l.put_right(dq, column, e, dq_ed);
+                l.put_right(dv, column, e, dv_ed);
+                l.put_below(da, column, e, M_de);
+                l.put_right(da, column, e, M_de);
             }
             for &e in own {
                 let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
-                l.put_below(dq, i, k, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
-                l.put_below(dv, i, k, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
-                l.put_below(da, i, k, e, S_e.dot(IS));
+                l.put_below(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
+                l.put_below(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
+                l.put_below(da, column, e, S_e.dot(IS));
             }
         }
         let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);

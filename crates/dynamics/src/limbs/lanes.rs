@@ -211,12 +211,18 @@ impl<'a> Limbs<'a> {
 
 impl Columns for Limbs<'_> {
     type Column = Link;
+    /// The how manieth of its joint.
+    type Own = usize;
     type Number = Fused;
 
     #[inline(always)]
     fn support(&self, i: usize) -> &[Link] {
         let (first, end) = self.steps[i].links;
         &self.links[first..end]
+    }
+    #[inline(always)]
+    fn own(&self, _: usize, k: usize) -> usize {
+        k
     }
     #[inline(always)]
     fn at<T: Copy>(&self, of: &[T], column: Link) -> T {
@@ -233,11 +239,11 @@ impl Columns for Limbs<'_> {
         assert!(matrix.len() == self.armature.len() * self.armature.len());
     }
     #[inline(always)]
-    fn put_below(&self, matrix: &mut [Fused], _: usize, k: usize, e: Link, value: Four) {
+    fn put_below(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
         Self::put(matrix, &self.pair(e, k).below, value);
     }
     #[inline(always)]
-    fn put_right(&self, matrix: &mut [Fused], _: usize, k: usize, e: Link, value: Four) {
+    fn put_right(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
         Self::put(matrix, &self.pair(e, k).right, value);
     }
     #[inline(always)]
