@@ -3,6 +3,7 @@
 use super::Plan;
 use super::lanes::Four;
 use super::pass::Scratch;
+use condyle_spatial::block::lanes;
 use condyle_spatial::{Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
 /// Of the derivatives of inverse dynamics.
@@ -48,7 +49,7 @@ impl<'d> Seen<'d> {
 }
 
 fn number<S: Scalar>(x: Four, lane: usize) -> S {
-    S::splat(x.to_array()[lane])
+    S::splat(lanes(&[x])[lane]) // out of memory: this is called with the instructions of any processor
 }
 
 fn vector<S: Scalar>(v: Vec3<Four>, lane: usize) -> Vec3<S> {
