@@ -111,8 +111,8 @@ impl Dense for Write<'_> {
                 let [d, dd] = list.slopes[k];
                 let row = &list.rows[k * list.stride..][..list.stride];
                 let (x, u) = row[..list.width].split_at(n.min(list.width));
-                add_multiple::<V>(node.q.as_mut_slice(), x, d);
-                add_multiple::<V>(node.r.as_mut_slice(), u, d);
+                add_multiple(node.q.as_mut_slice(), x, d);
+                add_multiple(node.r.as_mut_slice(), u, d);
                 let scale = dd.abs().sqrt();
                 let at = (first + k) * stride..(first + k) * stride + list.stride;
                 let (left, right) = (&mut left[at.clone()], &mut right[at]);
@@ -143,7 +143,7 @@ impl Dense for Write<'_> {
 
 /// y += a x on the entries of x.
 #[inline(always)]
-fn add_multiple<V: Vector>(y: &mut [f64], x: &[f64], a: f64) {
+fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += a * x;
     }
