@@ -17,6 +17,7 @@ from ._types import (
     CentroidalMapRate,
     Constrained,
     ConstrainedDerivatives,
+    ConstrainedEquations,
     Constraint,
     Control,
     CoriolisDerivatives,
@@ -1185,6 +1186,32 @@ def constrained_dynamics_derivatives(
     >>> touch = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
     >>> d = condyle.constrained_dynamics_derivatives(arm, condyle.Data(arm), touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
     >>> np.allclose(touch.jacobian() @ d.da_dtau, 0.0)  # no effort moves the point
+    True
+    """
+
+def constrained_dynamics_equations(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: ConstrainedEquations | Sequence[_Array] | None = None,
+) -> ConstrainedEquations:
+    """`constrained_dynamics` and the linear equations between changes of q, v, τ and of the q̈ and λ that follow, as
+    `ConstrainedEquations`:
+
+        M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
+
+    What `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a `ConstraintSet`, whose
+    targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
+    bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> d = condyle.constrained_dynamics_equations(arm, data, touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
+    >>> np.allclose(d.M, condyle.crba(arm, data, [0.3] * 7))
     True
     """
 
@@ -2453,7 +2480,9 @@ class Fddp:
 
     problem: what is solved; the solver allocates for its shape once.
     settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
-        `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP); and
+        `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP);
+        `implicit`, whether robots' knots come to the sweep as equations of inverse dynamics where that is possible
+        (default: yes; the same steps in less time); and
         any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
         `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
         `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,

@@ -152,6 +152,29 @@ class ConstrainedDerivatives(NamedTuple):
     """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia that the robot shows to its constraints."""
 
 
+class ConstrainedEquations(NamedTuple):
+    """What `constrained_dynamics_equations` gives; ∂/∂q is taken in the tangent space."""
+
+    a: NDArray[np.float64]
+    """q̈ itself, nv numbers."""
+    lambda_: NDArray[np.float64]
+    """λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m)."""
+    residual: float
+    """The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied."""
+    redundant: float
+    """How many rows of J depend on rows before them, up to rounding: they have no force of their own."""
+    M: NDArray[np.float64]
+    """M, (nv, nv), armature included."""
+    dtau_dq: NDArray[np.float64]
+    """∂(M q̈ + h − Jᵀ λ)/∂q, (nv, nv)."""
+    dtau_dv: NDArray[np.float64]
+    """∂h/∂v, (nv, nv)."""
+    dgamma_dq: NDArray[np.float64]
+    """∂(J q̈ + γ)/∂q, (rows, nv)."""
+    dgamma_dv: NDArray[np.float64]
+    """∂γ/∂v, (rows, nv)."""
+
+
 class Impulse(NamedTuple):
     """What `impulse_dynamics` gives."""
 

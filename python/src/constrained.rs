@@ -33,6 +33,7 @@ results! {
     ConstrainedDerivatives {
         a, lambda, residual, redundant, da_dq, da_dv, da_dtau, dlambda_dq, dlambda_dv, dlambda_dtau, inertia
     }
+    ConstrainedEquations { a, lambda, residual, redundant, M, dtau_dq, dtau_dv, dgamma_dq, dgamma_dv }
     Impulse { v, lambda, residual, redundant }
     ImpulseDerivatives { v, lambda, residual, redundant, dv_dq, dv_dv, dlambda_dq, dlambda_dv, inertia }
 }
@@ -285,6 +286,25 @@ fn constrained_dynamics(model, data, constraints;
 fn constrained_dynamics_derivatives(model, data, constraints;
     q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None; out) {
     condyle::constrained_dynamics_derivatives(model, data, constraints, &q, &v, &tau, &f_ext)
+}
+
+/// `constrained_dynamics` and the linear equations between changes of q, v, τ and of the q̈ and λ that follow, as
+/// `ConstrainedEquations`:
+///
+///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
+///
+/// What `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a `ConstraintSet`, whose
+/// targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
+/// bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+/// >>> d = condyle.constrained_dynamics_equations(arm, data, touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
+/// >>> np.allclose(d.M, condyle.crba(arm, data, [0.3] * 7))
+/// True
+fn constrained_dynamics_equations(model, data, constraints;
+    q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None; out) {
+    condyle::constrained_dynamics_equations(model, data, constraints, &q, &v, &tau, &f_ext)
 }
 
 /// v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact, as

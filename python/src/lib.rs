@@ -55,8 +55,8 @@ mod _condyle {
     };
     #[pymodule_export]
     use constrained::{
-        ConstraintSet, constrained_dynamics, constrained_dynamics_derivatives, impulse_dynamics,
-        impulse_dynamics_derivatives,
+        ConstraintSet, constrained_dynamics, constrained_dynamics_derivatives, constrained_dynamics_equations,
+        impulse_dynamics, impulse_dynamics_derivatives,
     };
     #[pymodule_export]
     use data::Data;

@@ -50,6 +50,19 @@ def test_derivatives_are_of_the_function(quadruped: Robot) -> None:
     assert all(a is b for a, b in zip(again, d, strict=True) if isinstance(a, np.ndarray))
 
 
+def test_equations_hold_for_the_derivatives(quadruped: Robot) -> None:
+    model, data, q, v, _, tau, f_ext = quadruped
+    feet = stance(quadruped)
+    d = condyle.constrained_dynamics_derivatives(model, data, feet, q, v, tau, f_ext)
+    e = condyle.constrained_dynamics_equations(model, data, feet, q, v, tau, f_ext)
+    J = feet.jacobian()
+    np.testing.assert_allclose(e.M @ d.da_dq - J.T @ d.dlambda_dq + e.dtau_dq, 0.0, **CLOSE)
+    np.testing.assert_allclose(e.M @ d.da_dv - J.T @ d.dlambda_dv + e.dtau_dv, 0.0, **CLOSE)
+    np.testing.assert_allclose(e.M @ d.da_dtau - J.T @ d.dlambda_dtau, np.eye(18), **CLOSE)
+    np.testing.assert_allclose(J @ d.da_dq + e.dgamma_dq, 0.0, **CLOSE)
+    np.testing.assert_allclose(J @ d.da_dv + e.dgamma_dv, 0.0, **CLOSE)
+
+
 def test_impacts(quadruped: Robot) -> None:
     model, data, q, v, *_ = quadruped
     feet = stance(quadruped)

@@ -47,6 +47,9 @@ CASES: dict[str, Case] = {
     "constrained_dynamics_derivatives": lambda r, q, v: condyle.constrained_dynamics_derivatives(
         r.model, r.data, held(r), q, v, v
     )[4:10],
+    "constrained_dynamics_equations": lambda r, q, v: condyle.constrained_dynamics_equations(
+        r.model, r.data, held(r), q, v, v
+    )[4:],
     "coriolis_derivatives": lambda r, q, v: condyle.coriolis_derivatives(r.model, r.data, q, v),
     "coriolis_matrix": lambda r, q, v: condyle.coriolis_matrix(r.model, r.data, q, v),
     "crba": lambda r, q, v: condyle.crba(r.model, r.data, q),

@@ -9,26 +9,18 @@
 //! ∂q̈/∂x = −P r − J̄ c,   ∂λ/∂x = J̄ᵀ r − Λ c,   ∂q̈/∂τ = P,   ∂λ/∂τ = −J̄ᵀ
 //! ```
 //!
-//! r comes from the derivatives of inverse dynamics with the forces of the constraints as external ones, each fixed in
-//! its body, and what is different: along the world's axes λ does not turn with frame 1, and the force on the other
-//! body is carried by frame 1 (a point's force: turned by frame 1, its point carried by body 2). Source: Carpentier and
+//! r and c are those of [`constrained_equations`]. Source: Carpentier and
 //! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier,
 //! Mastalli, Mansard, *Differential dynamic programming for multi-phase rigid contact dynamics* (2018).
 
 use crate::aba_derivatives::{minus_product, subtract_column};
-use crate::constrained_dynamics;
+use crate::constrained_equations;
 use crate::constrained_work::{self, Algorithm, Inputs};
-use crate::constraint::ConstraintKind;
-use crate::constraint_motion::{Columns, Ends};
 use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, Size, check, check_forces};
-use crate::frames::Placements;
-use crate::kinematics::World;
-use crate::layout::{Layout, Single};
 use crate::ltdl::{Ltdl, axpy};
 use crate::model::{Coupled, Model};
-use crate::rnea_derivatives;
-use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
+use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
@@ -38,6 +30,8 @@ pub(crate) struct Workspace<S> {
     pub forces: Vec<Force<S>>,
     /// M⁻¹, then P. Shape: nv × nv. Written by: `finish`.
     pub P: DMatrix<S>,
+    /// ∂(M q̈ + h − Jᵀ λ)/∂q. Shape: nv × nv. Written by: `differentiate`.
+    pub dtau_dq: DMatrix<S>,
     /// Of q̈ or of the velocity. Shape: nv × nv. Written by: `constrained_dynamics_derivatives`,
     /// `impulse_dynamics_derivatives`.
     pub da_dq: DMatrix<S>,
@@ -47,7 +41,13 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = DMatrix::from_element(size.nv, size.nv, S::zero());
-        Self { forces: vec![Force::zero(); size.bodies], P: square.clone(), da_dq: square.clone(), da_dv: square }
+        Self {
+            forces: vec![Force::zero(); size.bodies],
+            P: square.clone(),
+            dtau_dq: square.clone(),
+            da_dq: square.clone(),
+            da_dv: square,
+        }
     }
 }
 
@@ -62,96 +62,6 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(A: &DMatrix<S>, B: &DMatrix<S>
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// The force λ of constraint i along the axes of its frame.
-    #[inline(always)]
-    fn local_force(&self, i: usize, ends: &Ends<S>) -> Force<S> {
-        let f = self.force(i);
-        if self.plans[i].aligned() {
-            let R = ends.x1.rotation;
-            return Force::new(R.transpose_mul(f.linear), R.transpose_mul(f.angular));
-        }
-        f
-    }
-
-    /// The force on the other body, its sign turned, in the world's frame.
-    #[inline(always)]
-    fn reaction(&self, i: usize, ends: &Ends<S>) -> Force<S> {
-        let f = self.local_force(i, ends);
-        match self.plans[i].kind {
-            ConstraintKind::Rigid => ends.x1.act(f),
-            ConstraintKind::Point => {
-                let linear = ends.x1.rotation * f.linear;
-                Force::new(linear, ends.x2.translation.cross(linear))
-            }
-        }
-    }
-
-    /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
-    #[inline(always)]
-    pub(crate) fn load<R: Constant<S>>(
-        &self,
-        model: &Model<R>,
-        world: &World<S>,
-        f_ext: &[Force<S>],
-        forces: &mut [Force<S>],
-    ) {
-        forces.fill(Force::zero());
-        forces[..f_ext.len()].copy_from_slice(f_ext);
-        for (i, plan) in self.plans.iter().enumerate() {
-            let ends = Ends::at_rest(plan, &self.targets[i], world);
-            forces[plan.bodies[0]] += plan.placements[0].lift().act(self.local_force(i, &ends));
-            let oXb = Placements { model, world }.body(plan.bodies[1]);
-            forces[plan.bodies[1]] -= oXb.act_inv(self.reaction(i, &ends));
-        }
-    }
-
-    /// Adds to r = ∂(M q̈ + h − Jᵀ λ)/∂q what is different from forces that are fixed in their bodies.
-    #[inline(always)]
-    pub(crate) fn add_turning(&self, world: &World<S>, r: &mut DMatrix<S>) {
-        for (i, plan) in self.plans.iter().enumerate() {
-            if plan.bodies[1] > 0 {
-                let ends = Ends::at_rest(plan, &self.targets[i], world);
-                let f = self.reaction(i, &ends);
-                for e in &plan.touches {
-                    if e.first == e.second {
-                        continue;
-                    }
-                    let s = world.S[e.column];
-                    let change = match plan.kind {
-                        ConstraintKind::Rigid => s.cross(f),
-                        ConstraintKind::Point => {
-                            let linear = s.angular.cross(f.linear);
-                            Force::new(linear, ends.x2.translation.cross(linear))
-                        }
-                    };
-                    let change = change.scale(S::splat(if e.first { e.ratio } else { -e.ratio }));
-                    for j in &plan.touches {
-                        if j.second {
-                            let x = world.S[j.column].dot(change);
-                            r[(j.coordinate, e.coordinate)] += x * S::splat(j.ratio);
-                        }
-                    }
-                }
-            }
-            if plan.aligned() {
-                let f = self.force(i);
-                for e in &plan.touches {
-                    if !e.first {
-                        continue;
-                    }
-                    let w = world.S[e.column].angular.scale(S::splat(e.ratio));
-                    let turned = Motion::new(w.cross(f.linear), w.cross(f.angular)).to_array(); // ω × λ
-                    for k in 0..plan.rows() {
-                        let J = &self.J[plan.range(k)];
-                        for (at, &coordinate) in plan.coordinates.iter().enumerate() {
-                            r[(coordinate, e.coordinate)] += J[at] * turned[k]; // Jᵀ (ω × λ)
-                        }
-                    }
-                }
-            }
-        }
-    }
-
     /// Λ, J̄ and P of K⁻¹, for M and J M⁻¹ Jᵀ that are factorised.
     #[inline(always)]
     pub(crate) fn invert(&mut self, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
@@ -345,24 +255,9 @@ fn pass<S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) {
-    let l = Single::new(model);
-    constrained_dynamics::pass(&l, data, constraints, q, v, tau, f_ext);
-    let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
-    let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
-    constraints.load(model, world, f_ext, &mut d.forces);
-    rnea_derivatives::pass(&l, world, id.parts(), v, qdd, &d.forces, l.minus_gravity(), false);
-    constraints.add_turning(world, &mut id.dtau_dq);
-    let columns = Columns { S: &world.S, Psid: &id.bodies.Psid, Psidd: &id.bodies.Psidd, PsidSd: &id.bodies.PsidSd };
-    let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = &mut *constraints;
-    dgamma_dq.as_mut_slice().fill(S::zero());
-    dgamma_dv.as_mut_slice().fill(S::zero());
-    for (plan, target) in plans.iter().zip(targets.iter()) {
-        let ends = Ends::new(plan, target, world, &id.bodies.v, &id.bodies.a);
-        let error = &error[plan.row..plan.row + plan.rows()];
-        ends.acceleration_derivatives(plan, target, columns, error, dgamma_dq, dgamma_dv);
-    }
+    constrained_equations::differentiate(model, data, constraints, q, v, tau, f_ext);
+    let (d, id) = (&mut data.constrained_derivatives, &data.rnea_derivatives);
     constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
-    constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
-    id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
+    constraints.respond_to_q(&d.P, &d.dtau_dq, &mut d.da_dq);
     constraints.respond_to_v(&d.P, &id.dtau_dv, &mut d.da_dv);
 }

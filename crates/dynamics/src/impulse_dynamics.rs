@@ -154,7 +154,8 @@ impl Algorithm for ImpactDerivatives {
         let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
         constraints.load(model, world, &[], &mut d.forces);
         rnea_derivatives::pass(&l, world, id.parts(), &out.zero, change, &d.forces, Vec3::zero(), false); // ∂(M Δ − Jᵀ Λ)/∂q
-        constraints.add_turning(world, &mut id.dtau_dq);
+        d.dtau_dq.as_mut_slice().copy_from_slice(id.dtau_dq.as_slice());
+        constraints.add_turning(world, &mut d.dtau_dq);
         spread(&l, world, out);
         constraints.dgamma_dq.as_mut_slice().fill(S::zero());
         for (plan, target) in constraints.plans.iter().zip(&constraints.targets) {
@@ -163,8 +164,7 @@ impl Algorithm for ImpactDerivatives {
             ends.velocity_derivative(plan, &world.S, &out.Psid, value, &mut constraints.dgamma_dq);
         }
         constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
-        constraints.respond_to_q(&d.P, &id.dtau_dq, &mut d.da_dq);
-        id.dtau_dq.fill(S::zero()); // `add_turning` left entries where a tree has none
+        constraints.respond_to_q(&d.P, &d.dtau_dq, &mut d.da_dq);
         constraints.respond_to_v_before(restitution, &mut d.da_dv);
     }
 }

@@ -32,6 +32,7 @@ mod compose;
 mod configuration;
 mod constrained_derivatives;
 mod constrained_dynamics;
+mod constrained_equations;
 mod constrained_work;
 mod constraint;
 mod constraint_motion;
@@ -101,6 +102,7 @@ pub use configuration::{
 };
 pub use constrained_derivatives::{ConstrainedDerivatives, constrained_dynamics_derivatives};
 pub use constrained_dynamics::{Constrained, constrained_dynamics};
+pub use constrained_equations::{ConstrainedEquations, constrained_dynamics_equations};
 pub use constraint::{Constraint, ConstraintKind, Target};
 pub use constraint_set::{ConstraintSet, Proximal};
 pub use coriolis::coriolis_matrix;

@@ -74,6 +74,12 @@ pub trait ActionModel: Any + Send {
         1
     }
 
+    /// For actions that can write their knots in implicit form: the most dependent coordinates and rows of costs.
+    #[doc(hidden)]
+    fn implicit(&self) -> Option<[usize; 2]> {
+        None
+    }
+
     /// The least and the greatest controls of knot t, nu numbers each, infinite where there is none; `None` if no control
     /// is bounded. They must not change during a solve.
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {

@@ -11,9 +11,11 @@ use crate::vector::Vector;
 #[derive(Debug, Clone)]
 pub(crate) struct Euler {
     /// Nᵀ.
-    N: Vec<f64>,
+    pub(crate) N: Vec<f64>,
     /// Π.
-    Pi: Vec<f64>,
+    pub(crate) Pi: Vec<f64>,
+    /// Δt Eᵀp_q + p_v.
+    pub(crate) py: Vec<f64>,
     /// Part of NᵀF_q; stride as H, but at most that of Nᵀ and Π.
     M: Vec<f64>,
     /// The columns of P E or P T that are not those of P; stride as P.
@@ -24,7 +26,8 @@ impl Euler {
     /// Room for n states.
     pub(crate) fn new(n: usize) -> Self {
         let scratch = |rows: usize| vec![0.0; (rows + SLACK) * (n / 2)];
-        Self { N: scratch(n / 2), Pi: scratch(n / 2), M: scratch(n / 2), PB: scratch(n) }
+        let py = vec![0.0; n / 2];
+        Self { N: scratch(n / 2), Pi: scratch(n / 2), py, M: scratch(n / 2), PB: scratch(n) }
     }
 }
 
@@ -40,8 +43,38 @@ impl Work {
     ) {
         let n = self.p.len();
         let (nv, ld, rows) = (n / 2, stride(n, m), m + n);
-        let (ldp, ldn) = (n + SLACK, nv + SLACK);
-        let Self { P, p, F, W, H, euler: Euler { N, Pi, M, PB }, .. } = self;
+        let ldn = nv + SLACK;
+        self.step_curvature::<V, NR>(dt, blocks);
+        let Self { F, W, H, euler: Euler { N, Pi, py, M, .. }, .. } = self;
+
+        // W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
+        transpose::<V>(F, ld, 0, node.B.as_slice(), n, nv..n, 0..m);
+        transpose::<V>(F, ld, m, node.A.as_slice(), n, nv..n, nv..n);
+        transpose::<V>(F, ld, m + nv, node.A.as_slice(), n, nv..n, 0..nv);
+        let all = View { data: F, stride: ld };
+        product::<V, NR>(W, ld, [rows, nv, nv], all, View { data: Pi, stride: ldn });
+        for k in 0..nv {
+            let (W, N) = (&mut W[k * ld + m + nv..][..nv + 1], &N[k * ldn..][..nv]);
+            for i in 0..nv {
+                W[i] += N[i];
+            }
+            W[nv] = py[k];
+        }
+
+        // H += W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T,   Qx_q += Tᵀp_q
+        add_product_lower::<V, NR>(H, ld, [rows + 1, rows, nv], View { data: W, stride: ld }, all);
+        let H_qq = &mut H[(m + nv) * ld + m + nv..];
+        let (Nt, F_q) = (View { data: N, stride: ldn }, View { data: &F[m + nv..], stride: ld });
+        add_transposed_product_lower::<V, NR>(H_qq, ld, nv, Nt, F_q, M, ldn);
+        self.position_curvature::<V, NR>(m, blocks);
+    }
+
+    /// Π, N and Δt Eᵀp_q + p_v: how the value of the next state depends on its velocity.
+    #[inline(always)]
+    pub(crate) fn step_curvature<V: Vector, const NR: usize>(&mut self, dt: f64, blocks: &[EulerBlock]) {
+        let n = self.p.len();
+        let (nv, ldp, ldn) = (n / 2, n + SLACK, n / 2 + SLACK);
+        let Self { P, p, euler: Euler { N, Pi, py, PB, .. }, .. } = self;
 
         // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  as if T and E were 1 from the left
         times_blocks::<V, NR>(PB, P, ldp, n, blocks, |block| &block.E);
@@ -53,6 +86,7 @@ impl Work {
                 N[i] = dt * PE_q[i] + P_q[i];
                 Pi[i] = dt * (N[i] + PE_v[i]) + P_v[i];
             }
+            py[k] = dt * p[k] + p[nv + k];
         }
         // and their blocks from the left
         for block in blocks {
@@ -66,33 +100,20 @@ impl Work {
                 }
                 N.copy_from_slice(&TN[..size]);
             }
-        }
-
-        // W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
-        transpose::<V>(F, ld, 0, node.B.as_slice(), n, nv..n, 0..m);
-        transpose::<V>(F, ld, m, node.A.as_slice(), n, nv..n, nv..n);
-        transpose::<V>(F, ld, m + nv, node.A.as_slice(), n, nv..n, 0..nv);
-        let all = View { data: F, stride: ld };
-        product::<V, NR>(W, ld, [rows, nv, nv], all, View { data: Pi, stride: ldn });
-        for k in 0..nv {
-            let (W, N) = (&mut W[k * ld + m + nv..][..nv + 1], &N[k * ldn..][..nv]);
-            for i in 0..nv {
-                W[i] += N[i];
-            }
-            W[nv] = dt * p[k] + p[nv + k];
-        }
-        for block in blocks {
-            for k in block.range() {
-                let Ep = (0..block.E.nrows()).map(|r| block.E[(r, k - block.start)] * p[block.start + r]).sum::<f64>();
-                W[k * ld + rows] = dt * Ep + p[nv + k];
+            let Ep = combine(&E, &p[block.range()]);
+            for (i, k) in block.range().enumerate() {
+                py[k] = dt * Ep[i] + p[nv + k];
             }
         }
+    }
 
-        // H += W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T,   Qx_q += Tᵀp_q
-        add_product_lower::<V, NR>(H, ld, [rows + 1, rows, nv], View { data: W, stride: ld }, all);
+    /// H_qq += TᵀP₁₁T,   Qx_q += Tᵀp_q.
+    #[inline(always)]
+    pub(crate) fn position_curvature<V: Vector, const NR: usize>(&mut self, m: usize, blocks: &[EulerBlock]) {
+        let n = self.p.len();
+        let (nv, ld, ldp) = (n / 2, stride(n, m), n + SLACK);
+        let Self { P, p, H, euler: Euler { PB, .. }, .. } = self;
         let H_qq = &mut H[(m + nv) * ld + m + nv..];
-        let (Nt, F_q) = (View { data: N, stride: ldn }, View { data: &F[m + nv..], stride: ld });
-        add_transposed_product_lower::<V, NR>(H_qq, ld, nv, Nt, F_q, M, ldn);
         times_blocks::<V, NR>(PB, P, ldp, nv, blocks, |block| &block.T);
         for j in 0..nv {
             let (PT, H) = (&column(j, blocks, P, PB, ldp)[..nv], &mut H_qq[j * ld..][..nv]);

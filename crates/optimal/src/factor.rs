@@ -66,6 +66,38 @@ fn subtract_outer<V: Vector, const NR: usize>(
     column_block::<V, NR>(columns, stride, j..rows, 0, width, factor, b, length, Store::Subtract);
 }
 
+/// X ← X L⁻ᵀ for the L of an H of which m columns were eliminated; X has m columns and `rows` rows.
+#[inline(always)]
+pub(crate) fn solve_transposed<V: Vector, const NR: usize>(
+    x: &mut [f64],
+    ldx: usize,
+    rows: usize,
+    h: &[f64],
+    stride: usize,
+    m: usize,
+) {
+    let mut j0 = 0;
+    while j0 < m {
+        let width = NR.min(m - j0);
+        let (done, columns) = x.split_at_mut(j0 * ldx);
+        let (a, b) = (View { data: done, stride: ldx }, View { data: &h[j0..], stride });
+        if j0 > 0 {
+            column_block::<V, NR>(columns, ldx, 0..rows, 0, width, a, b, j0, Store::Subtract);
+        }
+        for j in 0..width {
+            let (done, column) = columns.split_at_mut(j * ldx);
+            for p in 0..j {
+                add_multiple::<V>(column, &done[p * ldx..], -h[(j0 + p) * stride + j0 + j], rows);
+            }
+            let scale = h[(j0 + j) * stride + j0 + j].recip();
+            for x in &mut column[..rows] {
+                *x *= scale;
+            }
+        }
+        j0 += NR;
+    }
+}
+
 /// X ← X L⁻¹ on the rows `first`..`rows` of H's first m columns, with L in the lower triangle above them.
 ///
 /// `upper` (m + SLACK rows, m columns) is scratch for Lᵀ.
@@ -146,6 +178,7 @@ mod tests {
 
     /// The factor and the gains of a matrix of which m columns are eliminated and one row is a right-hand side.
     struct Both<'a> {
+        before: &'a [f64],
         h: &'a mut [f64],
         gains: &'a mut [f64],
         size: usize,
@@ -160,6 +193,15 @@ mod tests {
             *self.result = eliminate::<V, NR>(self.h, stride, rows, self.size, self.m);
             self.gains.copy_from_slice(self.h);
             if self.result.is_ok() {
+                let (n, m) = (self.size + 1 - self.m, self.m); // X L⁻ᵀ of the rows below is what `eliminate` leaves
+                let mut x = vec![0.0; (n + SLACK) * m];
+                for (to, from) in x.chunks_exact_mut(n + SLACK).zip(self.before.chunks_exact(stride)) {
+                    to[..n].copy_from_slice(&from[m..rows]);
+                }
+                solve_transposed::<V, NR>(&mut x, n + SLACK, n, self.h, stride, m);
+                for (x, h) in x.chunks_exact(n + SLACK).zip(self.h.chunks_exact(stride)) {
+                    assert!(x[..n].iter().zip(&h[m..rows]).all(|(x, h)| (x - h).abs() < TOLERANCE));
+                }
                 let mut upper = vec![0.0; (self.m + SLACK) * self.m];
                 solve_right::<V, NR>(self.gains, stride, self.m, rows, self.m, &mut upper);
             }
@@ -179,8 +221,8 @@ mod tests {
                     for j in 0..size {
                         h[j * stride..][..size + 1].copy_from_slice(full.column(j).as_slice());
                     }
-                    let (mut gains, mut result) = (h.clone(), Ok(()));
-                    at_level(Both { h: &mut h, gains: &mut gains, size, m, result: &mut result });
+                    let (before, mut gains, mut result) = (h.clone(), h.clone(), Ok(()));
+                    at_level(Both { before: &before, h: &mut h, gains: &mut gains, size, m, result: &mut result });
                     result.unwrap();
 
                     let uu = full.view((0, 0), (m, m)).into_owned();
@@ -205,8 +247,8 @@ mod tests {
         for (j, x) in [1.0, 2.0, -3.0, 4.0].into_iter().enumerate() {
             h[j * stride + j] = x;
         }
-        let (mut gains, mut result) = (h.clone(), Ok(()));
-        at_level(Both { h: &mut h, gains: &mut gains, size: 4, m: 3, result: &mut result });
+        let (before, mut gains, mut result) = (h.clone(), h.clone(), Ok(()));
+        at_level(Both { before: &before, h: &mut h, gains: &mut gains, size: 4, m: 3, result: &mut result });
         assert_eq!(result, Err((2, -3.0)));
     }
 }

@@ -90,6 +90,8 @@ pub struct Fddp {
     /// Expected improvement without the part that depends on the trial: dg, dq.
     pub(crate) expected: [f64; 2],
     pub(crate) clock: Clock,
+    /// Whether knots may come in implicit form.
+    implicit: bool,
 }
 
 /// What carries over from one iteration to the next.
@@ -106,7 +108,8 @@ struct Progress {
 impl Fddp {
     /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
     pub fn new(problem: &Problem) -> Self {
-        let (nodes, shape) = (problem.nodes(), problem.shape());
+        let (mut nodes, shape) = (problem.nodes(), problem.shape());
+        problem.reserve_implicit(&mut nodes);
         let horizon = problem.horizon();
         Self {
             settings: Settings::default(),
@@ -122,6 +125,7 @@ impl Fddp {
             dx: vec![0.0; shape.ndx],
             expected: [0.0; 2],
             clock: Clock::default(),
+            implicit: false,
         }
     }
 
@@ -175,6 +179,7 @@ impl Fddp {
         self.settings.check()?;
         check_shape(self.solution.shape(), problem.shape())?;
         let bounded = problem.check_bounds()?;
+        self.implicit = self.settings.implicit && !bounded && !self.settings.second_order;
         let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
 
         self.solution.timings = Timings::default();
@@ -219,6 +224,7 @@ impl Fddp {
             if !self.clock.allows(Phase::Sweep) {
                 return Status::TimeLimit;
             }
+            self.sweep.keep_values(self.gaps_count(now.feasible));
             while let Err(error) = self.sweep(problem, now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
                 if now.regularisation == self.settings.regularisation_max {
@@ -295,6 +301,9 @@ impl Fddp {
     /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on.
     fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
+        for node in &mut self.nodes {
+            node.implicit.wanted = self.implicit;
+        }
         problem.calc_diff(&self.solution.xs, &self.solution.us, &mut self.nodes);
         for (t, node) in self.nodes.iter_mut().enumerate() {
             match self.gaps.get(self.solution.shape().dx(t + 1)) {

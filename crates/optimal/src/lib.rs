@@ -77,6 +77,7 @@ mod error;
 mod euler;
 mod factor;
 mod fddp;
+mod implicit;
 mod lq;
 mod lqr;
 mod numdiff;

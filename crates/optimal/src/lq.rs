@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use crate::error::assert_length;
+use crate::implicit::Implicit;
 use crate::structure::{EulerBlock, LARGEST_BLOCK, Structure};
 use nalgebra::{DMatrix, DVector};
 
@@ -40,6 +41,8 @@ pub struct LqNode {
     pub upper: DVector<f64>,
     /// What is known of the form of A and B.
     pub structure: Structure,
+    /// What stands for A, B, S, R and part of Q where the solver and the action can both use it.
+    pub(crate) implicit: Implicit,
 }
 
 impl LqNode {
@@ -57,6 +60,7 @@ impl LqNode {
             lower: DVector::from_element(nu, f64::NEG_INFINITY),
             upper: DVector::from_element(nu, f64::INFINITY),
             structure: Structure::default(),
+            implicit: Implicit::default(),
         }
     }
 
@@ -116,6 +120,8 @@ pub struct LqKnot {
     pub Qu: DVector<f64>,
     /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
     pub Quu: DMatrix<f64>,
+    /// Quᵀk and kᵀQuu k: what a full step is expected to change of the cost, to first and (twice) to second order.
+    pub expected: [f64; 2],
 }
 
 impl LqKnot {
@@ -128,6 +134,7 @@ impl LqKnot {
             Vxx: DMatrix::zeros(ndx, ndx),
             Qu: DVector::zeros(nu),
             Quu: DMatrix::zeros(nu, nu),
+            expected: [0.0; 2],
         }
     }
 }

@@ -286,6 +286,7 @@ impl Problem {
         assert_length("nodes", nodes.len(), horizon + 1);
         for node in &mut *nodes {
             node.structure.set_dense(); // the action says if it is not
+            node.implicit.active = false;
         }
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
@@ -299,6 +300,17 @@ impl Problem {
     /// Nodes of zeros with the dimensions of the knots, the terminal one last.
     pub fn nodes(&self) -> Vec<LqNode> {
         (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
+    }
+
+    /// Makes room in nodes for the implicit form, wherever in the horizon their actions come to serve.
+    pub(crate) fn reserve_implicit(&self, nodes: &mut [LqNode]) {
+        let sizes = self.models.iter().filter_map(|model| model.implicit());
+        let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return };
+        let (nv, horizon) = (self.ndx() / 2, self.horizon());
+        for node in &mut nodes[..horizon] {
+            let nu = node.nu();
+            node.implicit.reserve(nv, nu, most);
+        }
     }
 
     pub(crate) fn shape(&self) -> &Shape {

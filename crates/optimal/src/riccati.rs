@@ -2,9 +2,10 @@
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use crate::box_qp::BoxQp;
-use crate::dense::{SLACK, View, add_product_lower, add_scaled_product, copy, copy_symmetric, product, transpose};
+use crate::dense::{SLACK, View, add_product_lower, add_scaled_product, copy, copy_symmetric, dot, product, transpose};
 use crate::euler::Euler;
 use crate::factor::{eliminate, solve_right};
+use crate::implicit::Form;
 use crate::lq::{DIVERGED, Hessian, LqKnot, LqNode};
 use crate::sweep::SweepError;
 use crate::vector::Vector;
@@ -28,6 +29,7 @@ pub(crate) struct Work {
     /// Lᵀ for the back substitution.
     upper: Vec<f64>,
     pub(crate) euler: Euler,
+    pub(crate) form: Form,
     qp: BoxQp,
     /// The curvature of the dynamics, one for each number of controls.
     hessians: Vec<Hessian>,
@@ -52,6 +54,7 @@ impl Work {
             H: vec![0.0; stride(n, m) * (m + n)],
             upper: vec![0.0; (m + SLACK) * m],
             euler: Euler::new(n),
+            form: Form::new(n, m),
             qp: BoxQp::new(m),
             hessians: sizes.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
         }
@@ -85,26 +88,33 @@ impl Work {
                 add_scaled_product(&mut self.p, node.f[k], &self.P[k * (n + SLACK)..][..n], &[1.0]);
             }
         }
+        let implicit = node.implicit.active;
         let euler = node.structure.euler().filter(|_| n >= EULER_FROM);
         // The order of the states in H: the i-th is the (i + shift)-th of x, counted around.
-        let shift = if euler.is_some() { n / 2 } else { 0 };
-        self.fill::<V>(node, shift);
-        let hessian = self.hessians.iter_mut().find(|hessian| hessian.uu.nrows() == m).expect("one for each size");
-        if curvature(t, &self.p, hessian) {
-            self.add_hessian(shift, m);
-        }
-        match euler {
-            Some((dt, blocks)) => self.add_euler::<V, NR>(m, dt, blocks, node),
-            None => self.add_dense::<V, NR>(node),
+        let shift = if implicit || euler.is_some() { n / 2 } else { 0 };
+        if implicit {
+            self.add_implicit::<V, NR>(node, regularisation);
+        } else {
+            self.fill::<V>(node, shift);
+            let hessian = self.hessians.iter_mut().find(|hessian| hessian.uu.nrows() == m).expect("one for each size");
+            if curvature(t, &self.p, hessian) {
+                self.add_hessian(shift, m);
+            }
+            match euler {
+                Some((dt, blocks)) => self.add_euler::<V, NR>(m, dt, blocks, node),
+                None => self.add_dense::<V, NR>(node),
+            }
+            for j in 0..m {
+                self.H[j * ld + j] += regularisation; // Quu += ϱ I
+            }
         }
         let Self { P, p, H, upper, qp, .. } = self;
-
-        // Quu += ϱ I
-        for j in 0..m {
-            H[j * ld + j] += regularisation;
-            knot.Qu[j] = H[j * ld + last];
+        if !implicit {
+            for j in 0..m {
+                knot.Qu[j] = H[j * ld + last];
+            }
+            copy_symmetric::<V>(knot.Quu.as_mut_slice(), m, H, ld, m);
         }
-        copy_symmetric::<V>(knot.Quu.as_mut_slice(), m, H, ld, m);
 
         let failed = |row: usize, pivot: f64| match pivot.is_finite() {
             true => SweepError::NotPositive { knot: t, row, pivot },
@@ -144,6 +154,10 @@ impl Work {
             }
         }
 
+        if implicit {
+            self.gains_of_efforts::<V, NR>(node, knot);
+            return Ok(());
+        }
         // [K k]ᵀ = −[X; yᵀ] L⁻¹
         solve_right::<V, NR>(H, ld, free, rows, free, upper);
         if bounded {
@@ -174,6 +188,11 @@ impl Work {
             for j in 0..m {
                 knot.k[j] = -H[j * ld + free + n];
             }
+        }
+        let k = knot.k.as_slice();
+        knot.expected = [dot(knot.Qu.as_slice(), k), 0.0];
+        for (column, k_j) in knot.Quu.column_iter().zip(k) {
+            knot.expected[1] += k_j * dot(column.as_slice(), k);
         }
         Ok(())
     }
@@ -239,13 +258,14 @@ impl Work {
         add_product_lower::<V, NR>(H, ld, [rows + 1, rows, n], View { data: W, stride: ld }, F);
     }
 
-    /// Vxx += ϱ I, and out to the knot with both if they are finite.
+    /// Vxx += ϱ I, and out to the knot with Vx; Vxx only if it is to be kept. Fails if they are not finite.
     #[inline(always)]
     pub(crate) fn finish_value<V: Vector>(
         &mut self,
         t: usize,
         knot: &mut LqKnot,
         regularisation: f64,
+        keep: bool,
     ) -> Result<(), SweepError> {
         let n = self.p.len();
         knot.Vx.as_mut_slice().copy_from_slice(&self.p);
@@ -253,7 +273,9 @@ impl Work {
         for j in 0..n {
             let column = &mut self.P[j * (n + SLACK)..][..n];
             column[j] += regularisation;
-            copy::<V>(&mut knot.Vxx.as_mut_slice()[j * n..], column);
+            if keep {
+                copy::<V>(&mut knot.Vxx.as_mut_slice()[j * n..], column);
+            }
             finite &= all_bounded(column);
         }
         if finite { Ok(()) } else { Err(SweepError::NotFinite { knot: t }) }

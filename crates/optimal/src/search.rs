@@ -23,16 +23,18 @@ pub(crate) struct Search {
 }
 
 impl Fddp {
+    /// Whether gaps count in what a step should gain.
+    pub(crate) fn gaps_count(&self, feasible: bool) -> bool {
+        !feasible && self.settings.method == Method::Fddp
+    }
+
     /// dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP leaves the gaps f out.
     pub(crate) fn expect(&mut self, feasible: bool) {
         let (mut dg, mut dq) = (0.0, 0.0);
-        let gaps = !feasible && self.settings.method == Method::Fddp;
+        let gaps = self.gaps_count(feasible);
         for (t, knot) in self.sweep.knots().iter().enumerate() {
-            let k = knot.k.as_slice();
-            dg -= dot(knot.Qu.as_slice(), k);
-            for (column, k_j) in knot.Quu.column_iter().zip(k) {
-                dq -= k_j * dot(column.as_slice(), k);
-            }
+            dg -= knot.expected[0];
+            dq -= knot.expected[1];
             if gaps {
                 let place = self.solution.shape().dx(t);
                 let (f, curved) = (&self.gaps[place.clone()], &mut self.curved_gaps[place]);

@@ -78,6 +78,8 @@ pub struct Sweep {
     knots: Vec<LqKnot>,
     /// What one step reads and writes beside its knot.
     work: Work,
+    /// Whether the knots shall have their Vxx.
+    keep: bool,
 }
 
 impl Sweep {
@@ -95,7 +97,7 @@ impl Sweep {
             node.assert_shapes(n, node.nu());
             LqKnot::zeros(n, node.nu())
         });
-        Self { work: Work::new(nodes, n, m), knots: knots.collect() }
+        Self { work: Work::new(nodes, n, m), knots: knots.collect(), keep: true }
     }
 
     /// Lets the next run start as if it were the first.
@@ -103,6 +105,11 @@ impl Sweep {
         for knot in &mut self.knots {
             knot.k.fill(0.0);
         }
+    }
+
+    /// Whether the next runs shall write Vxx to the knots, for those that look at it.
+    pub(crate) fn keep_values(&mut self, keep: bool) {
+        self.keep = keep;
     }
 
     /// The feedback and value function of each knot, as the last [`run`](Self::run) left them; the terminal one has no
@@ -160,15 +167,15 @@ struct Run<'a, F> {
 impl<F: FnMut(usize, &[f64], &mut Hessian) -> bool> Dense for Run<'_, F> {
     #[inline(always)]
     fn run<V: Vector, const NR: usize>(self) {
-        let Self { sweep: Sweep { knots, work }, nodes, regularisation, mut curvature, result } = self;
+        let Self { sweep: Sweep { knots, work, keep }, nodes, regularisation, mut curvature, result } = self;
         let mut t = nodes.len() - 1;
         work.start(&nodes[t]);
-        *result = work.finish_value::<V>(t, &mut knots[t], regularisation);
+        *result = work.finish_value::<V>(t, &mut knots[t], regularisation, *keep);
         while result.is_ok() && t > 0 {
             t -= 1;
             *result = work.step::<V, NR>(t, &nodes[t], &mut knots[t], regularisation, &mut curvature);
             if result.is_ok() {
-                *result = work.finish_value::<V>(t, &mut knots[t], regularisation);
+                *result = work.finish_value::<V>(t, &mut knots[t], regularisation, *keep);
             }
         }
     }

@@ -6,7 +6,7 @@ use common::contacts::cases;
 use common::{State, Worst, dual, eps, lift, lift_forces, moved, unit};
 use condyle_dynamics::{
     Constraint, ConstraintSet, Data, Force, Model, Scalar, constrained_dynamics, constrained_dynamics_derivatives,
-    crba, impulse_dynamics, impulse_dynamics_derivatives,
+    constrained_dynamics_equations, crba, impulse_dynamics, impulse_dynamics_derivatives,
 };
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
@@ -139,6 +139,36 @@ fn derivatives_of_constrained_dynamics() {
             for k in 0..3 {
                 exact[k].see(&model, found[k].as_slice(), duals[k].as_slice());
                 near[k].see(&model, found[k].as_slice(), differences[k].as_slice());
+            }
+        }
+    }
+}
+
+/// M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c = 0 hold for the derivatives that dual numbers find.
+#[test]
+fn equations_of_constrained_dynamics() {
+    let names = ["r, c for q", "r, c for v", "for τ"];
+    let mut worst = names.map(|name| Worst::new(name, CONDITIONED));
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        for f_ext in [&[][..], &s.f_ext] {
+            let (nv, rows) = (model.nv(), set.rows());
+            let duals = by_duals::<Dynamics>(&model, &s, &constraints, f_ext);
+            let d = constrained_dynamics_equations(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+            let nothing = DMatrix::zeros(nv + rows, nv);
+            let blocks = [stack(d.dtau_dq, d.dgamma_dq), stack(d.dtau_dv, d.dgamma_dv), nothing];
+            let mut K = DMatrix::zeros(nv + rows, nv + rows);
+            K.view_mut((0, 0), (nv, nv)).copy_from(d.M);
+            let mut J = DMatrix::zeros(rows, nv);
+            set.jacobian(&mut J);
+            K.view_mut((nv, 0), (rows, nv)).copy_from(&J);
+            K.view_mut((0, nv), (nv, rows)).copy_from(&-J.transpose());
+            let mut efforts = DMatrix::zeros(nv + rows, nv);
+            efforts.fill_diagonal(1.0);
+            for k in 0..3 {
+                let expected = if k < 2 { -(&K * &duals[k]) } else { efforts.clone() - &K * &duals[k] };
+                worst[k].see(&model, blocks[k].as_slice(), expected.as_slice());
             }
         }
     }

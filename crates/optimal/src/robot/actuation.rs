@@ -70,6 +70,14 @@ impl Actuation {
         }
     }
 
+    /// How many coordinates, the first ones, nothing drives, if each of the others has a control of its own.
+    pub(super) fn passive(&self) -> Option<usize> {
+        match self.map {
+            Map::After(passive) => Some(passive),
+            Map::Matrix(_) => None,
+        }
+    }
+
     /// The number of coordinates, nv.
     pub(super) fn nv(&self) -> usize {
         self.nv

@@ -2,7 +2,9 @@
 
 use super::actuation::Actuation;
 use super::costs::{Cost, Costs};
-use super::lanes::SideBySide;
+use super::elimination::Elimination;
+use super::integrated::Wanted;
+use super::lanes::{Outcome, SideBySide};
 use super::state::groups;
 use super::watch::{Needs, Offer, Scene, Slopes, Watch};
 use crate::Error;
@@ -50,11 +52,41 @@ impl Robot {
     }
 
     /// Computes the dynamics of some states side by side.
-    pub(super) fn prepare(&self, lanes: &mut SideBySide, xs: &[f64], us: &[f64], derivatives: bool) {
+    pub(super) fn prepare(&self, lanes: &mut SideBySide, xs: &[f64], us: &[f64], wanted: Wanted) {
         let nx = self.model.nq() + self.model.nv();
         let (count, nu) = (xs.len() / nx, self.actuation.nu());
         (0..count).for_each(|k| self.actuation.effort(&us[k * nu..(k + 1) * nu], lanes.tau_mut(k)));
-        lanes.run(&self.model, count, xs, self.schedule.look_at_forces(), derivatives);
+        lanes.run(&self.model, count, xs, self.schedule.look_at_forces(), wanted);
+    }
+
+    /// Writes a knot of Δt = `scale` seconds in implicit form, from the equations of a state that was prepared; says
+    /// whether there is one.
+    pub(super) fn write_implicit(
+        &mut self,
+        elimination: &mut Elimination,
+        outcome: &mut Outcome,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        scale: f64,
+        node: &mut LqNode,
+    ) -> bool {
+        if !elimination.run(&mut outcome.equations, scale, &mut node.implicit) {
+            return false;
+        }
+        self.actuation.effort(u, &mut self.tau);
+        let scene = Scene { x, u, a: &outcome.a, tau: &self.tau, lambda: &outcome.lambda };
+        node.implicit.active = true;
+        let form = node.implicit.lend();
+        self.schedule.calc_diff(t, &scene, &elimination.slopes(&form, scale), scale, node);
+        node.implicit.take_back(form);
+        true
+    }
+
+    /// How to write implicit knots, with contacts whose rows are moved by some coordinates each; none if the drives mix
+    /// coordinates.
+    pub(super) fn elimination(&self, moved_by: &[Vec<usize>]) -> Option<Elimination> {
+        Some(Elimination::new(self.model.nv(), self.actuation.passive()?, moved_by))
     }
 
     /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
@@ -120,6 +152,11 @@ impl Schedule {
         let most = self.variants.iter().map(Costs::rows).fold([0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
         self.watch.resize(self.offer.nu, longest, most, needs);
         Ok(())
+    }
+
+    /// The most rows that a knot has of Jacobians with respect to (u, v, q).
+    pub(super) fn most_rows(&self) -> usize {
+        self.variants.iter().map(|costs| costs.rows()[0]).max().unwrap_or(0)
     }
 
     /// Whether a residual of some knot looks at forces.

@@ -92,3 +92,22 @@ pub(super) fn offer(offer: Offer, contacts: &[Contact]) -> Offer {
     });
     Offer { contacts: rows.collect(), ..offer }
 }
+
+/// For each row of all contacts the coordinates that move it.
+pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
+    let rows = contacts.iter().flat_map(|Contact { constraint, .. }| {
+        let mut coordinates = Vec::new();
+        for frame in [Some(constraint.frame), constraint.other].into_iter().flatten() {
+            let mut body = model.frames()[frame].body;
+            while body > 0 {
+                let joint = &model.bodies()[body];
+                coordinates.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
+                body = joint.parent;
+            }
+        }
+        coordinates.sort_unstable();
+        coordinates.dedup();
+        vec![coordinates; constraint.kind.rows()]
+    });
+    rows.collect()
+}

@@ -2,10 +2,12 @@
 
 use super::actuation::Actuation;
 use super::common::{Robot, robot_knot, robot_positions};
-use super::contact::{Contact, constraint_set, offer};
+use super::contact::{Contact, constraint_set, moved_by, offer};
 use super::costs::Cost;
-use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+use super::elimination::Elimination;
+use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator, Wanted};
 use super::lanes::{Held, Outcome, SideBySide};
+use super::quadratic::Row;
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
@@ -20,6 +22,7 @@ pub struct Contacts {
     set: ConstraintSet<f64>,
     data: Data<f64>,
     lanes: Option<SideBySide>,
+    elimination: Option<Elimination>,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
     da_du: Vec<f64>,
 }
@@ -71,9 +74,10 @@ impl Contacts {
         let data = Data::new(&model);
         let lanes = SideBySide::new(&model, Some(Held { contacts, proximal: set.proximal }));
         let da_du = actuation.scratch();
+        let moved_by = moved_by(&model, contacts);
         let robot = Robot::new(model, actuation, offer(own, contacts), costs)?;
         robot.check_regular()?;
-        Ok(Self { robot, set, data, lanes, da_du })
+        Ok(Self { elimination: robot.elimination(&moved_by), robot, set, data, lanes, da_du })
     }
 }
 
@@ -146,10 +150,29 @@ impl ContinuousModel for Contacts {
         self.lanes.as_ref().map_or(1, SideBySide::lanes)
     }
 
-    fn prepare(&mut self, xs: &[f64], us: &[f64], derivatives: bool) {
+    fn prepare(&mut self, xs: &[f64], us: &[f64], wanted: Wanted) {
         if let Some(lanes) = &mut self.lanes {
-            self.robot.prepare(lanes, xs, us, derivatives);
+            self.robot.prepare(lanes, xs, us, wanted);
         }
+    }
+
+    fn implicit(&self) -> Option<[usize; 2]> {
+        let elimination = self.elimination.as_ref().filter(|_| self.lanes.is_some())?;
+        Some([elimination.most_dependent(), self.robot.schedule.most_rows()])
+    }
+
+    fn equations_prepared(
+        &mut self,
+        i: usize,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        scale: f64,
+        node: &mut LqNode,
+    ) -> Option<&[f64]> {
+        let Self { robot, lanes: Some(lanes), elimination: Some(elimination), .. } = self else { return None };
+        let outcome = &mut lanes.outcomes[i];
+        robot.write_implicit(elimination, outcome, t, x, u, scale, node).then_some(&outcome.a)
     }
 
     fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
@@ -170,7 +193,7 @@ impl ContinuousModel for Contacts {
         node: &mut LqNode,
     ) -> Derivatives<'_> {
         let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc_diff(t, x, u, scale, node) };
-        let Outcome { a, lambda, da, dlambda } = &lanes.outcomes[i];
+        let Outcome { a, lambda, da, dlambda, .. } = &lanes.outcomes[i];
         robot.actuation.effort(u, &mut robot.tau);
         let scene = Scene { x, u, a, tau: &robot.tau, lambda };
         let slopes = ContactSlopes { da: da.each_ref(), dlambda: dlambda.each_ref(), actuation: &robot.actuation };
@@ -191,15 +214,14 @@ struct ContactSlopes<'a> {
 }
 
 impl Slopes for ContactSlopes<'_> {
-    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]) {
-        let nv = self.da[0].nrows();
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut Row<'_>) {
         let [by_q, by_v, by_tau] = match signal {
             Signal::Acceleration => self.da,
             Signal::Force => self.dlambda,
-            Signal::Effort => return self.actuation.add_row(row, c, &mut g[2 * nv..]),
+            Signal::Effort => return self.actuation.add_row(row, c, g.u),
         };
-        add_matrix_row(by_q, row, c, &mut g[..nv]);
-        add_matrix_row(by_v, row, c, &mut g[nv..2 * nv]);
-        self.actuation.add_product_row(by_tau, row, c, &mut g[2 * nv..]);
+        add_matrix_row(by_q, row, c, g.q);
+        add_matrix_row(by_v, row, c, g.v);
+        self.actuation.add_product_row(by_tau, row, c, g.u);
     }
 }

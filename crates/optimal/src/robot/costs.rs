@@ -135,7 +135,7 @@ impl Costs {
         self.plans.iter().map(|plan| plan.n).max().unwrap_or(0)
     }
 
-    /// How many rows there may be of Jacobians with respect to (q, v, u), and to q alone.
+    /// How many rows there may be of Jacobians with respect to (u, v, q), and to q alone.
     pub(super) fn rows(&self) -> [usize; 2] {
         let rows = |part| {
             let of = |(term, plan): (&Cost, &Plan)| if term.residual.part() == part { plan.n } else { 0 };
@@ -363,26 +363,26 @@ impl Costs {
     }
 }
 
-/// Row i of ∂r/∂(q, v, u) of a residual that depends on more than q, to the others.
+/// Row i of ∂r/∂(u, v, q) of a residual that depends on more than q, to the others.
 fn add_slope_row(residual: &Residual, plan: &Plan, i: usize, slopes: &dyn Slopes, nv: usize, s: &mut Scratch) {
     let Scratch { rows, d, dd, J, Jv, momentum, com, surplus_slopes, .. } = s;
-    let g = rows.push(d[i], dd[i]);
+    let g = &mut rows.push(d[i], dd[i]);
     match residual {
         Residual::FrameVelocity { .. } => {
-            add_matrix_row(J, i, 1.0, &mut g[..nv]);
-            add_matrix_row(Jv, i, 1.0, &mut g[nv..2 * nv]);
+            add_matrix_row(J, i, 1.0, g.q);
+            add_matrix_row(Jv, i, 1.0, g.v);
         }
         Residual::CentroidalMomentum { .. } => {
-            add_matrix_row(&momentum[0], i, 1.0, &mut g[..nv]);
-            add_matrix_row(&momentum[1], i, 1.0, &mut g[nv..2 * nv]);
+            add_matrix_row(&momentum[0], i, 1.0, g.q);
+            add_matrix_row(&momentum[1], i, 1.0, g.v);
         }
         Residual::ControlGravity => {
-            add_matrix_row(&surplus_slopes[0], i, 1.0, &mut g[..nv]);
-            add_matrix_row(&surplus_slopes[1], i, 1.0, &mut g[nv..2 * nv]);
+            add_matrix_row(&surplus_slopes[0], i, 1.0, g.q);
+            add_matrix_row(&surplus_slopes[1], i, 1.0, g.v);
             (0..nv).for_each(|k| slopes.add_row(Signal::Acceleration, k, surplus_slopes[2][(i, k)], g)); // M ∂q̈
         }
         Residual::ImpulseCenterOfMass => {
-            add_matrix_row(&com[1], i, 1.0, &mut g[..nv]);
+            add_matrix_row(&com[1], i, 1.0, g.q);
             (0..nv).for_each(|k| slopes.add_row(Signal::Acceleration, k, com[0][(i, k)], g)); // J_c ∂(v⁺ − v)
         }
         Residual::JointEffort { .. } => slopes.add_row(Signal::Effort, i, 1.0, g),

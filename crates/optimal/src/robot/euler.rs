@@ -3,7 +3,7 @@
 
 use super::integrated::{ContinuousModel, Derivatives};
 use crate::lq::LqNode;
-use crate::structure::LARGEST_BLOCK;
+use crate::structure::{EulerBlock, LARGEST_BLOCK};
 use crate::vector::{Dense, Vector, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -67,7 +67,47 @@ pub(super) fn calc_diff<M: ContinuousModel>(
         (from..group.start).for_each(|k| A[k * (2 * nv + 1)] += 1.0);
         from = group.end;
     }
+    write_blocks(model, dq, [&mut *transport, &mut *exp], node.structure.set_euler(dt, model.groups()));
+    for group in model.groups() {
+        apply_block(exp, group, &mut node.A);
+        apply_block(exp, group, &mut node.B);
+        for c in group.clone() {
+            for r in group.clone() {
+                node.A[(r, c)] += transport[(r, c)];
+            }
+        }
+    }
+}
+
+/// The derivatives in implicit form, of a state that was prepared for it; says whether there is one.
+pub(super) fn calc_implicit<M: ContinuousModel>(
+    model: &mut M,
+    lane: usize,
+    dt: f64,
+    t: usize,
+    x: &[f64],
+    u: &[f64],
+    dq: &mut [f64],
+    [transport, exp]: [&mut DMatrix<f64>; 2],
+    node: &mut LqNode,
+) -> bool {
+    let v = &x[model.nq()..];
+    let Some(a) = model.equations_prepared(lane, t, x, u, dt, node) else { return false };
+    for k in 0..v.len() {
+        dq[k] = v[k] * dt + a[k] * dt * dt;
+    }
     let blocks = node.structure.set_euler(dt, model.groups());
+    write_blocks(model, dq, [transport, exp], blocks);
+    true
+}
+
+/// T and E of the groups.
+fn write_blocks<M: ContinuousModel>(
+    model: &M,
+    dq: &[f64],
+    [transport, exp]: [&mut DMatrix<f64>; 2],
+    blocks: &mut [EulerBlock],
+) {
     if model.groups().is_empty() {
         return;
     }
@@ -77,13 +117,6 @@ pub(super) fn calc_diff<M: ContinuousModel>(
             for r in 0..group.len() {
                 block.T[(r, c)] = transport[(group.start + r, group.start + c)];
                 block.E[(r, c)] = exp[(group.start + r, group.start + c)];
-            }
-        }
-        apply_block(exp, group, &mut node.A);
-        apply_block(exp, group, &mut node.B);
-        for c in group.clone() {
-            for r in group.clone() {
-                node.A[(r, c)] += transport[(r, c)];
             }
         }
     }

@@ -3,8 +3,10 @@
 use super::actuation::Actuation;
 use super::common::{Robot, robot_knot, robot_positions};
 use super::costs::Cost;
-use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+use super::elimination::Elimination;
+use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator, Wanted};
 use super::lanes::{Outcome, SideBySide};
+use super::quadratic::Row;
 use super::watch::{NoSlopes, Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
@@ -18,6 +20,7 @@ pub struct Free {
     pub(super) robot: Robot,
     data: Data<f64>,
     lanes: Option<SideBySide>,
+    elimination: Option<Elimination>,
     /// Whether this is the end of a horizon, where nothing moves.
     still: bool,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
@@ -64,11 +67,15 @@ impl Free {
 
     fn make(model: Arc<Model>, actuation: Actuation, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
         let (nv, still) = (model.nv(), !offer.effort);
+        let (data, da_du) = (Data::new(&model), actuation.scratch());
+        let lanes = if still { None } else { SideBySide::new(&model, None) };
+        let robot = Robot::new(model, actuation, offer, costs)?;
         Ok(Self {
-            data: Data::new(&model),
-            lanes: if still { None } else { SideBySide::new(&model, None) },
-            da_du: actuation.scratch(),
-            robot: Robot::new(model, actuation, offer, costs)?,
+            data,
+            lanes,
+            elimination: robot.elimination(&[]),
+            da_du,
+            robot,
             still,
             zeros: DMatrix::zeros(nv, nv),
         })
@@ -157,10 +164,29 @@ impl ContinuousModel for Free {
         self.lanes.as_ref().map_or(1, SideBySide::lanes)
     }
 
-    fn prepare(&mut self, xs: &[f64], us: &[f64], derivatives: bool) {
+    fn prepare(&mut self, xs: &[f64], us: &[f64], wanted: Wanted) {
         if let Some(lanes) = &mut self.lanes {
-            self.robot.prepare(lanes, xs, us, derivatives);
+            self.robot.prepare(lanes, xs, us, wanted);
         }
+    }
+
+    fn implicit(&self) -> Option<[usize; 2]> {
+        let elimination = self.elimination.as_ref().filter(|_| self.lanes.is_some())?;
+        Some([elimination.most_dependent(), self.robot.schedule.most_rows()])
+    }
+
+    fn equations_prepared(
+        &mut self,
+        i: usize,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        scale: f64,
+        node: &mut LqNode,
+    ) -> Option<&[f64]> {
+        let Self { robot, lanes: Some(lanes), elimination: Some(elimination), .. } = self else { return None };
+        let outcome = &mut lanes.outcomes[i];
+        robot.write_implicit(elimination, outcome, t, x, u, scale, node).then_some(&outcome.a)
     }
 
     fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
@@ -222,15 +248,15 @@ struct FreeSlopes<'a> {
 }
 
 impl Slopes for FreeSlopes<'_> {
-    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]) {
-        let ([by_q, by_v, by_tau], nv) = (self.da, self.da[0].nrows());
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut Row<'_>) {
+        let [by_q, by_v, by_tau] = self.da;
         match signal {
             Signal::Acceleration => {
-                add_matrix_row(by_q, row, c, &mut g[..nv]);
-                add_matrix_row(by_v, row, c, &mut g[nv..2 * nv]);
-                self.actuation.add_product_row(by_tau, row, c, &mut g[2 * nv..]);
+                add_matrix_row(by_q, row, c, g.q);
+                add_matrix_row(by_v, row, c, g.v);
+                self.actuation.add_product_row(by_tau, row, c, g.u);
             }
-            Signal::Effort => self.actuation.add_row(row, c, &mut g[2 * nv..]),
+            Signal::Effort => self.actuation.add_row(row, c, g.u),
             Signal::Force => {}
         }
     }

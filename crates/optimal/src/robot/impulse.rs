@@ -4,6 +4,7 @@ use super::actuation::Actuation;
 use super::common::{Robot, robot_knot};
 use super::contact::{Contact, constraint_set, offer};
 use super::costs::Cost;
+use super::quadratic::Row;
 use super::state::{state_difference, state_integrate};
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
@@ -131,17 +132,17 @@ struct ImpulseSlopes<'a> {
 }
 
 impl Slopes for ImpulseSlopes<'_> {
-    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]) {
-        let (nv, d) = (self.d.v.len(), &self.d);
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut Row<'_>) {
+        let d = &self.d;
         match signal {
             Signal::Acceleration => {
-                add_matrix_row(d.dv_dq, row, c, &mut g[..nv]);
-                add_matrix_row(d.dv_dv, row, c, &mut g[nv..2 * nv]);
-                g[nv + row] -= c; // ∂(v⁺ − v)
+                add_matrix_row(d.dv_dq, row, c, g.q);
+                add_matrix_row(d.dv_dv, row, c, g.v);
+                g.v[row] -= c; // ∂(v⁺ − v)
             }
             Signal::Force => {
-                add_matrix_row(d.dlambda_dq, row, c, &mut g[..nv]);
-                add_matrix_row(d.dlambda_dv, row, c, &mut g[nv..2 * nv]);
+                add_matrix_row(d.dlambda_dq, row, c, g.q);
+                add_matrix_row(d.dlambda_dv, row, c, g.v);
             }
             Signal::Effort => {}
         }

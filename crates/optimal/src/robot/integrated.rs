@@ -76,10 +76,32 @@ pub trait ContinuousModel: Send + 'static {
         1
     }
 
-    /// Computes the dynamics of some states, at most [`lanes`](Self::lanes), side by side, with derivatives if they are
-    /// asked for, so that the calls for each of them that follow need not. Nothing by default.
-    fn prepare(&mut self, xs: &[f64], us: &[f64], derivatives: bool) {
-        let _ = (xs, us, derivatives);
+    /// Computes the dynamics of some states, at most [`lanes`](Self::lanes), side by side, so that the calls for each of
+    /// them that follow need not. Nothing by default.
+    fn prepare(&mut self, xs: &[f64], us: &[f64], wanted: Wanted) {
+        let _ = (xs, us, wanted);
+    }
+
+    /// For dynamics that can be written in implicit form: the most coordinates and the most rows of costs that this takes.
+    #[doc(hidden)]
+    fn implicit(&self) -> Option<[usize; 2]> {
+        None
+    }
+
+    /// A knot in implicit form at the i-th state that was prepared for it, of Δt = `scale` seconds: a, unless there is no
+    /// such form there.
+    #[doc(hidden)]
+    fn equations_prepared(
+        &mut self,
+        i: usize,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        scale: f64,
+        node: &mut LqNode,
+    ) -> Option<&[f64]> {
+        let _ = (i, t, x, u, scale, node);
+        None
     }
 
     /// [`calc`](Self::calc) of the i-th state that was prepared.
@@ -122,6 +144,19 @@ pub trait ContinuousModel: Send + 'static {
     fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         let _ = (dq, by_q, by_dq);
     }
+}
+
+/// What [`ContinuousModel::prepare`] computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Wanted {
+    /// Accelerations.
+    Motion,
+    /// And their derivatives.
+    Derivatives,
+    /// Accelerations and the equations that they satisfy, differentiated.
+    #[doc(hidden)]
+    Equations,
 }
 
 /// What [`ContinuousModel::calc_diff`] gives.
@@ -263,6 +298,13 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         }
     }
 
+    fn implicit(&self) -> Option<[usize; 2]> {
+        match (self.dt, &self.method) {
+            (Some(_), Method::Euler) => self.inner.implicit(),
+            _ => None,
+        }
+    }
+
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
         let (nx, nu, lanes) = (self.nx(), self.nu(), self.lanes());
         assert_length("xs", xs.len(), knots.len() * nx);
@@ -273,7 +315,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
             let to = (from + lanes).min(knots.len());
             let side_by_side = to - from >= WORTHWHILE;
             if side_by_side {
-                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], false);
+                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], Wanted::Motion);
             }
             for i in from..to {
                 let (x, u, next) = (&xs[i * nx..][..nx], &us[i * nu..][..nu], &mut next[i * nx..][..nx]);
@@ -296,18 +338,24 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         for from in (0..knots.len()).step_by(lanes) {
             let to = (from + lanes).min(knots.len());
             let side_by_side = to - from >= WORTHWHILE;
+            let implicit = side_by_side && self.implicit().is_some() && nodes[from].implicit.wanted;
             if side_by_side {
-                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], true);
+                let wanted = if implicit { Wanted::Equations } else { Wanted::Derivatives };
+                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], wanted);
             }
             for i in from..to {
-                let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
+                let (x, u, node) = (&xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
                 match self.dt {
                     Some(dt) if side_by_side => {
                         let Self { inner, dq, transport, exp, .. } = self;
-                        let lane = Some(i - from);
-                        euler::calc_diff(inner, lane, dt, knots[i], x, u, dq, [transport, exp], &mut nodes[i]);
+                        let (lane, exp) = (i - from, [transport, exp]);
+                        if !implicit {
+                            euler::calc_diff(inner, Some(lane), dt, knots[i], x, u, dq, exp, node);
+                        } else if !euler::calc_implicit(inner, lane, dt, knots[i], x, u, dq, exp, node) {
+                            self.calc_diff(knots[i], x, u, node);
+                        }
                     }
-                    _ => self.calc_diff(knots[i], x, u, &mut nodes[i]),
+                    _ => self.calc_diff(knots[i], x, u, node),
                 }
             }
         }

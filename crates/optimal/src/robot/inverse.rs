@@ -4,6 +4,7 @@ use super::actuation::Actuation;
 use super::common::{Robot, robot_knot, robot_positions};
 use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
+use super::quadratic::Row;
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
@@ -115,14 +116,14 @@ struct InverseSlopes<'a> {
 }
 
 impl Slopes for InverseSlopes<'_> {
-    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]) {
-        let (nv, d) = (self.d.dtau_dq.nrows(), &self.d);
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut Row<'_>) {
+        let d = &self.d;
         match signal {
-            Signal::Acceleration => g[2 * nv + row] += c,
+            Signal::Acceleration => g.u[row] += c,
             Signal::Effort => {
-                add_matrix_row(d.dtau_dq, row, c, &mut g[..nv]);
-                add_matrix_row(d.dtau_dv, row, c, &mut g[nv..2 * nv]);
-                add_matrix_row(d.dtau_da, row, c, &mut g[2 * nv..]);
+                add_matrix_row(d.dtau_dq, row, c, g.q);
+                add_matrix_row(d.dtau_dv, row, c, g.v);
+                add_matrix_row(d.dtau_da, row, c, g.u);
             }
             Signal::Force => {}
         }

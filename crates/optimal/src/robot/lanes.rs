@@ -5,9 +5,12 @@
 //! sweep look at one knot after the other.
 
 use super::contact::Contact;
+use super::elimination::Tableau;
+use super::integrated::Wanted;
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
     ConstraintSet, Data, Model, Proximal, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
+    constrained_dynamics_equations, rnea_derivatives,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real};
@@ -29,6 +32,8 @@ pub(super) struct Outcome {
     pub da: [DMatrix<f64>; 3],
     /// ∂λ/∂q, ∂λ/∂v, ∂λ/∂τ. Shape: rows × nv.
     pub dlambda: [DMatrix<f64>; 3],
+    /// The equations differentiated, row by row. Shape: that of the [`Tableau`].
+    pub equations: Vec<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -39,6 +44,10 @@ struct Group<S> {
     q: Vec<S>,
     v: Vec<S>,
     tau: Vec<S>,
+    /// q̈. Shape: nv.
+    a: Vec<S>,
+    /// Shape: rows × nv.
+    J: DMatrix<S>,
 }
 
 /// Writes numbers that lie knot after knot side by side; knots that are missing repeat the first one.
@@ -105,6 +114,77 @@ impl<S: Block<Number = f64>> Kernel for Unpack<'_, '_, S> {
     }
 }
 
+/// Writes the numbers of each lane, times a factor, to rows of a place of its own.
+struct UnpackRows<'a, 'b, S> {
+    from: &'a [S],
+    /// How far it is from one row to the next, and from one column to the next, where they come from.
+    strides: [usize; 2],
+    shape: [usize; 2],
+    factor: f64,
+    to: &'a mut [&'b mut [f64]],
+    stride: usize,
+}
+
+impl<S: Block<Number = f64>> Kernel for UnpackRows<'_, '_, S> {
+    #[inline(always)]
+    fn run(self) {
+        let ([rows, columns], [down, along]) = (self.shape, self.strides);
+        let factor = S::splat(self.factor);
+        if rows == 0 || columns == 0 {
+            return;
+        }
+        if columns < S::LANES {
+            for (i, j) in (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j))) {
+                let mut x = [0.0; WIDEST];
+                (self.from[i * down + j * along] * factor).store(&mut x);
+                for (k, to) in self.to.iter_mut().enumerate() {
+                    to[i * self.stride + j] = x[k];
+                }
+            }
+            return;
+        }
+        let mut block = [S::zero(); WIDEST];
+        for i in 0..rows {
+            let mut j = 0;
+            loop {
+                for k in 0..S::LANES {
+                    block[k] = self.from[i * down + (j + k) * along] * factor;
+                }
+                S::transpose(&mut block[..S::LANES]);
+                for (k, to) in self.to.iter_mut().enumerate() {
+                    block[k].store(&mut to[i * self.stride + j..]);
+                }
+                if j + S::LANES >= columns {
+                    break;
+                }
+                j = (j + S::LANES).min(columns - S::LANES); // the last ones overlap those before
+            }
+        }
+    }
+    #[inline(always)]
+    fn run_fused(self) {
+        self.run();
+    }
+}
+
+/// Unpacks a block of the equations: `at` is its first row and column there.
+fn unpack_rows<S: Block<Number = f64>>(
+    from: &[S],
+    strides: [usize; 2],
+    shape: [usize; 2],
+    factor: f64,
+    to: &mut [Outcome],
+    at: [usize; 2],
+    tableau: Tableau,
+) {
+    let (stride, count) = (tableau.stride(), to.len());
+    let mut places: [&mut [f64]; WIDEST] = Default::default();
+    for (place, outcome) in places.iter_mut().zip(to) {
+        *place = &mut outcome.equations[at[0] * stride + at[1]..];
+    }
+    S::enter(UnpackRows { from, strides, shape, factor, to: &mut places[..count], stride });
+}
+
 /// Unpacks to the part of each outcome that `part` names.
 fn unpack<S: Block<Number = f64>>(from: &[S], to: &mut [Outcome], part: impl Fn(&mut Outcome) -> &mut [f64]) {
     let mut places: [&mut [f64]; WIDEST] = Default::default();
@@ -119,30 +199,32 @@ impl<S: Block<Number = f64>> Group<S> {
     fn new(model: &Model, set: Option<ConstraintSet<S>>) -> Self {
         let o = S::zero();
         let (q, v) = (vec![o; model.nq()], vec![o; model.nv()]);
-        Self { data: Data::new(model), set, q, tau: v.clone(), v }
+        let J = DMatrix::from_element(set.as_ref().map_or(0, ConstraintSet::rows), model.nv(), o);
+        Self { data: Data::new(model), set, q, tau: v.clone(), a: v.clone(), v, J }
     }
 
-    fn run(&mut self, model: &Model, xs: &[f64], taus: &[f64], forces: bool, slopes: bool, out: &mut [Outcome]) {
+    fn run(&mut self, model: &Model, xs: &[f64], taus: &[f64], forces: bool, wanted: Wanted, out: &mut [Outcome]) {
         let (nq, nv, count) = (model.nq(), model.nv(), out.len());
-        let Self { data, set, q, v, tau } = self;
+        let Self { data, set, q, v, tau, .. } = self;
         S::enter(Pack { from: xs, stride: nq + nv, count, to: q });
         S::enter(Pack { from: &xs[nq..], stride: nq + nv, count, to: v });
         S::enter(Pack { from: taus, stride: nv, count, to: tau });
-        match (set, slopes) {
-            (None, false) => unpack(aba(model, data, q, v, tau, &[]), out, |o| &mut o.a),
-            (None, true) => {
+        match (set, wanted) {
+            (_, Wanted::Equations) => self.equations(model, out),
+            (None, Wanted::Motion) => unpack(aba(model, data, q, v, tau, &[]), out, |o| &mut o.a),
+            (None, Wanted::Derivatives) => {
                 let d = aba_derivatives(model, data, q, v, tau, &[]);
                 unpack(d.a, out, |o| &mut o.a);
                 for (k, da) in [d.da_dq, d.da_dv, d.da_dtau].into_iter().enumerate() {
                     unpack(da.as_slice(), out, |o| o.da[k].as_mut_slice());
                 }
             }
-            (Some(set), false) => {
+            (Some(set), Wanted::Motion) => {
                 let d = constrained_dynamics(model, data, set, q, v, tau, &[]);
                 unpack(d.a, out, |o| &mut o.a);
                 unpack(d.lambda, out, |o| &mut o.lambda);
             }
-            (Some(set), true) => {
+            (Some(set), Wanted::Derivatives) => {
                 let d = constrained_dynamics_derivatives(model, data, set, q, v, tau, &[]);
                 unpack(d.a, out, |o| &mut o.a);
                 unpack(d.lambda, out, |o| &mut o.lambda);
@@ -153,6 +235,46 @@ impl<S: Block<Number = f64>> Group<S> {
                 for (k, dlambda) in dlambda.into_iter().enumerate().filter(|_| forces) {
                     unpack(dlambda.as_slice(), out, |o| o.dlambda[k].as_mut_slice());
                 }
+            }
+        }
+    }
+
+    /// The tableau [J μ1 c_v c_q; M −Jᵀ r_v r_q].
+    fn equations(&mut self, model: &Model, out: &mut [Outcome]) {
+        let Self { data, set, q, v, tau, a, J } = self;
+        let tableau = Tableau { nv: model.nv(), rows: J.nrows() };
+        let Tableau { nv, rows } = tableau;
+        let x = nv + rows;
+        let dynamics = |out: &mut [Outcome], M: &DMatrix<S>, dtau_dv: &DMatrix<S>, dtau_dq: &DMatrix<S>| {
+            unpack_rows(M.as_slice(), [nv, 1], [nv, nv], 1.0, out, [rows, 0], tableau); // M is symmetric
+            unpack_rows(dtau_dv.as_slice(), [1, nv], [nv, nv], 1.0, out, [rows, x], tableau);
+            unpack_rows(dtau_dq.as_slice(), [1, nv], [nv, nv], 1.0, out, [rows, x + nv], tableau);
+        };
+        match set {
+            None => {
+                a.copy_from_slice(aba(model, data, q, v, tau, &[]));
+                let d = rnea_derivatives(model, data, q, v, a, &[]);
+                unpack(a, out, |o| &mut o.a);
+                dynamics(out, d.dtau_da, d.dtau_dv, d.dtau_dq);
+            }
+            Some(set) => {
+                let d = constrained_dynamics_equations(model, data, set, q, v, tau, &[]);
+                unpack(d.a, out, |o| &mut o.a);
+                unpack(d.lambda, out, |o| &mut o.lambda);
+                unpack_rows(d.dgamma_dv.as_slice(), [1, rows], [rows, nv], 1.0, out, [0, x], tableau);
+                unpack_rows(d.dgamma_dq.as_slice(), [1, rows], [rows, nv], 1.0, out, [0, x + nv], tableau);
+                dynamics(out, d.M, d.dtau_dv, d.dtau_dq);
+                set.jacobian(J);
+                unpack_rows(J.as_slice(), [1, rows], [rows, nv], 1.0, out, [0, 0], tableau);
+                unpack_rows(J.as_slice(), [rows, 1], [nv, rows], -1.0, out, [rows, nv], tableau);
+            }
+        }
+        let mu = self.set.as_ref().map_or(0.0, |set| set.proximal.mu);
+        for outcome in out {
+            for r in 0..rows {
+                let forces = &mut outcome.equations[r * tableau.stride() + nv..][..rows];
+                forces.fill(0.0);
+                forces[r] = mu;
             }
         }
     }
@@ -209,6 +331,7 @@ impl SideBySide {
             lambda: vec![0.0; rows],
             da: [square(), square(), square()],
             dlambda: [wide(), wide(), wide()],
+            equations: vec![0.0; Tableau { nv, rows }.len()],
         };
         Some(Self { width: Box::new(width), taus: vec![0.0; lanes * nv], outcomes: vec![outcome; lanes] })
     }
@@ -224,12 +347,12 @@ impl SideBySide {
         &mut self.taus[k * nv..(k + 1) * nv]
     }
 
-    /// Computes the outcomes of some states, with their slopes and those of the forces if they are asked for.
-    pub(super) fn run(&mut self, model: &Model, count: usize, xs: &[f64], forces: bool, slopes: bool) {
+    /// Computes what is wanted of some states; the slopes of forces only if they are asked for.
+    pub(super) fn run(&mut self, model: &Model, count: usize, xs: &[f64], forces: bool, wanted: Wanted) {
         let Self { width, taus, outcomes } = self;
         match &mut **width {
-            Width::Short(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
-            Width::Long(group) => group.run(model, xs, taus, forces, slopes, &mut outcomes[..count]),
+            Width::Short(group) => group.run(model, xs, taus, forces, wanted, &mut outcomes[..count]),
+            Width::Long(group) => group.run(model, xs, taus, forces, wanted, &mut outcomes[..count]),
         }
     }
 }

@@ -17,81 +17,81 @@ pub(super) fn add_diagonal(q: &mut [f64], Q: &mut [f64], entries: Range<usize>, 
     }
 }
 
-/// Some rows of Jacobians, each with the derivatives a′ and a″ of its activation.
+/// A row of a Jacobian with respect to (u, v, q), to be added to.
+pub(super) struct Row<'a> {
+    pub u: &'a mut [f64],
+    pub v: &'a mut [f64],
+    pub q: &'a mut [f64],
+}
+
+/// The rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In
+/// a knot of implicit form u stands for the unknowns that replace the controls.
 #[derive(Clone, Debug)]
-struct List {
-    /// How many numbers a row has, and how far it is to the next one.
-    width: usize,
+pub(super) struct Rows {
+    nu: usize,
+    nv: usize,
+    /// How far it is from one row to the next.
     stride: usize,
-    count: usize,
+    /// Those of residuals that depend on more than q, and behind their end those of the others, from the last one on.
     rows: Vec<f64>,
     /// a′ and a″.
     slopes: Vec<[f64; 2]>,
-}
-
-impl List {
-    fn new(width: usize, most: usize) -> Self {
-        let stride = width + SLACK;
-        Self { width, stride, count: 0, rows: vec![0.0; most * stride], slopes: vec![[0.0; 2]; most] }
-    }
-
-    fn push(&mut self, d: f64, dd: f64) -> &mut [f64] {
-        self.slopes[self.count] = [d, dd];
-        self.count += 1;
-        let row = &mut self.rows[(self.count - 1) * self.stride..][..self.width];
-        row.fill(0.0);
-        row
-    }
-}
-
-/// The rows of all residuals of a knot.
-#[derive(Clone, Debug)]
-pub(super) struct Rows {
-    nv: usize,
-    /// With respect to (q, v, u).
-    whole: List,
-    /// With respect to q, of residuals that depend on nothing else.
-    positions: List,
-    /// The rows times √|a″|, those of `whole` before those of `positions`, and the same with the sign of a″. Shape: as
-    /// many rows of the stride of `whole`.
+    /// How many there are of both kinds.
+    whole: usize,
+    positions: usize,
+    /// The rows times √|a″|, and the same with the sign of a″.
     left: Vec<f64>,
     right: Vec<f64>,
 }
 
 impl Rows {
-    /// Room for so many rows with respect to (q, v, u), and to q alone, of a robot with nv coordinates and nu controls.
+    /// Room for so many rows with respect to (u, v, q), and to q alone, of a robot with nv coordinates and nu controls.
     pub(super) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
-        let whole = List::new(2 * nv + nu, whole);
-        let positions = List::new(nv, positions);
-        let most = (whole.slopes.len() + positions.slopes.len()).max(1);
-        let scaled = vec![0.0; most * whole.stride];
-        Self { nv, whole, positions, left: scaled.clone(), right: scaled }
+        let (most, stride) = (whole + positions, nu + 2 * nv + SLACK);
+        let rows = vec![0.0; most.max(1) * stride];
+        let (left, right, slopes) = (rows.clone(), rows.clone(), vec![[0.0; 2]; most]);
+        Self { nu, nv, stride, rows, slopes, whole: 0, positions: 0, left, right }
     }
 
     /// Forgets all rows.
     pub(super) fn clear(&mut self) {
-        (self.whole.count, self.positions.count) = (0, 0);
+        (self.whole, self.positions) = (0, 0);
     }
 
-    /// A row of zeros with respect to (q, v, u), to be written.
-    pub(super) fn push(&mut self, d: f64, dd: f64) -> &mut [f64] {
-        self.whole.push(d, dd)
+    /// A row of zeros, to be written.
+    pub(super) fn push(&mut self, d: f64, dd: f64) -> Row<'_> {
+        let k = self.whole;
+        self.slopes[k] = [d, dd];
+        self.whole += 1;
+        let row = &mut self.rows[k * self.stride..][..self.nu + 2 * self.nv];
+        row.fill(0.0);
+        let (u, x) = row.split_at_mut(self.nu);
+        let (v, q) = x.split_at_mut(self.nv);
+        Row { u, v, q }
     }
 
     /// The rows of a Jacobian with respect to q that has entries in some columns alone; J has at least as many rows.
     pub(super) fn push_positions(&mut self, J: &[f64], height: usize, columns: &[usize], d: &[f64], dd: &[f64]) {
         for i in 0..d.len() {
-            let row = self.positions.push(d[i], dd[i]);
+            self.positions += 1;
+            let k = self.slopes.len() - self.positions;
+            self.slopes[k] = [d[i], dd[i]];
+            let row = &mut self.rows[k * self.stride + self.nu + self.nv..][..self.nv];
+            row.fill(0.0);
             for &c in columns {
                 row[c] = J[c * height + i];
             }
         }
     }
 
-    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows.
+    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in implicit form, it writes q and the
+    /// part of Q for q alone, and leaves the rows that depend on more to the sweep.
     pub(super) fn write(&mut self, node: &mut LqNode) {
         node.q.as_mut_slice().fill(0.0);
         node.r.as_mut_slice().fill(0.0);
+        if node.implicit.active {
+            node.implicit.set_costs(&self.rows[..self.whole * self.stride], &self.slopes[..self.whole]);
+        }
         at_level(Write { rows: self, node });
     }
 }
@@ -104,39 +104,56 @@ struct Write<'a> {
 impl Dense for Write<'_> {
     #[inline(always)]
     fn run<V: Vector, const NR: usize>(self) {
-        let Self { rows: Rows { nv, whole, positions, left, right }, node } = self;
-        let (nv, n, m, stride) = (*nv, 2 * *nv, node.r.len(), whole.stride);
-        for (list, first) in [(&*whole, 0), (&*positions, whole.count)] {
-            for k in 0..list.count {
-                let [d, dd] = list.slopes[k];
-                let row = &list.rows[k * list.stride..][..list.stride];
-                let (x, u) = row[..list.width].split_at(n.min(list.width));
-                add_multiple(node.q.as_mut_slice(), x, d);
-                add_multiple(node.r.as_mut_slice(), u, d);
-                let scale = dd.abs().sqrt();
-                let at = (first + k) * stride..(first + k) * stride + list.stride;
-                let (left, right) = (&mut left[at.clone()], &mut right[at]);
-                for i in 0..list.stride {
-                    left[i] = row[i] * scale;
-                    right[i] = if dd < 0.0 { -left[i] } else { left[i] };
-                }
+        let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, node } = self;
+        let (m, nv, n, stride) = (*nu, *nv, 2 * *nv, *stride);
+        let implicit = node.implicit.active;
+        let (some, all) = if implicit { (0, *positions) } else { (*whole, *whole + *positions) };
+        let first = slopes.len() - *positions;
+        for k in 0..all {
+            let from = if k < some { k } else { first + k - some };
+            let ([d, dd], row) = (slopes[from], &rows[from * stride..][..stride]);
+            let start = if k < some { 0 } else { m + nv };
+            if k < some {
+                add_multiple(node.r.as_mut_slice(), row, d);
+                add_multiple(&mut node.q.as_mut_slice()[nv..], &row[m..], d);
+            }
+            add_multiple(&mut node.q.as_mut_slice()[..nv], &row[m + nv..], d);
+            let scale = dd.abs().sqrt();
+            let (left, right) = (&mut left[k * stride..][..stride], &mut right[k * stride..][..stride]);
+            for i in start..stride {
+                left[i] = row[i] * scale;
+                right[i] = if dd < 0.0 { -left[i] } else { left[i] };
             }
         }
-        let (some, all) = (whole.count, whole.count + positions.count);
+        let (u, v, q) = (0, m, m + nv); // where they stand in a row
         let Q = node.Q.as_mut_slice();
-        let products = [left.as_slice(), right.as_slice()];
-        if some == 0 {
+        let both = [left.as_slice(), right.as_slice()];
+        if implicit {
+            for k in 0..nv {
+                Q[(nv + k) * (n + 1)] = 0.0;
+            }
+            for k in 0..m {
+                node.R[(k, k)] = 0.0;
+            }
+            for k in 0..if all == 0 { nv } else { 0 } {
+                Q[k * n..][..nv].fill(0.0);
+            }
+        } else if some == 0 {
             Q.fill(0.0);
             node.S.as_mut_slice().fill(0.0);
             node.R.as_mut_slice().fill(0.0);
         } else {
-            outer::<V, NR>(Q, n, [nv..n, 0..nv], [0, 0], products, stride, some);
-            outer::<V, NR>(Q, n, [0..n, nv..n], [0, 0], products, stride, some);
-            outer::<V, NR>(node.S.as_mut_slice(), n, [0..n, 0..m], [0, n], products, stride, some);
-            outer::<V, NR>(node.R.as_mut_slice(), m, [0..m, 0..m], [n, n], products, stride, some);
+            outer::<V, NR>(&mut Q[nv..], n, [nv, nv], [v, q], both, stride, some);
+            outer::<V, NR>(&mut Q[nv * n..], n, [nv, nv], [q, v], both, stride, some);
+            outer::<V, NR>(&mut Q[nv * n + nv..], n, [nv, nv], [v, v], both, stride, some);
+            if m > 0 {
+                outer::<V, NR>(node.S.as_mut_slice(), n, [nv, m], [q, u], both, stride, some);
+                outer::<V, NR>(&mut node.S.as_mut_slice()[nv..], n, [nv, m], [v, u], both, stride, some);
+                outer::<V, NR>(node.R.as_mut_slice(), m, [m, m], [u, u], both, stride, some);
+            }
         }
         if all > 0 {
-            outer::<V, NR>(Q, n, [0..nv, 0..nv], [0, 0], products, stride, all);
+            outer::<V, NR>(Q, n, [nv, nv], [q, q], both, stride, all);
         }
     }
 }
@@ -149,25 +166,25 @@ fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
     }
 }
 
-/// C = Σ left right ᵀ over the first `length` rows of both, for some rows and columns of C, whose entries in the rows of
-/// `left` and `right` stand `shift` after their own number. The sums are the same on both sides of the diagonal.
+/// C = Σ left rightᵀ over the first `length` rows of both, for some rows and columns of C that stand from two places on in
+/// the rows of `left` and `right`. The sums are the same on both sides of the diagonal.
 #[inline(always)]
 fn outer<V: Vector, const NR: usize>(
     C: &mut [f64],
     ldc: usize,
-    [rows, columns]: [Range<usize>; 2],
-    shift: [usize; 2],
+    [rows, columns]: [usize; 2],
+    from: [usize; 2],
     [left, right]: [&[f64]; 2],
     stride: usize,
     length: usize,
 ) {
-    let (left, right) = (&left[shift[0]..], &right[shift[1]..]);
-    let mut j = columns.start;
-    while j < columns.end {
-        let width = NR.min(columns.end - j);
-        let mut i = rows.start;
-        while i < rows.end {
-            if rows.end - i >= 2 * V::N {
+    let (left, right) = (&left[from[0]..], &right[from[1]..]);
+    let mut j = 0;
+    while j < columns {
+        let width = NR.min(columns - j);
+        let mut i = 0;
+        while i < rows {
+            if rows - i >= 2 * V::N {
                 let tile = tile_rows::<V, 2, NR>(left, stride, i, right, stride, j, length);
                 for jj in 0..NR {
                     if jj < width {
@@ -179,21 +196,21 @@ fn outer<V: Vector, const NR: usize>(
                 i += 2 * V::N;
                 continue;
             }
-            if rows.len() >= V::N {
-                i = i.min(rows.end - V::N); // the last strip overlaps the one before
+            if rows >= V::N {
+                i = i.min(rows - V::N); // the last strip overlaps the one before
             }
             let tile = tile_rows::<V, 1, NR>(left, stride, i, right, stride, j, length);
             for jj in 0..NR {
                 if jj < width {
                     let to = &mut C[(j + jj) * ldc + i..];
-                    if rows.len() >= V::N {
+                    if rows >= V::N {
                         tile[jj][0].store(to);
                         continue;
                     }
                     let mut numbers = [0.0; SLACK];
                     tile[jj][0].store(&mut numbers);
                     for k in 0..V::N {
-                        if k < rows.len() {
+                        if k < rows {
                             to[k] = numbers[k]; // one by one: no function call
                         }
                     }

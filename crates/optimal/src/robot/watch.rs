@@ -1,6 +1,6 @@
 //! What the dynamics of a knot offer to its residuals, and what residuals share.
 
-use super::quadratic::Rows;
+use super::quadratic::{Row, Rows};
 use condyle_dynamics::{
     Data, Model, Placements, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
@@ -58,15 +58,15 @@ pub(super) struct Scene<'a> {
 
 /// How the signals of a knot change with x and u.
 pub(super) trait Slopes {
-    /// g += c · ∂s_row/∂(q, v, u) for entry `row` of a signal s; g has 2 nv + nu numbers.
-    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut [f64]);
+    /// g += c · ∂s_row/∂(u, v, q) for entry `row` of a signal s.
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut Row<'_>);
 }
 
 /// Of a knot without dynamics.
 pub(super) struct NoSlopes;
 
 impl Slopes for NoSlopes {
-    fn add_row(&self, _: Signal, _: usize, _: f64, _: &mut [f64]) {}
+    fn add_row(&self, _: Signal, _: usize, _: f64, _: &mut Row<'_>) {}
 }
 
 /// g += c X[row, :] for a matrix with as many columns as g has numbers.
@@ -141,7 +141,7 @@ pub(super) struct Scratch {
 
 impl Watch {
     /// For a robot with nu controls, residuals of at most `longest` numbers, and at most so many rows of Jacobians with
-    /// respect to (q, v, u), and to q alone.
+    /// respect to (u, v, q), and to q alone.
     pub(super) fn new(model: &Model, nu: usize, longest: usize, most: [usize; 2], needs: Needs) -> Self {
         let nv = model.nv();
         let rows = |n| DMatrix::zeros(n, nv);

@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // the names of the literature
 
 mod files;
+mod implicit;
 
 use condyle_dynamics::{
     Constraint, Data, Force, Mat3, Model, Motion, ReferenceFrame, Vec3, centroidal_map, forward_kinematics,

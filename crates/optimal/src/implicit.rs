@@ -1,0 +1,384 @@
+//! Knots in implicit form: accelerations and forces take the place of the controls.
+//!
+//! Inverse dynamics is cheap, and sparse where forward dynamics is full. In place of δu take as many unknowns w out of
+//! the changes of accelerations and contact forces, so that all others follow from w and δx by the equations that hold
+//! no control (contacts stay, nothing drives the base). With the step of velocities ŷ = v⁺ = v + Δt a as the unknown,
+//!
+//! ```text
+//! δu = U (w, δv, δq),     y_c = δv_c + w_k  (a coordinate that is an unknown),     y_d = δv_d + D_d (w, δv, δq)  (one that is not)
+//! δq⁺ = T δq + Δt E y,    δv⁺ = y:        ½ δx⁺ᵀ P δx⁺ = ½ yᵀ Π y + yᵀ N δq + ½ δqᵀ Tᵀ P₁₁ T δq
+//! ```
+//!
+//! with Π and N of [`riccati`](crate::riccati), so that the quadratic form of the knot is copies of Π and N and few outer
+//! products, U's with the cost of controls, and D's with Z = (Π y + N δq)_d − ½ Π_dd D:
+//!
+//! ```text
+//! H = [Π and N on w, δv, δq] + Uᵀ (R + ϱ 1) U + DᵀZ + ZᵀD + Gᵀ a″ G
+//! ```
+//!
+//! where the rows G are those of residuals that look at more than δq. All rows have zeros where the tree of the robot
+//! has none, which are left out in blocks. What follows is the elimination of w. P, p, K = U_x + U_w K_w and k = U_w k_w are
+//! those of the explicit form, since for any δx the map from w to δu is invertible.
+#![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
+
+use crate::dense::{SLACK, Store, View, column_block, copy, transpose};
+use crate::factor::solve_transposed;
+use crate::lq::{LqKnot, LqNode};
+use crate::riccati::{Work, stride};
+use crate::vector::Vector;
+
+/// Rows of numbers over (w, δv, δq), with zeros up to their stride, and for each which blocks are not zero.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Rows {
+    pub(crate) numbers: Vec<f64>,
+    pub(crate) masks: Vec<u64>,
+}
+
+impl Rows {
+    /// Makes it so many rows; allocates only where there were never so many.
+    pub(crate) fn resize(&mut self, rows: usize, stride: usize) {
+        self.numbers.resize(rows * stride, 0.0);
+        self.masks.resize(rows, 0);
+    }
+
+    /// Notes which blocks are not zero.
+    #[inline(always)]
+    pub(crate) fn mark(&mut self, stride: usize) {
+        let wide = block(stride);
+        for (mask, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
+            *mask = 0;
+            for (k, block) in row.chunks(wide).enumerate() {
+                let mut bits = 0;
+                for x in block {
+                    bits |= x.to_bits() << 1; // all but the sign
+                }
+                *mask |= u64::from(bits != 0) << k;
+            }
+        }
+    }
+}
+
+/// How many columns one bit of a mask stands for.
+#[inline(always)]
+fn block(stride: usize) -> usize {
+    8 * stride.div_ceil(8 * 64)
+}
+
+/// A knot's rows; see the head of the file. `R`'s diagonal, `r`, `q`, and the diagonal of `Q` and its part for δq are those
+/// of the node; its `A`, `B` and `S` are not used.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Implicit {
+    /// Whether the solver can use this form.
+    pub(crate) wanted: bool,
+    /// Whether the action wrote it.
+    pub(crate) active: bool,
+    /// Of all rows.
+    pub(crate) stride: usize,
+    /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, how many.
+    pub(crate) own: Vec<[usize; 3]>,
+    /// The other coordinates.
+    pub(crate) dependent: Vec<usize>,
+    /// U.
+    pub(crate) efforts: Rows,
+    /// D, a row for each dependent coordinate.
+    pub(crate) steps: Rows,
+    /// G, and a′ and a″.
+    pub(crate) costs: Rows,
+    pub(crate) slopes: Vec<[f64; 2]>,
+}
+
+impl Implicit {
+    /// Room for a node of nv coordinates and nu controls with at most so many dependent coordinates and rows of costs.
+    pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
+        self.stride = nu + 2 * nv + SLACK;
+        self.own.reserve(nv);
+        self.dependent.reserve(dependent);
+        self.slopes.reserve(costs);
+        for (rows, most) in [(&mut self.efforts, nu), (&mut self.steps, dependent), (&mut self.costs, costs)] {
+            rows.resize(most, self.stride);
+        }
+    }
+
+    /// U and D, for as long as G is written.
+    pub(crate) fn lend(&mut self) -> Self {
+        let Self { wanted, active, stride, .. } = *self;
+        let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
+        core::mem::replace(self, Self { wanted, active, stride, costs, slopes, ..Self::default() })
+    }
+
+    /// Ends what `lend` began.
+    pub(crate) fn take_back(&mut self, lent: Self) {
+        let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
+        *self = Self { costs, slopes, ..lent };
+    }
+
+    /// Takes over G.
+    pub(crate) fn set_costs(&mut self, rows: &[f64], slopes: &[[f64; 2]]) {
+        self.costs.resize(slopes.len(), self.stride);
+        for (to, from) in self.costs.numbers.chunks_exact_mut(self.stride).zip(rows.chunks_exact(self.stride)) {
+            to[..self.stride - SLACK].copy_from_slice(&from[..self.stride - SLACK]);
+        }
+        self.slopes.clear();
+        self.slopes.extend_from_slice(slopes);
+        self.costs.mark(self.stride);
+    }
+}
+
+/// An outer product of some rows with as many others, with the same blocks of zeros.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    /// The first row on the left and on the right.
+    rows: [usize; 2],
+    masks: [u64; 2],
+    count: usize,
+}
+
+/// Scratch of the form.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Form {
+    /// The factors of the outer products, with the factor of the gradient behind (w, δv, δq). Shape: rows of one stride.
+    rows: Vec<f64>,
+    count: usize,
+    parts: Vec<Part>,
+    /// ½ Π_dd. Shape: dependent × dependent, with slack rows.
+    half: Vec<f64>,
+    /// U_w. Shape: nu × nu, with slack rows.
+    U: Vec<f64>,
+    /// [K_u k_u]ᵀ. Shape: as H.
+    gains: Vec<f64>,
+}
+
+impl Form {
+    /// Room for n states and at most m controls.
+    pub(crate) fn new(n: usize, m: usize) -> Self {
+        Self { U: vec![0.0; (m + SLACK) * m], gains: vec![0.0; stride(n, m) * m], ..Self::default() }
+    }
+
+    /// A row for a factor, `a` times x.
+    #[inline(always)]
+    fn push(&mut self, x: &[f64], a: f64) -> &mut [f64] {
+        let at = self.count * x.len();
+        self.count += 1;
+        if self.rows.len() < at + x.len() {
+            self.rows.resize(at + x.len(), 0.0);
+        }
+        let row = &mut self.rows[at..at + x.len()];
+        for (to, x) in row.iter_mut().zip(x) {
+            *to = a * x;
+        }
+        row
+    }
+
+    /// Of the rows `left` with those from `right` on.
+    #[inline(always)]
+    fn multiply(&mut self, left: core::ops::Range<usize>, right: usize, masks: [u64; 2]) {
+        match self.parts.last_mut() {
+            Some(last) if last.masks == masks && last.rows.map(|row| row + last.count) == [left.start, right] => {
+                last.count += left.len();
+            }
+            _ => self.parts.push(Part { rows: [left.start, right], masks, count: left.len() }),
+        }
+    }
+
+    /// H += a″ x xᵀ and a gradient of a′ x.
+    #[inline(always)]
+    fn square(&mut self, x: &[f64], mask: u64, [d, dd]: [f64; 2], size: usize) {
+        let (k, gradient) = (self.count, 1 << (size / block(x.len())));
+        if dd > 0.0 {
+            let root = dd.sqrt();
+            self.push(x, root)[size] = d / root;
+            self.multiply(k..k + 1, k, [mask | gradient, mask]);
+        } else if d != 0.0 || dd != 0.0 {
+            self.push(x, dd)[size] = d;
+            self.push(x, 1.0);
+            self.multiply(k..k + 1, k + 1, [mask | gradient, mask]);
+        }
+    }
+}
+
+impl Work {
+    /// H of the knot, with ϱ in it, in the order (w, δv, δq).
+    #[inline(always)]
+    pub(crate) fn add_implicit<V: Vector, const NR: usize>(&mut self, node: &LqNode, regularisation: f64) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (nv, ld, all) = (n / 2, stride(n, m), m + n);
+        let (ldn, imp) = (nv + SLACK, &node.implicit);
+        let (dt, blocks) = node.structure.euler().expect("an implicit node is one of Euler steps");
+        self.step_curvature::<V, NR>(dt, blocks);
+        let Self { H, euler, form, .. } = self;
+        let (N, Pi, py) = (&euler.N, &euler.Pi, &euler.py);
+
+        // Π and N on the unknowns and δv
+        let forces = imp.own.last().map_or(0, |own| own[1] + own[2]);
+        for &[c, k, length] in &imp.own {
+            for j in 0..length {
+                let column = &mut H[(k + j) * ld..][..ld];
+                let (Pi, N) = (&Pi[(c + j) * ldn..][..nv], &N[(c + j) * ldn..][..nv]);
+                for &[cc, kk, length] in &imp.own {
+                    if kk >= k {
+                        copy::<V>(&mut column[kk..], &Pi[cc..cc + length]);
+                    }
+                }
+                for k in forces..m {
+                    column[k] = 0.0;
+                }
+                copy::<V>(&mut column[m..], Pi);
+                copy::<V>(&mut column[m + nv..], N);
+                column[all] = py[c + j];
+            }
+        }
+        for k in forces..m {
+            H[k * ld + k..][..=all - k].fill(0.0);
+        }
+        for j in 0..nv {
+            let column = &mut H[(m + j) * ld..][..ld];
+            copy::<V>(&mut column[m + j..], &Pi[j * ldn + j..][..nv - j]);
+            copy::<V>(&mut column[m + nv..], &N[j * ldn..][..nv]);
+            column[m + j] += node.Q[(nv + j, nv + j)];
+            column[all] = py[j] + node.q[nv + j];
+            let column = &mut H[(m + nv + j) * ld..][..ld];
+            copy::<V>(&mut column[m + nv + j..], &node.Q.as_slice()[j * n + j..][..nv - j]);
+            column[all] = node.q[j];
+        }
+
+        // Uᵀ (R + ϱ 1) U and Gᵀ a″ G
+        let size = imp.stride;
+        form.count = 0;
+        form.parts.clear();
+        for (k, (row, &mask)) in imp.efforts.numbers.chunks_exact(size).zip(&imp.efforts.masks).enumerate() {
+            form.square(row, mask, [node.r[k], node.R[(k, k)] + regularisation], all);
+        }
+        for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
+            form.square(row, mask, slopes, all);
+        }
+        // ZᵀD + DᵀZ
+        let (D, count) = (form.count, imp.dependent.len());
+        let Z = D + count;
+        for row in imp.steps.numbers.chunks_exact(size) {
+            form.push(row, 1.0);
+        }
+        for row in imp.steps.numbers.chunks_exact(size) {
+            form.push(row, 0.0);
+        }
+        let ldh = count + SLACK;
+        form.half.resize(ldh * count, 0.0);
+        for (j, &d) in imp.dependent.iter().enumerate() {
+            let (Pi, N, row) = (&Pi[d * ldn..][..nv], &N[d * ldn..][..nv], &mut form.rows[(Z + j) * size..][..size]);
+            for &[c, k, length] in &imp.own {
+                copy::<V>(&mut row[k..], &Pi[c..c + length]);
+            }
+            copy::<V>(&mut row[m..], Pi);
+            copy::<V>(&mut row[m + nv..], N);
+            row[all] = py[d];
+            for (i, &d) in imp.dependent.iter().enumerate() {
+                form.half[j * ldh + i] = 0.5 * Pi[d]; // symmetric
+            }
+        }
+        if count > 0 {
+            let (D, Z) = form.rows[D * size..].split_at_mut(count * size);
+            let (D, half) = (View { data: D, stride: size }, View { data: &form.half, stride: ldh });
+            let mut j = 0;
+            while j < count {
+                column_block::<V, NR>(Z, size, 0..all, j, NR.min(count - j), D, half, count, Store::Add);
+                j += NR;
+            }
+        }
+        for (k, &mask) in imp.steps.masks.iter().enumerate() {
+            form.multiply(Z + k..Z + k + 1, D + k, [u64::MAX, mask]);
+        }
+        for (k, &mask) in imp.steps.masks.iter().enumerate() {
+            form.multiply(D + k..D + k + 1, Z + k, [mask, u64::MAX]);
+        }
+        add_outer::<V, NR>(H, ld, all, form, size);
+        self.position_curvature::<V, NR>(m, blocks);
+    }
+
+    /// From H after the elimination of w, [L ·; X ·; yᵀ ·]:
+    ///
+    /// K = U_x − U_w L⁻ᵀ Xᵀ,   k = −U_w L⁻ᵀ y,   Quᵀk = −yᵀy = −kᵀQuu k
+    #[inline(always)]
+    pub(crate) fn gains_of_efforts<V: Vector, const NR: usize>(&mut self, node: &LqNode, knot: &mut LqKnot) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (nv, ld, imp) = (n / 2, stride(n, m), &node.implicit);
+        let Self { H, form: Form { U, gains, .. }, .. } = self;
+        let ldu = m + SLACK;
+        transpose::<V>(U, ldu, 0, &imp.efforts.numbers, imp.stride, 0..m, 0..m);
+        solve_transposed::<V, NR>(U, ldu, m, H, ld, m);
+        for (to, from) in gains.chunks_exact_mut(ld).zip(imp.efforts.numbers.chunks_exact(imp.stride)) {
+            copy::<V>(to, &from[m..m + n]);
+            to[n] = 0.0;
+        }
+        let (a, b) = (View { data: &H[m..], stride: ld }, View { data: U, stride: ldu });
+        let mut j = 0;
+        while j < m {
+            column_block::<V, NR>(gains, ld, 0..n + 1, j, NR.min(m - j), a, b, m, Store::Subtract);
+            j += NR;
+        }
+        let K = knot.K.as_mut_slice();
+        transpose::<V>(&mut K[nv * m..], m, 0, gains, ld, 0..nv, 0..m);
+        transpose::<V>(K, m, 0, gains, ld, nv..n, 0..m);
+        let mut square = 0.0;
+        for j in 0..m {
+            knot.k[j] = gains[j * ld + n];
+            square += H[j * ld + m + n] * H[j * ld + m + n];
+        }
+        knot.expected = [-square, square];
+    }
+}
+
+/// The lower triangle (with some of the upper one) of H += Σ left rightᵀ, and the row of the gradient below it, without
+/// the blocks that are zero.
+#[inline(always)]
+fn add_outer<V: Vector, const NR: usize>(H: &mut [f64], ld: usize, size: usize, form: &Form, stride: usize) {
+    let wide = block(stride);
+    let bits = |from: usize, length: usize| {
+        let (first, last) = (from / wide, (from + length - 1) / wide);
+        (2_u64 << (last - first)).wrapping_sub(1) << first
+    };
+    let mut j = 0;
+    while j < size {
+        let columns = bits(j, NR.min(size - j));
+        let mut i = j;
+        while i <= size {
+            let strip = if size - i >= V::N { 2 } else { 1 };
+            let rows = bits(i, strip * V::N);
+            let mut tile = [[V::splat(0.0); 2]; NR];
+            for part in &form.parts {
+                if part.masks[0] & rows == 0 || part.masks[1] & columns == 0 {
+                    continue;
+                }
+                let [left, right] = part.rows;
+                for p in 0..part.count {
+                    let (left, right) =
+                        (&form.rows[(left + p) * stride + i..], &form.rows[(right + p) * stride + j..][..NR]);
+                    let first = V::load(left);
+                    if strip == 1 {
+                        for jj in 0..NR {
+                            tile[jj][0] = first.mul_add(V::splat(right[jj]), tile[jj][0]);
+                        }
+                    } else {
+                        let second = V::load(&left[V::N..]);
+                        for jj in 0..NR {
+                            let x = V::splat(right[jj]);
+                            tile[jj][0] = first.mul_add(x, tile[jj][0]);
+                            tile[jj][1] = second.mul_add(x, tile[jj][1]);
+                        }
+                    }
+                }
+            }
+            for jj in 0..NR {
+                if jj < size - j {
+                    let column = &mut H[(j + jj) * ld + i..][..strip * V::N];
+                    for s in 0..2 {
+                        if s < strip {
+                            let place = &mut column[s * V::N..];
+                            V::load(place).add(tile[jj][s]).store(place);
+                        }
+                    }
+                }
+            }
+            i += strip * V::N;
+        }
+        j += NR;
+    }
+}

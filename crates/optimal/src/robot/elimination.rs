@@ -1,0 +1,306 @@
+//! The equations of a knot in contact, solved for what is not chosen: see [`implicit`](crate::implicit).
+//!
+//! Changes of accelerations a and forces f satisfy
+//!
+//! ```text
+//! J δa            + c_v δv + c_q δq = 0         contacts stay            → the accelerations of the limbs in contact
+//! M_b δa − J_bᵀ δf + r_v δv + r_q δq = 0         nothing drives the base  → forces, and accelerations if these cannot
+//! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        the joints               → δu
+//! ```
+//!
+//! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those that
+//! it may best do without. A contact's rows prefer joints that move no other contact; where these are close to singular
+//! (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are redundant is there
+//! no pivot, and the knot stays explicit.
+#![allow(non_snake_case)] // J, M, T, U, D
+
+use super::quadratic::Row;
+use super::watch::{Signal, Slopes};
+use crate::dense::SLACK;
+use crate::implicit::{Implicit, Rows};
+use crate::vector::{Dense, Vector, at_level};
+
+/// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
+const PREFERENCE: f64 = 1e-2;
+/// A pivot that is so much smaller than the row's largest entry was at first counts as zero.
+const REDUNDANT: f64 = 1e-7;
+
+/// How wide and how high the tableau of a knot is: a row for each contact's row and each coordinate, over
+/// (δa, δf, δv, δq).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tableau {
+    pub nv: usize,
+    /// The number of rows of all contacts.
+    pub rows: usize,
+}
+
+impl Tableau {
+    /// From one row to the next.
+    pub(super) fn stride(self) -> usize {
+        3 * self.nv + self.rows + SLACK
+    }
+
+    /// How many numbers it has.
+    pub(super) fn len(self) -> usize {
+        (self.rows + self.nv) * self.stride()
+    }
+}
+
+/// The elimination for one set of contacts, and its scratch.
+#[derive(Clone, Debug)]
+pub(super) struct Elimination {
+    tableau: Tableau,
+    /// How many coordinates, the first ones, are not driven.
+    passive: usize,
+    /// For each contact's row the coordinates that it prefers.
+    preferred: Vec<Vec<usize>>,
+    /// The column that each row was solved for.
+    pivots: Vec<usize>,
+    /// For each column of δa and δf its unknown, if it is one, or else the row that was solved for it.
+    place: Vec<Place>,
+    /// Runs of columns that are unknowns: the first column, the first unknown, how many.
+    runs: Vec<[usize; 3]>,
+    /// The forces that are not unknowns, over (w, δv, δq).
+    forces: Rows,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Place {
+    Unknown(usize),
+    Row(usize),
+}
+
+impl Elimination {
+    /// For contacts whose rows are moved by some coordinates each, of a robot whose first `passive` coordinates are not
+    /// driven.
+    pub(super) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
+        let rows = moved_by.len();
+        let driven = |k: &usize| *k >= passive;
+        let alone = |r: usize, k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
+        let preferred = (0..rows).map(|r| {
+            let own: Vec<_> = moved_by[r].iter().copied().filter(|k| driven(k) && alone(r, k)).collect();
+            if own.is_empty() { moved_by[r].iter().copied().filter(driven).collect() } else { own }
+        });
+        Self {
+            tableau: Tableau { nv, rows },
+            passive,
+            preferred: preferred.collect(),
+            pivots: Vec::with_capacity(rows + passive),
+            place: vec![Place::Unknown(0); nv + rows],
+            runs: Vec::with_capacity(nv + rows),
+            forces: Rows::default(),
+        }
+    }
+
+    /// The most coordinates that are not unknowns.
+    pub(super) fn most_dependent(&self) -> usize {
+        self.tableau.rows + self.passive
+    }
+
+    /// Writes U and D for steps of Δt; says whether there were pivots. Overwrites the tableau.
+    pub(super) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut Implicit) -> bool {
+        let mut done = false;
+        at_level(Run { elimination: self, T: tableau, dt, implicit, done: &mut done });
+        done
+    }
+
+    /// How signals depend on (w, δv, δq), for a knot whose U and D are these.
+    pub(super) fn slopes<'a>(&'a self, implicit: &'a Implicit, dt: f64) -> Unknowns<'a> {
+        Unknowns { elimination: self, implicit, dt }
+    }
+
+    /// The column with the largest entry of a row, and the entry.
+    #[inline(always)]
+    fn largest(&self, row: &[f64], columns: impl Iterator<Item = usize>) -> (usize, f64) {
+        let mut best = (0, 0.0);
+        for k in columns {
+            if row[k].abs() > f64::abs(best.1) && matches!(self.place[k], Place::Unknown(_)) {
+                best = (k, row[k]);
+            }
+        }
+        best
+    }
+
+    /// The column to solve row r for.
+    #[inline(always)]
+    fn choose(&self, r: usize, row: &[f64], scale: [f64; 2]) -> Option<usize> {
+        let Tableau { nv, rows } = self.tableau;
+        let any = self.largest(row, 0..nv);
+        let (best, least) = if r < rows {
+            (self.largest(row, self.preferred[r].iter().copied()), PREFERENCE * any.1.abs())
+        } else {
+            (self.largest(row, nv..nv + rows), PREFERENCE * scale[1])
+        };
+        match (best, any) {
+            ((k, pivot), _) if pivot != 0.0 && pivot.abs() >= least && pivot.abs() > REDUNDANT * scale[1] => Some(k),
+            (_, (k, pivot)) if pivot.abs() > REDUNDANT * scale[0] => Some(k),
+            _ => None, // a NaN ends here
+        }
+    }
+}
+
+struct Run<'a> {
+    elimination: &'a mut Elimination,
+    T: &'a mut [f64],
+    dt: f64,
+    implicit: &'a mut Implicit,
+    done: &'a mut bool,
+}
+
+/// y −= a x on whole registers.
+#[inline(always)]
+fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64) {
+    let (a, mut i) = (V::splat(-a), 0);
+    while i + V::N <= y.len() {
+        let place = &mut y[i..][..V::N];
+        V::load(&x[i..]).mul_add(a, V::load(place)).store(place);
+        i += V::N;
+    }
+}
+
+impl Dense for Run<'_> {
+    #[inline(always)]
+    fn run<V: Vector, const NR: usize>(self) {
+        let Self { elimination: e, T, dt, implicit, done } = self;
+        let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
+        let (solved, all) = (rows + e.passive, rows + nv);
+        let largest = |x: &[f64]| x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let mut force_scale = 0.0_f64;
+        for r in rows..solved {
+            force_scale = force_scale.max(largest(&T[r * stride + nv..][..rows]));
+        }
+        e.place.fill(Place::Unknown(0));
+        e.pivots.clear();
+        for r in 0..solved {
+            let (before, rest) = T.split_at_mut(r * stride);
+            let (row, after) = rest.split_at_mut(stride);
+            // what the entries of a row that depends on others are compared with: a contact's are of order one
+            let scale = if r < rows { [1.0, 1.0] } else { [largest(&row[..nv]), force_scale] };
+            let Some(k) = e.choose(r, row, scale) else { return };
+            e.place[k] = Place::Row(r);
+            e.pivots.push(k);
+            let inverse = row[k].recip();
+            for x in row.iter_mut() {
+                *x *= inverse;
+            }
+            row[k] = 1.0;
+            for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride).take(all - r - 1)) {
+                let factor = other[k];
+                if factor != 0.0 {
+                    subtract::<V>(other, row, factor);
+                    other[k] = 0.0;
+                }
+            }
+        }
+
+        // the columns that are left are the unknowns
+        let mut unknowns = 0;
+        e.runs.clear();
+        implicit.own.clear();
+        for k in 0..nv + rows {
+            if matches!(e.place[k], Place::Row(_)) {
+                continue;
+            }
+            e.place[k] = Place::Unknown(unknowns);
+            match e.runs.last_mut() {
+                Some([first, _, length]) if *first + *length == k && k != nv => *length += 1,
+                _ => e.runs.push([k, unknowns, 1]),
+            }
+            unknowns += 1;
+        }
+        implicit.own.extend(e.runs.iter().filter(|run| run[0] < nv));
+        let size = implicit.stride;
+        let m = nv - e.passive;
+        let gather = Gather { runs: &e.runs, nv, x: nv + rows, m };
+
+        // U; the dependent steps D; the dependent forces
+        implicit.efforts.resize(m, size);
+        for (row, to) in T[solved * stride..].chunks_exact(stride).zip(implicit.efforts.numbers.chunks_exact_mut(size))
+        {
+            gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
+        }
+        implicit.dependent.clear();
+        implicit.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
+        implicit.steps.resize(implicit.dependent.len(), size);
+        e.forces.resize(solved - implicit.dependent.len(), size);
+        let (mut step, mut force) = (0, 0);
+        for (r, &k) in e.pivots.iter().enumerate() {
+            let row = &T[r * stride..][..stride];
+            if k < nv {
+                gather.row::<V>(row, [-1.0, -dt, -dt], &mut implicit.steps.numbers[step * size..][..size]);
+                e.place[k] = Place::Row(step);
+                step += 1;
+            } else {
+                gather.row::<V>(row, [-1.0 / dt, -1.0, -1.0], &mut e.forces.numbers[force * size..][..size]);
+                e.place[k] = Place::Row(force);
+                force += 1;
+            }
+        }
+        implicit.efforts.mark(size);
+        implicit.steps.mark(size);
+        *done = true;
+    }
+}
+
+/// From the columns (δa, δf, δv, δq) to (w, δv, δq).
+struct Gather<'a> {
+    runs: &'a [[usize; 3]],
+    nv: usize,
+    /// Where δv begins.
+    x: usize,
+    m: usize,
+}
+
+impl Gather<'_> {
+    #[inline(always)]
+    fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
+        for &[from, unknown, length] in self.runs {
+            let by = if from < self.nv { by_a } else { by_f };
+            for j in 0..length {
+                to[unknown + j] = by * row[from + j];
+            }
+        }
+        let (x, to) = (&row[self.x..][..2 * self.nv], &mut to[self.m..][..2 * self.nv]);
+        for j in 0..2 * self.nv {
+            to[j] = by_x * x[j];
+        }
+    }
+}
+
+/// The slopes of a knot over (w, δv, δq); see [`Elimination::slopes`].
+pub(super) struct Unknowns<'a> {
+    elimination: &'a Elimination,
+    implicit: &'a Implicit,
+    dt: f64,
+}
+
+impl Unknowns<'_> {
+    /// g += c times row k of some rows.
+    fn add(&self, rows: &Rows, k: usize, c: f64, g: &mut Row<'_>) {
+        let row = &rows.numbers[k * self.implicit.stride..];
+        let (u, x) = row.split_at(g.u.len());
+        let (v, q) = x.split_at(g.v.len());
+        for (g, row) in [(&mut *g.u, u), (&mut *g.v, v), (&mut *g.q, q)] {
+            g.iter_mut().zip(row).for_each(|(g, x)| *g += c * x);
+        }
+    }
+}
+
+impl Slopes for Unknowns<'_> {
+    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut Row<'_>) {
+        let Elimination { tableau, passive, place, forces, .. } = self.elimination;
+        let per_step = c / self.dt; // δa = (y − δv) / Δt
+        match (signal, row) {
+            (Signal::Effort, row) if row < *passive => {}
+            (Signal::Effort, row) => self.add(&self.implicit.efforts, row - passive, c, g),
+            (Signal::Acceleration, row) => match place[row] {
+                Place::Unknown(k) => g.u[k] += per_step,
+                Place::Row(k) => self.add(&self.implicit.steps, k, per_step, g),
+            },
+            (Signal::Force, row) => match place[tableau.nv + row] {
+                Place::Unknown(k) => g.u[k] += c,
+                Place::Row(k) => self.add(forces, k, c, g),
+            },
+        }
+    }
+}
