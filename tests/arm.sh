@@ -39,7 +39,7 @@ run condyle-spatial --lib --tests
 run condyle-dynamics --test vectors
 run condyle-dynamics --test suite -- limbs::
 run condyle-optimal --lib -- dense:: factor::
-run condyle-optimal --test contacts -- side_by_side
+run condyle-optimal --test contacts -- side_by_side implicit
 
 # a vector instruction that was not inlined shows in any program that has kernels
 program=$("$cargo" test --locked --target $target --package condyle-dynamics --test vectors --no-run --message-format=json |

@@ -188,6 +188,7 @@ impl ModelBuilder {
             support: Vec::new(),
             finished: Vec::new(),
             coupled: Vec::new(),
+            spaces: Vec::new(),
             limbs: None,
             warnings: Vec::new(),
             singular: Vec::new(),
@@ -217,6 +218,7 @@ impl ModelBuilder {
             }
         }
         model.add_nodes();
+        model.add_spaces();
         model.limbs = Plan::new(&model);
         for (body, &old) in model.bodies.iter().zip(&order).skip(1) {
             soundness::of_body(body, self.drafts[old].between, &mut model.warnings);

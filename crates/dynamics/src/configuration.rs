@@ -10,7 +10,33 @@ use nalgebra::DMatrix;
 /// Where a random position lies in a coordinate that has no limits: within this of zero (rad, m).
 const UNLIMITED: f64 = 3.0;
 
+/// Coordinates of one joint, or of several joints side by side whose coordinates are vectors.
+#[derive(Clone, Debug)]
+pub(crate) struct Space {
+    /// One of them.
+    pub joint: Joint,
+    pub q: Range<usize>,
+    pub v: Range<usize>,
+}
+
 impl<R> Model<R> {
+    /// All coordinates, in as few spaces as they make.
+    pub(crate) fn add_spaces(&mut self) {
+        let is_vector = |joint: Joint| joint.nq() == joint.nv();
+        let mut spaces: Vec<Space> = Vec::new();
+        for (joint, q, v) in self.coordinates() {
+            match spaces.last_mut() {
+                Some(last)
+                    if is_vector(last.joint) && is_vector(joint) && (last.q.end, last.v.end) == (q.start, v.start) =>
+                {
+                    (last.q.end, last.v.end) = (q.end, v.end);
+                }
+                _ => spaces.push(Space { joint, q, v }),
+            }
+        }
+        self.spaces = spaces;
+    }
+
     /// Each joint that has coordinates of its own, with where they stand in q and in v.
     fn coordinates(&self) -> impl Iterator<Item = (Joint, Range<usize>, Range<usize>)> + '_ {
         self.nodes
@@ -77,8 +103,8 @@ pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]
     check("q", q.len(), model.nq);
     check("v", v.len(), model.nv);
     check("out", out.len(), model.nq);
-    for (joint, iq, iv) in model.coordinates() {
-        joint.integrate(&q[iq.clone()], &v[iv], &mut out[iq]);
+    for space in &model.spaces {
+        space.joint.integrate(&q[space.q.clone()], &v[space.v.clone()], &mut out[space.q.clone()]);
     }
 }
 
@@ -92,8 +118,8 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
     check("q0", q0.len(), model.nq);
     check("q1", q1.len(), model.nq);
     check("out", out.len(), model.nv);
-    for (joint, iq, iv) in model.coordinates() {
-        joint.difference(&q0[iq.clone()], &q1[iq], &mut out[iv]);
+    for space in &model.spaces {
+        space.joint.difference(&q0[space.q.clone()], &q1[space.q.clone()], &mut out[space.v.clone()]);
     }
 }
 
@@ -251,12 +277,12 @@ fn block_diagonal<S: Scalar, R>(
     check(name, v.len(), model.nv);
     assert!(J.shape() == (model.nv, model.nv), "J: expected {0} × {0}, found {1:?}", model.nv, J.shape());
     J.as_mut_slice().fill(S::zero());
-    for (joint, _, iv) in model.coordinates() {
+    for Space { joint, v: iv, .. } in model.spaces.iter().cloned() {
         let mut signed = [S::zero(); 6];
         for (signed, &v) in signed.iter_mut().zip(&v[iv.clone()]) {
             *signed = v * sign;
         }
-        match joint.jacobian(which, &signed[..iv.len()]) {
+        match joint.jacobian(which, &signed[..iv.len().min(6)]) {
             None => iv.for_each(|k| J[(k, k)] = sign),
             Some(map) => {
                 let columns = map.columns();

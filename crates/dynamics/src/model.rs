@@ -1,5 +1,6 @@
 //! The frozen description of a robot.
 
+use crate::configuration::Space;
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::limbs::Plan;
@@ -169,6 +170,8 @@ pub struct Model<R = f64> {
     pub(crate) finished: Vec<usize>,
     /// For each coordinate.
     pub(crate) coupled: Vec<Coupled>,
+    /// All coordinates, in order.
+    pub(crate) spaces: Vec<Space>,
     /// How single calls compute several bodies at once, if they do.
     pub(crate) limbs: Option<Plan>,
     pub(crate) warnings: Vec<Warning>,
@@ -339,6 +342,7 @@ impl Model {
             support: self.support.clone(),
             finished: self.finished.clone(),
             coupled: self.coupled.clone(),
+            spaces: self.spaces.clone(),
             limbs: None,
             warnings: self.warnings.clone(),
             singular: self.singular.clone(),

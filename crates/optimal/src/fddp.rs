@@ -293,7 +293,12 @@ impl Fddp {
         let (shape, xs) = (self.solution.shape(), &self.solution.xs);
         for t in 0..=shape.horizon() {
             let predicted = if t == 0 { problem.x0() } else { &self.next[shape.x(t - 1)] };
-            problem.action(t).difference(&xs[shape.x(t)], predicted, &mut self.gaps[shape.dx(t)]);
+            let (x, gap) = (&xs[shape.x(t)], &mut self.gaps[shape.dx(t)]);
+            if x == predicted {
+                gap.fill(0.0);
+            } else {
+                problem.action(t).difference(x, predicted, gap);
+            }
         }
         max_abs(&self.gaps)
     }

@@ -44,16 +44,19 @@ impl Rows {
     /// Notes which blocks are not zero.
     #[inline(always)]
     pub(crate) fn mark(&mut self, stride: usize) {
-        let wide = block(stride);
+        let wide = block(stride) / 8;
         for (mask, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
             *mask = 0;
-            for (k, block) in row.chunks(wide).enumerate() {
+            let (eights, rest) = row.as_chunks::<8>();
+            for (k, x) in eights.iter().enumerate() {
                 let mut bits = 0;
-                for x in block {
-                    bits |= x.to_bits() << 1; // all but the sign
+                for i in 0..8 {
+                    bits |= x[i].to_bits() << 1; // all but the sign
                 }
-                *mask |= u64::from(bits != 0) << k;
+                *mask |= u64::from(bits != 0) << (k / wide);
             }
+            let rest = rest.iter().any(|x| *x != 0.0);
+            *mask |= u64::from(rest) << (eights.len() / wide);
         }
     }
 }

@@ -217,7 +217,7 @@ impl Dense for Run<'_> {
         implicit.efforts.resize(m, size);
         for (row, to) in T[solved * stride..].chunks_exact(stride).zip(implicit.efforts.numbers.chunks_exact_mut(size))
         {
-            gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
+            gather.row(row, [1.0 / dt, 1.0, 1.0], to);
         }
         implicit.dependent.clear();
         implicit.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
@@ -227,11 +227,11 @@ impl Dense for Run<'_> {
         for (r, &k) in e.pivots.iter().enumerate() {
             let row = &T[r * stride..][..stride];
             if k < nv {
-                gather.row::<V>(row, [-1.0, -dt, -dt], &mut implicit.steps.numbers[step * size..][..size]);
+                gather.row(row, [-1.0, -dt, -dt], &mut implicit.steps.numbers[step * size..][..size]);
                 e.place[k] = Place::Row(step);
                 step += 1;
             } else {
-                gather.row::<V>(row, [-1.0 / dt, -1.0, -1.0], &mut e.forces.numbers[force * size..][..size]);
+                gather.row(row, [-1.0 / dt, -1.0, -1.0], &mut e.forces.numbers[force * size..][..size]);
                 e.place[k] = Place::Row(force);
                 force += 1;
             }
@@ -251,19 +251,22 @@ struct Gather<'a> {
     m: usize,
 }
 
+/// to = a x.
+#[inline(always)]
+fn scale(to: &mut [f64], x: &[f64], a: f64) {
+    for (to, x) in to.iter_mut().zip(x) {
+        *to = a * x;
+    }
+}
+
 impl Gather<'_> {
     #[inline(always)]
-    fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
+    fn row(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
         for &[from, unknown, length] in self.runs {
             let by = if from < self.nv { by_a } else { by_f };
-            for j in 0..length {
-                to[unknown + j] = by * row[from + j];
-            }
+            scale(&mut to[unknown..][..length], &row[from..][..length], by);
         }
-        let (x, to) = (&row[self.x..][..2 * self.nv], &mut to[self.m..][..2 * self.nv]);
-        for j in 0..2 * self.nv {
-            to[j] = by_x * x[j];
-        }
+        scale(&mut to[self.m..][..2 * self.nv], &row[self.x..][..2 * self.nv], by_x);
     }
 }
 

@@ -337,8 +337,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         assert_length("nodes", nodes.len(), knots.len());
         for from in (0..knots.len()).step_by(lanes) {
             let to = (from + lanes).min(knots.len());
-            let side_by_side = to - from >= WORTHWHILE;
-            let implicit = side_by_side && self.implicit().is_some() && nodes[from].implicit.wanted;
+            let implicit = self.implicit().is_some() && nodes[from].implicit.wanted;
+            let side_by_side = implicit || to - from >= WORTHWHILE;
             if side_by_side {
                 let wanted = if implicit { Wanted::Equations } else { Wanted::Derivatives };
                 self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], wanted);
