@@ -3,7 +3,7 @@
 
 use crate::dense::{SLACK, View, add_product_lower, add_transposed_product_lower, product, transpose};
 use crate::lq::LqNode;
-use crate::riccati::{Work, stride};
+use crate::riccati::Work;
 use crate::structure::{EulerBlock, LARGEST_BLOCK};
 use crate::vector::Vector;
 
@@ -39,7 +39,7 @@ impl Work {
         node: &LqNode,
     ) {
         let n = self.p.len();
-        let (nv, ld, rows) = (n / 2, stride(n, m), m + n);
+        let (nv, ld, rows) = (n / 2, self.stride(m), m + n);
         let (ldp, ldn) = (n + SLACK, nv + SLACK);
         let Self { P, p, F, W, H, euler: Euler { N, Pi, M, PB }, .. } = self;
 
@@ -117,6 +117,43 @@ impl Work {
         }
         for j in 0..nv {
             H_qq[j * ld + nv] += p[j];
+        }
+    }
+}
+
+impl Work {
+    /// Rows below H: Θ [B A] for a Θ of n rows (stride n + SLACK),
+    ///
+    /// ```text
+    /// Θ B = Ψ G,   Θ A = Ψ [F_q F_v] + [Θ_q T  0],   Ψ = Δt Θ_q E + Θ_v
+    /// ```
+    #[inline(always)]
+    pub(crate) fn add_euler_below<V: Vector, const NR: usize>(
+        &mut self,
+        Theta: &[f64],
+        m: usize,
+        dt: f64,
+        blocks: &[EulerBlock],
+    ) {
+        let n = self.p.len();
+        let (nv, ld, ldt, at) = (n / 2, self.stride(m), n + SLACK, m + n + 1);
+        let Self { F, W: Psi, H, euler: Euler { PB, .. }, .. } = self;
+        times_blocks::<V, NR>(PB, Theta, ldt, n, blocks, |block| &block.E);
+        for k in 0..nv {
+            let (Theta_q, Theta_v) = (column(k, blocks, Theta, PB, ldt), &Theta[(nv + k) * ldt..][..n]);
+            let Psi = &mut Psi[k * ldt..][..n];
+            for i in 0..n {
+                Psi[i] = dt * Theta_q[i] + Theta_v[i];
+            }
+        }
+        let (Psi, F) = (View { data: Psi, stride: ldt }, View { data: F, stride: ld });
+        product::<V, NR>(&mut H[at..], ld, [n, m + n, nv], Psi, F);
+        times_blocks::<V, NR>(PB, Theta, ldt, n, blocks, |block| &block.T);
+        for j in 0..nv {
+            let (Theta_q, H) = (column(j, blocks, Theta, PB, ldt), &mut H[(m + nv + j) * ld + at..][..n]);
+            for i in 0..n {
+                H[i] += Theta_q[i];
+            }
         }
     }
 }

@@ -34,7 +34,8 @@ use std::time::Instant;
 /// The first step length is tried alone; if it fails, the others are tried side by side, as many as the actions have
 /// [`lanes`](crate::ActionModel::lanes), and the longest good one is taken: the same step that one by one would find.
 ///
-/// The workspace is allocated by [`new`](Self::new); a solve allocates the trace when it begins (not again the next time), and then nothing.
+/// The workspace is allocated by [`new`](Self::new); a solve allocates the trace, and workspaces for
+/// [`segments`](Settings::segments), when it begins (not again the next time), and then nothing.
 ///
 /// # Examples
 /// ```
@@ -185,6 +186,7 @@ impl Fddp {
         let start = self.settings.regularisation_start;
         let mut progress =
             Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
+        self.sweep.set_segments(self.settings.segments);
         self.sweep.forget();
         self.clock.start(begin, self.settings.time_budget);
         let status = self.iterate(problem, &mut progress, &mut observer);

@@ -36,6 +36,11 @@ pub struct Settings {
     /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
     /// as the last of its kind. `None` for no limit.
     pub time_budget: Option<Duration>,
+    /// How many segments of the horizon a sweep works on at the same time: see [`Sweep::set_segments`]. It is not the number
+    /// of threads, which are those of rayon's pool, and any number of them finds the same.
+    ///
+    /// [`Sweep::set_segments`]: crate::Sweep::set_segments
+    pub segments: usize,
     /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
     pub step_lengths: usize,
     /// A step is accepted if the cost falls by more than this times the expected decrease.
@@ -68,6 +73,7 @@ impl Default for Settings {
             tolerance: 1e-9,
             tolerance_bounded: 5e-5,
             time_budget: None,
+            segments: 1,
             step_lengths: 10,
             accept: 0.1,
             accept_ascent: 2.0,
@@ -88,10 +94,11 @@ impl Settings {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();
-        let steps = self.step_lengths as f64;
+        let (steps, segments) = (self.step_lengths as f64, self.segments as f64);
         for (name, value, good, allowed) in [
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
+            ("segments", segments, self.segments > 0, "at least 1"),
             ("step_lengths", steps, (1..=60).contains(&self.step_lengths), "from 1 to 60"),
             ("accept", self.accept, from_zero(self.accept), "at least 0"),
             ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),
