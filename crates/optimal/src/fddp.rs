@@ -35,7 +35,8 @@ use std::time::Instant;
 /// [`lanes`](crate::ActionModel::lanes), and the longest good one is taken: the same step that one by one would find.
 ///
 /// The workspace is allocated by [`new`](Self::new); a solve allocates the trace, and workspaces for
-/// [`segments`](Settings::segments), when it begins (not again the next time), and then nothing.
+/// [`segments`](Settings::segments), when it begins, and copies of actions for [`threads`](Settings::threads) (not again the
+/// next time), and then nothing, but for what rayon does by itself.
 ///
 /// # Examples
 /// ```
@@ -297,7 +298,8 @@ impl Fddp {
     /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on.
     fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
-        problem.calc_diff(&self.solution.xs, &self.solution.us, &mut self.nodes);
+        let Solution { xs, us, .. } = &self.solution;
+        problem.calc_diff_on(self.settings.threads, xs, us, &mut self.nodes);
         for (t, node) in self.nodes.iter_mut().enumerate() {
             match self.gaps.get(self.solution.shape().dx(t + 1)) {
                 Some(gap) if !feasible => node.f.as_mut_slice().copy_from_slice(gap),

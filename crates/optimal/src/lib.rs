@@ -92,6 +92,7 @@ mod shift;
 mod solution;
 mod structure;
 mod sweep;
+mod threads;
 mod vector;
 
 pub use action::ActionModel;

@@ -215,4 +215,14 @@ fn a_gait_allocates_nothing() {
     });
     assert_eq!(second, 0);
     assert!(solver.solution().trace.iter().any(|i| i.accepted));
+    // with copies for three threads, once they are made
+    solver.settings.threads = 3;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let count = pool.install(|| {
+        solver.solve(&mut problem, &xs, &us).unwrap();
+        allocations(|| {
+            solver.solve(&mut problem, &xs, &us).unwrap();
+        })
+    });
+    assert_eq!(count, 0);
 }
