@@ -5,6 +5,10 @@
 //! 106 / 11 / 2.9 / 1.8 · baseline 133 / 15 / 3.7 / 2.3, dense 222 / 22 / 4.9 / 2.7. The form is used from 16 states on. Of the
 //! 46 µs, 36 % are the three products (at 57 GFLOP/s), 24 % factor and gains, 10 % waiting for 200 KB a knot, the rest copies
 //! and transposes.
+//!
+//! In segments, on one thread, of such steps of 46 / 8.1 / 1.6 µs: one that does not know what comes after the segment
+//! takes 1.4 / 1.3 / 1.0, a link 1.9 / 1.7 / 1.35. From these are the figures of `Sweep::set_segments`. The group `segments`
+//! has the time of whole sweeps, on one thread and on as many as there are.
 #![allow(non_snake_case)]
 
 use condyle::optimal::{LqNode, Sweep};
@@ -16,6 +20,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 const HORIZON: usize = 50;
+const LONG: usize = 100;
 const DT: f64 = 0.02;
 
 /// A humanoid, a quadruped, an arm of 7 joints and one of 9: (ndx, nu, rows of the free joint).
@@ -45,15 +50,20 @@ fn node(rng: &mut StdRng, ndx: usize, nu: usize, free: usize) -> LqNode {
     node
 }
 
+fn nodes(horizon: usize, (ndx, nu, free): (usize, usize, usize)) -> Vec<LqNode> {
+    let mut rng = StdRng::seed_from_u64(1);
+    let mut nodes: Vec<_> = (0..horizon).map(|_| node(&mut rng, ndx, nu, free)).collect();
+    let mut end = LqNode::zeros(ndx, 0);
+    end.Q.fill_with_identity();
+    nodes.push(end);
+    nodes
+}
+
 fn sweep(c: &mut Criterion) {
     let mut group = c.benchmark_group("sweep");
     group.throughput(Throughput::Elements(HORIZON as u64));
     for (ndx, nu, free) in SIZES {
-        let mut rng = StdRng::seed_from_u64(1);
-        let mut nodes: Vec<_> = (0..HORIZON).map(|_| node(&mut rng, ndx, nu, free)).collect();
-        let mut end = LqNode::zeros(ndx, 0);
-        end.Q.fill_with_identity();
-        nodes.push(end);
+        let mut nodes = nodes(HORIZON, (ndx, nu, free));
         let mut sweep = Sweep::new(&nodes);
         for form in ["Euler", "dense"] {
             if form == "dense" {
@@ -68,9 +78,28 @@ fn sweep(c: &mut Criterion) {
     group.finish();
 }
 
+fn segments(c: &mut Criterion) {
+    let mut group = c.benchmark_group("segments");
+    group.throughput(Throughput::Elements(LONG as u64));
+    let all = std::thread::available_parallelism().map_or(1, |threads| threads.get());
+    for threads in [1, all] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+        for (ndx, nu, free) in &SIZES[..3] {
+            let nodes = nodes(LONG, (*ndx, *nu, *free));
+            let mut sweep = Sweep::new(&nodes);
+            for segments in [1, 2, 4, 8] {
+                sweep.set_segments(segments);
+                let id = BenchmarkId::new(format!("{segments} on {threads} threads"), format!("ndx {ndx}, nu {nu}"));
+                group.bench_function(id, |b| pool.install(|| b.iter(|| sweep.run(black_box(&nodes), 1e-9))));
+            }
+        }
+    }
+    group.finish();
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(30).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
-    targets = sweep
+    targets = sweep, segments
 }
 criterion_main!(benches);

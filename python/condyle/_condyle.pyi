@@ -2486,7 +2486,10 @@ class Fddp:
         any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
         `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
         `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
-        `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit").
+        `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit"),
+        `segments` (of the horizon on which a sweep works at the same time, in as many threads as there are; 1 unless
+        given, for one thread. Results are the same but for rounding, and to the last bit for any number of threads),
+        `threads` (on which derivatives of a robot are computed, 1 unless given; the same to the last bit).
     """
 
     def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...

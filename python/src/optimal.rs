@@ -239,7 +239,10 @@ impl Problem {
 ///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
 ///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
 ///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
-///     `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit").
+///     `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit"),
+///     `segments` (of the horizon on which a sweep works at the same time, in as many threads as there are; 1 unless
+///     given, for one thread. Results are the same but for rounding, and to the last bit for any number of threads),
+///     `threads` (on which derivatives of a robot are computed, 1 unless given; the same to the last bit).
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Fddp {
     problem: Py<Problem>,
@@ -266,6 +269,14 @@ impl Fddp {
                 }
                 "implicit" => {
                     s.implicit = value.extract()?;
+                    continue;
+                }
+                "segments" => {
+                    s.segments = value.extract()?;
+                    continue;
+                }
+                "threads" => {
+                    s.threads = value.extract()?;
                     continue;
                 }
                 "step_lengths" => {

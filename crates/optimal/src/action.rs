@@ -133,6 +133,12 @@ pub trait ActionModel: Any + Send {
         }
     }
 
+    /// A copy that computes the same, for another thread; `None`, unless an implementation gives one: then its knots are
+    /// all differentiated on one thread, whatever [`threads`](crate::Settings::threads) says.
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        None
+    }
+
     /// x ⊕ δx into `out` (nx); the sum in a vector space.
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         for ((o, x), dx) in out.iter_mut().zip(x).zip(dx) {

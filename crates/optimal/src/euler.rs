@@ -3,7 +3,7 @@
 
 use crate::dense::{SLACK, View, add_product_lower, add_transposed_product_lower, product, transpose};
 use crate::lq::LqNode;
-use crate::riccati::{Work, stride};
+use crate::riccati::Work;
 use crate::structure::{EulerBlock, LARGEST_BLOCK};
 use crate::vector::Vector;
 
@@ -42,7 +42,7 @@ impl Work {
         node: &LqNode,
     ) {
         let n = self.p.len();
-        let (nv, ld, rows) = (n / 2, stride(n, m), m + n);
+        let (nv, ld, rows) = (n / 2, self.stride(m), m + n);
         let ldn = nv + SLACK;
         self.step_curvature::<V, NR>(dt, blocks);
         let Self { F, W, H, euler: Euler { N, Pi, py, M, .. }, .. } = self;
@@ -111,7 +111,7 @@ impl Work {
     #[inline(always)]
     pub(crate) fn position_curvature<V: Vector, const NR: usize>(&mut self, m: usize, blocks: &[EulerBlock]) {
         let n = self.p.len();
-        let (nv, ld, ldp) = (n / 2, stride(n, m), n + SLACK);
+        let (nv, ld, ldp) = (n / 2, self.stride(m), n + SLACK);
         let Self { P, p, H, euler: Euler { PB, .. }, .. } = self;
         let H_qq = &mut H[(m + nv) * ld + m + nv..];
         times_blocks::<V, NR>(PB, P, ldp, nv, blocks, |block| &block.T);
@@ -138,6 +138,66 @@ impl Work {
         }
         for j in 0..nv {
             H_qq[j * ld + nv] += p[j];
+        }
+    }
+}
+
+impl Work {
+    /// Rows below H: Θ [B A] for a Θ of n rows (stride n + SLACK),
+    ///
+    /// ```text
+    /// Θ B = Ψ G,   Θ A = Ψ [F_q F_v] + [Θ_q T  0],   Ψ = Δt Θ_q E + Θ_v
+    /// ```
+    #[inline(always)]
+    pub(crate) fn add_euler_below<V: Vector, const NR: usize>(
+        &mut self,
+        Theta: &[f64],
+        m: usize,
+        dt: f64,
+        blocks: &[EulerBlock],
+    ) {
+        let n = self.p.len();
+        let (nv, ld, at) = (n / 2, self.stride(m), m + n + 1);
+        self.velocity_below::<V, NR>(Theta, dt, blocks);
+        let Self { F, W: Psi, H, .. } = self;
+        let (Psi, F) = (View { data: Psi, stride: n + SLACK }, View { data: F, stride: ld });
+        product::<V, NR>(&mut H[at..], ld, [n, m + n, nv], Psi, F);
+        self.position_below::<V, NR>(Theta, m, blocks);
+    }
+
+    /// Ψ, in W with the stride of Θ.
+    #[inline(always)]
+    pub(crate) fn velocity_below<V: Vector, const NR: usize>(&mut self, Theta: &[f64], dt: f64, blocks: &[EulerBlock]) {
+        let n = self.p.len();
+        let (nv, ldt) = (n / 2, n + SLACK);
+        let Self { W: Psi, euler: Euler { PB, .. }, .. } = self;
+        times_blocks::<V, NR>(PB, Theta, ldt, n, blocks, |block| &block.E);
+        for k in 0..nv {
+            let (Theta_q, Theta_v) = (column(k, blocks, Theta, PB, ldt), &Theta[(nv + k) * ldt..][..n]);
+            let Psi = &mut Psi[k * ldt..][..n];
+            for i in 0..n {
+                Psi[i] = dt * Theta_q[i] + Theta_v[i];
+            }
+        }
+    }
+
+    /// Adds Θ_q T to the columns of δq.
+    #[inline(always)]
+    pub(crate) fn position_below<V: Vector, const NR: usize>(
+        &mut self,
+        Theta: &[f64],
+        m: usize,
+        blocks: &[EulerBlock],
+    ) {
+        let n = self.p.len();
+        let (nv, ld, ldt, at) = (n / 2, self.stride(m), n + SLACK, m + n + 1);
+        let Self { H, euler: Euler { PB, .. }, .. } = self;
+        times_blocks::<V, NR>(PB, Theta, ldt, n, blocks, |block| &block.T);
+        for j in 0..nv {
+            let (Theta_q, H) = (column(j, blocks, Theta, PB, ldt), &mut H[(m + nv + j) * ld + at..][..n]);
+            for i in 0..n {
+                H[i] += Theta_q[i];
+            }
         }
     }
 }

@@ -34,7 +34,9 @@ use std::time::Instant;
 /// The first step length is tried alone; if it fails, the others are tried side by side, as many as the actions have
 /// [`lanes`](crate::ActionModel::lanes), and the longest good one is taken: the same step that one by one would find.
 ///
-/// The workspace is allocated by [`new`](Self::new); a solve allocates the trace when it begins (not again the next time), and then nothing.
+/// The workspace is allocated by [`new`](Self::new); a solve allocates the trace, and workspaces for
+/// [`segments`](Settings::segments), when it begins, and copies of actions for [`threads`](Settings::threads) (not again the
+/// next time), and then nothing, but for what rayon does by itself.
 ///
 /// # Examples
 /// ```
@@ -190,6 +192,7 @@ impl Fddp {
         let start = self.settings.regularisation_start;
         let mut progress =
             Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
+        self.sweep.set_segments(self.settings.segments);
         self.sweep.forget();
         self.clock.start(begin, self.settings.time_budget);
         let status = self.iterate(problem, &mut progress, &mut observer);
@@ -309,7 +312,8 @@ impl Fddp {
         for node in &mut self.nodes {
             node.implicit.wanted = self.implicit;
         }
-        problem.calc_diff(&self.solution.xs, &self.solution.us, &mut self.nodes);
+        let Solution { xs, us, .. } = &self.solution;
+        problem.calc_diff_on(self.settings.threads, xs, us, &mut self.nodes);
         for (t, node) in self.nodes.iter_mut().enumerate() {
             match self.gaps.get(self.solution.shape().dx(t + 1)) {
                 Some(gap) if !feasible => node.f.as_mut_slice().copy_from_slice(gap),

@@ -24,7 +24,8 @@
 use crate::dense::{SLACK, Store, View, column_block, copy, transpose};
 use crate::factor::solve_transposed;
 use crate::lq::{LqKnot, LqNode};
-use crate::riccati::{Work, stride};
+use crate::riccati::Work;
+use crate::structure::EulerBlock;
 use crate::vector::Vector;
 
 /// Rows of numbers over (w, δv, δq), with zeros up to their stride, and for each which blocks are not zero.
@@ -147,14 +148,16 @@ pub(crate) struct Form {
     half: Vec<f64>,
     /// U_w. Shape: nu × nu, with slack rows.
     U: Vec<f64>,
-    /// [K_u k_u]ᵀ. Shape: as H.
+    /// [K_u k_u]ᵀ. Shape: n + 1 × nu, with slack rows.
     gains: Vec<f64>,
+    /// Columns of dependent coordinates. Shape: n × dependent, with slack rows.
+    below: Vec<f64>,
 }
 
 impl Form {
     /// Room for n states and at most m controls.
     pub(crate) fn new(n: usize, m: usize) -> Self {
-        Self { U: vec![0.0; (m + SLACK) * m], gains: vec![0.0; stride(n, m) * m], ..Self::default() }
+        Self { U: vec![0.0; (m + SLACK) * m], gains: vec![0.0; (n + 1 + SLACK) * m], ..Self::default() }
     }
 
     /// A row for a factor, `a` times x.
@@ -204,7 +207,7 @@ impl Work {
     #[inline(always)]
     pub(crate) fn add_implicit<V: Vector, const NR: usize>(&mut self, node: &LqNode, regularisation: f64) {
         let (n, m) = (node.ndx(), node.nu());
-        let (nv, ld, all) = (n / 2, stride(n, m), m + n);
+        let (nv, ld, all) = (n / 2, self.stride(m), m + n);
         let (ldn, imp) = (nv + SLACK, &node.implicit);
         let (dt, blocks) = node.structure.euler().expect("an implicit node is one of Euler steps");
         self.step_curvature::<V, NR>(dt, blocks);
@@ -296,33 +299,76 @@ impl Work {
         self.position_curvature::<V, NR>(m, blocks);
     }
 
+    /// Rows below H: Θ times the map from (w, δv, δq) to δx⁺, for a Θ of n rows (stride n + SLACK),
+    ///
+    /// ```text
+    /// Ψ y + Θ_q T δq,   Ψ = Δt Θ_q E + Θ_v
+    /// ```
+    #[inline(always)]
+    pub(crate) fn add_implicit_below<V: Vector, const NR: usize>(
+        &mut self,
+        Theta: &[f64],
+        node: &LqNode,
+        dt: f64,
+        blocks: &[EulerBlock],
+    ) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (nv, ld, ldt, at, imp) = (n / 2, self.stride(m), n + SLACK, m + n + 1, &node.implicit);
+        self.velocity_below::<V, NR>(Theta, dt, blocks);
+        let Self { W: Psi, H, form: Form { below, .. }, .. } = self;
+        for k in 0..m {
+            H[k * ld + at..][..n].fill(0.0);
+        }
+        for &[c, k, length] in &imp.own {
+            for j in 0..length {
+                copy::<V>(&mut H[(k + j) * ld + at..], &Psi[(c + j) * ldt..][..n]);
+            }
+        }
+        for j in 0..nv {
+            copy::<V>(&mut H[(m + j) * ld + at..], &Psi[j * ldt..][..n]);
+            H[(m + nv + j) * ld + at..][..n].fill(0.0);
+        }
+        let count = imp.dependent.len();
+        below.resize(count * ldt, 0.0);
+        for (to, &d) in below.chunks_exact_mut(ldt).zip(&imp.dependent) {
+            copy::<V>(to, &Psi[d * ldt..][..n]);
+        }
+        let (a, D) = (View { data: below, stride: ldt }, View { data: &imp.steps.numbers, stride: imp.stride });
+        let mut j = 0;
+        while j < m + n && count > 0 {
+            column_block::<V, NR>(&mut H[at..], ld, 0..n, j, NR.min(m + n - j), a, D, count, Store::Add);
+            j += NR;
+        }
+        self.position_below::<V, NR>(Theta, m, blocks);
+    }
+
     /// From H after the elimination of w, [L ·; X ·; yᵀ ·]:
     ///
     /// K = U_x − U_w L⁻ᵀ Xᵀ,   k = −U_w L⁻ᵀ y,   Quᵀk = −yᵀy = −kᵀQuu k
     #[inline(always)]
     pub(crate) fn gains_of_efforts<V: Vector, const NR: usize>(&mut self, node: &LqNode, knot: &mut LqKnot) {
         let (n, m) = (node.ndx(), node.nu());
-        let (nv, ld, imp) = (n / 2, stride(n, m), &node.implicit);
+        let (nv, ld, imp) = (n / 2, self.stride(m), &node.implicit);
+        let (ldu, ldk) = (m + SLACK, n + 1 + SLACK);
         let Self { H, form: Form { U, gains, .. }, .. } = self;
-        let ldu = m + SLACK;
         transpose::<V>(U, ldu, 0, &imp.efforts.numbers, imp.stride, 0..m, 0..m);
         solve_transposed::<V, NR>(U, ldu, m, H, ld, m);
-        for (to, from) in gains.chunks_exact_mut(ld).zip(imp.efforts.numbers.chunks_exact(imp.stride)) {
+        for (to, from) in gains.chunks_exact_mut(ldk).zip(imp.efforts.numbers.chunks_exact(imp.stride)) {
             copy::<V>(to, &from[m..m + n]);
             to[n] = 0.0;
         }
         let (a, b) = (View { data: &H[m..], stride: ld }, View { data: U, stride: ldu });
         let mut j = 0;
         while j < m {
-            column_block::<V, NR>(gains, ld, 0..n + 1, j, NR.min(m - j), a, b, m, Store::Subtract);
+            column_block::<V, NR>(gains, ldk, 0..n + 1, j, NR.min(m - j), a, b, m, Store::Subtract);
             j += NR;
         }
         let K = knot.K.as_mut_slice();
-        transpose::<V>(&mut K[nv * m..], m, 0, gains, ld, 0..nv, 0..m);
-        transpose::<V>(K, m, 0, gains, ld, nv..n, 0..m);
+        transpose::<V>(&mut K[nv * m..], m, 0, gains, ldk, 0..nv, 0..m);
+        transpose::<V>(K, m, 0, gains, ldk, nv..n, 0..m);
         let mut square = 0.0;
         for j in 0..m {
-            knot.k[j] = gains[j * ld + n];
+            knot.k[j] = gains[j * ldk + n];
             square += H[j * ld + m + n] * H[j * ld + m + n];
         }
         knot.expected = [-square, square];

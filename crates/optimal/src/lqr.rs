@@ -74,6 +74,10 @@ impl ActionModel for Lqr {
         Some((self.0.lower.as_slice(), self.0.upper.as_slice()))
     }
 
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         let LqNode { A, B, f, Q, S, R, q, r, .. } = &self.0;
         next.copy_from_slice(f.as_slice());

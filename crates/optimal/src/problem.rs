@@ -3,6 +3,7 @@
 use crate::action::ActionModel;
 use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
+use crate::threads::Copies;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::ops::Range;
@@ -49,14 +50,16 @@ use std::ops::Range;
 /// ```
 pub struct Problem {
     x0: Vec<f64>,
-    models: Vec<Box<dyn ActionModel>>,
+    pub(crate) models: Vec<Box<dyn ActionModel>>,
     stages: Vec<usize>,
-    terminal: Box<dyn ActionModel>,
-    shape: Shape,
+    pub(crate) terminal: Box<dyn ActionModel>,
+    pub(crate) shape: Shape,
     /// Maximal runs of knots with one model: (model, knots).
-    runs: Vec<(usize, Range<usize>)>,
+    pub(crate) runs: Vec<(usize, Range<usize>)>,
     /// 0, 1, …, N: the knots of a group are a slice of it.
-    knots: Vec<usize>,
+    pub(crate) knots: Vec<usize>,
+    /// Of the models, for threads.
+    pub(crate) copies: Copies,
     /// Where the terminal action may write a next state.
     unread: Vec<f64>,
 }
@@ -137,7 +140,8 @@ impl Problem {
         Error::check("x0", &x0, nx)?;
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
-        let mut problem = Self { x0, models, stages, terminal, shape, runs, knots, unread: vec![0.0; nx] };
+        let (copies, unread) = (Copies::default(), vec![0.0; nx]);
+        let mut problem = Self { x0, models, stages, terminal, shape, runs, knots, copies, unread };
         problem.arrange();
         Ok(problem)
     }
@@ -231,6 +235,7 @@ impl Problem {
     /// The action model `index`, if there is one and it is a `T`; to change a reference between solves. Its dimensions
     /// must stay.
     pub fn model_mut<T: ActionModel>(&mut self, index: usize) -> Option<&mut T> {
+        self.copies.forget(index);
         let model: &mut dyn Any = self.models.get_mut(index)?.as_mut();
         model.downcast_mut()
     }
@@ -282,12 +287,7 @@ impl Problem {
     /// If a length is wrong.
     pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         let horizon = self.horizon();
-        self.assert_trajectory(xs, us);
-        assert_length("nodes", nodes.len(), horizon + 1);
-        for node in &mut *nodes {
-            node.structure.set_dense(); // the action says if it is not
-            node.implicit.active = false;
-        }
+        self.begin_derivatives(xs, us, nodes);
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
             let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);
@@ -295,6 +295,17 @@ impl Problem {
         }
         let x = &xs[self.shape.x(horizon)];
         self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
+    }
+
+    /// Checks the lengths, and lets nothing be known of the forms of A and B: the action says if it is.
+    #[track_caller]
+    pub(crate) fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        self.assert_trajectory(xs, us);
+        assert_length("nodes", nodes.len(), self.horizon() + 1);
+        for node in nodes {
+            node.structure.set_dense();
+            node.implicit.active = false;
+        }
     }
 
     /// Nodes of zeros with the dimensions of the knots, the terminal one last.

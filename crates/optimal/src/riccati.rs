@@ -7,11 +7,19 @@ use crate::euler::Euler;
 use crate::factor::{eliminate, solve_right};
 use crate::implicit::Form;
 use crate::lq::{DIVERGED, Hessian, LqKnot, LqNode};
+use crate::structure::EulerBlock;
 use crate::sweep::SweepError;
 use crate::vector::Vector;
 
 /// The least ndx for which the form of Euler steps is worth its bookkeeping, as `benches/riccati.rs` measured.
 const EULER_FROM: usize = 16;
+
+impl LqNode {
+    /// Δt and the blocks of T and E, if the form of Euler steps is used.
+    pub(crate) fn euler(&self) -> Option<(f64, &[EulerBlock])> {
+        self.structure.euler().filter(|_| self.implicit.active || self.ndx() >= EULER_FROM)
+    }
+}
 
 /// Scratch of a step. Matrices are column-major with slack rows; P has the stride n + SLACK, the others `ld`.
 #[derive(Debug, Clone)]
@@ -26,6 +34,10 @@ pub(crate) struct Work {
     pub(crate) W: Vec<f64>,
     /// The quadratic form.
     pub(crate) H: Vec<f64>,
+    /// Rows below the form, of which others make use.
+    below: usize,
+    /// Whether knots shall have their Vxx.
+    pub(crate) keep: bool,
     /// Lᵀ for the back substitution.
     upper: Vec<f64>,
     pub(crate) euler: Euler,
@@ -35,29 +47,32 @@ pub(crate) struct Work {
     hessians: Vec<Hessian>,
 }
 
-/// The stride of F, W and H with their m + n + 1 rows.
-pub(crate) fn stride(n: usize, m: usize) -> usize {
-    m + n + 1 + SLACK
-}
-
 impl Work {
-    /// Room for knots with n states and at most m controls.
-    pub(crate) fn new(nodes: &[LqNode], n: usize, m: usize) -> Self {
+    /// Room for knots with n states and at most m controls, those of `nodes` with curvature, and in H for `below` more rows.
+    pub(crate) fn new(nodes: &[LqNode], n: usize, m: usize, below: usize) -> Self {
+        let stride = m + n + 1 + below + SLACK;
         let mut sizes: Vec<_> = nodes.iter().map(LqNode::nu).collect();
         sizes.sort_unstable();
         sizes.dedup();
         Self {
             P: vec![0.0; (n + SLACK) * n],
             p: vec![0.0; n],
-            F: vec![0.0; stride(n, m) * n],
-            W: vec![0.0; stride(n, m) * n],
-            H: vec![0.0; stride(n, m) * (m + n)],
+            F: vec![0.0; stride * n],
+            W: vec![0.0; stride * n],
+            H: vec![0.0; stride * (m + n)],
+            below,
+            keep: true,
             upper: vec![0.0; (m + SLACK) * m],
             euler: Euler::new(n),
             form: Form::new(n, m),
             qp: BoxQp::new(m),
             hessians: sizes.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
         }
+    }
+
+    /// The stride of F, W and H at a knot with m controls: their m + n + 1 rows, those below, and slack.
+    pub(crate) fn stride(&self, m: usize) -> usize {
+        m + self.p.len() + 1 + self.below + SLACK
     }
 
     /// V = ½ δxᵀ Q δx + qᵀ δx at the terminal knot.
@@ -68,6 +83,40 @@ impl Work {
         for j in 0..n {
             self.P[j * (n + SLACK)..][..n].copy_from_slice(&node.Q.as_slice()[j * n..][..n]);
         }
+    }
+
+    /// The sweep of the end of a horizon, of which the first node is knot `first` and the last the terminal one.
+    #[inline(always)]
+    pub(crate) fn run<V: Vector, const NR: usize>(
+        &mut self,
+        first: usize,
+        nodes: &[LqNode],
+        knots: &mut [LqKnot],
+        regularisation: f64,
+        curvature: &mut impl FnMut(usize, &[f64], &mut Hessian) -> bool,
+    ) -> Result<(), SweepError> {
+        let last = nodes.len() - 1;
+        self.start(&nodes[last]);
+        self.finish_value::<V>(first + last, &mut knots[last], regularisation)?;
+        self.back::<V, NR>(first, &nodes[..last], knots, regularisation, curvature)
+    }
+
+    /// Steps at `nodes`, of which the first is knot `first`, from P, p of the knot after them.
+    #[inline(always)]
+    pub(crate) fn back<V: Vector, const NR: usize>(
+        &mut self,
+        first: usize,
+        nodes: &[LqNode],
+        knots: &mut [LqKnot],
+        regularisation: f64,
+        curvature: &mut impl FnMut(usize, &[f64], &mut Hessian) -> bool,
+    ) -> Result<(), SweepError> {
+        for i in (0..nodes.len()).rev() {
+            let (t, knot) = (first + i, &mut knots[i]);
+            self.step::<V, NR>(t, &nodes[i], knot, regularisation, curvature)?;
+            self.finish_value::<V>(t, knot, regularisation)?;
+        }
+        Ok(())
     }
 
     /// One Riccati step: P, p of knot t + 1 become those of knot t, and the gains of knot t are written.
@@ -81,34 +130,10 @@ impl Work {
         curvature: &mut impl FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
         let (n, m) = (node.ndx(), node.nu());
-        let (ld, rows, last) = (stride(n, m), m + n + 1, m + n);
-        // P f + p, the gradient at the predicted state
-        for k in 0..n {
-            if node.f[k] != 0.0 {
-                add_scaled_product(&mut self.p, node.f[k], &self.P[k * (n + SLACK)..][..n], &[1.0]);
-            }
-        }
+        let (ld, rows, last) = (self.stride(m), m + n + 1, m + n);
+        let shift = self.form::<V, NR>(t, node, regularisation, curvature);
+        let Self { H, qp, .. } = self;
         let implicit = node.implicit.active;
-        let euler = node.structure.euler().filter(|_| n >= EULER_FROM);
-        // The order of the states in H: the i-th is the (i + shift)-th of x, counted around.
-        let shift = if implicit || euler.is_some() { n / 2 } else { 0 };
-        if implicit {
-            self.add_implicit::<V, NR>(node, regularisation);
-        } else {
-            self.fill::<V>(node, shift);
-            let hessian = self.hessians.iter_mut().find(|hessian| hessian.uu.nrows() == m).expect("one for each size");
-            if curvature(t, &self.p, hessian) {
-                self.add_hessian(shift, m);
-            }
-            match euler {
-                Some((dt, blocks)) => self.add_euler::<V, NR>(m, dt, blocks, node),
-                None => self.add_dense::<V, NR>(node),
-            }
-            for j in 0..m {
-                self.H[j * ld + j] += regularisation; // Quu += ϱ I
-            }
-        }
-        let Self { P, p, H, upper, qp, .. } = self;
         if !implicit {
             for j in 0..m {
                 knot.Qu[j] = H[j * ld + last];
@@ -138,27 +163,14 @@ impl Work {
         if let Err((row, pivot)) = eliminate::<V, NR>(H, ld, rows, free + n, free) {
             return Err(failed(if bounded { qp.free[row] } else { row }, pivot));
         }
-        let (split, stride) = (n - shift, n + SLACK); // states in H before and after the turn
-        copy_symmetric::<V>(&mut P[shift * stride + shift..], stride, &H[free * ld + free..], ld, split);
-        for j in 0..split {
-            p[shift + j] = H[(free + j) * ld + free + n];
-        }
-        if shift > 0 {
-            copy_symmetric::<V>(P, stride, &H[(free + split) * ld + free + split..], ld, shift);
-            transpose::<V>(P, stride, shift, &H[free * ld..], ld, free + split..free + n, 0..split);
-            for j in 0..split {
-                copy::<V>(&mut P[(shift + j) * stride..], &H[(free + j) * ld + free + split..][..shift]);
-            }
-            for j in 0..shift {
-                p[j] = H[(free + split + j) * ld + free + n];
-            }
-        }
+        self.take_value::<V>(ld, free, shift);
 
         if implicit {
             self.gains_of_efforts::<V, NR>(node, knot);
             return Ok(());
         }
         // [K k]ᵀ = −[X; yᵀ] L⁻¹
+        let (Self { H, upper, qp, .. }, split) = (self, n - shift);
         solve_right::<V, NR>(H, ld, free, rows, free, upper);
         if bounded {
             knot.K.fill(0.0);
@@ -197,11 +209,74 @@ impl Work {
         Ok(())
     }
 
+    /// The quadratic form H of knot t, with ϱ on the diagonal of Quu, and P f + p. Returns how the states are turned in H:
+    /// the i-th there is the (i + shift)-th of x, counted around.
+    #[inline(always)]
+    pub(crate) fn form<V: Vector, const NR: usize>(
+        &mut self,
+        t: usize,
+        node: &LqNode,
+        regularisation: f64,
+        curvature: &mut impl FnMut(usize, &[f64], &mut Hessian) -> bool,
+    ) -> usize {
+        let (n, m) = (node.ndx(), node.nu());
+        // P f + p, the gradient at the predicted state
+        for k in 0..n {
+            if node.f[k] != 0.0 {
+                add_scaled_product(&mut self.p, node.f[k], &self.P[k * (n + SLACK)..][..n], &[1.0]);
+            }
+        }
+        if node.implicit.active {
+            self.add_implicit::<V, NR>(node, regularisation);
+            return n / 2;
+        }
+        let euler = node.euler();
+        let shift = if euler.is_some() { n / 2 } else { 0 };
+        self.fill::<V>(node, shift);
+        if let Some(hessian) = self.hessians.iter_mut().find(|hessian| hessian.uu.nrows() == m)
+            && curvature(t, &self.p, hessian)
+        {
+            self.add_hessian(shift, m);
+        }
+        match euler {
+            Some((dt, blocks)) => self.add_euler::<V, NR>(m, dt, blocks, node),
+            None => self.add_dense::<V, NR>(node),
+        }
+        // Quu += ϱ I
+        let ld = self.stride(m);
+        for j in 0..m {
+            self.H[j * ld + j] += regularisation;
+        }
+        shift
+    }
+
+    /// P, p = Vxx, Vx of an H (stride `ld`) whose first `free` columns are eliminated and whose states are turned by `shift`.
+    #[inline(always)]
+    pub(crate) fn take_value<V: Vector>(&mut self, ld: usize, free: usize, shift: usize) {
+        let Self { P, p, H, .. } = self;
+        let n = p.len();
+        let (split, stride) = (n - shift, n + SLACK); // states in H before and after the turn
+        copy_symmetric::<V>(&mut P[shift * stride + shift..], stride, &H[free * ld + free..], ld, split);
+        for j in 0..split {
+            p[shift + j] = H[(free + j) * ld + free + n];
+        }
+        if shift > 0 {
+            copy_symmetric::<V>(P, stride, &H[(free + split) * ld + free + split..], ld, shift);
+            transpose::<V>(P, stride, shift, &H[free * ld..], ld, free + split..free + n, 0..split);
+            for j in 0..split {
+                copy::<V>(&mut P[(shift + j) * stride..], &H[(free + j) * ld + free + split..][..shift]);
+            }
+            for j in 0..shift {
+                p[j] = H[(free + split + j) * ld + free + n];
+            }
+        }
+    }
+
     /// H = [R ·; S Q; rᵀ qᵀ], the states turned by `shift`: its lower triangle.
     #[inline(always)]
     fn fill<V: Vector>(&mut self, node: &LqNode, shift: usize) {
         let (n, m) = (node.ndx(), node.nu());
-        let (ld, split) = (stride(n, m), n - shift);
+        let (ld, split) = (self.stride(m), n - shift);
         for j in 0..m {
             let column = &mut self.H[j * ld..][..ld];
             copy::<V>(&mut column[j..], &node.R.as_slice()[j * m + j..][..m - j]);
@@ -225,7 +300,7 @@ impl Work {
     /// H += [ψuu ·; ψxu ψxx; 0 0], the states turned by `shift`.
     fn add_hessian(&mut self, shift: usize, m: usize) {
         let n = self.p.len();
-        let (ld, state) = (stride(n, m), |i: usize| (i + shift) % n);
+        let (ld, state) = (self.stride(m), |i: usize| (i + shift) % n);
         let Some(Hessian { xx, xu, uu }) = self.hessians.iter().find(|hessian| hessian.uu.nrows() == m) else { return };
         for j in 0..m {
             for i in 0..m {
@@ -246,7 +321,7 @@ impl Work {
     #[inline(always)]
     fn add_dense<V: Vector, const NR: usize>(&mut self, node: &LqNode) {
         let (n, m) = (node.ndx(), node.nu());
-        let (ld, rows) = (stride(n, m), m + n);
+        let (ld, rows) = (self.stride(m), m + n);
         let Self { P, p, F, W, H, .. } = self;
         transpose::<V>(F, ld, 0, node.B.as_slice(), n, 0..n, 0..m);
         transpose::<V>(F, ld, m, node.A.as_slice(), n, 0..n, 0..n);
@@ -265,7 +340,6 @@ impl Work {
         t: usize,
         knot: &mut LqKnot,
         regularisation: f64,
-        keep: bool,
     ) -> Result<(), SweepError> {
         let n = self.p.len();
         knot.Vx.as_mut_slice().copy_from_slice(&self.p);
@@ -273,7 +347,7 @@ impl Work {
         for j in 0..n {
             let column = &mut self.P[j * (n + SLACK)..][..n];
             column[j] += regularisation;
-            if keep {
+            if self.keep {
                 copy::<V>(&mut knot.Vxx.as_mut_slice()[j * n..], column);
             }
             finite &= all_bounded(column);

@@ -40,6 +40,17 @@ pub struct Settings {
     /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
     /// as the last of its kind. `None` for no limit.
     pub time_budget: Option<Duration>,
+    /// How many segments of the horizon a sweep works on at the same time: see [`Sweep::set_segments`]. It is not the number
+    /// of threads, which are those of rayon's pool, and any number of them finds the same.
+    ///
+    /// [`Sweep::set_segments`]: crate::Sweep::set_segments
+    pub segments: usize,
+    /// Threads on which derivatives are computed, of rayon's pool in which a solve is called, else of the global one. Any
+    /// number finds the same to the last bit. More than 1 need copies of the actions ([`fork`]), which are made when
+    /// there are none yet, or not of a model as it is now.
+    ///
+    /// [`fork`]: crate::ActionModel::fork
+    pub threads: usize,
     /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
     pub step_lengths: usize,
     /// A step is accepted if the cost falls by more than this times the expected decrease.
@@ -73,6 +84,8 @@ impl Default for Settings {
             tolerance: 1e-9,
             tolerance_bounded: 5e-5,
             time_budget: None,
+            segments: 1,
+            threads: 1,
             step_lengths: 10,
             accept: 0.1,
             accept_ascent: 2.0,
@@ -93,10 +106,12 @@ impl Settings {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();
-        let steps = self.step_lengths as f64;
+        let [steps, segments, threads] = [self.step_lengths, self.segments, self.threads].map(|count| count as f64);
         for (name, value, good, allowed) in [
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
+            ("segments", segments, self.segments > 0, "at least 1"),
+            ("threads", threads, self.threads > 0, "at least 1"),
             ("step_lengths", steps, (1..=60).contains(&self.step_lengths), "from 1 to 60"),
             ("accept", self.accept, from_zero(self.accept), "at least 0"),
             ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),

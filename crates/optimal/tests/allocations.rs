@@ -56,6 +56,23 @@ fn a_sweep_allocates_nothing() {
     assert_eq!(allocations(|| sweep.run(&nodes, 1e-9).unwrap()), 0);
 }
 
+/// On one thread: what rayon allocates to share work is its own.
+#[test]
+fn a_sweep_in_segments_allocates_nothing() {
+    let mut random = random();
+    let nodes: Vec<_> = (0..=12).map(|t| random_node(&mut random, 11, if t < 12 { t % 5 } else { 0 })).collect();
+    let mut sweep = Sweep::new(&nodes);
+    sweep.set_segments(4);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let count = pool.install(|| {
+        allocations(|| {
+            sweep.set_segments(4);
+            sweep.run(&nodes, 1e-9).unwrap();
+        })
+    });
+    assert_eq!(count, 0);
+}
+
 #[test]
 fn a_solve_allocates_nothing() {
     for lanes in [1, 4] {
@@ -198,4 +215,14 @@ fn a_gait_allocates_nothing() {
     });
     assert_eq!(second, 0);
     assert!(solver.solution().trace.iter().any(|i| i.accepted));
+    // with copies for three threads, once they are made
+    solver.settings.threads = 3;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let count = pool.install(|| {
+        solver.solve(&mut problem, &xs, &us).unwrap();
+        allocations(|| {
+            solver.solve(&mut problem, &xs, &us).unwrap();
+        })
+    });
+    assert_eq!(count, 0);
 }

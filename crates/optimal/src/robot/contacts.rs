@@ -112,6 +112,10 @@ impl ContactDynamics {
 robot_knot!(ContactDynamics, inner);
 
 impl ContinuousModel for Contacts {
+    fn fork(&self) -> Option<Self> {
+        Some(self.clone())
+    }
+
     fn nq(&self) -> usize {
         self.robot.model.nq()
     }

@@ -118,6 +118,10 @@ impl FreeDynamics {
 robot_knot!(FreeDynamics, inner);
 
 impl ContinuousModel for Free {
+    fn fork(&self) -> Option<Self> {
+        Some(self.clone())
+    }
+
     fn nq(&self) -> usize {
         self.robot.model.nq()
     }

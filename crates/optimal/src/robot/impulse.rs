@@ -91,6 +91,10 @@ impl ActionModel for ImpulseDynamics {
         0
     }
 
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         let Self { robot, set, data, change, .. } = self;
         let (q, v) = x.split_at(robot.model.nq());

@@ -124,6 +124,14 @@ pub trait ContinuousModel: Send + 'static {
         self.calc_diff(t, x, u, scale, node)
     }
 
+    /// A copy that computes the same, for another thread; `None` by default: see [`ActionModel::fork`].
+    fn fork(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
     /// The coordinates of each group of positions that is no vector space, at most six a group: elsewhere q ⊕ δ is a sum.
     /// None by default.
     fn groups(&self) -> &[Range<usize>] {
@@ -303,6 +311,13 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
             (Some(_), Method::Euler) => self.inner.implicit(),
             _ => None,
         }
+    }
+
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        let Self { dt, method, bounds, dq, transport, exp, .. } = self;
+        let (method, bounds, dq) = (method.clone(), bounds.clone(), dq.clone());
+        let (transport, exp) = (transport.clone(), exp.clone());
+        Some(Box::new(Self { inner: self.inner.fork()?, dt: *dt, method, bounds, dq, transport, exp }))
     }
 
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {

@@ -77,6 +77,10 @@ impl InverseDynamics {
 robot_knot!(InverseDynamics, inner);
 
 impl ContinuousModel for Inverse {
+    fn fork(&self) -> Option<Self> {
+        Some(self.clone())
+    }
+
     fn nq(&self) -> usize {
         self.robot.model.nq()
     }

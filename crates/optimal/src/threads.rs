@@ -1,0 +1,149 @@
+//! The derivatives of a horizon on several threads, each with its own copies of the actions.
+
+use crate::action::ActionModel;
+use crate::lq::LqNode;
+use crate::problem::Problem;
+use std::ops::Range;
+
+/// The copies, and who computes what.
+#[derive(Default)]
+pub(crate) struct Copies {
+    /// For each thread beside the first one, for each model its copy.
+    of: Vec<Vec<Option<Box<dyn ActionModel>>>>,
+    /// Whether a model has copies.
+    copied: Vec<bool>,
+    /// The first knot of each thread, and the end of the horizon.
+    cuts: Vec<usize>,
+}
+
+impl Copies {
+    /// Drops the copies of a model that may change.
+    pub(crate) fn forget(&mut self, model: usize) {
+        for copy in self.of.iter_mut().filter_map(|copies| copies.get_mut(model)) {
+            *copy = None;
+        }
+    }
+
+    /// Makes those that are missing of the models that can be copied, for `threads` threads in all.
+    fn renew(&mut self, threads: usize, models: &[Box<dyn ActionModel>]) {
+        self.of.resize_with(threads - 1, || models.iter().map(|_| None).collect());
+        self.copied.resize(models.len(), false);
+        for copies in &mut self.of {
+            for ((copy, copied), model) in copies.iter_mut().zip(&mut self.copied).zip(models) {
+                if copy.is_none() {
+                    *copy = model.fork();
+                }
+                *copied = copy.is_some();
+            }
+        }
+    }
+
+    /// Shares the groups of knots of the models with copies among `threads` threads: as many knots as a model has lanes,
+    /// counted from the start of a run, as one thread counts them.
+    fn share(&mut self, threads: usize, models: &[Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
+        let Self { copied, cuts, .. } = self;
+        let lanes = |model: usize| models[model].lanes().max(1);
+        let groups = |model: usize, run: &Range<usize>| usize::from(copied[model]) * run.len().div_ceil(lanes(model));
+        let total: usize = runs.iter().map(|(model, run)| groups(*model, run)).sum();
+        let horizon = runs.last().map_or(0, |(_, run)| run.end);
+        cuts.clear();
+        cuts.push(0);
+        for thread in 1..threads {
+            let (mut group, mut cut) = (total * thread / threads, horizon);
+            for (model, run) in runs {
+                let here = groups(*model, run);
+                if group < here {
+                    cut = run.start + group * lanes(*model);
+                    break;
+                }
+                group -= here;
+            }
+            cuts.push(cut);
+        }
+        cuts.push(horizon);
+    }
+}
+
+/// What all threads read.
+#[derive(Clone, Copy)]
+struct Horizon<'a> {
+    runs: &'a [(usize, Range<usize>)],
+    knots: &'a [usize],
+    xs: &'a [f64],
+    us: &'a [f64],
+    nx: usize,
+    /// Where the controls of a knot start.
+    offsets: &'a [usize],
+}
+
+impl Horizon<'_> {
+    /// The derivatives at consecutive knots of one model; `nodes` are theirs.
+    fn derive(self, model: &mut dyn ActionModel, knots: Range<usize>, nodes: &mut [LqNode]) {
+        let xs = &self.xs[knots.start * self.nx..knots.end * self.nx];
+        let us = &self.us[self.offsets[knots.start]..self.offsets[knots.end]];
+        model.calc_diff_group(&self.knots[knots], xs, us, nodes);
+    }
+
+    /// Shows the runs in a part of the horizon, with their models; `nodes` are the part's.
+    fn visit(self, part: Range<usize>, nodes: &mut [LqNode], mut f: impl FnMut(usize, Range<usize>, &mut [LqNode])) {
+        for (model, run) in self.runs {
+            let knots = run.start.max(part.start)..run.end.min(part.end);
+            if !knots.is_empty() {
+                f(*model, knots.clone(), &mut nodes[knots.start - part.start..knots.end - part.start]);
+            }
+        }
+    }
+
+    /// The parts between `cuts`, by the copies that each has; `nodes` are theirs.
+    fn spread(self, cuts: &[usize], copies: &mut [Vec<Option<Box<dyn ActionModel>>>], nodes: &mut [LqNode]) {
+        if let [copies] = copies {
+            return self.visit(cuts[0]..cuts[1], nodes, |model, knots, nodes| {
+                if let Some(copy) = &mut copies[model] {
+                    self.derive(&mut **copy, knots, nodes);
+                }
+            });
+        }
+        let half = copies.len() / 2;
+        let (some, others) = copies.split_at_mut(half);
+        let (first, second) = nodes.split_at_mut(cuts[half] - cuts[0]);
+        rayon::join(|| self.spread(&cuts[..=half], some, first), || self.spread(&cuts[half..], others, second));
+    }
+}
+
+impl Problem {
+    /// [`calc_diff`](Self::calc_diff) on `threads` threads of the rayon pool in which it is called, else of the global one;
+    /// the same to the last bit. The knots of models without a copy ([`fork`](ActionModel::fork)) come last, on one thread.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub(crate) fn calc_diff_on(&mut self, threads: usize, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        if threads == 1 {
+            return self.calc_diff(xs, us, nodes);
+        }
+        self.begin_derivatives(xs, us, nodes);
+        let Self { models, runs, copies, knots, shape, terminal, .. } = self;
+        copies.renew(threads, models);
+        copies.share(threads, models, runs);
+        let Copies { of, copied, cuts } = copies;
+        let (nodes, end) = nodes.split_at_mut(shape.horizon());
+        let horizon = Horizon { runs, knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
+        let (own, others) = nodes.split_at_mut(cuts[1]);
+        rayon::join(
+            || {
+                horizon.visit(0..own.len(), own, |model, knots, nodes| {
+                    if copied[model] {
+                        horizon.derive(&mut *models[model], knots, nodes);
+                    }
+                });
+                let t = shape.horizon();
+                terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
+            },
+            || horizon.spread(&cuts[1..], of, others),
+        );
+        horizon.visit(0..nodes.len(), nodes, |model, knots, nodes| {
+            if !copied[model] {
+                horizon.derive(&mut *models[model], knots, nodes);
+            }
+        });
+    }
+}

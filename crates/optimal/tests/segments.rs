@@ -1,0 +1,373 @@
+//! A sweep in several segments at the same time finds what a sweep as one does.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::{random, random_euler_node, random_matrix, random_node};
+use condyle_dynamics::{Constraint, Vec3, neutral, robots};
+use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
+use condyle_optimal::{Error, Fddp, LqKnot, LqNode, Problem, Sweep, SweepError};
+use nalgebra::{DMatrix, DVector};
+use rand::RngExt;
+use std::sync::Arc;
+
+/// Relative to the largest entry. As the other tests of the sweep: random problems with entries of size one, whose value
+/// functions grow to 1e3 or so; and the value functions of robots' problems have a condition of 1e6 or more.
+const SAME: f64 = 1e-9;
+
+/// Of the cost of an iterate, which forgives most of what a step is off.
+const COST: f64 = 1e-9;
+
+fn largest(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |largest, x| largest.max(x.abs()))
+}
+
+#[track_caller]
+fn assert_same(found: &[LqKnot], expected: &[LqKnot], case: &str) {
+    let fields = |knot: &LqKnot| {
+        [&knot.Vxx, &knot.K, &knot.Quu]
+            .map(|matrix| matrix.as_slice().to_vec())
+            .into_iter()
+            .chain([&knot.Vx, &knot.k, &knot.Qu].map(|vector| vector.as_slice().to_vec()))
+            .collect::<Vec<_>>()
+    };
+    // Vectors vanish where the trajectory is good: what they are compared with is the largest of the horizon.
+    let mut scales = [0.0_f64; 6];
+    for knot in expected {
+        for (scale, field) in scales.iter_mut().zip(fields(knot)) {
+            *scale = scale.max(largest(&field));
+        }
+    }
+    for (t, (a, b)) in found.iter().zip(expected).enumerate() {
+        for (i, (a, b)) in fields(a).iter().zip(fields(b)).enumerate() {
+            let scale = if i < 3 { largest(&b) } else { scales[i] };
+            let error = a.iter().zip(&b).fold(0.0, |error: f64, (a, b)| error.max((a - b).abs()));
+            let name = ["Vxx", "K", "Quu", "Vx", "k", "Qu"][i];
+            assert!(error <= SAME * scale, "{case}, knot {t}: {name} differs by {error:e} of {scale:e}");
+        }
+    }
+}
+
+/// The knots of a sweep as one, and of one in segments, of which both succeed.
+fn both(nodes: &[LqNode], segments: usize, regularisation: f64) -> (Vec<LqKnot>, Vec<LqKnot>) {
+    let mut sweep = Sweep::new(nodes);
+    sweep.run(nodes, regularisation).unwrap();
+    let as_one = sweep.knots().to_vec();
+    let mut sweep = Sweep::new(nodes);
+    sweep.set_segments(segments);
+    sweep.run(nodes, regularisation).unwrap();
+    (as_one, sweep.knots().to_vec())
+}
+
+/// Nodes of all kinds: dense and of Euler steps, with blocks and without, and numbers of controls that differ.
+fn problems() -> Vec<Vec<LqNode>> {
+    let (mut random, root) = (random(), 0..6);
+    let root = std::slice::from_ref(&root);
+    let mut all = Vec::new();
+    for (ndx, nus) in [
+        (1, vec![1; 4]),
+        (2, vec![1; 11]),
+        (5, vec![3, 0, 2, 0, 0, 4, 1, 3, 3, 2, 0, 0, 5]),
+        (14, vec![7; 23]),
+        (17, vec![4; 30]),
+        (33, vec![9, 12, 40, 9, 12, 9, 15]),
+    ] {
+        let mut nodes: Vec<_> = nus.iter().map(|&nu| random_node(&mut random, ndx, nu)).collect();
+        nodes.push(random_node(&mut random, ndx, 0));
+        all.push(nodes);
+    }
+    for (nv, nus, blocks) in
+        [(9, vec![4; 17], &[][..]), (10, vec![3, 0, 10, 11, 0, 2, 5, 5, 5, 1], root), (38, vec![32; 9], root)]
+    {
+        let mut nodes: Vec<_> = nus.iter().map(|&nu| random_euler_node(&mut random, nv, nu, blocks)).collect();
+        nodes[nus.len() / 2].structure.set_dense();
+        nodes.push(random_node(&mut random, 2 * nv, 0));
+        all.push(nodes);
+    }
+    all
+}
+
+#[test]
+fn segments_change_nothing_but_rounding() {
+    for nodes in problems() {
+        let (ndx, horizon) = (nodes[0].ndx(), nodes.len() - 1);
+        for segments in [2, 3, 4, 7, 16] {
+            for regularisation in [0.0, 1e-3] {
+                let (as_one, knots) = both(&nodes, segments, regularisation);
+                assert_same(&knots, &as_one, &format!("ndx {ndx}, horizon {horizon}, {segments} segments"));
+                assert!(knots != as_one, "ndx {ndx}: not in segments"); // other sums, so other roundings
+            }
+        }
+    }
+}
+
+#[test]
+fn a_horizon_too_short_for_two_segments_is_swept_as_one() {
+    let mut random = random();
+    for horizon in 0..4 {
+        let mut nodes: Vec<_> = (0..horizon).map(|_| random_node(&mut random, 4, 2)).collect();
+        nodes.push(random_node(&mut random, 4, 0));
+        let (as_one, knots) = both(&nodes, 5, 1e-6);
+        assert_eq!(knots, as_one, "horizon {horizon}");
+    }
+    let nodes = &problems()[3];
+    let (as_one, knots) = both(nodes, 1, 1e-6);
+    assert_eq!(knots, as_one);
+}
+
+/// The minimum over all states and controls at once, by its Karush–Kuhn–Tucker system.
+#[test]
+fn segments_solve_the_whole_problem() {
+    let mut random = random();
+    for nodes in problems().into_iter().take(3) {
+        let (n, horizon) = (nodes[0].ndx(), nodes.len() - 1);
+        let x0: DVector<f64> = random_matrix(&mut random, n, 1).column(0).into_owned();
+        // Unknown: x₁, …, then u₀, …, then the multipliers of x_{t+1} = A x + B u + f.
+        let mut offsets = vec![horizon * n];
+        for node in &nodes[..horizon] {
+            offsets.push(offsets[offsets.len() - 1] + node.nu());
+        }
+        let (unknown, all) = (offsets[horizon], offsets[horizon] + horizon * n);
+        let mut kkt = DMatrix::zeros(all, all);
+        let mut right = DVector::zeros(all);
+        for (t, node) in nodes.iter().enumerate() {
+            let (x, row) = (t.wrapping_sub(1).wrapping_mul(n), unknown + t * n);
+            if t > 0 {
+                kkt.view_mut((x, x), (n, n)).copy_from(&node.Q);
+                right.rows_mut(x, n).copy_from(&-&node.q);
+            }
+            if t == horizon {
+                continue;
+            }
+            let (u, m) = (offsets[t], node.nu());
+            kkt.view_mut((u, u), (m, m)).copy_from(&node.R);
+            right.rows_mut(u, m).copy_from(&-&node.r);
+            kkt.view_mut((row, t * n), (n, n)).fill_diagonal(-1.0);
+            kkt.view_mut((row, u), (n, m)).copy_from(&node.B);
+            right.rows_mut(row, n).copy_from(&-&node.f);
+            if t > 0 {
+                kkt.view_mut((u, x), (m, n)).copy_from(&node.S.transpose());
+                kkt.view_mut((row, x), (n, n)).copy_from(&node.A);
+            } else {
+                right.rows_mut(u, m).axpy(-1.0, &(node.S.transpose() * &x0), 1.0);
+                right.rows_mut(row, n).axpy(-1.0, &(&node.A * &x0), 1.0);
+            }
+        }
+        kkt.fill_upper_triangle_with_lower_triangle();
+        let solution = kkt.lu().solve(&right).unwrap();
+        for segments in [2, 5] {
+            let mut sweep = Sweep::new(&nodes);
+            sweep.set_segments(segments);
+            sweep.run(&nodes, 0.0).unwrap();
+            let mut x = x0.clone();
+            for (t, node) in nodes[..horizon].iter().enumerate() {
+                let knot = &sweep.knots()[t];
+                let u = &knot.k + &knot.K * &x;
+                x = &node.A * &x + &node.B * &u + &node.f;
+                let expected = solution.rows(t * n, n);
+                let scale = 1.0 + largest(solution.rows(0, unknown).as_slice());
+                assert!((&x - expected).amax() < SAME * scale, "ndx {n}, {segments} segments, knot {t}");
+                let expected = solution.rows(offsets[t], node.nu());
+                assert!(u.iter().zip(&expected).all(|(a, b)| (a - b).abs() < SAME * scale), "ndx {n}, knot {t}: u");
+            }
+        }
+    }
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same_bits() {
+    for nodes in problems() {
+        for segments in [2, 3, 8] {
+            let mut sweep = Sweep::new(&nodes);
+            sweep.set_segments(segments);
+            let mut first = None;
+            for threads in 1..5 {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| sweep.run(&nodes, 1e-9)).unwrap();
+                let knots = first.get_or_insert_with(|| sweep.knots().to_vec());
+                assert!(sweep.knots() == *knots, "{segments} segments, {threads} threads");
+            }
+        }
+    }
+}
+
+/// What stops a sweep as one stops one in segments, with the same words, wherever it is.
+#[test]
+fn failures_are_those_of_a_sweep_as_one() {
+    let mut random = random();
+    let good: Vec<_> = (0..=20).map(|t| random_node(&mut random, 4, if t < 20 { 3 } else { 0 })).collect();
+    for knot in 0..=20 {
+        for wrong in ["R", "A", "q"] {
+            let mut nodes = good.clone();
+            match wrong {
+                "R" if knot < 20 => nodes[knot].R[(2, 2)] = -1e6,
+                "A" if knot < 20 => nodes[knot].A[(1, 0)] = f64::NAN,
+                _ => nodes[knot].q[3] = f64::INFINITY,
+            }
+            let mut sweep = Sweep::new(&nodes);
+            let expected = sweep.run(&nodes, 1e-9).unwrap_err();
+            for segments in [2, 4] {
+                let mut sweep = Sweep::new(&nodes);
+                sweep.set_segments(segments);
+                let found = sweep.run(&nodes, 1e-9).unwrap_err();
+                match (found, expected) {
+                    (SweepError::NotPositive { .. }, SweepError::NotPositive { .. }) => assert_eq!(found, expected),
+                    (SweepError::NotFinite { knot: found }, SweepError::NotFinite { knot: t }) => assert_eq!(found, t),
+                    _ => panic!("{wrong} of knot {knot}: {found:?} instead of {expected:?}"),
+                }
+                sweep.run(&good, 1e-9).unwrap();
+            }
+        }
+    }
+}
+
+/// Of these a segment alone has no minimum, or the value function is none of a convex problem.
+#[test]
+fn what_segments_cannot_do_is_swept_as_one() {
+    let mut random = random();
+    let good: Vec<_> = (0..=16).map(|t| random_node(&mut random, 5, if t < 16 { 2 } else { 0 })).collect();
+    let mut without_effort = good.clone();
+    for node in &mut without_effort {
+        node.R.fill(0.0);
+        node.S.fill(0.0);
+    }
+    let mut concave = good.clone();
+    for node in &mut concave {
+        node.R.fill_diagonal(1e4);
+        node.Q.fill_diagonal(-0.1);
+        node.A *= 0.1;
+    }
+    let mut bounded = good.clone();
+    bounded[3].upper[1] = 0.1;
+    for (name, nodes) in [("no effort", without_effort), ("concave", concave), ("bounded", bounded)] {
+        let (as_one, knots) = both(&nodes, 3, 0.0);
+        assert_eq!(knots, as_one, "{name}");
+    }
+}
+
+/// Digits that a link would lose are not lost: controls that cost 1e-12 of what states do.
+#[test]
+fn cheap_controls_lose_no_digits() {
+    let mut random = random();
+    for effort in [1e-3, 1e-6, 1e-9, 1e-12] {
+        let mut nodes: Vec<_> = (0..=24).map(|t| random_node(&mut random, 6, if t < 24 { 2 } else { 0 })).collect();
+        for node in &mut nodes {
+            node.S.fill(0.0);
+            node.R.fill(0.0);
+            node.R.fill_diagonal(effort);
+        }
+        let (as_one, knots) = both(&nodes, 4, 0.0);
+        assert_same(&knots, &as_one, &format!("effort {effort:e}"));
+    }
+}
+
+/// States that nothing depends on leave the value function singular.
+#[test]
+fn states_may_cost_nothing() {
+    let mut random = random();
+    let mut nodes: Vec<_> = (0..=15).map(|t| random_node(&mut random, 7, if t < 15 { 3 } else { 0 })).collect();
+    for node in &mut nodes {
+        for free in [2, 6] {
+            node.Q.row_mut(free).fill(0.0);
+            node.Q.column_mut(free).fill(0.0);
+            node.S.row_mut(free).fill(0.0);
+            node.A.column_mut(free).fill(0.0);
+        }
+    }
+    let (as_one, knots) = both(&nodes, 4, 0.0);
+    assert_same(&knots, &as_one, "singular");
+    assert!(knots != as_one);
+}
+
+#[test]
+#[should_panic(expected = "`segments` is 0, expected at least 1")]
+fn no_segment_at_all_is_refused() {
+    Sweep::new(&[LqNode::zeros(2, 0)]).set_segments(0);
+}
+
+/// A quadruped that shifts its weight on four feet and then reaches with one, from a warm start with gaps.
+fn quadruped() -> (Problem, Vec<f64>, Vec<f64>) {
+    let model = Arc::new(robots::quadruped());
+    let mut q = neutral(&model);
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    let x0 = [q, vec![0.0; 18]].concat();
+    let foot =
+        |name: &str| Contact::new(name, Constraint { kd: 20.0, ..Constraint::point(model.frame(name).unwrap()) });
+    let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
+    let frame = model.frame("RF_foot").unwrap();
+    let costs = |target| {
+        vec![
+            quadratic("state", 1e-1, Residual::State { reference: x0.clone() }),
+            quadratic("com", 1e3, Residual::CenterOfMass { target: Vec3::new(0.03, 0.02, 0.36) }),
+            quadratic("foot", 1e2, Residual::FrameTranslation { frame, target }),
+        ]
+    };
+    let driven = |target| {
+        let effort = quadratic("effort", 1e-3, Residual::Control { reference: vec![0.0; 12] });
+        [costs(target), vec![effort]].concat()
+    };
+    let near = Vec3::new(0.35, -0.2, 0.05);
+    let feet = ["LF_foot", "LH_foot", "RH_foot", "RF_foot"].map(foot);
+    let mut stance = ContactDynamics::running(model.clone(), &feet, 0.02, driven(near)).unwrap();
+    let us = stance.quasi_static(&x0).repeat(30);
+    let reach = ContactDynamics::running(model.clone(), &feet[..3], 0.02, driven(near)).unwrap();
+    let end = FreeDynamics::terminal(model.clone(), costs(near)).unwrap();
+    let stages = (0..30).map(|t| usize::from(t >= 12)).collect();
+    let problem = Problem::new(x0.clone(), vec![Box::new(stance), Box::new(reach)], stages, Box::new(end)).unwrap();
+    let mut xs = x0.repeat(31);
+    let mut random = random();
+    for t in 1..31 {
+        (7..19).for_each(|i| xs[37 * t + i] += random.random_range(-0.02..0.02));
+    }
+    (problem, xs, us)
+}
+
+#[test]
+fn a_robots_solve_makes_the_same_iterates() {
+    let (mut problem, xs, us) = quadruped();
+    let mut as_one = Fddp::new(&problem);
+    as_one.settings.max_iterations = 15;
+    let expected = as_one.solve(&mut problem, &xs, &us).unwrap().clone();
+    assert!(expected.trace.len() > 4 && expected.trace.iter().any(|i| i.step < 1.0), "{:?}", expected.trace);
+    for segments in [2, 4, 9] {
+        let mut solver = Fddp::new(&problem);
+        solver.settings.max_iterations = 15;
+        solver.settings.segments = segments;
+        let solution = solver.solve(&mut problem, &xs, &us).unwrap();
+        assert_eq!(solution.status, expected.status);
+        assert_eq!(solution.trace.len(), expected.trace.len());
+        for (a, b) in solution.trace.iter().zip(&expected.trace) {
+            assert_eq!((a.step, a.accepted, a.feasible), (b.step, b.accepted, b.feasible), "{a:?} {b:?}");
+            assert_eq!(a.regularisation, b.regularisation);
+            assert!((a.cost - b.cost).abs() < COST * b.cost.abs(), "{a:?} {b:?}");
+        }
+        assert!(solution.xs != expected.xs, "not in segments");
+        // once more in as many, and then as one again
+        let again = solver.solve(&mut problem, &xs, &us).unwrap().xs.clone();
+        assert_eq!(again, solver.solve(&mut problem, &xs, &us).unwrap().xs);
+        solver.settings.segments = 1;
+        assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap().xs, expected.xs);
+    }
+
+    // and of the last derivatives each knot
+    let mut nodes = problem.nodes();
+    problem.calc_diff(&expected.xs, &expected.us, &mut nodes);
+    let mut random = random();
+    for node in &mut nodes {
+        node.f.copy_from(&(random_matrix(&mut random, 36, 1) * 1e-3).column(0));
+    }
+    for segments in [2, 4, 9] {
+        let (as_one, knots) = both(&nodes, segments, 1e-9);
+        assert_same(&knots, &as_one, "quadruped");
+        assert!(knots != as_one);
+    }
+}
+
+#[test]
+fn a_solve_without_segments_is_refused() {
+    let (mut problem, xs, us) = quadruped();
+    let mut solver = Fddp::new(&problem);
+    solver.settings.segments = 0;
+    let expected = Error::Setting { name: "segments", value: 0.0, allowed: "at least 1" };
+    assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap_err(), expected);
+}

@@ -1,0 +1,125 @@
+//! Derivatives on several threads are those on one, to the last bit.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::{random, random_matrix, random_node};
+use condyle_dynamics::{Constraint, Vec3, integrate, neutral, robots};
+use condyle_optimal::robot::{
+    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, ImpulseDynamics, Integrator, Residual,
+};
+use condyle_optimal::{ActionModel, Error, Fddp, Lqr, NumDiff, Problem, Solution};
+use rand::RngExt;
+use std::sync::Arc;
+
+/// A gait of a quadruped of every kind of knot: stance, an impact, one by differences that cannot be copied, flight by
+/// Runge–Kutta and by Euler; in runs that are no multiples of lanes.
+fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
+    let model = Arc::new(robots::quadruped());
+    let mut q = neutral(&model);
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    let x0 = [q, vec![0.0; 18]].concat();
+    let foot = |name: &str| Constraint::point(model.frame(name).unwrap());
+    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, Constraint { kd: 20.0, ..foot(name) }));
+    let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
+    let standing = || {
+        let com = Residual::CenterOfMass { target: Vec3::new(0.0, 0.0, 0.4) };
+        vec![quadratic("state", 1e-1, Residual::State { reference: x0.clone() }), quadratic("com", 1e1, com)]
+    };
+    let driven = || {
+        let effort = quadratic("effort", 1e-3, Residual::Control { reference: vec![0.0; 12] });
+        [standing(), vec![effort]].concat()
+    };
+    let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, driven()).unwrap();
+    let us = stance.quasi_static(&x0);
+    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, standing()).unwrap();
+    let flight = Free::new(model.clone(), Actuation::joints(&model), driven()).unwrap();
+    let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
+    let flying = FreeDynamics::running(model.clone(), 0.01, driven()).unwrap();
+    let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
+    let models: Vec<Box<dyn ActionModel>> =
+        vec![Box::new(stance), Box::new(impact.clone()), Box::new(NumDiff(impact)), Box::new(flight), Box::new(flying)];
+    let stages = [vec![2], vec![0; 19], vec![1], vec![3; 5], vec![4; 11], vec![2], vec![0; 9], vec![1, 1]].concat();
+    let nus = stages.iter().map(|stage| if [1, 2].contains(stage) { 0 } else { 12 });
+    let us = nus.flat_map(|nu| us[..nu].to_vec()).collect();
+    let mut random = random();
+    let mut state = || {
+        let step: Vec<f64> = (0..18).map(|_| random.random_range(-0.1..0.1)).collect();
+        let mut q = x0[..19].to_vec();
+        integrate(&model, &x0[..19], &step, &mut q);
+        [q, (0..18).map(|_| random.random_range(-0.1..0.1)).collect()].concat()
+    };
+    let xs = (0..=stages.len()).flat_map(|_| state()).collect();
+    (Problem::new(x0.clone(), models, stages, Box::new(end)).unwrap(), xs, us)
+}
+
+fn solve(problem: &mut Problem, xs: &[f64], us: &[f64], threads: usize) -> Solution {
+    let mut solver = Fddp::new(problem);
+    solver.settings.max_iterations = 4;
+    solver.settings.threads = threads;
+    let mut solution = solver.solve(problem, xs, us).unwrap().clone();
+    solution.timings = Default::default();
+    solution
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same_bits() {
+    let (mut problem, xs, us) = gait();
+    let expected = solve(&mut problem, &xs, &us, 1);
+    assert!(expected.trace.iter().any(|iteration| iteration.accepted), "{:?}", expected.trace);
+    for threads in [2, 3, 4, 7, 100] {
+        for pool in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(pool).build().unwrap();
+            assert!(pool.install(|| solve(&mut problem, &xs, &us, threads)) == expected, "{threads} threads");
+        }
+    }
+    assert!(solve(&mut problem, &xs, &us, 1) == expected);
+}
+
+/// A model that was changed is copied anew.
+#[test]
+fn copies_follow_their_models() {
+    let (mut problem, xs, us) = gait();
+    let before = solve(&mut problem, &xs, &us, 3);
+    let change = |problem: &mut Problem| {
+        assert!(problem.model_mut::<ContactDynamics>(0).unwrap().set_weight("com", 50.0));
+        assert!(problem.model_mut::<ImpulseDynamics>(1).unwrap().set_weight("state", 0.3));
+        assert!(problem.terminal_mut::<FreeDynamics>().unwrap().set_weight("com", 5.0));
+    };
+    change(&mut problem);
+    let after = solve(&mut problem, &xs, &us, 3);
+    let (mut fresh, ..) = gait();
+    change(&mut fresh);
+    assert!(after == solve(&mut fresh, &xs, &us, 1));
+    assert!(after.cost != before.cost);
+}
+
+/// Models of other numbers of controls, in a horizon that moves on.
+#[test]
+fn a_horizon_may_move() {
+    let mut random = random();
+    let models = [3, 1, 2].map(|nu| random_node(&mut random, 4, nu));
+    let end = random_node(&mut random, 4, 0);
+    let build = || {
+        let models = models.iter().map(|node| Box::new(Lqr::new(node.clone())) as Box<dyn ActionModel>).collect();
+        Problem::new(vec![0.5; 4], models, vec![0, 0, 1, 2, 2, 2], Box::new(Lqr::new(end.clone()))).unwrap()
+    };
+    let (mut one, mut several) = (build(), build());
+    for last in [1, 0, 2, 2] {
+        let us = random_matrix(&mut random, one.control_range(6).end, 1);
+        let xs = random_matrix(&mut random, 4 * 7, 1);
+        let expected = solve(&mut one, xs.as_slice(), us.as_slice(), 1);
+        assert!(solve(&mut several, xs.as_slice(), us.as_slice(), 4) == expected);
+        one.shift(last).unwrap();
+        several.shift(last).unwrap();
+    }
+}
+
+#[test]
+fn no_thread_at_all_is_refused() {
+    let (mut problem, xs, us) = gait();
+    let mut solver = Fddp::new(&problem);
+    solver.settings.threads = 0;
+    let expected = Error::Setting { name: "threads", value: 0.0, allowed: "at least 1" };
+    assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap_err(), expected);
+}
