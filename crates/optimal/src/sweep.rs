@@ -147,7 +147,7 @@ impl Sweep {
     ///
     /// # Errors
     /// [`SweepError`] if a Quu is not positive definite or the value function not finite; the knots before that one
-    /// then keep their old values.
+    /// then keep their old values, but in segments some may have new ones.
     ///
     /// # Panics
     /// If the shapes of `nodes` are not those given to [`new`](Self::new).
