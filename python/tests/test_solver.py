@@ -53,3 +53,18 @@ def test_bounds_and_method() -> None:
     problem = Problem(xs[0], [wrong], [0], FreeDynamics(arm, None, []))
     with pytest.raises(ProblemError, match="control 0 must be at least 1 and at most 0"):
         Fddp(problem).solve(xs[:2], us[:1])
+
+
+def test_segments_and_threads_change_no_iterate() -> None:
+    problem, xs, us = reach()
+    one = Fddp(problem).solve(xs, us)
+    threaded = Fddp(problem, threads=2).solve(xs, us)
+    np.testing.assert_array_equal(threaded.xs, one.xs)
+    segments = Fddp(problem, segments=3, threads=2).solve(xs, us)
+    assert segments.status == one.status
+    np.testing.assert_allclose([i.cost for i in segments.trace], [i.cost for i in one.trace], rtol=1e-9)
+    np.testing.assert_allclose(segments.xs, one.xs, atol=1e-9)
+    assert (segments.xs != one.xs).any()
+    for name in ("segments", "threads"):
+        with pytest.raises(ProblemError, match=f"setting `{name}` is 0, but it must be at least 1"):
+            Fddp(problem, **{name: 0}).solve(xs, us)

@@ -106,11 +106,12 @@ impl Sweep {
     /// which it is called, else of the global one. What it finds is the same but for rounding, and to the last bit for any
     /// number of threads. With 1, as it is made, it never leaves the caller's thread.
     ///
-    /// S segments on as many cores take the time of 2½ N / (S + 1½) + 1.8 (S − 1) of the N steps of a sweep as one; that
-    /// no longer falls beyond S = √N. From the measured parts (`benches/riccati.rs`), for N = 100 and (ndx, nu) =
-    /// (76, 32) / (36, 12) / (14, 7), they are faster by 1.4 / 1.4 / 1.4 with S = 2, by 1.9 / 2.0 / 2.0 with 4 and by
-    /// 2.5 / 2.6 / 2.8 with 8. So two cores gain something, if a sweep takes much longer than the 10 µs or so in which
-    /// threads meet. On one core S segments are slower than one, by 1.3 to 3 times.
+    /// S segments on as many cores take at least the time of 2½ N / (S + 1½) + 1.8 (S − 1) of the N steps of a sweep as one;
+    /// that no longer falls beyond S = √N. From the measured parts (`benches/riccati.rs`), for N = 100 and (ndx, nu) =
+    /// (76, 32) / (36, 12) / (14, 7), they could be faster by 1.4 / 1.4 / 1.4 with S = 2, by 1.9 / 2.0 / 2.0 with 4 and by
+    /// 2.5 / 2.6 / 2.8 with 8. That leaves out the time in which threads meet: in solves on two cores, S = 2 was faster
+    /// by 1.25 for a humanoid (5.3 ms a sweep), as fast for a quadruped (0.9 ms), and slower for an arm (0.14 ms). On one
+    /// core S segments are slower than one, by 1.3 to 3 times.
     ///
     /// A sweep with bounds on controls or with curvature of the dynamics is done as one nevertheless. So is one whose
     /// segments lose too many digits or have no minimum of their own, after it was tried in vain: that wants an R that is
@@ -152,7 +153,7 @@ impl Sweep {
     ///
     /// # Errors
     /// [`SweepError`] if a Quu is not positive definite or the value function not finite; the knots before that one
-    /// then keep their old values.
+    /// then keep their old values, but in segments some may have new ones.
     ///
     /// # Panics
     /// If the shapes of `nodes` are not those given to [`new`](Self::new).
