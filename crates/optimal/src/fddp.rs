@@ -31,8 +31,9 @@ use std::time::Instant;
 /// Iterates count as feasible from the first full step on (α = 1 closes all gaps at once). The feedback is
 /// u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K.
 ///
-/// The first step length is tried alone; if it fails, the others are tried side by side, as many as the actions have
-/// [`lanes`](crate::ActionModel::lanes), and the longest good one is taken: the same step that one by one would find.
+/// The first step length is tried alone; if it fails, the next four are tried side by side and then the others, at most as
+/// many as the actions have [`lanes`](crate::ActionModel::lanes), and the longest good one is taken: the same step that one
+/// by one would find.
 ///
 /// The workspace is allocated by [`new`](Self::new); a solve allocates the trace, and workspaces for
 /// [`segments`](Settings::segments), when it begins, and copies of actions for [`threads`](Settings::threads) (not again the

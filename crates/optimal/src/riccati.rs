@@ -363,14 +363,14 @@ fn turn<V: Vector>(to: &mut [f64], x: &[f64], shift: usize) {
     copy::<V>(&mut to[x.len() - shift..], &x[..shift]);
 }
 
-/// Whether no entry has diverged; false for a NaN.
+/// Whether no entry has diverged; false for a NaN. The bits of positive numbers are in the numbers' order, a NaN's above all.
 #[inline(always)]
 fn all_bounded(x: &[f64]) -> bool {
-    let mut bounded = true;
+    let mut largest = 0;
     for x in x {
-        bounded &= x.abs() < DIVERGED;
+        largest = largest.max(x.abs().to_bits());
     }
-    bounded
+    largest < DIVERGED.to_bits()
 }
 
 /// Moves the rows and columns of the `free` ones of m controls to the front of H, and what follows up behind them.

@@ -9,6 +9,10 @@ use crate::settings::Method;
 use crate::solution::Solution;
 use std::time::Instant;
 
+/// How many step lengths are tried side by side when the first one fails: beside dynamics in lanes each costs something of
+/// its own, and the next few mostly have a good one.
+const SECOND: usize = 4;
+
 /// The outcome of a line search: of the trial it accepted or else of the last that stayed finite.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Search {
@@ -71,7 +75,12 @@ impl Fddp {
         }
         let (mut tried, count) = (0, self.steps.len());
         while tried < count {
-            let width = if tried == 0 { 1 } else { self.trials.width().min(count - tried) };
+            let most = match tried {
+                0 => 1,
+                1 => SECOND,
+                _ => count,
+            };
+            let width = most.min(self.trials.width()).min(count - tried);
             if !self.clock.allows(Phase::Rollout) {
                 search.out_of_time = true;
                 return search;

@@ -53,6 +53,10 @@ pub enum SweepError {
 /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   H += W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T
 /// ```
 ///
+/// The knots of robots that [`Fddp`](crate::Fddp) sweeps come without A and B, as the equations of inverse dynamics, in
+/// which accelerations and contact forces are eliminated in place of the controls ([`implicit`](crate::Settings::implicit)):
+/// what comes out is the same.
+///
 /// Where δu is bounded, k solves the quadratic program of its knot by projected Newton steps (Tassa, Mansard, Todorov,
 /// ICRA 2014), and the elimination is that of the controls that are not at a bound. The steps start from minus the k of
 /// the last run, Crocoddyl's choice; it decides nothing but which of two equally good sets of bounds is found.
