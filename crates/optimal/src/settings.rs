@@ -25,7 +25,8 @@ pub struct Settings {
     /// How gaps are closed and which steps are accepted.
     pub method: Method,
     /// Whether the curvature of the dynamics counts, Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action gives it: full DDP,
-    /// which converges quadratically. Quu may need more regularisation then.
+    /// which converges quadratically. Quu may need more regularisation then. Of a robot's knots those by semi-implicit
+    /// Euler that are without contacts give it, exactly; the others count as linear.
     pub second_order: bool,
     /// Whether a robot's knots come to the sweep as the equations of inverse dynamics, with accelerations and contact
     /// forces as unknowns instead of the controls, where that is possible: without bounds on controls and without

@@ -152,11 +152,14 @@ fn a_robots_solve_allocates_nothing() {
         let xs = x0.repeat(11);
         let mut solver = Fddp::new(&problem);
         solver.settings.max_iterations = 5;
-        solver.solve(&mut problem, &xs, &us).unwrap();
-        let second = allocations(|| {
+        for second_order in [false, true] {
+            solver.settings.second_order = second_order;
             solver.solve(&mut problem, &xs, &us).unwrap();
-        });
-        assert_eq!(second, 0, "{}", model.name());
+            let second = allocations(|| {
+                solver.solve(&mut problem, &xs, &us).unwrap();
+            });
+            assert_eq!(second, 0, "{}, second order: {second_order}", model.name());
+        }
     }
 }
 

@@ -4,10 +4,13 @@
 mod common;
 
 use common::{Circle, HANGING, cartpole_action, random, random_matrix, straight};
-use condyle_dynamics::{neutral, robots};
-use condyle_optimal::robot::{Actuation, Free, FreeDynamics, Integrator};
+use condyle_dynamics::{
+    DifferenceArgument, Inertia, IntegrateArgument, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD,
+    difference_jacobian, integrate_jacobian, neutral, random_configuration, robots,
+};
+use condyle_optimal::robot::{Activation, Actuation, Cost, Free, FreeDynamics, Integrator, InverseDynamics, Residual};
 use condyle_optimal::{ActionModel, Fddp, Hessian, LqNode, NumDiff, Problem, Status, Sweep};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// Second central differences of functions of size one to ten.
@@ -16,6 +19,10 @@ const DIFFERENCES: f64 = 1e-5;
 /// First central differences with this step are good to 1e-8 or so.
 const STEP: f64 = 6e-6;
 const SLOPES: f64 = 1e-7;
+/// As `DIFFERENCES`, for a robot: rounding grows with the condition of its inertia matrix, truncation with its sines' squares.
+const VALUES: f64 = 1e-4;
+/// Both triangles are sums of the same numbers in different orders, of those of a factorisation.
+const SYMMETRY: f64 = 1e-12;
 /// What the condition of the arm's inertia matrix, 1e4, leaves of the bits of its inverse.
 const ROUNDING: f64 = 1e-12;
 
@@ -91,51 +98,192 @@ fn convergence_is_quadratic() {
     assert!(newton.0 <= 4 && gauss_newton.0 >= 10, "{newton:?} {gauss_newton:?}");
 }
 
-/// The second derivatives of a robot's dynamics are the differences of its first ones, Aᵀλ and Bᵀλ.
+/// Joints of every kind whose positions are a group, and a knee.
+fn groups() -> Model {
+    let limb = Inertia::from_com(1.3, Vec3::new(0.1, -0.05, -0.3), Sym3::diagonal(0.07));
+    let at = |x: f64| Se3 { translation: Vec3::new(x, 0.2, -0.4), ..Se3::identity() };
+    let (y, z) = (Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.6, 0.8));
+    let mut robot = ModelBuilder::new("groups");
+    let sledge = robot.body("sledge", WORLD, Joint::Planar, at(0.0), limb);
+    let shoulder = robot.body("shoulder", sledge, Joint::Spherical, at(0.3), limb);
+    let wheel = robot.body("wheel", shoulder, Joint::Continuous { axis: z }, at(-0.1), limb);
+    robot.body("knee", wheel, Joint::Revolute { axis: y }, at(0.2), limb);
+    robot.body("loose", sledge, Joint::FreeFlyer, at(0.5), limb);
+    robot.build().unwrap()
+}
+
+/// ∂²ψ against the differences of ∂ψ and of ψ, at random states.
+fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
+    let mut random = random();
+    let (nv, ndx, nu) = (model.nv(), action.ndx(), action.nu());
+    let mut node = LqNode::zeros(ndx, nu);
+    for _ in 0..3 {
+        let numbers = random_matrix(&mut random, nv + nu + ndx, 1);
+        let (v, numbers) = numbers.as_slice().split_at(nv);
+        let (u, lambda) = numbers.split_at(nu);
+        let x = [&random_configuration(model, &mut random), v].concat();
+        let mut ours = Hessian::zeros(ndx, nu);
+        assert!(action.dynamics_hessian(0, &x, u, lambda, &mut ours));
+        let largest = 1.0 + ours.xx.amax().max(ours.xu.amax()).max(ours.uu.amax());
+
+        // ψ(z) = λᵀ(φ(x ⊕ δx, u + δu) ⊖ φ(x, u)):   ∂ψ/∂x = E(δx)ᵀ Aᵀ L(φ(…) ⊖ φ)ᵀ λ,   ∂ψ/∂u = Bᵀ Lᵀ λ
+        let (mut centre, mut next, mut moved) = (x.clone(), x.clone(), x.clone());
+        action.calc(0, &x, u, &mut centre);
+        let mut change = vec![0.0; ndx];
+        let (mut E, mut L) = (DMatrix::zeros(nv, nv), DMatrix::zeros(nv, nv));
+        let mut gradient = |z: &[f64]| {
+            action.integrate(&x, &z[..ndx], &mut moved);
+            let u: Vec<f64> = u.iter().zip(&z[ndx..]).map(|(u, du)| u + du).collect();
+            action.calc(0, &moved, &u, &mut next);
+            action.calc_diff(0, &moved, &u, &mut node);
+            action.difference(&centre, &next, &mut change);
+            integrate_jacobian(model, &z[..nv], IntegrateArgument::Velocity, &mut E);
+            difference_jacobian(model, &change[..nv], DifferenceArgument::To, &mut L);
+            let mut lambda = DVector::from_column_slice(lambda);
+            let upper = L.tr_mul(&lambda.rows(0, nv));
+            lambda.rows_mut(0, nv).copy_from(&upper);
+            let (mut by_x, by_u) = (node.A.tr_mul(&lambda), node.B.tr_mul(&lambda));
+            let upper = E.tr_mul(&by_x.rows(0, nv));
+            by_x.rows_mut(0, nv).copy_from(&upper);
+            (by_x, by_u)
+        };
+        for j in 0..ndx + nu {
+            let mut z = vec![0.0; ndx + nu];
+            z[j] = STEP;
+            let above = gradient(&z);
+            z[j] = -STEP;
+            let below = gradient(&z);
+            // Both slopes are differences of numbers that carry a rounding of a few bits.
+            let rounding = ROUNDING * (above.0.amax() + above.1.amax()) / STEP;
+            let (x, u) = ((above.0 - below.0) / (2.0 * STEP), (above.1 - below.1) / (2.0 * STEP));
+            let (ours_x, ours_u) = match j < ndx {
+                true => (ours.xx.column(j).into_owned(), ours.xu.row(j).transpose()),
+                false => (ours.xu.column(j - ndx).into_owned(), ours.uu.column(j - ndx).into_owned()),
+            };
+            assert!((&ours_x - &x).amax() < SLOPES * largest + rounding, "{j}: {ours_x} {x}");
+            assert!((&ours_u - &u).amax() < SLOPES * largest + rounding, "{j}: {ours_u} {u}");
+        }
+
+        // The same without the Jacobians of the groups, where there are some.
+        if model.nq() > nv {
+            let mut numeric = Hessian::zeros(ndx, nu);
+            NumDiff(action.clone()).dynamics_hessian(0, &x, u, lambda, &mut numeric);
+            let worst = [(&ours.xx, &numeric.xx), (&ours.xu, &numeric.xu), (&ours.uu, &numeric.uu)]
+                .map(|(ours, numeric)| (ours - numeric).amax());
+            assert!(worst.iter().all(|&worst| worst < VALUES * largest), "{worst:?} of {largest}");
+        }
+        assert!((&ours.xx - ours.xx.transpose()).amax() <= SYMMETRY * largest);
+        assert_eq!(ours.uu, ours.uu.transpose());
+    }
+}
+
+/// The second derivatives of a robot's dynamics are the differences of its first ones.
 #[test]
 fn robots_give_theirs_exactly() {
-    let mut random = random();
     let arm = Arc::new(robots::arm7());
-    let map = Actuation::matrix(&arm, random_matrix(&mut random, 7, 3)).unwrap();
+    let map = Actuation::matrix(&arm, random_matrix(&mut random(), 7, 3)).unwrap();
     let few = Free::new(arm.clone(), map, vec![]).unwrap();
-    let few = FreeDynamics::new(few, Integrator::SemiImplicitEuler, 0.05).unwrap();
-    for mut action in [FreeDynamics::running(arm.clone(), 0.05, vec![]).unwrap(), few] {
-        let nu = action.nu();
-        let mut node = LqNode::zeros(14, nu);
-        for _ in 0..3 {
-            let numbers = random_matrix(&mut random, 28 + nu, 1);
-            let (z, lambda) = numbers.as_slice().split_at(14 + nu);
-            let mut ours = Hessian::zeros(14, nu);
-            assert!(action.dynamics_hessian(0, &z[..14], &z[14..], lambda, &mut ours));
-            let lambda = DVector::from_column_slice(lambda);
-            let mut gradient = |z: &[f64]| {
-                action.calc_diff(0, &z[..14], &z[14..], &mut node);
-                (node.A.transpose() * &lambda, node.B.transpose() * &lambda)
-            };
-            let largest = 1.0 + ours.xx.amax();
-            for j in 0..14 + nu {
-                let mut moved = z.to_vec();
-                moved[j] = z[j] + STEP;
-                let above = gradient(&moved);
-                moved[j] = z[j] - STEP;
-                let below = gradient(&moved);
-                // Both slopes are differences of numbers that carry a rounding of a few bits.
-                let rounding = ROUNDING * (above.0.amax() + above.1.amax()) / STEP;
-                let (x, u) = ((above.0 - below.0) / (2.0 * STEP), (above.1 - below.1) / (2.0 * STEP));
-                let (ours_x, ours_u) = match j < 14 {
-                    true => (ours.xx.column(j).into_owned(), ours.xu.row(j).transpose()),
-                    false => (ours.xu.column(j - 14).into_owned(), ours.uu.column(j - 14).into_owned()),
-                };
-                assert!((&ours_x - &x).amax() < SLOPES * largest + rounding, "{j}: {ours_x} {x}");
-                assert!((&ours_u - &u).amax() < SLOPES * largest + rounding, "{j}: {ours_u} {u}");
-            }
+    check(&arm, FreeDynamics::new(few, Integrator::SemiImplicitEuler, 0.05).unwrap());
+    for model in [arm, Arc::new(robots::quadruped()), Arc::new(groups())] {
+        for dt in [0.05, 0.5] {
+            check(&model, FreeDynamics::running(model.clone(), dt, vec![]).unwrap());
+            check(&model, InverseDynamics::running(model.clone(), dt, vec![]).unwrap());
         }
     }
-    // On a group there is more to it; so it says.
-    let quadruped = Arc::new(robots::quadruped());
-    let x = [neutral(&quadruped), vec![0.0; 18]].concat();
-    let mut action = FreeDynamics::running(quadruped, 0.05, vec![]).unwrap();
-    assert!(!action.dynamics_hessian(0, &x, &[0.0; 12], &[1.0; 36], &mut Hessian::zeros(36, 12)));
+}
+
+/// A body with four rotors, which push and twist it; a knot of it, or its end.
+fn quadrotor(running: bool) -> FreeDynamics {
+    let frame = Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(0.02));
+    let mut robot = ModelBuilder::new("quadrotor");
+    robot.body("frame", WORLD, Joint::FreeFlyer, Se3::identity(), frame);
+    let robot = Arc::new(robot.build().unwrap());
+    let still = [neutral(&robot), vec![0.0; 6]].concat();
+    let state = Residual::State { reference: still };
+    if !running {
+        return FreeDynamics::terminal(robot, vec![Cost::new("goal", 100.0, state, Activation::Quadratic)]).unwrap();
+    }
+    let arms = [[0.2, 0.0], [0.0, 0.2], [-0.2, 0.0], [0.0, -0.2]];
+    let map = DMatrix::from_fn(6, 4, |row, k| match row {
+        2 => 1.0,                  // thrust
+        3 => arms[k][1],           // y f
+        4 => -arms[k][0],          // −x f
+        5 => [0.02, -0.02][k % 2], // drag
+        _ => 0.0,
+    });
+    let drives = Actuation::matrix(&robot, map).unwrap();
+    let effort = Residual::Control { reference: vec![9.81 / 4.0; 4] };
+    let costs = vec![
+        Cost::new("state", 1.0, state, Activation::Quadratic),
+        Cost::new("effort", 0.1, effort, Activation::Quadratic),
+    ];
+    FreeDynamics::new(Free::new(robot, drives, costs).unwrap(), Integrator::SemiImplicitEuler, 0.05).unwrap()
+}
+
+/// The costs' Hessians are exact, by differences, the dynamics' are the robot's own.
+struct ExactCosts(NumDiff<FreeDynamics>);
+
+impl ActionModel for ExactCosts {
+    fn nx(&self) -> usize {
+        self.0.nx()
+    }
+    fn ndx(&self) -> usize {
+        self.0.ndx()
+    }
+    fn nu(&self) -> usize {
+        self.0.nu()
+    }
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.0.calc(t, x, u, next)
+    }
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.0.calc_diff(t, x, u, node);
+    }
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        self.0.0.dynamics_hessian(t, x, u, lambda, hessian)
+    }
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        self.0.integrate(x, dx, out);
+    }
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        self.0.difference(x0, x1, out);
+    }
+}
+
+/// A quadrotor that tumbles comes to rest: its thrust turns with it, and its turns do not commute.
+#[test]
+fn convergence_is_quadratic_on_a_group() {
+    const KNOTS: usize = 30;
+    let still = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let away = [1.0, -0.5, 0.3, 1.0, 0.7, -0.5, 0.0, 0.0, 0.0, 2.0, -1.0, 1.0];
+    let mut x0 = [0.0; 13];
+    quadrotor(true).integrate(&still, &away, &mut x0);
+    let solve = |exact: bool, second_order: bool| {
+        let model = |running: bool| -> Box<dyn ActionModel> {
+            match exact {
+                true => Box::new(ExactCosts(NumDiff(quadrotor(running)))),
+                false => Box::new(quadrotor(running)),
+            }
+        };
+        let mut problem = Problem::new(x0.to_vec(), vec![model(true)], vec![0; KNOTS], model(false)).unwrap();
+        let mut solver = Fddp::new(&problem);
+        // Near the optimum of Gauss–Newton first, so that both go to the same one.
+        (solver.settings.tolerance, solver.settings.max_iterations) = (1e-2, 300);
+        let near = solver.solve(&mut problem, &x0.repeat(KNOTS + 1), &[9.81 / 4.0; 4 * KNOTS]).unwrap().clone();
+        assert_eq!(near.status, Status::Converged);
+        (solver.settings.tolerance, solver.settings.second_order) = (1e-9, second_order);
+        let solution = solver.solve(&mut problem, &near.xs, &near.us).unwrap();
+        assert_eq!(solution.status, Status::Converged);
+        let stops: Vec<f64> = solution.trace.iter().map(|iteration| iteration.stop).collect();
+        (solution.cost, stops)
+    };
+    for exact in [false, true] {
+        let ((newton, few), (gauss_newton, many)) = (solve(exact, true), solve(exact, false));
+        assert!((newton - gauss_newton).abs() < 1e-8);
+        assert!(2 * few.len() <= many.len(), "{few:?} {many:?}");
+        // What is left to gain is the square of the error: with all Hessians exact, each is a multiple of the square before.
+        assert!(!exact || few.windows(2).all(|stops| stops[1] < 10.0 * stops[0] * stops[0]), "{few:?}");
+    }
 }
 
 /// Steps on a circle are linear in the angle: nothing curves.

@@ -5,10 +5,10 @@ use super::costs::{Cost, Costs};
 use super::elimination::Elimination;
 use super::integrated::Wanted;
 use super::lanes::{Outcome, SideBySide};
-use super::state::groups;
+use super::state::{GroupHessian, groups};
 use super::watch::{Needs, Offer, Scene, Slopes, Watch};
 use crate::Error;
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 use condyle_dynamics::{IntegrateArgument, Model, integrate_jacobian};
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -19,6 +19,7 @@ pub(super) struct Robot {
     pub model: Arc<Model>,
     pub actuation: Actuation,
     pub groups: Vec<Range<usize>>,
+    group_hessian: GroupHessian,
     /// The efforts of all joints.
     pub tau: Vec<f64>,
     pub schedule: Schedule,
@@ -30,9 +31,11 @@ impl Robot {
             let what = format!("it drives {} coordinates, the robot has {}", actuation.nv(), model.nv());
             return Err(Error::Actuation { what });
         }
+        let groups = groups(&model);
         Ok(Self {
             schedule: Schedule::new(model.clone(), offer, costs)?,
-            groups: groups(&model),
+            group_hessian: GroupHessian::new(model.nv(), &groups),
+            groups,
             tau: vec![0.0; model.nv()],
             actuation,
             model,
@@ -93,6 +96,11 @@ impl Robot {
     pub(super) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         integrate_jacobian(&self.model, dq, IntegrateArgument::Position, by_q);
         integrate_jacobian(&self.model, dq, IntegrateArgument::Velocity, by_dq);
+    }
+
+    /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
+    pub(super) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
+        self.group_hessian.run(&self.model, &self.groups, dq, lambda, hessian);
     }
 }
 
@@ -243,6 +251,11 @@ macro_rules! robot_positions {
             by_dq: &mut nalgebra::DMatrix<f64>,
         ) {
             self.robot.integrate_jacobians(dq, by_q, by_dq);
+        }
+
+        fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut crate::Hessian) -> bool {
+            self.robot.integrate_hessian(dq, lambda, hessian);
+            true
         }
     };
 }

@@ -220,7 +220,14 @@ impl ContinuousModel for Free {
         Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
     }
 
-    fn hessian(&mut self, _: usize, x: &[f64], u: &[f64], mu: &[f64], hessian: &mut Hessian) -> bool {
+    fn hessian(
+        &mut self,
+        _: usize,
+        x: &[f64],
+        u: &[f64],
+        mu: &[f64],
+        hessian: &mut Hessian,
+    ) -> Option<Derivatives<'_>> {
         let Self { robot, data, .. } = self;
         robot.actuation.effort(u, &mut robot.tau);
         let (nv, (q, v)) = (robot.model.nv(), x.split_at(robot.model.nq()));
@@ -239,7 +246,9 @@ impl ContinuousModel for Free {
             }
         }
         hessian.uu.fill(0.0);
-        true
+        let first = d.first;
+        let da_du = robot.actuation.columns(first.da_dtau, &mut self.da_du);
+        Some(Derivatives { a: first.a, da_dq: first.da_dq, da_dv: first.da_dv, da_du })
     }
 
     robot_positions!();

@@ -1,5 +1,6 @@
 //! Steps of time: from accelerations to the next state.
 
+use super::curvature::Curvature;
 use super::euler;
 use super::lanes::WORTHWHILE;
 use super::runge_kutta::RungeKutta;
@@ -64,11 +65,19 @@ pub trait ContinuousModel: Send + 'static {
     /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the node, which are overwritten.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_>;
 
-    /// The second derivatives of ψ = μᵀ a(x, u) into `hessian`, for nv numbers `mu`; says whether it did. It does not by
-    /// default: a then counts as linear, whatever [`second_order`](crate::Settings::second_order) says.
-    fn hessian(&mut self, t: usize, x: &[f64], u: &[f64], mu: &[f64], hessian: &mut Hessian) -> bool {
+    /// The second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, for nv numbers `mu`; returns the first ones
+    /// of a. It gives none by default: a then counts as linear, whatever
+    /// [`second_order`](crate::Settings::second_order) says.
+    fn hessian(
+        &mut self,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        mu: &[f64],
+        hessian: &mut Hessian,
+    ) -> Option<Derivatives<'_>> {
         let _ = (t, x, u, mu, hessian);
-        false
+        None
     }
 
     /// How many states [`prepare`](Self::prepare) takes at the price of few; 1 unless it uses vector lanes.
@@ -152,6 +161,15 @@ pub trait ContinuousModel: Send + 'static {
     fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         let _ = (dq, by_q, by_dq);
     }
+
+    /// The second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`, by δ (its state) and ε
+    /// (its control), nv numbers each: the blocks of the [`groups`](Self::groups) are all that is read. Says whether it
+    /// did. It does not by default: where there are groups, a step then counts as linear, whatever
+    /// [`second_order`](crate::Settings::second_order) says.
+    fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let _ = (dq, lambda, hessian);
+        false
+    }
 }
 
 /// What [`ContinuousModel::prepare`] computes.
@@ -214,6 +232,7 @@ pub struct Integrated<M> {
     /// ∂(q ⊕ dq)/∂q and ∂(q ⊕ dq)/∂dq.
     pub(super) transport: DMatrix<f64>,
     pub(super) exp: DMatrix<f64>,
+    curvature: Curvature,
 }
 
 #[derive(Clone, Debug)]
@@ -255,8 +274,9 @@ impl<M: ContinuousModel> Integrated<M> {
             1 => Method::Euler,
             _ => Method::RungeKutta(Box::new(RungeKutta::new(stages, nq, nv, nu))),
         };
-        let square = DMatrix::zeros(nv, nv);
-        Self { inner: model, dt, method, bounds: None, dq: vec![0.0; nv], transport: square.clone(), exp: square }
+        let (square, curvature) = (DMatrix::zeros(nv, nv), Curvature::new(&model));
+        let (transport, exp) = (square.clone(), square);
+        Self { inner: model, dt, method, bounds: None, dq: vec![0.0; nv], transport, exp, curvature }
     }
 
     /// The same with bounds on the controls, infinite where there is none.
@@ -314,10 +334,16 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
     }
 
     fn fork(&self) -> Option<Box<dyn ActionModel>> {
-        let Self { dt, method, bounds, dq, transport, exp, .. } = self;
-        let (method, bounds, dq) = (method.clone(), bounds.clone(), dq.clone());
-        let (transport, exp) = (transport.clone(), exp.clone());
-        Some(Box::new(Self { inner: self.inner.fork()?, dt: *dt, method, bounds, dq, transport, exp }))
+        Some(Box::new(Self {
+            inner: self.inner.fork()?,
+            dt: self.dt,
+            method: self.method.clone(),
+            bounds: self.bounds.clone(),
+            dq: self.dq.clone(),
+            transport: self.transport.clone(),
+            exp: self.exp.clone(),
+            curvature: self.curvature.clone(),
+        }))
     }
 
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
@@ -396,17 +422,12 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         }
     }
 
-    /// By semi-implicit Euler in a vector space: of λᵀ∂²(q⁺, v⁺) there is left Δt (λ_v + Δt λ_q)ᵀ ∂²a.
+    /// By semi-implicit Euler: see `curvature.rs`.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
-        let Self { inner, dt: Some(dt), method: Method::Euler, dq: mu, .. } = self else { return false };
-        if !inner.groups().is_empty() {
+        let Self { inner, dt: Some(dt), method: Method::Euler, dq, transport, exp, curvature, .. } = self else {
             return false;
-        }
-        let nv = mu.len();
-        for k in 0..nv {
-            mu[k] = *dt * (lambda[nv + k] + *dt * lambda[k]);
-        }
-        inner.hessian(t, x, u, mu, hessian)
+        };
+        curvature.run(inner, *dt, t, x, u, lambda, dq, [transport, exp], hessian)
     }
 
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {

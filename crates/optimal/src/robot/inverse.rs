@@ -7,7 +7,7 @@ use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::quadratic::Row;
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 use condyle_dynamics::{Data, Model, RneaDerivatives, rnea, rnea_derivatives};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -110,6 +110,16 @@ impl ContinuousModel for Inverse {
         let scene = Scene { x, u, a: u, tau: &robot.tau, lambda: &[] };
         robot.schedule.calc_diff(t, &scene, &InverseSlopes { d }, scale, node);
         Derivatives { a, da_dq: zeros, da_dv: zeros, da_du: identity.as_slice() }
+    }
+
+    /// Accelerations that are given do not curve.
+    fn hessian(&mut self, _: usize, _: &[f64], u: &[f64], _: &[f64], hessian: &mut Hessian) -> Option<Derivatives<'_>> {
+        let Self { a, zeros, identity, .. } = self;
+        a.copy_from_slice(u);
+        for part in [&mut hessian.xx, &mut hessian.xu, &mut hessian.uu] {
+            part.fill(0.0);
+        }
+        Some(Derivatives { a, da_dq: zeros, da_dv: zeros, da_du: identity.as_slice() })
     }
 
     robot_positions!();

@@ -48,6 +48,7 @@ mod cones;
 mod contact;
 mod contacts;
 mod costs;
+mod curvature;
 mod description;
 mod elimination;
 mod euler;

@@ -1,7 +1,13 @@
 //! The state x = (q, v) of a robot, and the linear algebra that its Jacobians' sparsity allows.
 
-use condyle_dynamics::{Joint, Model, difference, integrate};
+use crate::lq::Hessian;
+use condyle_dynamics::{
+    DifferenceArgument, IntegrateArgument, Joint, Model, difference, difference_jacobian, integrate, integrate_jacobian,
+};
+use condyle_spatial::Scalar;
+use condyle_spatial::lane_dual::LaneDual;
 use core::ops::Range;
+use nalgebra::DMatrix;
 
 /// x ⊕ δx, with δx = (δq, δv): q ⊕ δq in the configuration space, v + δv.
 pub(super) fn state_integrate(model: &Model, x: &[f64], dx: &[f64], out: &mut [f64]) {
@@ -25,4 +31,73 @@ pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut 
 pub(super) fn groups(model: &Model) -> Vec<Range<usize>> {
     let group = |joint| matches!(joint, Joint::Spherical | Joint::Planar | Joint::FreeFlyer);
     model.bodies()[1..].iter().filter(|b| group(b.joint)).map(|b| b.idx_v..b.idx_v + b.joint.nv()).collect()
+}
+
+/// Room for the second derivatives of q ⊕ δ along the groups, empty where there are none.
+#[derive(Clone, Debug)]
+pub(super) struct GroupHessian {
+    /// δ, with one coordinate of each group moving. Shape: nv. Written by: `run`.
+    delta: Vec<LaneDual<f64>>,
+    /// E and its derivative along that coordinate. Shape: nv × nv. Written by: `run`.
+    E: DMatrix<LaneDual<f64>>,
+    /// −J_log(−δ). Shape: nv × nv. Written by: `run`.
+    back: DMatrix<f64>,
+    /// M. Shape: nv × nv, the blocks of groups. Written by: `run`.
+    M: DMatrix<f64>,
+}
+
+impl GroupHessian {
+    pub(super) fn new(nv: usize, groups: &[Range<usize>]) -> Self {
+        let n = if groups.is_empty() { 0 } else { nv };
+        let (zero, square) = (LaneDual::zero(), DMatrix::zeros(n, n));
+        Self { delta: vec![zero; n], E: DMatrix::from_element(n, n, zero), back: square.clone(), M: square }
+    }
+
+    /// The second derivatives of θ(δ₀, ε) = λᵀ((q ⊕ δ₀) ⊕ (δ + ε) ⊖ (q ⊕ δ)) by δ₀ and ε, at zero, of each group.
+    ///
+    /// Let E(δ) = J_exp(δ), M_ik = Σᵣ λᵣ ∂E_ri/∂δ_k. In the group θ = λᵀ log(exp(Tδ₀) exp(η)), T = Ad exp(−δ), where
+    /// dη = J_log(η) E(δ + ε) dε, thus
+    ///
+    /// ```text
+    /// θ = λᵀ(T δ₀ + E ε + ½ ∂E[ε] ε + ½ [T δ₀, E ε]) + …      [E e, E ε] = ∂E[ε] e − ∂E[e] ε
+    /// ```
+    ///
+    /// (the second one is the equation of Maurer and Cartan), and with e = E⁻¹ T δ₀ = J_log(−δ) δ₀ the derivatives are
+    /// ∂²θ/∂δ₀∂δ₀ = 0, ∂²θ/∂δ₀∂ε = ½ J_log(−δ)ᵀ (M − Mᵀ), ∂²θ/∂ε∂ε = ½ (M + Mᵀ).
+    pub(super) fn run(
+        &mut self,
+        model: &Model,
+        groups: &[Range<usize>],
+        dq: &[f64],
+        lambda: &[f64],
+        hessian: &mut Hessian,
+    ) {
+        let Self { delta, E, back, M } = self;
+        let largest = groups.iter().map(Range::len).max().unwrap_or(0);
+        for k in 0..largest {
+            for (delta, &dq) in delta.iter_mut().zip(dq) {
+                *delta = LaneDual::splat(dq);
+            }
+            // E has a block a group: all of them can move at the same time
+            for group in groups.iter().filter(|group| k < group.len()) {
+                delta[group.start + k].eps = 1.0;
+            }
+            integrate_jacobian(model, delta, IntegrateArgument::Velocity, E);
+            for group in groups.iter().filter(|group| k < group.len()) {
+                for i in group.clone() {
+                    M[(i, group.start + k)] = group.clone().map(|r| lambda[r] * E[(r, i)].eps).sum();
+                }
+            }
+        }
+        difference_jacobian(model, dq, DifferenceArgument::From, back);
+        for group in groups {
+            for j in group.clone() {
+                for i in group.clone() {
+                    hessian.xx[(i, j)] = 0.0;
+                    hessian.xu[(i, j)] = group.clone().map(|r| 0.5 * back[(r, i)] * (M[(j, r)] - M[(r, j)])).sum();
+                    hessian.uu[(i, j)] = 0.5 * (M[(i, j)] + M[(j, i)]);
+                }
+            }
+        }
+    }
 }

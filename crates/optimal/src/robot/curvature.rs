@@ -1,0 +1,148 @@
+//! The second derivatives of a step of semi-implicit Euler.
+//!
+//! With y = v + Δt a(x, u) the step is q⁺ = q ⊕ Δt y, v⁺ = y. Let E = ∂(q ⊕ δ)/∂δ at δ = Δt y, ε = Δt δy and
+//! θ(δq, ε) = λ_qᵀ((q ⊕ δq) ⊕ (Δt y + ε) ⊖ q⁺). By the chain rule
+//!
+//! ```text
+//! ψ = θ(δq, ε) + λ_vᵀ δy      ∂²ψ = Δt μᵀ∂²a + [∂δq; ∂ε]ᵀ ∂²θ [∂δq; ∂ε]      μ = λ_v + Δt Eᵀ λ_q
+//! ```
+//!
+//! where ∂²θ has a block for each group of positions that is no vector space, and is zero elsewhere.
+#![allow(non_snake_case)] // E
+
+use super::integrated::{ContinuousModel, Derivatives};
+use crate::lq::Hessian;
+use crate::structure::LARGEST_BLOCK;
+use core::ops::Range;
+use nalgebra::DMatrix;
+
+/// Of a column of a matrix, the rows of a group; zeros after them.
+type Rows = [f64; LARGEST_BLOCK];
+
+/// Room for the second derivatives of steps of one model.
+#[derive(Clone, Debug)]
+pub(super) struct Curvature {
+    groups: Vec<Range<usize>>,
+    /// Δt μ. Shape: nv. Written by: `run`.
+    mu: Vec<f64>,
+    /// ∂²θ, ε in place of controls. Shape: nv and nv; nothing where there are no groups. Written by: `run`.
+    theta: Hessian,
+    /// A group's rows of ∂ε/∂(x, u), ∂²θ/∂q∂(x, u), ∂²θ/∂ε∂(x, u). Shape: ndx + nu columns each; nothing where there are
+    /// no groups. Written by: `add_group`.
+    columns: [Vec<Rows>; 3],
+}
+
+impl Curvature {
+    pub(super) fn new<M: ContinuousModel>(model: &M) -> Self {
+        let (groups, nv) = (model.groups().to_vec(), model.nv());
+        let (n, count) = if groups.is_empty() { (0, 0) } else { (nv, 2 * nv + model.nu()) };
+        let columns = [(); 3].map(|()| vec![[0.0; LARGEST_BLOCK]; count]);
+        Self { groups, mu: vec![0.0; nv], theta: Hessian::zeros(n, n), columns }
+    }
+
+    /// ∂²ψ into `hessian`; says whether the model gives it. Overwrites dq, ∂(q ⊕ dq)/∂q and E.
+    pub(super) fn run<M: ContinuousModel>(
+        &mut self,
+        model: &mut M,
+        dt: f64,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        lambda: &[f64],
+        dq: &mut [f64],
+        [transport, exp]: [&mut DMatrix<f64>; 2],
+        hessian: &mut Hessian,
+    ) -> bool {
+        let Self { groups, mu, theta, columns } = self;
+        let nv = mu.len();
+        let (lambda_q, lambda_v) = lambda.split_at(nv);
+        mu.copy_from_slice(lambda_q);
+        if !groups.is_empty() {
+            let v = &x[model.nq()..];
+            let a = model.calc(t, x, u).0;
+            for k in 0..nv {
+                dq[k] = v[k] * dt + a[k] * dt * dt;
+            }
+            if !model.integrate_hessian(dq, lambda_q, theta) {
+                return false;
+            }
+            model.integrate_jacobians(dq, transport, exp);
+            for group in groups.iter() {
+                for k in group.clone() {
+                    mu[k] = group.clone().map(|r| exp[(r, k)] * lambda_q[r]).sum(); // Eᵀ λ_q
+                }
+            }
+        }
+        for k in 0..nv {
+            mu[k] = dt * (lambda_v[k] + dt * mu[k]); // Δt (λ_v + Δt Eᵀ λ_q)
+        }
+        let Some(first) = model.hessian(t, x, u, mu, hessian) else { return false };
+        for group in groups.iter() {
+            add_group(group, dt, &first, theta, columns, hessian);
+        }
+        true
+    }
+}
+
+/// Adds [∂δq; ∂ε]ᵀ ∂²θ [∂δq; ∂ε] of a group, O((ndx + nu)²), with ε = Δt (δv + Δt (∂a/∂q δq + ∂a/∂v δv + ∂a/∂u δu)).
+fn add_group(
+    group: &Range<usize>,
+    dt: f64,
+    first: &Derivatives<'_>,
+    theta: &Hessian,
+    [epsilon, by_q, by_epsilon]: &mut [Vec<Rows>; 3],
+    hessian: &mut Hessian,
+) {
+    let (nv, start, size) = (first.a.len(), group.start, group.len());
+    let slopes = [first.da_dq.as_slice(), first.da_dv.as_slice(), first.da_du];
+    let mut column = 0;
+    for (part, slope) in slopes.into_iter().enumerate() {
+        for (k, slope) in slope.chunks_exact(nv).enumerate() {
+            let (mut e, mut along_q, mut along_epsilon) =
+                ([0.0; LARGEST_BLOCK], [0.0; LARGEST_BLOCK], [0.0; LARGEST_BLOCK]);
+            for r in 0..size {
+                e[r] = dt * dt * slope[start + r];
+            }
+            if part == 1 && group.contains(&k) {
+                e[k - start] += dt;
+            }
+            for c in 0..size {
+                for r in 0..size {
+                    along_q[r] += theta.xu[(start + r, start + c)] * e[c];
+                    along_epsilon[r] += theta.uu[(start + r, start + c)] * e[c];
+                }
+            }
+            if part == 0 && group.contains(&k) {
+                for r in 0..size {
+                    along_q[r] += theta.xx[(start + r, k)];
+                    along_epsilon[r] += theta.xu[(k, start + r)];
+                }
+            }
+            (epsilon[column], by_q[column], by_epsilon[column]) = (e, along_q, along_epsilon);
+            column += 1;
+        }
+    }
+    // entry (i, j) = (∂δq/∂i)ᵀ ∂²θ/∂q∂j + (∂ε/∂i)ᵀ ∂²θ/∂ε∂j
+    let ndx = 2 * nv;
+    for j in 0..column {
+        for i in 0..=j {
+            let mut sum = if group.contains(&i) { by_q[j][i - start] } else { 0.0 };
+            for r in 0..LARGEST_BLOCK {
+                sum += epsilon[i][r] * by_epsilon[j][r];
+            }
+            match (i < ndx, j < ndx) {
+                (_, true) if i == j => hessian.xx[(i, i)] += sum,
+                (_, true) => {
+                    hessian.xx[(i, j)] += sum;
+                    hessian.xx[(j, i)] += sum;
+                }
+                (true, false) => hessian.xu[(i, j - ndx)] += sum,
+                (false, false) if i == j => hessian.uu[(i - ndx, i - ndx)] += sum,
+                (false, false) => {
+                    hessian.uu[(i - ndx, j - ndx)] += sum;
+                    hessian.uu[(j - ndx, i - ndx)] += sum;
+                }
+            }
+        }
+    }
+}
