@@ -173,7 +173,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             assert!(worst.iter().all(|&worst| worst < VALUES * largest), "{worst:?} of {largest}");
         }
         assert!((&ours.xx - ours.xx.transpose()).amax() <= SYMMETRY * largest);
-        assert_eq!(ours.uu, ours.uu.transpose());
+        assert!((&ours.uu - ours.uu.transpose()).amax() <= SYMMETRY * largest);
     }
 }
 

@@ -122,27 +122,31 @@ fn add_group(
             column += 1;
         }
     }
-    // entry (i, j) = (∂δq/∂i)ᵀ ∂²θ/∂q∂j + (∂ε/∂i)ᵀ ∂²θ/∂ε∂j
-    let ndx = 2 * nv;
+    // column j, row i: (∂δq/∂i)ᵀ ∂²θ/∂q∂j + (∂ε/∂i)ᵀ ∂²θ/∂ε∂j
+    let (ndx, nu) = (2 * nv, column - 2 * nv);
+    let (by_state, by_control) = epsilon.split_at(ndx);
     for j in 0..column {
-        for i in 0..=j {
-            let mut sum = if group.contains(&i) { by_q[j][i - start] } else { 0.0 };
-            for r in 0..LARGEST_BLOCK {
-                sum += epsilon[i][r] * by_epsilon[j][r];
-            }
-            match (i < ndx, j < ndx) {
-                (_, true) if i == j => hessian.xx[(i, i)] += sum,
-                (_, true) => {
-                    hessian.xx[(i, j)] += sum;
-                    hessian.xx[(j, i)] += sum;
-                }
-                (true, false) => hessian.xu[(i, j - ndx)] += sum,
-                (false, false) if i == j => hessian.uu[(i - ndx, i - ndx)] += sum,
-                (false, false) => {
-                    hessian.uu[(i - ndx, j - ndx)] += sum;
-                    hessian.uu[(j - ndx, i - ndx)] += sum;
-                }
-            }
+        let states = match j < ndx {
+            true => &mut hessian.xx.as_mut_slice()[j * ndx..][..ndx],
+            false => &mut hessian.xu.as_mut_slice()[(j - ndx) * ndx..][..ndx],
+        };
+        add_products(by_state, &by_epsilon[j], states);
+        for r in 0..size {
+            states[start + r] += by_q[j][r];
         }
+        if j >= ndx {
+            add_products(by_control, &by_epsilon[j], &mut hessian.uu.as_mut_slice()[(j - ndx) * nu..][..nu]);
+        }
+    }
+}
+
+/// out += Rᵀ x, for the columns of R.
+fn add_products(rows: &[Rows], x: &Rows, out: &mut [f64]) {
+    for (out, row) in out.iter_mut().zip(rows) {
+        let mut sum = 0.0;
+        for r in 0..LARGEST_BLOCK {
+            sum += row[r] * x[r];
+        }
+        *out += sum;
     }
 }
