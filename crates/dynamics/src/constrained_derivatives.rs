@@ -17,7 +17,7 @@ use crate::aba_derivatives::{minus_product, subtract_column};
 use crate::constrained_equations;
 use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_set::ConstraintSet;
-use crate::data::{Data, Size, check, check_forces};
+use crate::data::{Data, Size};
 use crate::ltdl::{Ltdl, axpy};
 use crate::model::{Coupled, Model};
 use condyle_spatial::{Constant, Force, Scalar};
@@ -206,14 +206,9 @@ pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> ConstrainedDerivatives<'d, S> {
-    data.check(model);
-    constraints.check(model);
-    model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("tau", tau.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
-    constrained_work::run(Derivatives, model, data, constraints, Inputs { q, v, tau, f_ext });
+    let inputs = Inputs { q, v, tau, f_ext };
+    constrained_work::check_arguments(model, data, constraints, &inputs);
+    constrained_work::run(Derivatives, model, data, constraints, inputs);
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ConstrainedDerivatives {
         a: &data.constrained_dynamics.qdd,

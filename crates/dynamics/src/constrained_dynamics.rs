@@ -15,7 +15,7 @@ use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::crba;
-use crate::data::{Data, Size, check, check_forces};
+use crate::data::{Data, Size};
 use crate::dispatch::Kernel;
 use crate::kinematics::{World, place};
 use crate::layout::{Pairs, Single};
@@ -218,14 +218,9 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> Constrained<'d, S> {
-    data.check(model);
-    constraints.check(model);
-    model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("tau", tau.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
-    constrained_work::run(Forward, model, data, constraints, Inputs { q, v, tau, f_ext });
+    let inputs = Inputs { q, v, tau, f_ext };
+    constrained_work::check_arguments(model, data, constraints, &inputs);
+    constrained_work::run(Forward, model, data, constraints, inputs);
     Constrained {
         a: &data.constrained_dynamics.qdd,
         lambda: &constraints.lambda,

@@ -17,7 +17,7 @@ use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint::ConstraintKind;
 use crate::constraint_motion::{Columns, Ends};
 use crate::constraint_set::ConstraintSet;
-use crate::data::{Data, check, check_forces};
+use crate::data::Data;
 use crate::frames::Placements;
 use crate::kinematics::World;
 use crate::layout::{Layout, Single};
@@ -178,14 +178,9 @@ pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> ConstrainedEquations<'d, S> {
-    data.check(model);
-    constraints.check(model);
-    model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("tau", tau.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
-    constrained_work::run(Equations, model, data, constraints, Inputs { q, v, tau, f_ext });
+    let inputs = Inputs { q, v, tau, f_ext };
+    constrained_work::check_arguments(model, data, constraints, &inputs);
+    constrained_work::run(Equations, model, data, constraints, inputs);
     ConstrainedEquations {
         a: &data.constrained_dynamics.qdd,
         lambda: &constraints.lambda,

@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use crate::constraint_set::ConstraintSet;
-use crate::data::Data;
+use crate::data::{Data, check, check_forces};
 use crate::dispatch::{Kernel, fused, is_f64, same, short, slice};
 use crate::model::Model;
 use condyle_spatial::lanes::Fused;
@@ -59,6 +59,22 @@ impl<A: Algorithm, S: Scalar, R: Constant<S>> Kernel for Work<'_, A, S, R> {
             short(Work { algorithm: self.algorithm, model, data: fused(self.data), constraints, inputs });
         }
     }
+}
+
+/// Panics unless the arguments of forward dynamics fit.
+#[inline]
+#[track_caller]
+pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, constraints: &ConstraintSet<S>, x: &Inputs<'_, S>)
+where
+    S: Scalar,
+{
+    data.check(model);
+    constraints.check(model);
+    model.check_regular();
+    check("q", x.q.len(), model.nq);
+    check("v", x.v.len(), model.nv);
+    check("tau", x.tau.len(), model.nv);
+    check_forces(x.f_ext.len(), model.nodes.len());
 }
 
 /// Runs an algorithm, compiled for the level of its scalar.

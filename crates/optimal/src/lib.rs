@@ -14,6 +14,7 @@
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
 //! - [`AugmentedLagrangian`] repeats that until general constraints hold, those of [`Constrained`] actions.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
+//! - [`AutoDiff`] makes an action of dynamics and a cost that are written for any scalar: exact derivatives by dual numbers.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
 //! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖
@@ -69,6 +70,7 @@
 
 mod action;
 mod augmented;
+mod autodiff;
 mod box_qp;
 mod clock;
 mod conditional;
@@ -98,6 +100,7 @@ mod vector;
 
 pub use action::ActionModel;
 pub use augmented::{AugmentedLagrangian, Outcome};
+pub use autodiff::{AutoDiff, GenericAction};
 pub use constrained::{Constrained, Constraint};
 pub use error::Error;
 pub use fddp::Fddp;

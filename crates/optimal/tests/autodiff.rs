@@ -1,0 +1,150 @@
+//! Actions that are written for any scalar: exact derivatives of both orders, on manifolds too.
+#![allow(non_snake_case)]
+
+use condyle_dynamics::{Data, Model, aba, difference, integrate, neutral, robots};
+use condyle_optimal::robot::{Activation, Actuation, Cost, Free, FreeDynamics, Integrated, Integrator, Residual};
+use condyle_optimal::{ActionModel, AutoDiff, Fddp, GenericAction, Hessian, LqNode, NumDiff, Problem, Status};
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+use std::sync::Arc;
+
+/// Two exact ways, through a factorisation of M.
+const EXACT: f64 = 1e-9;
+/// Central differences of first and second order, of functions of order one to a hundred.
+const DIFFERENCES: f64 = 1e-4;
+const DT: f64 = 0.05;
+
+/// A robot by semi-implicit Euler, with the cost ½ (‖x ⊖ x₀‖² + ‖u‖²) Δt.
+#[derive(Clone)]
+struct Steps {
+    model: Arc<Model>,
+    nu: usize,
+    x0: Vec<f64>,
+}
+
+impl GenericAction for Steps {
+    fn nx(&self) -> usize {
+        self.model.nq() + self.model.nv()
+    }
+    fn ndx(&self) -> usize {
+        2 * self.model.nv()
+    }
+    fn nu(&self) -> usize {
+        self.nu
+    }
+    fn calc<S: Scalar>(&mut self, _: usize, x: &[S], u: &[S], next: &mut [S]) -> S {
+        let (model, nq, nv) = (&self.model, self.model.nq(), self.model.nv());
+        let (q, v) = x.split_at(nq);
+        let mut tau = vec![S::zero(); nv];
+        tau[nv - self.nu..].copy_from_slice(u);
+        let (mut data, dt) = (Data::new(model), S::splat(DT));
+        let a = aba(model, &mut data, q, v, &tau, &[]);
+        let dq: Vec<S> = (0..nv).map(|k| (v[k] + a[k] * dt) * dt).collect();
+        integrate(model, q, &dq, &mut next[..nq]);
+        (0..nv).for_each(|k| next[nq + k] = v[k] + a[k] * dt);
+        let (mut sum, x0) = (S::zero(), self.x0.iter().map(|&x| S::splat(x)).collect::<Vec<_>>());
+        let mut error = vec![S::zero(); 2 * nv];
+        self.difference(&x0, x, &mut error);
+        error.iter().chain(u).for_each(|&e| sum += e * e);
+        sum * S::splat(0.5 * DT)
+    }
+    fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
+        let (nq, nv) = (self.model.nq(), self.model.nv());
+        integrate(&self.model, &x[..nq], &dx[..nv], &mut out[..nq]);
+        (0..nv).for_each(|k| out[nq + k] = x[nq + k] + dx[nv + k]);
+    }
+    fn difference<S: Scalar>(&self, x0: &[S], x1: &[S], out: &mut [S]) {
+        let (nq, nv) = (self.model.nq(), self.model.nv());
+        difference(&self.model, &x0[..nq], &x1[..nq], &mut out[..nv]);
+        (0..nv).for_each(|k| out[nv + k] = x1[nq + k] - x0[nq + k]);
+    }
+}
+
+fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
+    (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
+}
+
+fn close(what: &str, a: &DMatrix<f64>, b: &DMatrix<f64>, tolerance: f64) {
+    let error = (a - b).amax() / (1.0 + b.amax());
+    assert!(error < tolerance, "{what} is off by {error:e}");
+}
+
+/// A random state near neutral.
+fn state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
+    let mut q = neutral(model);
+    integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
+    [q, random(model.nv(), 1.0, rng)].concat()
+}
+
+#[test]
+fn first_derivatives_are_those_by_hand() {
+    let mut rng = StdRng::seed_from_u64(1);
+    for model in [robots::arm7(), robots::quadruped()].map(Arc::new) {
+        let nu = Actuation::joints(&model).nu();
+        let x0 = state(&model, &mut rng);
+        let costs = vec![
+            Cost::new("x", 1.0, Residual::State { reference: x0.clone() }, Activation::Quadratic),
+            Cost::new("u", 1.0, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic),
+        ];
+        let free = Free::new(model.clone(), Actuation::joints(&model), costs).unwrap();
+        let mut by_hand = Integrated::new(free, Integrator::SemiImplicitEuler, DT).unwrap();
+        let mut by_duals = AutoDiff::new(Steps { model: model.clone(), nu, x0 });
+        let (x, u) = (state(&model, &mut rng), random(nu, 5.0, &mut rng));
+        let mut nodes = [(); 2].map(|()| LqNode::zeros(2 * model.nv(), nu));
+        let [a, b] = &mut nodes;
+        by_duals.calc_diff(0, &x, &u, a);
+        by_hand.calc_diff(0, &x, &u, b);
+        close("A", &a.A, &b.A, EXACT);
+        close("B", &a.B, &b.B, EXACT);
+        close(
+            "q",
+            &DMatrix::from_column_slice(b.q.len(), 1, a.q.as_slice()),
+            &DMatrix::from_column_slice(b.q.len(), 1, b.q.as_slice()),
+            EXACT,
+        );
+        close(
+            "r",
+            &DMatrix::from_column_slice(nu, 1, a.r.as_slice()),
+            &DMatrix::from_column_slice(nu, 1, b.r.as_slice()),
+            EXACT,
+        );
+        close("R", &a.R, &b.R, EXACT);
+        let mut found = Hessian::zeros(2 * model.nv(), nu);
+        let mut expected = found.clone();
+        let lambda = random(2 * model.nv(), 1.0, &mut rng);
+        assert!(by_duals.dynamics_hessian(0, &x, &u, &lambda, &mut found));
+        assert!(by_hand.dynamics_hessian(0, &x, &u, &lambda, &mut expected));
+        close("λᵀ∂²φ/∂x²", &found.xx, &expected.xx, EXACT);
+        close("λᵀ∂²φ/∂x∂u", &found.xu, &expected.xu, EXACT);
+        close("λᵀ∂²φ/∂u²", &found.uu, &expected.uu, EXACT);
+    }
+}
+
+#[test]
+fn hessians_of_costs_are_those_by_differences() {
+    let mut rng = StdRng::seed_from_u64(2);
+    let model = Arc::new(robots::quadruped());
+    let action = Steps { model: model.clone(), nu: 12, x0: state(&model, &mut rng) };
+    let (x, u) = (state(&model, &mut rng), random(12, 5.0, &mut rng));
+    let (mut exact, mut numeric) = (LqNode::zeros(36, 12), LqNode::zeros(36, 12));
+    AutoDiff::new(action.clone()).calc_diff(0, &x, &u, &mut exact);
+    NumDiff(AutoDiff::new(action)).calc_diff(0, &x, &u, &mut numeric);
+    close("Q", &exact.Q, &numeric.Q, DIFFERENCES);
+    close("S", &exact.S, &numeric.S, DIFFERENCES);
+    close("R", &exact.R, &numeric.R, DIFFERENCES);
+}
+
+#[test]
+fn an_action_of_any_scalar_is_solved() {
+    let model = Arc::new(robots::arm7());
+    let x0 = vec![0.1; 14];
+    let goal = [vec![0.5; 7], vec![0.0; 7]].concat();
+    let action = AutoDiff::new(Steps { model: model.clone(), nu: 7, x0: goal.clone() });
+    let end = vec![Cost::new("x", 10.0, Residual::State { reference: goal }, Activation::Quadratic)];
+    let end = Box::new(FreeDynamics::terminal(model, end).unwrap());
+    let mut problem = Problem::new(x0.clone(), vec![Box::new(action)], vec![0; 10], end).unwrap();
+    let mut solver = Fddp::new(&problem);
+    let solution = solver.solve(&mut problem, &x0.repeat(11), &[0.0; 70]).unwrap();
+    assert_eq!(solution.status, Status::Converged);
+}
