@@ -94,6 +94,7 @@ __all__ = [
     "compute_all_terms",
     "constrained_dynamics",
     "constrained_dynamics_derivatives",
+    "constrained_dynamics_equations",
     "coriolis_derivatives",
     "coriolis_matrix",
     "crba",
