@@ -2,14 +2,15 @@
 
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
+use crate::numdiff;
 use std::any::Any;
 
 /// The dynamics x⁺ = φₜ(x, u) and the cost ℓₜ(x, u) of the knots t that it serves.
 ///
-/// Only the methods for a single knot must be written. The solver calls those for a **group**: consecutive knots of
-/// the horizon, or the trials of a line search at one knot. Their defaults loop; an implementation that computes
-/// several states at a time in the lanes of a vector register overrides them and says in [`lanes`](Self::lanes) how
-/// many states it likes to be given.
+/// Only the sizes and [`calc`](Self::calc) must be written; derivatives by hand are faster than the default ones. The
+/// solver calls the methods for a **group**: consecutive knots of the horizon, or the trials of a line search at one knot.
+/// Their defaults loop; an implementation that computes several states at a time in the lanes of a vector register
+/// overrides them and says in [`lanes`](Self::lanes) how many states it likes to be given.
 ///
 /// Each knot of a group comes with its index t in the horizon, so that one model can serve all knots that differ only
 /// in a reference (a foot's path, a tracked posture) and these still make one group.
@@ -92,7 +93,12 @@ pub trait ActionModel: Any + Send {
 
     /// The derivatives of both at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B = ∂x⁺/∂u, q = ∂ℓ/∂x,
     /// r = ∂ℓ/∂u, and the Hessian of ℓ or its Gauss–Newton approximation, Q, S, R. The gap f is the solver's.
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode);
+    ///
+    /// By default central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff)'s: slow, allocating, and right to
+    /// about 1e-9 (1e-7 the Hessian). [`AutoDiff`](crate::AutoDiff) has exact ones of what is written for any scalar.
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        numdiff::calc_diff(self, t, x, u, node);
+    }
 
     /// The second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for ndx numbers
     /// `lambda`; says whether it did. Where it did not, the dynamics count as linear around each iterate

@@ -32,7 +32,7 @@
 //! # Example
 //! A pendulum swings up, from hanging (θ = 0) to upright (θ = π).
 //! ```
-//! use condyle_optimal::{ActionModel, Fddp, LqNode, NumDiff, Problem, Status};
+//! use condyle_optimal::{ActionModel, Fddp, Problem, Status};
 //!
 //! /// x = (θ, θ̇), u = torque: θ̈ = u − sin θ, by semi-implicit Euler steps of 0.1 s.
 //! struct Pendulum { terminal: bool }
@@ -49,13 +49,9 @@
 //!         next[0] = x[0] + 0.1 * next[1];             // θ⁺ = θ + Δt θ̇⁺
 //!         0.5 * 0.1 * u[0] * u[0]                     // ℓ = ½ Δt u²
 //!     }
-//!     fn calc_diff(&mut self, _t: usize, _x: &[f64], _u: &[f64], _node: &mut LqNode) {
-//!         unreachable!("NumDiff stands in for it")
-//!     }
 //! }
 //!
-//! let knot = NumDiff(Pendulum { terminal: false });
-//! let end = NumDiff(Pendulum { terminal: true });
+//! let (knot, end) = (Pendulum { terminal: false }, Pendulum { terminal: true }); // differentiated by differences
 //! let mut problem = Problem::new(vec![0.0, 0.0], vec![Box::new(knot)], vec![0; 40], Box::new(end))?;
 //!
 //! let mut solver = Fddp::new(&problem);

@@ -9,7 +9,8 @@ const FIRST: f64 = 6e-6;
 /// The step of second differences, about ε^¼: truncation h² meets rounding ε/h².
 const SECOND: f64 = 1.2e-4;
 
-/// An action whose derivatives are central differences of [`calc`](ActionModel::calc), taken with ⊕ and ⊖.
+/// An action whose derivatives, whatever it has of its own, are central differences of [`calc`](ActionModel::calc), taken
+/// with ⊕ and ⊖.
 ///
 /// First derivatives are right to about 1e-9, second ones to about 1e-7 (relative to the size of cost and state). The
 /// Hessian is the exact one: an action that gives a Gauss–Newton approximation differs from it where the residuals
@@ -28,9 +29,6 @@ const SECOND: f64 = 1.2e-4;
 ///         next[1] = x[1] + 0.1 * (u[0] - x[0].sin());
 ///         1.0 - x[0].cos() + 0.5 * u[0] * u[0]
 ///     }
-///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut LqNode) {
-///         unreachable!("NumDiff stands in for it")
-///     }
 /// }
 ///
 /// let mut node = LqNode::zeros(2, 1);
@@ -44,14 +42,60 @@ pub struct NumDiff<A>(
     pub A,
 );
 
-impl<A: ActionModel> NumDiff<A> {
-    /// x⁺ and ℓ at (x ⊕ δx, u + δu) with z = (δx, δu).
-    fn at(&mut self, t: usize, x: &[f64], u: &[f64], z: &[f64], next: &mut [f64]) -> f64 {
-        let (dx, du) = z.split_at(self.0.ndx());
-        let mut moved = vec![0.0; x.len()];
-        self.0.integrate(x, dx, &mut moved);
-        let u: Vec<f64> = u.iter().zip(du).map(|(u, du)| u + du).collect();
-        self.0.calc(t, &moved, &u, next)
+/// x⁺ and ℓ at (x ⊕ δx, u + δu) with z = (δx, δu).
+fn at<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], z: &[f64], next: &mut [f64]) -> f64 {
+    let (dx, du) = z.split_at(action.ndx());
+    let mut moved = vec![0.0; x.len()];
+    action.integrate(x, dx, &mut moved);
+    let u: Vec<f64> = u.iter().zip(du).map(|(u, du)| u + du).collect();
+    action.calc(t, &moved, &u, next)
+}
+
+/// [`calc_diff`](ActionModel::calc_diff) by differences of [`calc`](ActionModel::calc).
+pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
+    // A terminal action leaves `next` alone: start from x, which is a state on any manifold.
+    let (mut centre, mut plus, mut minus) = (x.to_vec(), x.to_vec(), x.to_vec());
+    let (mut up, mut down) = (vec![0.0; ndx], vec![0.0; ndx]);
+    let mut z = vec![0.0; ndx + nu];
+    debug_assert_eq!(x.len(), nx);
+    at(action, t, x, u, &z, &mut centre);
+
+    for j in 0..ndx + nu {
+        z[j] = FIRST;
+        let above = at(action, t, x, u, &z, &mut plus);
+        z[j] = -FIRST;
+        let below = at(action, t, x, u, &z, &mut minus);
+        z[j] = 0.0;
+        // ∂x⁺/∂zⱼ = ((x⁺(h) ⊖ x⁺) − (x⁺(−h) ⊖ x⁺)) / 2h,   ∂ℓ/∂zⱼ = (ℓ(h) − ℓ(−h)) / 2h
+        action.difference(&centre, &plus, &mut up);
+        action.difference(&centre, &minus, &mut down);
+        for i in 0..ndx {
+            let slope = (up[i] - down[i]) / (2.0 * FIRST);
+            if j < ndx { node.A[(i, j)] = slope } else { node.B[(i, j - ndx)] = slope }
+        }
+        let slope = (above - below) / (2.0 * FIRST);
+        if j < ndx { node.q[j] = slope } else { node.r[j - ndx] = slope }
+    }
+
+    for i in 0..ndx + nu {
+        for j in 0..=i {
+            // ∂²ℓ/∂zᵢ∂zⱼ = (ℓ(h, h) − ℓ(h, −h) − ℓ(−h, h) + ℓ(−h, −h)) / 4h²
+            let mut sum = 0.0;
+            for (si, sj) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+                z[i] += si * SECOND;
+                z[j] += sj * SECOND;
+                sum += si * sj * at(action, t, x, u, &z, &mut plus);
+                z[i] = 0.0;
+                z[j] = 0.0;
+            }
+            let curvature = sum / (4.0 * SECOND * SECOND);
+            match (i < ndx, j < ndx) {
+                (true, _) => (node.Q[(i, j)], node.Q[(j, i)]) = (curvature, curvature),
+                (false, true) => node.S[(j, i - ndx)] = curvature,
+                (false, false) => (node.R[(i - ndx, j - ndx)], node.R[(j - ndx, i - ndx)]) = (curvature, curvature),
+            }
+        }
     }
 }
 
@@ -77,64 +121,21 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        let (nx, ndx, nu) = (self.nx(), self.ndx(), self.nu());
-        // A terminal action leaves `next` alone: start from x, which is a state on any manifold.
-        let (mut centre, mut plus, mut minus) = (x.to_vec(), x.to_vec(), x.to_vec());
-        let (mut up, mut down) = (vec![0.0; ndx], vec![0.0; ndx]);
-        let mut z = vec![0.0; ndx + nu];
-        debug_assert_eq!(x.len(), nx);
-        self.at(t, x, u, &z, &mut centre);
-
-        for j in 0..ndx + nu {
-            z[j] = FIRST;
-            let above = self.at(t, x, u, &z, &mut plus);
-            z[j] = -FIRST;
-            let below = self.at(t, x, u, &z, &mut minus);
-            z[j] = 0.0;
-            // ∂x⁺/∂zⱼ = ((x⁺(h) ⊖ x⁺) − (x⁺(−h) ⊖ x⁺)) / 2h,   ∂ℓ/∂zⱼ = (ℓ(h) − ℓ(−h)) / 2h
-            self.0.difference(&centre, &plus, &mut up);
-            self.0.difference(&centre, &minus, &mut down);
-            for i in 0..ndx {
-                let slope = (up[i] - down[i]) / (2.0 * FIRST);
-                if j < ndx { node.A[(i, j)] = slope } else { node.B[(i, j - ndx)] = slope }
-            }
-            let slope = (above - below) / (2.0 * FIRST);
-            if j < ndx { node.q[j] = slope } else { node.r[j - ndx] = slope }
-        }
-
-        for i in 0..ndx + nu {
-            for j in 0..=i {
-                // ∂²ℓ/∂zᵢ∂zⱼ = (ℓ(h, h) − ℓ(h, −h) − ℓ(−h, h) + ℓ(−h, −h)) / 4h²
-                let mut sum = 0.0;
-                for (si, sj) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-                    z[i] += si * SECOND;
-                    z[j] += sj * SECOND;
-                    sum += si * sj * self.at(t, x, u, &z, &mut plus);
-                    z[i] = 0.0;
-                    z[j] = 0.0;
-                }
-                let curvature = sum / (4.0 * SECOND * SECOND);
-                match (i < ndx, j < ndx) {
-                    (true, _) => (node.Q[(i, j)], node.Q[(j, i)]) = (curvature, curvature),
-                    (false, true) => node.S[(j, i - ndx)] = curvature,
-                    (false, false) => (node.R[(i - ndx, j - ndx)], node.R[(j - ndx, i - ndx)]) = (curvature, curvature),
-                }
-            }
-        }
+        calc_diff(&mut self.0, t, x, u, node);
     }
 
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let (ndx, nu) = (self.ndx(), self.nu());
         let (mut centre, mut moved) = (x.to_vec(), x.to_vec());
         let (mut z, mut change) = (vec![0.0; ndx + nu], vec![0.0; ndx]);
-        self.at(t, x, u, &z, &mut centre);
+        at(&mut self.0, t, x, u, &z, &mut centre);
         for i in 0..ndx + nu {
             for j in 0..=i {
                 let mut sum = 0.0;
                 for (si, sj) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
                     z[i] += si * SECOND;
                     z[j] += sj * SECOND;
-                    self.at(t, x, u, &z, &mut moved);
+                    at(&mut self.0, t, x, u, &z, &mut moved);
                     self.0.difference(&centre, &moved, &mut change);
                     sum += si * sj * lambda.iter().zip(&change).map(|(l, c)| l * c).sum::<f64>();
                     (z[i], z[j]) = (0.0, 0.0);

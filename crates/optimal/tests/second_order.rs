@@ -40,9 +40,6 @@ impl<A: ActionModel> ActionModel for Chained<A> {
         let cost = self.0.calc(t, x, u, next);
         cost + 0.5 * next.iter().map(|x| x * x).sum::<f64>()
     }
-    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut LqNode) {
-        unreachable!("only differentiated numerically")
-    }
 }
 
 /// With it, the quadratic model of a horizon of one knot is the exact one: that of ℓ(x, u) + V(φ(x, u)).
