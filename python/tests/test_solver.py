@@ -62,7 +62,8 @@ def test_segments_and_threads_change_no_iterate() -> None:
     np.testing.assert_array_equal(threaded.xs, one.xs)
     segments = Fddp(problem, segments=3, threads=2).solve(xs, us)
     assert segments.status == one.status
-    np.testing.assert_allclose([i.cost for i in segments.trace], [i.cost for i in one.trace], rtol=1e-9)
+    # segments that disagree by more than 1e-9 of their value functions are swept as one
+    np.testing.assert_allclose([i.cost for i in segments.trace], [i.cost for i in one.trace], rtol=1e-8)
     np.testing.assert_allclose(segments.xs, one.xs, atol=1e-9)
     assert (segments.xs != one.xs).any()
     for name in ("segments", "threads"):
