@@ -9,9 +9,9 @@
 //! ∂q̈/∂x = −P r − J̄ c,   ∂λ/∂x = J̄ᵀ r − Λ c,   ∂q̈/∂τ = P,   ∂λ/∂τ = −J̄ᵀ
 //! ```
 //!
-//! r and c are those of [`constrained_equations`]. Source: Carpentier and
-//! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier,
-//! Mastalli, Mansard, *Differential dynamic programming for multi-phase rigid contact dynamics* (2018).
+//! r and c are those of [`constrained_equations`]. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
+//! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
+//! programming for multi-phase rigid contact dynamics* (2018).
 
 use crate::aba_derivatives::{minus_product, subtract_column};
 use crate::constrained_equations;

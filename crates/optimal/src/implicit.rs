@@ -138,7 +138,7 @@ struct Part {
 }
 
 /// Scratch of the form.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Form {
     /// The factors of the outer products, with the factor of the gradient behind (w, δv, δq). Shape: rows of one stride.
     rows: Vec<f64>,
@@ -155,9 +155,27 @@ pub(crate) struct Form {
 }
 
 impl Form {
-    /// Room for n states and at most m controls.
-    pub(crate) fn new(n: usize, m: usize) -> Self {
-        Self { U: vec![0.0; (m + SLACK) * m], gains: vec![0.0; (n + 1 + SLACK) * m], ..Self::default() }
+    /// What the rows of some nodes need at most, whichever are active: numbers in `rows`, parts, dependent coordinates.
+    pub(crate) fn room(nodes: &[LqNode]) -> [usize; 3] {
+        let rooms = nodes.iter().map(|LqNode { implicit, .. }| {
+            let [efforts, steps, costs] =
+                [&implicit.efforts, &implicit.steps, &implicit.costs].map(|rows| rows.masks.capacity());
+            [2 * (efforts + steps + costs) * implicit.stride, efforts + 2 * steps + costs, steps]
+        });
+        rooms.fold([0; 3], |a, b| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])])
+    }
+
+    /// For n states and at most m controls, with such room.
+    pub(crate) fn new([rows, parts, dependent]: [usize; 3], n: usize, m: usize) -> Self {
+        Self {
+            rows: vec![0.0; rows],
+            count: 0,
+            parts: Vec::with_capacity(parts),
+            half: Vec::with_capacity((dependent + SLACK) * dependent),
+            U: vec![0.0; (m + SLACK) * m],
+            gains: vec![0.0; (n + 1 + SLACK) * m],
+            below: Vec::with_capacity((n + SLACK) * dependent),
+        }
     }
 
     /// A row for a factor, `a` times x.
@@ -175,14 +193,12 @@ impl Form {
         row
     }
 
-    /// Of the rows `left` with those from `right` on.
+    /// Of a row on the left with one on the right.
     #[inline(always)]
-    fn multiply(&mut self, left: core::ops::Range<usize>, right: usize, masks: [u64; 2]) {
+    fn multiply(&mut self, rows: [usize; 2], masks: [u64; 2]) {
         match self.parts.last_mut() {
-            Some(last) if last.masks == masks && last.rows.map(|row| row + last.count) == [left.start, right] => {
-                last.count += left.len();
-            }
-            _ => self.parts.push(Part { rows: [left.start, right], masks, count: left.len() }),
+            Some(last) if last.masks == masks && last.rows.map(|row| row + last.count) == rows => last.count += 1,
+            _ => self.parts.push(Part { rows, masks, count: 1 }),
         }
     }
 
@@ -193,11 +209,11 @@ impl Form {
         if dd > 0.0 {
             let root = dd.sqrt();
             self.push(x, root)[size] = d / root;
-            self.multiply(k..k + 1, k, [mask | gradient, mask]);
+            self.multiply([k, k], [mask | gradient, mask]);
         } else if d != 0.0 || dd != 0.0 {
             self.push(x, dd)[size] = d;
             self.push(x, 1.0);
-            self.multiply(k..k + 1, k + 1, [mask | gradient, mask]);
+            self.multiply([k, k + 1], [mask | gradient, mask]);
         }
     }
 }
@@ -290,10 +306,10 @@ impl Work {
             }
         }
         for (k, &mask) in imp.steps.masks.iter().enumerate() {
-            form.multiply(Z + k..Z + k + 1, D + k, [u64::MAX, mask]);
+            form.multiply([Z + k, D + k], [u64::MAX, mask]);
         }
         for (k, &mask) in imp.steps.masks.iter().enumerate() {
-            form.multiply(D + k..D + k + 1, Z + k, [mask, u64::MAX]);
+            form.multiply([D + k, Z + k], [mask, u64::MAX]);
         }
         add_outer::<V, NR>(H, ld, all, form, size);
         self.position_curvature::<V, NR>(m, blocks);

@@ -54,7 +54,7 @@ struct Segment {
 impl Segments {
     /// `at_once` segments at a time for a horizon of `horizon` knots with n states and at most m controls; `None` if that
     /// is one, or the horizon too short for two.
-    pub(crate) fn new(at_once: usize, horizon: usize, n: usize, m: usize) -> Option<Self> {
+    pub(crate) fn new(at_once: usize, horizon: usize, n: usize, m: usize, room: [usize; 3]) -> Option<Self> {
         let at_once = at_once.min(horizon.saturating_sub(2));
         if at_once < 2 {
             return None;
@@ -62,7 +62,7 @@ impl Segments {
         let cut = |k: usize| if k > at_once { horizon } else { 2 * horizon * k / (2 * at_once + 3) };
         let segment = |k: usize| Segment {
             knots: cut(k)..cut(k + 1),
-            work: Work::new(&[], n, m, n),
+            work: Work::new(&[], n, m, n, room),
             transfer: Transfer::zeros(n),
             end: Value::zeros(n),
             result: Ok(()),

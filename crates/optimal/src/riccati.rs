@@ -49,7 +49,7 @@ pub(crate) struct Work {
 
 impl Work {
     /// Room for knots with n states and at most m controls, those of `nodes` with curvature, and in H for `below` more rows.
-    pub(crate) fn new(nodes: &[LqNode], n: usize, m: usize, below: usize) -> Self {
+    pub(crate) fn new(nodes: &[LqNode], n: usize, m: usize, below: usize, room: [usize; 3]) -> Self {
         let stride = m + n + 1 + below + SLACK;
         let mut sizes: Vec<_> = nodes.iter().map(LqNode::nu).collect();
         sizes.sort_unstable();
@@ -64,7 +64,7 @@ impl Work {
             keep: true,
             upper: vec![0.0; (m + SLACK) * m],
             euler: Euler::new(n),
-            form: Form::new(n, m),
+            form: Form::new(room, n, m),
             qp: BoxQp::new(m),
             hessians: sizes.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
         }

@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use crate::error::assert_length;
+use crate::implicit::Form;
 use crate::lq::{Hessian, LqKnot, LqNode};
 use crate::parallel::Segments;
 use crate::riccati::Work;
@@ -86,6 +87,8 @@ pub struct Sweep {
     /// As many at the same time as asked for; with their own workspaces, unless it is one.
     at_once: usize,
     segments: Option<Segments>,
+    /// Of the nodes' implicit form.
+    room: [usize; 3],
 }
 
 impl Sweep {
@@ -103,7 +106,8 @@ impl Sweep {
             node.assert_shapes(n, node.nu());
             LqKnot::zeros(n, node.nu())
         });
-        Self { work: Work::new(nodes, n, m, 0), knots: knots.collect(), at_once: 1, segments: None }
+        let room = Form::room(nodes);
+        Self { work: Work::new(nodes, n, m, 0, room), knots: knots.collect(), at_once: 1, room, segments: None }
     }
 
     /// Lets [`run`](Self::run) work on so many segments of the horizon at the same time, in the threads of rayon's pool in
@@ -130,7 +134,7 @@ impl Sweep {
         assert!(segments > 0, "`segments` is 0, expected at least 1");
         if segments != self.at_once {
             let m = self.knots.iter().map(|knot| knot.k.len()).max().unwrap_or(0);
-            self.segments = Segments::new(segments, self.knots.len() - 1, self.work.p.len(), m);
+            self.segments = Segments::new(segments, self.knots.len() - 1, self.work.p.len(), m, self.room);
             self.at_once = segments;
         }
     }

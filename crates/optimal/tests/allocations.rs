@@ -229,3 +229,38 @@ fn a_gait_allocates_nothing() {
     });
     assert_eq!(count, 0);
 }
+
+/// The feet stand at first; then they push harder than they may, and rows awake that were not there.
+#[test]
+fn active_rows_allocate_nothing() {
+    let model = std::sync::Arc::new(robots::quadruped());
+    let mut q = neutral(&model);
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    let x0 = [q, vec![0.0; 18]].concat();
+    let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
+    let contacts = feet.map(|name| Contact::new(name, Constraint::point(model.frame(name).unwrap())));
+    let cone = FrictionCone::new(0.7);
+    let (lower, upper) = cone.bounds();
+    let limited = |foot: &str| {
+        let force = Residual::ContactForce { contact: foot.into(), target: Force::zero() };
+        let bounds = Activation::Barrier { lower: vec![-200.0; 3], upper: vec![200.0; 3] };
+        let grip = Residual::FrictionCone { contact: foot.into(), cone: cone.clone() };
+        let grips = Activation::Barrier { lower: lower.clone(), upper: upper.clone() };
+        [
+            Cost::new(&format!("{foot} force"), 1e-2, force, bounds),
+            Cost::new(&format!("{foot} grip"), 1e-2, grip, grips),
+        ]
+    };
+    let effort = Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 12] }, Activation::Quadratic);
+    let running = [vec![effort], feet.map(limited).concat()].concat();
+    let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, running).unwrap();
+    let us = stance.quasi_static(&x0).repeat(8);
+    let ahead = Residual::CenterOfMass { target: Vec3::new(0.3, 0.0, 0.4) };
+    let end = FreeDynamics::terminal(model, vec![Cost::new("ahead", 1e5, ahead, Activation::Quadratic)]).unwrap();
+    let mut problem = Problem::new(x0.clone(), vec![Box::new(stance)], vec![0; 8], Box::new(end)).unwrap();
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 3;
+    let mut counts = [None; 4];
+    solver.solve_with(&mut problem, &x0.repeat(9), &us, |i| counts[i.iteration] = Some(COUNT.get())).unwrap();
+    assert_eq!(counts[0], counts[2], "{counts:?}");
+}

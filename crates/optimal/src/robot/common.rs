@@ -260,3 +260,38 @@ macro_rules! robot_positions {
     };
 }
 pub(super) use robot_positions;
+
+/// The methods of a [`ContinuousModel`](super::ContinuousModel) that knots in lanes answer.
+macro_rules! robot_lanes {
+    () => {
+        fn lanes(&self) -> usize {
+            self.lanes.as_ref().map_or(1, SideBySide::lanes)
+        }
+
+        fn prepare(&mut self, xs: &[f64], us: &[f64], wanted: super::Wanted) {
+            if let Some(lanes) = &mut self.lanes {
+                self.robot.prepare(lanes, xs, us, wanted);
+            }
+        }
+
+        fn implicit(&self) -> Option<[usize; 2]> {
+            let elimination = self.elimination.as_ref().filter(|_| self.lanes.is_some())?;
+            Some([elimination.most_dependent(), self.robot.schedule.most_rows()])
+        }
+
+        fn equations_prepared(
+            &mut self,
+            i: usize,
+            t: usize,
+            x: &[f64],
+            u: &[f64],
+            scale: f64,
+            node: &mut LqNode,
+        ) -> Option<&[f64]> {
+            let Self { robot, lanes: Some(lanes), elimination: Some(elimination), .. } = self else { return None };
+            let outcome = &mut lanes.outcomes[i];
+            robot.write_implicit(elimination, outcome, t, x, u, scale, node).then_some(&outcome.a)
+        }
+    };
+}
+pub(super) use robot_lanes;

@@ -96,18 +96,24 @@ pub(super) fn offer(offer: Offer, contacts: &[Contact]) -> Offer {
 /// For each row of all contacts the coordinates that move it.
 pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
     let rows = contacts.iter().flat_map(|Contact { constraint, .. }| {
-        let mut coordinates = Vec::new();
-        for frame in [Some(constraint.frame), constraint.other].into_iter().flatten() {
-            let mut body = model.frames()[frame].body;
-            while body > 0 {
-                let joint = &model.bodies()[body];
-                coordinates.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
-                body = joint.parent;
-            }
-        }
-        coordinates.sort_unstable();
-        coordinates.dedup();
-        vec![coordinates; constraint.kind.rows()]
+        let frames = [Some(constraint.frame), constraint.other].into_iter().flatten();
+        vec![coordinates_of(model, frames); constraint.kind.rows()]
     });
     rows.collect()
+}
+
+/// The coordinates that move some frames, in order.
+pub(super) fn coordinates_of(model: &Model, frames: impl IntoIterator<Item = usize>) -> Vec<usize> {
+    let mut coordinates = Vec::new();
+    for frame in frames {
+        let mut body = model.frames()[frame].body;
+        while body > 0 {
+            let joint = &model.bodies()[body];
+            coordinates.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
+            body = joint.parent;
+        }
+    }
+    coordinates.sort_unstable();
+    coordinates.dedup();
+    coordinates
 }

@@ -1,11 +1,11 @@
 //! The dynamics of a robot in contact with the world.
 
 use super::actuation::Actuation;
-use super::common::{Robot, robot_knot, robot_positions};
+use super::common::{Robot, robot_knot, robot_lanes, robot_positions};
 use super::contact::{Contact, constraint_set, moved_by, offer};
 use super::costs::Cost;
 use super::elimination::Elimination;
-use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator, Wanted};
+use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::lanes::{Held, Outcome, SideBySide};
 use super::quadratic::Row;
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
@@ -150,34 +150,7 @@ impl ContinuousModel for Contacts {
         Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
     }
 
-    fn lanes(&self) -> usize {
-        self.lanes.as_ref().map_or(1, SideBySide::lanes)
-    }
-
-    fn prepare(&mut self, xs: &[f64], us: &[f64], wanted: Wanted) {
-        if let Some(lanes) = &mut self.lanes {
-            self.robot.prepare(lanes, xs, us, wanted);
-        }
-    }
-
-    fn implicit(&self) -> Option<[usize; 2]> {
-        let elimination = self.elimination.as_ref().filter(|_| self.lanes.is_some())?;
-        Some([elimination.most_dependent(), self.robot.schedule.most_rows()])
-    }
-
-    fn equations_prepared(
-        &mut self,
-        i: usize,
-        t: usize,
-        x: &[f64],
-        u: &[f64],
-        scale: f64,
-        node: &mut LqNode,
-    ) -> Option<&[f64]> {
-        let Self { robot, lanes: Some(lanes), elimination: Some(elimination), .. } = self else { return None };
-        let outcome = &mut lanes.outcomes[i];
-        robot.write_implicit(elimination, outcome, t, x, u, scale, node).then_some(&outcome.a)
-    }
+    robot_lanes!();
 
     fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
         let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc(t, x, u) };

@@ -1,6 +1,7 @@
 //! Costs of a robot's state and control: weighted sums of activations of residuals.
 
 use super::activation::Activation;
+use super::contact::coordinates_of;
 use super::quadratic::add_diagonal;
 use super::residual::{Part, Residual};
 use super::state::{groups, state_difference};
@@ -74,15 +75,7 @@ impl Plan {
         if let Some(what) = term.activation.wrong(n) {
             return Err(wrong(what));
         }
-        let mut columns = Vec::new();
-        let mut body = term.residual.frame().map_or(0, |frame| model.frames()[frame].body);
-        while body > 0 {
-            let joint = &model.bodies()[body];
-            columns.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
-            body = joint.parent;
-        }
-        columns.sort_unstable();
-        columns.dedup();
+        let columns = coordinates_of(model, term.residual.frame());
         let rows = term.residual.contact().map_or(Ok(0..0), |name| offer.contact(name)).map_err(wrong)?;
         Ok(Self { n, columns, W: term.residual.force_rows(rows.len()), rows })
     }
