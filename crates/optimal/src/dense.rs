@@ -188,6 +188,25 @@ pub(crate) fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
     V::load(&x[length - V::N..]).store(&mut to[length - V::N..]);
 }
 
+/// to = a x, in the same way.
+#[inline(always)]
+pub(crate) fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
+    let length = x.len();
+    let to = &mut to[..length];
+    if length < V::N {
+        for i in 0..length {
+            to[i] = a * x[i];
+        }
+        return;
+    }
+    let (a, last, mut i) = (V::splat(a), length - V::N, 0);
+    while i < last {
+        V::load(&x[i..]).mul(a).store(&mut to[i..]);
+        i += V::N;
+    }
+    V::load(&x[last..]).mul(a).store(&mut to[last..]);
+}
+
 /// Aᵀ into `out` (stride `ldo`) from its row `at` on, for the rows `rows` of A (stride `lda`) and its columns `columns`.
 #[inline(always)]
 pub(crate) fn transpose<V: Vector>(
@@ -240,20 +259,47 @@ pub(crate) fn transpose<V: Vector>(
 /// Copies the lower triangle of A to both triangles of `out`.
 #[inline(always)]
 pub(crate) fn copy_symmetric<V: Vector>(out: &mut [f64], ldo: usize, a: &[f64], lda: usize, size: usize) {
-    let mut j = 0;
+    // What lies below the diagonal to the right of it, in blocks of columns; with them comes what lies above.
+    let (width, mut j) = (V::N.min(size), 0);
     while j < size {
-        let end = size.min(j + V::N);
-        for jj in j..end {
-            copy::<V>(&mut out[jj * ldo + jj..], &a[jj * lda + jj..jj * lda + size]);
-            for i in j..jj {
-                out[jj * ldo + i] = a[i * lda + jj];
-            }
-        }
-        if end < size {
-            transpose::<V>(&mut out[end * ldo..], ldo, j, a, lda, end..size, j..end); // the rows below, as columns beside
-        }
-        j = end;
+        let from = j.min(size - width);
+        transpose::<V>(&mut out[from * ldo..], ldo, from, a, lda, from..size, from..from + width);
+        j += V::N;
     }
+    for j in 0..size {
+        copy::<V>(&mut out[j * ldo + j..], &a[j * lda + j..][..size - j]);
+    }
+}
+
+/// y += x on `length` numbers, in whole registers: what follows them is slack.
+#[inline(always)]
+pub(crate) fn add<V: Vector>(y: &mut [f64], x: &[f64], length: usize) {
+    let mut i = 0;
+    while i < length {
+        V::load(&y[i..]).add(V::load(&x[i..])).store(&mut y[i..]);
+        i += V::N;
+    }
+}
+
+/// Adds the squares of the numbers of x to two registers, of some of them more than once: enough to see if one has diverged.
+#[inline(always)]
+pub(crate) fn add_squares<V: Vector>(sums: &mut [V; 2], x: &[f64]) {
+    if x.len() < V::N {
+        for x in x {
+            sums[0] = V::splat(*x).mul_add(V::splat(*x), sums[0]);
+        }
+        return;
+    }
+    let (last, mut i) = (x.len() - V::N, 0);
+    while i < last {
+        for sum in &mut *sums {
+            let x = V::load(&x[i.min(last)..]);
+            *sum = x.mul_add(x, *sum);
+            i += V::N;
+        }
+    }
+    let x = V::load(&x[last..]);
+    sums[0] = x.mul_add(x, sums[0]);
 }
 
 /// y += α A x for a column-major A without slack.
@@ -274,8 +320,17 @@ pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
 }
 
 /// ‖x‖∞; NaN if an entry is.
+#[inline(always)]
 pub(crate) fn max_abs(x: &[f64]) -> f64 {
-    x.iter().fold(0.0, |largest, x| if x.abs() > largest || x.is_nan() { x.abs() } else { largest })
+    let larger = |most: f64, x: f64| if x.abs() > most || x.is_nan() { x.abs() } else { most };
+    let (eights, rest) = x.as_chunks::<8>();
+    let mut most = [0.0; 8];
+    for x in eights {
+        for i in 0..8 {
+            most[i] = larger(most[i], x[i]);
+        }
+    }
+    most.iter().chain(rest).fold(0.0, |most, x| larger(most, *x))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The quadratic form of a knot of semi-implicit Euler: blocks that are the identity or Δt are never multiplied.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, T, E
 
-use crate::dense::{SLACK, View, add_product_lower, add_transposed_product_lower, product, transpose};
+use crate::dense::{SLACK, View, add, add_product_lower, add_transposed_product_lower, product, transpose};
 use crate::lq::LqNode;
 use crate::riccati::Work;
 use crate::structure::{EulerBlock, LARGEST_BLOCK};
@@ -78,13 +78,16 @@ impl Work {
 
         // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  as if T and E were 1 from the left
         times_blocks::<V, NR>(PB, P, ldp, n, blocks, |block| &block.E);
+        let step = V::splat(dt);
         for k in 0..nv {
-            let (PE_q, PE_v) = column(k, blocks, P, PB, ldp)[..n].split_at(nv);
-            let (P_q, P_v) = P[(nv + k) * ldp..][..n].split_at(nv);
-            let (N, Pi) = (&mut N[k * ldn..][..nv], &mut Pi[k * ldn..][..nv]);
-            for i in 0..nv {
-                N[i] = dt * PE_q[i] + P_q[i];
-                Pi[i] = dt * (N[i] + PE_v[i]) + P_v[i];
+            let (PE, P) = (column(k, blocks, P, PB, ldp), &P[(nv + k) * ldp..]);
+            let (N, Pi) = (&mut N[k * ldn..], &mut Pi[k * ldn..]);
+            let mut i = 0;
+            while i < nv {
+                let sum = V::load(&PE[i..]).mul_add(step, V::load(&P[i..]));
+                sum.store(&mut N[i..]);
+                sum.add(V::load(&PE[nv + i..])).mul_add(step, V::load(&P[nv + i..])).store(&mut Pi[i..]);
+                i += V::N;
             }
             py[k] = dt * p[k] + p[nv + k];
         }
@@ -116,10 +119,10 @@ impl Work {
         let H_qq = &mut H[(m + nv) * ld + m + nv..];
         times_blocks::<V, NR>(PB, P, ldp, nv, blocks, |block| &block.T);
         for j in 0..nv {
-            let (PT, H) = (&column(j, blocks, P, PB, ldp)[..nv], &mut H_qq[j * ld..][..nv]);
-            for i in 0..nv {
-                H[i] += PT[i]; // what lies above the diagonal is not read
-            }
+            let (PT, H) = (column(j, blocks, P, PB, ldp), &mut H_qq[j * ld..]);
+            let gradient = H[nv];
+            add::<V>(H, PT, nv); // what lies above the diagonal is not read
+            H[nv] = gradient;
         }
         for block in blocks {
             let (T, size) = (rows_of(&block.T), block.T.nrows());

@@ -1,4 +1,5 @@
 //! The Cholesky factor of part of a symmetric matrix, and what follows from it; kernels as in [`dense`](crate::dense).
+#![allow(non_snake_case)] // L, X, B
 
 use crate::dense::{SLACK, Store, View, column_block};
 use crate::vector::Vector;
@@ -23,19 +24,13 @@ pub(crate) fn eliminate<V: Vector, const NR: usize>(
         for j in j0..j0 + width {
             let (done, column) = h.split_at_mut(j * stride);
             let column = &mut column[j..];
-            for p in j0..j {
-                let left = &done[p * stride + j..];
-                let factor = left[0];
-                add_multiple::<V>(column, left, -factor, rows - j);
-            }
+            let done = View { data: done, stride };
+            subtract_multiples::<V>(column, rows - j, j0..j, done, j, done, j);
             let pivot = column[0];
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return Err((j, pivot));
             }
-            let scale = pivot.sqrt().recip();
-            for c in &mut column[..rows - j] {
-                *c *= scale;
-            }
+            scale::<V>(column, rows - j, pivot.sqrt().recip());
         }
         j0 += NR;
     }
@@ -86,13 +81,9 @@ pub(crate) fn solve_transposed<V: Vector, const NR: usize>(
         }
         for j in 0..width {
             let (done, column) = columns.split_at_mut(j * ldx);
-            for p in 0..j {
-                add_multiple::<V>(column, &done[p * ldx..], -h[(j0 + p) * stride + j0 + j], rows);
-            }
-            let scale = h[(j0 + j) * stride + j0 + j].recip();
-            for x in &mut column[..rows] {
-                *x *= scale;
-            }
+            let (done, L) = (View { data: done, stride: ldx }, View { data: &h[j0 * stride..], stride });
+            subtract_multiples::<V>(column, rows, 0..j, done, 0, L, j0 + j);
+            scale::<V>(column, rows, h[(j0 + j) * stride + j0 + j].recip());
         }
         j0 += NR;
     }
@@ -140,25 +131,43 @@ pub(crate) fn solve_right<V: Vector, const NR: usize>(
         for j in (j0..end).rev() {
             let (left, right) = h.split_at_mut((j + 1) * stride);
             let column = &mut left[j * stride + first..];
-            for p in j + 1..end {
-                add_multiple::<V>(column, &right[(p - j - 1) * stride + first..], -upper[p * ldu + j], rows - first);
-            }
-            let scale = upper[j * ldu + j].recip();
-            for c in &mut column[..rows - first] {
-                *c *= scale;
-            }
+            let (right, Lt) = (View { data: right, stride }, View { data: &upper[(j + 1) * ldu..], stride: ldu });
+            subtract_multiples::<V>(column, rows - first, 0..end - j - 1, right, first, Lt, j);
+            scale::<V>(column, rows - first, upper[j * ldu + j].recip());
         }
     }
 }
 
-/// y += factor · x on `rows` rows, in whole registers: what follows them is slack.
+/// y −= Σ X[i.., p] B[j, p] over the columns p on `rows` rows, in whole registers: what follows them is slack.
 #[inline(always)]
-fn add_multiple<V: Vector>(y: &mut [f64], x: &[f64], factor: f64, rows: usize) {
-    let (factor, mut i) = (V::splat(factor), 0);
-    while i < rows {
-        let place = &mut y[i..][..V::N];
-        V::load(&x[i..][..V::N]).mul_add(factor, V::load(place)).store(place);
-        i += V::N;
+fn subtract_multiples<V: Vector>(
+    y: &mut [f64],
+    rows: usize,
+    columns: core::ops::Range<usize>,
+    X: View<'_>,
+    i: usize,
+    B: View<'_>,
+    j: usize,
+) {
+    let mut k = 0;
+    while k < rows {
+        let mut sum = V::load(&y[k..]);
+        for p in columns.start..columns.end {
+            let factor = V::splat(-B.data[p * B.stride + j]);
+            sum = V::load(&X.data[p * X.stride + i + k..]).mul_add(factor, sum);
+        }
+        sum.store(&mut y[k..]);
+        k += V::N;
+    }
+}
+
+/// y ← factor · y on `rows` rows, in whole registers.
+#[inline(always)]
+fn scale<V: Vector>(y: &mut [f64], rows: usize, factor: f64) {
+    let (factor, mut k) = (V::splat(factor), 0);
+    while k < rows {
+        V::load(&y[k..]).mul(factor).store(&mut y[k..]);
+        k += V::N;
     }
 }
 

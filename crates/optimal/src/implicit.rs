@@ -21,7 +21,7 @@
 //! those of the explicit form, since for any δx the map from w to δu is invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
 
-use crate::dense::{SLACK, Store, View, column_block, copy, transpose};
+use crate::dense::{SLACK, Store, View, column_block, copy, copy_scaled, transpose};
 use crate::factor::solve_transposed;
 use crate::lq::{LqKnot, LqNode};
 use crate::riccati::Work;
@@ -148,7 +148,7 @@ pub(crate) struct Form {
     half: Vec<f64>,
     /// U_w. Shape: nu × nu, with slack rows.
     U: Vec<f64>,
-    /// [K_u k_u]ᵀ. Shape: n + 1 × nu, with slack rows.
+    /// [K k], the states in the order (v, q). Shape: nu × n + 1, with slack rows.
     gains: Vec<f64>,
     /// Columns of dependent coordinates. Shape: n × dependent, with slack rows.
     below: Vec<f64>,
@@ -173,23 +173,28 @@ impl Form {
             parts: Vec::with_capacity(parts),
             half: Vec::with_capacity((dependent + SLACK) * dependent),
             U: vec![0.0; (m + SLACK) * m],
-            gains: vec![0.0; (n + 1 + SLACK) * m],
+            gains: vec![0.0; (m + SLACK) * (n + 1)],
             below: Vec::with_capacity((n + SLACK) * dependent),
         }
     }
 
+    /// So many more rows; the first of them.
+    #[inline(always)]
+    fn take(&mut self, count: usize, size: usize) -> usize {
+        let first = self.count;
+        self.count += count;
+        if self.rows.len() < self.count * size {
+            self.rows.resize(self.count * size, 0.0);
+        }
+        first
+    }
+
     /// A row for a factor, `a` times x.
     #[inline(always)]
-    fn push(&mut self, x: &[f64], a: f64) -> &mut [f64] {
-        let at = self.count * x.len();
-        self.count += 1;
-        if self.rows.len() < at + x.len() {
-            self.rows.resize(at + x.len(), 0.0);
-        }
+    fn push<V: Vector>(&mut self, x: &[f64], a: f64) -> &mut [f64] {
+        let at = self.take(1, x.len()) * x.len();
         let row = &mut self.rows[at..at + x.len()];
-        for (to, x) in row.iter_mut().zip(x) {
-            *to = a * x;
-        }
+        copy_scaled::<V>(row, x, a);
         row
     }
 
@@ -204,15 +209,15 @@ impl Form {
 
     /// H += a″ x xᵀ and a gradient of a′ x.
     #[inline(always)]
-    fn square(&mut self, x: &[f64], mask: u64, [d, dd]: [f64; 2], size: usize) {
+    fn square<V: Vector>(&mut self, x: &[f64], mask: u64, [d, dd]: [f64; 2], size: usize) {
         let (k, gradient) = (self.count, 1 << (size / block(x.len())));
         if dd > 0.0 {
             let root = dd.sqrt();
-            self.push(x, root)[size] = d / root;
+            self.push::<V>(x, root)[size] = d / root;
             self.multiply([k, k], [mask | gradient, mask]);
         } else if d != 0.0 || dd != 0.0 {
-            self.push(x, dd)[size] = d;
-            self.push(x, 1.0);
+            self.push::<V>(x, dd)[size] = d;
+            self.push::<V>(x, 1.0);
             self.multiply([k, k + 1], [mask | gradient, mask]);
         }
     }
@@ -268,20 +273,17 @@ impl Work {
         form.count = 0;
         form.parts.clear();
         for (k, (row, &mask)) in imp.efforts.numbers.chunks_exact(size).zip(&imp.efforts.masks).enumerate() {
-            form.square(row, mask, [node.r[k], node.R[(k, k)] + regularisation], all);
+            form.square::<V>(row, mask, [node.r[k], node.R[(k, k)] + regularisation], all);
         }
         for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
-            form.square(row, mask, slopes, all);
+            form.square::<V>(row, mask, slopes, all);
         }
         // ZᵀD + DᵀZ
         let (D, count) = (form.count, imp.dependent.len());
-        let Z = D + count;
         for row in imp.steps.numbers.chunks_exact(size) {
-            form.push(row, 1.0);
+            form.push::<V>(row, 1.0);
         }
-        for row in imp.steps.numbers.chunks_exact(size) {
-            form.push(row, 0.0);
-        }
+        let Z = form.take(count, size);
         let ldh = count + SLACK;
         form.half.resize(ldh * count, 0.0);
         for (j, &d) in imp.dependent.iter().enumerate() {
@@ -289,6 +291,7 @@ impl Work {
             for &[c, k, length] in &imp.own {
                 copy::<V>(&mut row[k..], &Pi[c..c + length]);
             }
+            row[forces..m].fill(0.0);
             copy::<V>(&mut row[m..], Pi);
             copy::<V>(&mut row[m + nv..], N);
             row[all] = py[d];
@@ -364,27 +367,27 @@ impl Work {
     #[inline(always)]
     pub(crate) fn gains_of_efforts<V: Vector, const NR: usize>(&mut self, node: &LqNode, knot: &mut LqKnot) {
         let (n, m) = (node.ndx(), node.nu());
-        let (nv, ld, imp) = (n / 2, self.stride(m), &node.implicit);
-        let (ldu, ldk) = (m + SLACK, n + 1 + SLACK);
+        let (nv, ld, ldu) = (n / 2, self.stride(m), m + SLACK);
         let Self { H, form: Form { U, gains, .. }, .. } = self;
-        transpose::<V>(U, ldu, 0, &imp.efforts.numbers, imp.stride, 0..m, 0..m);
+        let (efforts, size) = (&node.implicit.efforts.numbers, node.implicit.stride);
+        transpose::<V>(U, ldu, 0, efforts, size, 0..m, 0..m);
         solve_transposed::<V, NR>(U, ldu, m, H, ld, m);
-        for (to, from) in gains.chunks_exact_mut(ldk).zip(imp.efforts.numbers.chunks_exact(imp.stride)) {
-            copy::<V>(to, &from[m..m + n]);
-            to[n] = 0.0;
-        }
-        let (a, b) = (View { data: &H[m..], stride: ld }, View { data: U, stride: ldu });
+        transpose::<V>(gains, ldu, 0, efforts, size, m..m + n, 0..m);
+        gains[n * ldu..][..m].fill(0.0);
+        let (a, b) = (View { data: U, stride: ldu }, View { data: &H[m..], stride: ld });
         let mut j = 0;
-        while j < m {
-            column_block::<V, NR>(gains, ldk, 0..n + 1, j, NR.min(m - j), a, b, m, Store::Subtract);
+        while j <= n {
+            column_block::<V, NR>(gains, ldu, 0..m, j, NR.min(n + 1 - j), a, b, m, Store::Subtract);
             j += NR;
         }
         let K = knot.K.as_mut_slice();
-        transpose::<V>(&mut K[nv * m..], m, 0, gains, ldk, 0..nv, 0..m);
-        transpose::<V>(K, m, 0, gains, ldk, nv..n, 0..m);
+        for j in 0..nv {
+            copy::<V>(&mut K[j * m..], &gains[(nv + j) * ldu..][..m]);
+            copy::<V>(&mut K[(nv + j) * m..], &gains[j * ldu..][..m]);
+        }
+        copy::<V>(knot.k.as_mut_slice(), &gains[n * ldu..][..m]);
         let mut square = 0.0;
         for j in 0..m {
-            knot.k[j] = gains[j * ldk + n];
             square += H[j * ld + m + n] * H[j * ld + m + n];
         }
         knot.expected = [-square, square];
@@ -406,29 +409,18 @@ fn add_outer<V: Vector, const NR: usize>(H: &mut [f64], ld: usize, size: usize, 
         let mut i = j;
         while i <= size {
             let strip = if size - i >= V::N { 2 } else { 1 };
-            let rows = bits(i, strip * V::N);
+            let upper = bits(i, V::N);
+            let lower = if strip == 2 { bits(i + V::N, V::N) } else { 0 };
             let mut tile = [[V::splat(0.0); 2]; NR];
             for part in &form.parts {
-                if part.masks[0] & rows == 0 || part.masks[1] & columns == 0 {
+                if part.masks[1] & columns == 0 {
                     continue;
                 }
-                let [left, right] = part.rows;
-                for p in 0..part.count {
-                    let (left, right) =
-                        (&form.rows[(left + p) * stride + i..], &form.rows[(right + p) * stride + j..][..NR]);
-                    let first = V::load(left);
-                    if strip == 1 {
-                        for jj in 0..NR {
-                            tile[jj][0] = first.mul_add(V::splat(right[jj]), tile[jj][0]);
-                        }
-                    } else {
-                        let second = V::load(&left[V::N..]);
-                        for jj in 0..NR {
-                            let x = V::splat(right[jj]);
-                            tile[jj][0] = first.mul_add(x, tile[jj][0]);
-                            tile[jj][1] = second.mul_add(x, tile[jj][1]);
-                        }
-                    }
+                match [part.masks[0] & upper != 0, part.masks[0] & lower != 0] {
+                    [true, true] => add_part::<V, 0, 2, NR>(&mut tile, &form.rows, stride, part, [i, j]),
+                    [true, false] => add_part::<V, 0, 1, NR>(&mut tile, &form.rows, stride, part, [i, j]),
+                    [false, true] => add_part::<V, 1, 2, NR>(&mut tile, &form.rows, stride, part, [i, j]),
+                    [false, false] => (),
                 }
             }
             for jj in 0..NR {
@@ -445,5 +437,30 @@ fn add_outer<V: Vector, const NR: usize>(H: &mut [f64], ld: usize, size: usize, 
             i += strip * V::N;
         }
         j += NR;
+    }
+}
+
+/// The registers FROM..TO of rows of a tile at [i, j] += those of a part.
+#[inline(always)]
+fn add_part<V: Vector, const FROM: usize, const TO: usize, const NR: usize>(
+    tile: &mut [[V; 2]; NR],
+    rows: &[f64],
+    stride: usize,
+    part: &Part,
+    [i, j]: [usize; 2],
+) {
+    for p in 0..part.count {
+        let [left, right] = part.rows;
+        let (left, right) = (&rows[(left + p) * stride + i..][..TO * V::N], &rows[(right + p) * stride + j..][..NR]);
+        let mut registers = [V::splat(0.0); 2];
+        for s in FROM..TO {
+            registers[s] = V::load(&left[s * V::N..]);
+        }
+        for jj in 0..NR {
+            let x = V::splat(right[jj]);
+            for s in FROM..TO {
+                tile[jj][s] = registers[s].mul_add(x, tile[jj][s]);
+            }
+        }
     }
 }

@@ -2,7 +2,9 @@
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use crate::box_qp::BoxQp;
-use crate::dense::{SLACK, View, add_product_lower, add_scaled_product, copy, copy_symmetric, dot, product, transpose};
+use crate::dense::{
+    SLACK, View, add_product_lower, add_scaled_product, add_squares, copy, copy_symmetric, dot, product, transpose,
+};
 use crate::euler::Euler;
 use crate::factor::{eliminate, solve_right};
 use crate::implicit::Form;
@@ -333,7 +335,7 @@ impl Work {
         add_product_lower::<V, NR>(H, ld, [rows + 1, rows, n], View { data: W, stride: ld }, F);
     }
 
-    /// Vxx += ϱ I, and out to the knot with Vx; Vxx only if it is to be kept. Fails if they are not finite.
+    /// Vxx += ϱ I, and out to the knot with Vx; Vxx only if it is to be kept. Fails if they have diverged.
     #[inline(always)]
     pub(crate) fn finish_value<V: Vector>(
         &mut self,
@@ -342,16 +344,20 @@ impl Work {
         regularisation: f64,
     ) -> Result<(), SweepError> {
         let n = self.p.len();
-        knot.Vx.as_mut_slice().copy_from_slice(&self.p);
-        let mut finite = all_bounded(&self.p);
+        let mut squares = [V::splat(0.0); 2];
+        copy::<V>(knot.Vx.as_mut_slice(), &self.p);
+        add_squares(&mut squares, &self.p);
         for j in 0..n {
             let column = &mut self.P[j * (n + SLACK)..][..n];
             column[j] += regularisation;
             if self.keep {
                 copy::<V>(&mut knot.Vxx.as_mut_slice()[j * n..], column);
             }
-            finite &= all_bounded(column);
+            add_squares(&mut squares, column);
         }
+        let mut sums = [0.0; SLACK];
+        squares[0].add(squares[1]).store(&mut sums);
+        let finite = sums.iter().sum::<f64>() < DIVERGED * DIVERGED; // false for a NaN
         if finite { Ok(()) } else { Err(SweepError::NotFinite { knot: t }) }
     }
 }
@@ -361,16 +367,6 @@ impl Work {
 fn turn<V: Vector>(to: &mut [f64], x: &[f64], shift: usize) {
     copy::<V>(to, &x[shift..]);
     copy::<V>(&mut to[x.len() - shift..], &x[..shift]);
-}
-
-/// Whether no entry has diverged; false for a NaN. The bits of positive numbers are in the numbers' order, a NaN's above all.
-#[inline(always)]
-fn all_bounded(x: &[f64]) -> bool {
-    let mut largest = 0;
-    for x in x {
-        largest = largest.max(x.abs().to_bits());
-    }
-    largest < DIVERGED.to_bits()
 }
 
 /// Moves the rows and columns of the `free` ones of m controls to the front of H, and what follows up behind them.

@@ -20,6 +20,7 @@ pub(crate) trait Vector: Copy {
     fn mul_add(self, b: Self, c: Self) -> Self;
     fn add(self, b: Self) -> Self;
     fn sub(self, b: Self) -> Self;
+    fn mul(self, b: Self) -> Self;
     /// Of N registers, number i of register k becomes number k of register i.
     fn transpose(rows: &mut [Self]);
 }
@@ -55,6 +56,10 @@ impl Vector for Pair {
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
         Self([self.0[0] - b.0[0], self.0[1] - b.0[1]])
+    }
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        Self([self.0[0] * b.0[0], self.0[1] * b.0[1]])
     }
     #[inline(always)]
     fn transpose(rows: &mut [Self]) {
@@ -94,6 +99,10 @@ where
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
         self - b
+    }
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        self * b
     }
     #[inline(always)]
     fn transpose(rows: &mut [Self]) {

@@ -113,14 +113,17 @@ pub(super) struct Schedule {
     variants: Vec<Costs>,
     /// Which of them serves a knot; beyond its end the first.
     of: Vec<usize>,
+    /// The most rows that a knot has of Jacobians with respect to (u, v, q), and to q alone.
+    pub most: [usize; 2],
     watch: Watch,
 }
 
 impl Schedule {
     fn new(model: Arc<Model>, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
         let costs = Costs::new(model.clone(), offer.clone(), costs)?;
-        let watch = Watch::new(&model, offer.nu, costs.longest(), costs.rows(), costs.needs());
-        Ok(Self { variants: vec![costs], of: Vec::new(), watch, offer, model })
+        let most = costs.rows();
+        let watch = Watch::new(&model, offer.nu, costs.longest(), most, costs.needs());
+        Ok(Self { variants: vec![costs], of: Vec::new(), most, watch, offer, model })
     }
 
     fn index(&self, t: usize) -> usize {
@@ -157,14 +160,9 @@ impl Schedule {
         }
         let longest = self.variants.iter().map(Costs::longest).max().unwrap_or(0);
         let needs = self.variants.iter().map(Costs::needs).fold(Needs::default(), |a, b| a | b);
-        let most = self.variants.iter().map(Costs::rows).fold([0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
-        self.watch.resize(self.offer.nu, longest, most, needs);
+        self.most = self.variants.iter().map(Costs::rows).fold([0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        self.watch.resize(self.offer.nu, longest, self.most, needs);
         Ok(())
-    }
-
-    /// The most rows that a knot has of Jacobians with respect to (u, v, q).
-    pub(super) fn most_rows(&self) -> usize {
-        self.variants.iter().map(|costs| costs.rows()[0]).max().unwrap_or(0)
     }
 
     /// Whether a residual of some knot looks at forces.
@@ -276,7 +274,7 @@ macro_rules! robot_lanes {
 
         fn implicit(&self) -> Option<[usize; 2]> {
             let elimination = self.elimination.as_ref().filter(|_| self.lanes.is_some())?;
-            Some([elimination.most_dependent(), self.robot.schedule.most_rows()])
+            Some([elimination.most_dependent(), self.robot.schedule.most[0]])
         }
 
         fn equations_prepared(

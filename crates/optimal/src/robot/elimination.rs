@@ -16,7 +16,7 @@
 
 use super::quadratic::Row;
 use super::watch::{Signal, Slopes};
-use crate::dense::SLACK;
+use crate::dense::{SLACK, copy_scaled, max_abs};
 use crate::implicit::{Implicit, Rows};
 use crate::vector::{Dense, Vector, at_level};
 
@@ -164,10 +164,9 @@ impl Dense for Run<'_> {
         let Self { elimination: e, T, dt, implicit, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
         let (solved, all) = (rows + e.passive, rows + nv);
-        let largest = |x: &[f64]| x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let mut force_scale = 0.0_f64;
         for r in rows..solved {
-            force_scale = force_scale.max(largest(&T[r * stride + nv..][..rows]));
+            force_scale = force_scale.max(max_abs(&T[r * stride + nv..][..rows]));
         }
         e.place.fill(Place::Unknown(0));
         e.pivots.clear();
@@ -175,7 +174,7 @@ impl Dense for Run<'_> {
             let (before, rest) = T.split_at_mut(r * stride);
             let (row, after) = rest.split_at_mut(stride);
             // what the entries of a row that depends on others are compared with: a contact's are of order one
-            let scale = if r < rows { [1.0, 1.0] } else { [largest(&row[..nv]), force_scale] };
+            let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = e.choose(r, row, scale) else { return };
             e.place[k] = Place::Row(r);
             e.pivots.push(k);
@@ -217,7 +216,7 @@ impl Dense for Run<'_> {
         implicit.efforts.resize(m, size);
         for (row, to) in T[solved * stride..].chunks_exact(stride).zip(implicit.efforts.numbers.chunks_exact_mut(size))
         {
-            gather.row(row, [1.0 / dt, 1.0, 1.0], to);
+            gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
         }
         implicit.dependent.clear();
         implicit.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
@@ -227,11 +226,11 @@ impl Dense for Run<'_> {
         for (r, &k) in e.pivots.iter().enumerate() {
             let row = &T[r * stride..][..stride];
             if k < nv {
-                gather.row(row, [-1.0, -dt, -dt], &mut implicit.steps.numbers[step * size..][..size]);
+                gather.row::<V>(row, [-1.0, -dt, -dt], &mut implicit.steps.numbers[step * size..][..size]);
                 e.place[k] = Place::Row(step);
                 step += 1;
             } else {
-                gather.row(row, [-1.0 / dt, -1.0, -1.0], &mut e.forces.numbers[force * size..][..size]);
+                gather.row::<V>(row, [-1.0 / dt, -1.0, -1.0], &mut e.forces.numbers[force * size..][..size]);
                 e.place[k] = Place::Row(force);
                 force += 1;
             }
@@ -251,22 +250,14 @@ struct Gather<'a> {
     m: usize,
 }
 
-/// to = a x.
-#[inline(always)]
-fn scale(to: &mut [f64], x: &[f64], a: f64) {
-    for (to, x) in to.iter_mut().zip(x) {
-        *to = a * x;
-    }
-}
-
 impl Gather<'_> {
     #[inline(always)]
-    fn row(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
+    fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
         for &[from, unknown, length] in self.runs {
             let by = if from < self.nv { by_a } else { by_f };
-            scale(&mut to[unknown..][..length], &row[from..][..length], by);
+            copy_scaled::<V>(&mut to[unknown..], &row[from..][..length], by);
         }
-        scale(&mut to[self.m..][..2 * self.nv], &row[self.x..][..2 * self.nv], by_x);
+        copy_scaled::<V>(&mut to[self.m..], &row[self.x..][..2 * self.nv], by_x);
     }
 }
 
