@@ -28,6 +28,7 @@ from ._types import (
     Inertia,
     Limits,
     Mimic,
+    Outcome,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
@@ -41,6 +42,7 @@ __all__ = [
     "WORLD",
     "Action",
     "Activation",
+    "AugmentedLagrangian",
     "BodyId",
     "Cholesky",
     "ConstraintSet",
@@ -56,6 +58,7 @@ __all__ = [
     "ImpulseDynamics",
     "InverseDynamics",
     "Joint",
+    "Limit",
     "Lqr",
     "Ltdl",
     "Model",
@@ -2254,6 +2257,138 @@ class Cost:
         """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass."""
 
 @final
+class Limit:
+    """A residual r of a robot within bounds, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+
+    lower, upper: as many numbers as r has, infinite where there is no bound; a missing one is no bound. Without both
+    r = 0; entries where both are equal are equalities too. Limits hold at the beginning of a knot. To `Fddp` alone they
+    are costs for leaving the bounds.
+
+    >>> condyle.optimal.Limit.control("effort", [0.0] * 7, lower=[-30.0] * 7, upper=[30.0] * 7)
+    <condyle.optimal.Limit 'effort'>
+    """
+
+    @staticmethod
+    def state(name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
+        """r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
+
+    @staticmethod
+    def control(
+        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+    ) -> Limit:
+        """r = u − reference, nu numbers."""
+
+    @staticmethod
+    def control_gravity(name: str, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
+        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
+
+    @staticmethod
+    def joint_effort(
+        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+    ) -> Limit:
+        """r = τ − reference, the efforts of all joints, nv numbers."""
+
+    @staticmethod
+    def joint_acceleration(
+        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+    ) -> Limit:
+        """r = q̈ − reference, nv numbers."""
+
+    @staticmethod
+    def center_of_mass(
+        name: str, target: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+    ) -> Limit:
+        """r = c − target, 3 numbers in the world, of the centre of mass."""
+
+    @staticmethod
+    def centroidal_momentum(
+        name: str, target: ArrayLike | None = None, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+    ) -> Limit:
+        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
+
+    @staticmethod
+    def frame_placement(
+        name: str,
+        model: Model,
+        frame: str | int,
+        target: ArrayLike,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Limit:
+        """r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix."""
+
+    @staticmethod
+    def frame_translation(
+        name: str,
+        model: Model,
+        frame: str | int,
+        target: ArrayLike,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Limit:
+        """r = p − target, 3 numbers in the world, of the origin of a frame of the model."""
+
+    @staticmethod
+    def frame_rotation(
+        name: str,
+        model: Model,
+        frame: str | int,
+        target: ArrayLike,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Limit:
+        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
+
+    @staticmethod
+    def frame_velocity(
+        name: str,
+        model: Model,
+        frame: str | int,
+        target: ArrayLike | None = None,
+        reference: _Reference = "local",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Limit:
+        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
+        'local_world_aligned'.
+        """
+
+    @staticmethod
+    def contact_force(
+        name: str,
+        contact: str,
+        target: ArrayLike | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Limit:
+        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
+
+    @staticmethod
+    def friction_cone(name: str, contact: str, cone: FrictionCone) -> Limit:
+        """r = A f of a contact's force, within the cone's bounds."""
+
+    @staticmethod
+    def wrench_cone(name: str, contact: str, cone: WrenchCone) -> Limit:
+        """r = A w of a rigid contact's wrench, within the cone's bounds."""
+
+    @staticmethod
+    def center_of_pressure(
+        name: str,
+        contact: str,
+        size: tuple[float, float] | Sequence[float],
+        rotation: ArrayLike | None = None,
+    ) -> Limit:
+        """The centre of pressure of a rigid contact inside a rectangle: four numbers not above 0.
+
+        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
+        (3, 3).
+        """
+
+    @staticmethod
+    def impulse_center_of_mass(name: str, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
+        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass."""
+
+@final
 class FreeDynamics:
     """A knot of a robot that moves freely under its joints' efforts.
 
@@ -2267,8 +2402,10 @@ class FreeDynamics:
     actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
     lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+    limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
+    limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
 
-    Raises `ProblemError` for a cost or drives that do not fit.
+    Raises `ProblemError` for a cost, a limit or drives that do not fit.
     """
 
     def __new__(
@@ -2281,6 +2418,8 @@ class FreeDynamics:
         integrator: _Scheme = "semi_implicit_euler",
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+        limits_at: dict[int, Sequence[Limit]] | None = None,
     ) -> FreeDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The efforts that hold the robot still at the state x, nu numbers."""
@@ -2294,9 +2433,10 @@ class ContactDynamics:
     dt: Δt in seconds.
     costs: a list of `Cost`.
     damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-    costs_at, actuation, integrator, lower, upper: as of `FreeDynamics`.
+    costs_at, actuation, integrator, lower, upper, limits, limits_at: as of `FreeDynamics`.
 
-    Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
+    Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
+    damping.
 
     >>> from condyle.optimal import ContactDynamics
     >>> quadruped = condyle.robots.quadruped()
@@ -2316,6 +2456,8 @@ class ContactDynamics:
         integrator: _Scheme = "semi_implicit_euler",
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+        limits_at: dict[int, Sequence[Limit]] | None = None,
     ) -> ContactDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The smallest controls and forces that hold the robot still at the state x: nu controls of them."""
@@ -2331,6 +2473,7 @@ class ImpulseDynamics:
     costs: a list of `Cost`; they look at the state before the impact.
     restitution: ε, 0 to 1.
     damping: μ (1/kg).
+    limits: a list of `Limit`, or None; they too look at the state before the impact.
 
     Raises `ProblemError` as `ContactDynamics` does.
     """
@@ -2342,6 +2485,7 @@ class ImpulseDynamics:
         costs: Sequence[Cost],
         restitution: float = 0.0,
         damping: float = 0.0,
+        limits: Sequence[Limit] | None = None,
     ) -> ImpulseDynamics: ...
 
 @final
@@ -2351,9 +2495,9 @@ class InverseDynamics:
     model: the robot.
     dt: Δt in seconds.
     costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
-    integrator, lower, upper: as of `FreeDynamics`.
+    integrator, lower, upper, limits: as of `FreeDynamics`.
 
-    Raises `ProblemError` for a cost that does not fit.
+    Raises `ProblemError` for a cost or a limit that does not fit.
     """
 
     def __new__(
@@ -2364,6 +2508,7 @@ class InverseDynamics:
         integrator: _Scheme = "semi_implicit_euler",
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
     ) -> InverseDynamics: ...
 
 @final
@@ -2517,3 +2662,50 @@ class Fddp:
 
         Raises `ProblemError` if there is no such model.
         """
+
+@final
+class AugmentedLagrangian:
+    """The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s.
+
+    repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
+    y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
+
+    problem: what is solved; the solver allocates for its shape once.
+    inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen.
+    settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
+        gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
+        `penalty_max`, `penalty_factor` (by which it rises).
+
+    >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem
+    >>> arm = condyle.robots.arm7()
+    >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+    >>> costs = [Cost.state("rest", 1e-1, x0), Cost.control("effort", 1e-3, np.zeros(7))]
+    >>> weak = Limit.control("weak", np.zeros(7), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+    >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
+    >>> reach = Limit.frame_translation("reach", arm, "tool", [0.5, 0.1, 0.6])  # exactly
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
+    >>> solver = AugmentedLagrangian(problem)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
+    >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
+    ('converged', True, True)
+    """
+
+    def __new__(
+        cls, problem: Problem, inner: dict[str, Any] | None = None, **settings: float
+    ) -> AugmentedLagrangian: ...
+    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+        """Solves the problem from a warm start and multipliers of zero, and returns a `Solution`. Other threads run
+        meanwhile.
+
+        Its status is "converged" when the residuals of `outcome` are below the tolerances, and "infeasible" if the
+        penalty reached its limit and the limits do not hold. Its cost contains the terms of the limits, that of
+        `outcome` does not; its trace and gains are those of the last inner solve.
+
+        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+
+        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+        """
+    @property
+    def outcome(self) -> Outcome:
+        """What the last solve says of the limits, an `Outcome`."""

@@ -443,12 +443,31 @@ class Solution(NamedTuple):
     """Largest gap of the trajectory."""
     feasible: bool
     """Whether the trajectory satisfies the dynamics."""
-    status: Literal["converged", "max_iterations", "time_limit", "regularisation_limit", "not_finite"]
+    status: Literal["converged", "max_iterations", "time_limit", "regularisation_limit", "infeasible", "not_finite"]
     """How the solve ended."""
     trace: list[Iteration]
     """A record per iteration."""
     timings: Timings
     """Where the time went."""
+
+
+class Outcome(NamedTuple):
+    """What a solve of `AugmentedLagrangian` says beside its `Solution`."""
+
+    cost: float
+    """The cost without the terms of the limits."""
+    primal: float
+    """The largest distance of a limit's number from its bounds, or gap of the dynamics."""
+    dual: float
+    """The largest entry of the gradient of the Lagrangian by the controls, projected on their bounds."""
+    multipliers: list[NDArray[np.float64]]
+    """The multipliers of each knot, limit after limit: positive at an upper bound, negative at a lower one."""
+    penalty: float
+    """1/μ at the end."""
+    solves: int
+    """Inner solves."""
+    iterations: int
+    """Iterations of all of them."""
 
 
 class Control(NamedTuple):

@@ -12,12 +12,15 @@
 >>> solution.status, solution.xs.shape
 ('converged', (21, 14))
 
+What must hold exactly is a `Limit`, for `AugmentedLagrangian`: see there.
+
 The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are Crocoddyl's.
 """
 
 from ._condyle import (
     Action,
     Activation,
+    AugmentedLagrangian,
     ContactDynamics,
     Cost,
     Fddp,
@@ -25,16 +28,18 @@ from ._condyle import (
     FrictionCone,
     ImpulseDynamics,
     InverseDynamics,
+    Limit,
     Lqr,
     Problem,
     ProblemError,
     WrenchCone,
 )
-from ._types import Iteration, Solution, Timings
+from ._types import Iteration, Outcome, Solution, Timings
 
 __all__ = [
     "Action",
     "Activation",
+    "AugmentedLagrangian",
     "ContactDynamics",
     "Cost",
     "Fddp",
@@ -43,7 +48,9 @@ __all__ = [
     "ImpulseDynamics",
     "InverseDynamics",
     "Iteration",
+    "Limit",
     "Lqr",
+    "Outcome",
     "Problem",
     "ProblemError",
     "Solution",

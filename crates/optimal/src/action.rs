@@ -2,6 +2,7 @@
 
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
+use crate::multipliers::Visit;
 use crate::numdiff;
 use std::any::Any;
 
@@ -86,6 +87,12 @@ pub trait ActionModel: Any + Send {
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         let _ = t;
         None
+    }
+
+    /// Shows the constraints of knot t, which have terms of an augmented Lagrangian in its cost, in their order.
+    #[doc(hidden)]
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        let _ = (t, visit);
     }
 
     /// x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).

@@ -8,8 +8,8 @@ use crate::settings::{ConstraintSettings, Settings};
 use crate::solution::{Solution, Status};
 use nalgebra::DVector;
 
-/// The method of multipliers around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions, with the rules
-/// of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP
+/// The method of multipliers around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and robots with
+/// [`Limit`](crate::robot::Limit)s, with the rules of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP
 /// has them (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier, 2023).
 ///
 /// ```text
@@ -88,7 +88,8 @@ pub struct Outcome {
     /// The largest entry of the gradient of the Lagrangian by the controls, projected on their bounds.
     pub dual: f64,
     /// The multipliers y of each knot: positive at an upper bound, negative at a lower one, none where there is no
-    /// constraint.
+    /// constraint. Of a robot's knot those of its [`Limit`](crate::robot::Limit)s come first, in their order, then those
+    /// of a [`Constrained`](crate::Constrained) around it.
     pub multipliers: Vec<Vec<f64>>,
     /// 1/μ at the end.
     pub penalty: f64,
@@ -110,16 +111,29 @@ impl AugmentedLagrangian {
     ///
     /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances,
     /// [`Status::Infeasible`] if the penalty reached its limit and the constraints do not hold, or that of the inner solve
-    /// that stopped early. The cost of the solution contains the terms of the constraints, the outcome's does not.
+    /// that stopped early. The cost of the solution contains the terms of the constraints, the outcome's does not. The
+    /// problem keeps nothing of the multipliers.
     ///
     /// # Errors
     /// [`Error`] as for [`Fddp::solve`], or if a constraint's bounds leave no value.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
+        let result = self.run(problem, xs, us);
+        if result.is_ok() {
+            problem.multipliers(&mut self.outcome.multipliers);
+        }
+        problem.forget_multipliers();
+        self.solver.solution.status = result?;
+        Ok(&self.solver.solution)
+    }
+
+    /// The outer iterations.
+    fn run(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<Status, Error> {
         let Self { settings, inner, solver, .. } = self;
         settings.check()?;
         problem.start_constraints(1.0 / settings.penalty_start)?;
         solver.settings = inner.clone();
-        self.outcome = Outcome { penalty: settings.penalty_start, ..Outcome::default() };
+        let multipliers = std::mem::take(&mut self.outcome.multipliers);
+        self.outcome = Outcome { multipliers, penalty: settings.penalty_start, ..Outcome::default() };
         let (tolerance, tolerance_dual) = (self.settings.tolerance, self.settings.tolerance_dual);
         let mut mu = 1.0 / self.settings.penalty_start;
         // the tolerances of one inner solve, which follow μ
@@ -142,7 +156,7 @@ impl AugmentedLagrangian {
             // z − Π z at the iterate, and how far it is from a solution
             self.measure(problem);
             if self.outcome.primal <= eta.max(tolerance) {
-                problem.update_multipliers(&self.solver.solution.xs, &self.solver.solution.us);
+                problem.update_multipliers();
                 if self.outcome.primal <= tolerance && self.outcome.dual <= tolerance_dual {
                     status = Status::Converged;
                     break;
@@ -160,9 +174,7 @@ impl AugmentedLagrangian {
             }
         }
         self.outcome.penalty = 1.0 / mu;
-        self.outcome.multipliers = (0..=problem.horizon()).map(|t| problem.multipliers(t)).collect();
-        self.solver.solution.status = status;
-        Ok(&self.solver.solution)
+        Ok(status)
     }
 
     /// The result of the last solve.
@@ -181,8 +193,12 @@ impl AugmentedLagrangian {
         let Self { solver, outcome, adjoint: [lambda, before], .. } = self;
         let horizon = problem.horizon();
         let Solution { xs, us, gap, cost, .. } = &solver.solution;
+        for node in &mut solver.nodes {
+            node.implicit.wanted = false; // r and B are read
+        }
         problem.calc_diff(xs, us, &mut solver.nodes);
-        (outcome.primal, outcome.cost, outcome.dual) = (*gap, *cost, 0.0);
+        let (violation, terms) = problem.measure_constraints();
+        (outcome.primal, outcome.cost, outcome.dual) = (gap.max(violation), cost - terms, 0.0);
         lambda.copy_from(&solver.nodes[horizon].q);
         for t in (0..horizon).rev() {
             let node = &solver.nodes[t];
@@ -199,14 +215,6 @@ impl AugmentedLagrangian {
             before.copy_from(&node.q);
             before.gemv_tr(1.0, &node.A, lambda, 1.0);
             std::mem::swap(lambda, before);
-        }
-        for t in 0..=horizon {
-            let (x, u) = (solver.solution.shape().x(t), solver.solution.shape().u(t));
-            if let Some(constrained) = problem.constrained(t) {
-                let (violation, term) = constrained.evaluate(t, &xs[x], &us[u]);
-                outcome.primal = if violation.is_nan() { f64::INFINITY } else { outcome.primal.max(violation) };
-                outcome.cost -= term;
-            }
         }
     }
 }

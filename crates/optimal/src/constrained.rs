@@ -4,6 +4,7 @@
 use crate::action::ActionModel;
 use crate::error::{Error, assert_length};
 use crate::lq::{Hessian, LqNode};
+use crate::multipliers::{Bounded, Multipliers, PENALTY, Visit};
 use crate::problem::Problem;
 use nalgebra::DMatrix;
 use std::any::Any;
@@ -51,28 +52,26 @@ pub trait Constraint: Any + Send {
 /// ```
 ///
 /// whose Hessian is that of Gauss and Newton. A solver that knows nothing of constraints sees a cost for leaving the
-/// bounds.
+/// bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes its dynamics once for both.
 pub struct Constrained {
     action: Box<dyn ActionModel>,
     constraint: Box<dyn Constraint>,
-    mu: f64,
-    /// y of each knot; zero beyond its end.
-    multipliers: Vec<f64>,
-    /// g, and then z − Π z.
+    multipliers: Multipliers,
     g: Vec<f64>,
+    /// The slope and the curvature of the cost by g.
+    d: Vec<f64>,
+    dd: Vec<f64>,
     gx: DMatrix<f64>,
     gu: DMatrix<f64>,
 }
-
-/// 1/μ before a solve has chosen one.
-const PENALTY: f64 = 10.0;
 
 impl Constrained {
     /// `action` under `constraint`, at all knots that it serves.
     pub fn new(action: Box<dyn ActionModel>, constraint: Box<dyn Constraint>) -> Self {
         let (size, ndx, nu) = (constraint.size(), action.ndx(), action.nu());
         let (gx, gu) = (DMatrix::zeros(size, ndx), DMatrix::zeros(size, nu));
-        Self { action, constraint, mu: 1.0 / PENALTY, multipliers: vec![], g: vec![0.0; size], gx, gu }
+        let [g, d, dd] = [(); 3].map(|()| vec![0.0; size]);
+        Self { action, constraint, multipliers: Multipliers::new(size), g, d, dd, gx, gu }
     }
 
     /// The action, if it is a `T`.
@@ -87,54 +86,27 @@ impl Constrained {
         constraint.downcast_mut()
     }
 
-    /// The number of constraints.
-    fn size(&self) -> usize {
-        self.g.len()
-    }
-
-    /// z − Π z into `g`; returns the largest violation, the distance of g from its bounds, and the term of the cost.
-    pub(crate) fn evaluate(&mut self, t: usize, x: &[f64], u: &[f64]) -> (f64, f64) {
-        let size = self.size();
+    /// The term of the cost.
+    fn term(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
         self.constraint.calc(t, x, u, &mut self.g);
         let (lower, upper) = self.constraint.bounds(t);
-        let y = self.multipliers.get(t * size..(t + 1) * size);
-        let (mut violation, mut term) = (0.0_f64, 0.0);
-        for i in 0..size {
-            let (g, y) = (self.g[i], y.map_or(0.0, |y| y[i]));
-            let z = g + self.mu * y;
-            let outside = |z: f64| match z {
-                z if z > upper[i] => z - upper[i],
-                z if z >= lower[i] => 0.0,
-                z => z - lower[i], // a NaN stays one
-            };
-            violation = violation.max(outside(g).abs());
-            self.g[i] = outside(z);
-            term += 0.5 * (self.g[i] * self.g[i] / self.mu - self.mu * y * y);
-        }
-        // `max` above drops a NaN, the sum does not
-        (if term.is_nan() { f64::NAN } else { violation }, term)
+        self.multipliers.value(t, 0, &self.g, lower, upper)
     }
 
-    /// y ← (z − Π z) / μ, from the last `evaluate` at knot t.
-    fn update_multipliers(&mut self, t: usize) {
-        let size = self.size();
-        for i in 0..size {
-            self.multipliers[t * size + i] = self.g[i] / self.mu;
-        }
-    }
-
-    /// The gradient and the Gauss–Newton Hessian of the term: w = (z − Π z) / μ,  q += gₓᵀ w,  Q += gₓᵀ D gₓ / μ, …, where D
-    /// is 1 for the functions outside of their bounds.
+    /// The gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, …, with its slope d and its
+    /// curvature D by g.
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        _ = self.evaluate(t, x, u);
+        self.constraint.calc(t, x, u, &mut self.g);
         self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu);
         let (lower, upper) = self.constraint.bounds(t);
+        self.multipliers.begin(t);
+        self.multipliers.slopes(t, 0, &self.g, [lower, upper], &mut self.d, &mut self.dd);
         let (ndx, nu) = (self.gx.ncols(), self.gu.ncols());
         for i in 0..self.g.len() {
-            if self.g[i] == 0.0 && lower[i] < upper[i] {
+            let (w, d) = (self.d[i], self.dd[i]);
+            if d == 0.0 {
                 continue;
             }
-            let (w, d) = (self.g[i] / self.mu, 1.0 / self.mu);
             for a in 0..ndx {
                 let ga = self.gx[(i, a)];
                 if ga != 0.0 {
@@ -183,7 +155,7 @@ impl ActionModel for Constrained {
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         let cost = self.action.calc(t, x, u, next);
-        cost + self.evaluate(t, x, u).1
+        cost + self.term(t, x, u)
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
@@ -195,7 +167,7 @@ impl ActionModel for Constrained {
         let (nx, nu) = (self.nx(), self.nu());
         self.action.calc_group(knots, xs, us, next, costs);
         for (i, &t) in knots.iter().enumerate() {
-            costs[i] += self.evaluate(t, &xs[i * nx..][..nx], &us[i * nu..][..nu]).1;
+            costs[i] += self.term(t, &xs[i * nx..][..nx], &us[i * nu..][..nu]);
         }
     }
 
@@ -206,6 +178,12 @@ impl ActionModel for Constrained {
         for (i, &t) in knots.iter().enumerate() {
             self.add_derivatives(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
         }
+    }
+
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        self.action.constraints(t, visit);
+        let (lower, upper) = self.constraint.bounds(t);
+        visit(Bounded { count: self.g.len(), lower, upper, multipliers: &mut self.multipliers });
     }
 
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
@@ -222,63 +200,71 @@ impl ActionModel for Constrained {
 }
 
 impl Problem {
-    /// The model of knot t, if it is a constrained one.
-    pub(crate) fn constrained(&mut self, t: usize) -> Option<&mut Constrained> {
-        let action: &mut dyn Any = self.action_mut(t);
-        action.downcast_mut()
-    }
-
     /// Multipliers of zero everywhere, and the penalty 1/μ.
     ///
     /// # Errors
     /// [`Error`] if bounds have a wrong length or leave no value.
     pub(crate) fn start_constraints(&mut self, mu: f64) -> Result<(), Error> {
         let horizon = self.horizon();
-        for knot in 0..=horizon {
-            let Some(constrained) = self.constrained(knot) else { continue };
-            let expected = constrained.size();
-            let (lower, upper) = constrained.constraint.bounds(knot);
-            for (name, found) in [("lower bounds", lower.len()), ("upper bounds", upper.len())] {
-                if found != expected {
-                    return Err(Error::Dimension { node: knot, name, expected, found });
-                }
-            }
-            for (row, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
-                // false for NaN
-                if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
-                    return Err(Error::Constraint { knot, row, lower, upper });
-                }
-            }
-            constrained.multipliers.resize((horizon + 1) * expected, 0.0);
-            constrained.multipliers.fill(0.0);
-            constrained.mu = mu;
+        for t in 0..=horizon {
+            let mut result = Ok(());
+            self.action_mut(t).constraints(t, &mut |bounded| {
+                result = result.clone().and(bounded.check(t));
+                bounded.multipliers.start(t, horizon + 1, mu);
+            });
+            result?;
         }
+        self.share_multipliers();
         Ok(())
+    }
+
+    /// Multipliers of zero and the penalty of actions by themselves, everywhere.
+    pub(crate) fn forget_multipliers(&mut self) {
+        let knots = self.horizon() + 1;
+        for t in 0..knots {
+            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.start(t, knots, 1.0 / PENALTY));
+        }
+        self.share_multipliers();
     }
 
     /// The penalty 1/μ.
     pub(crate) fn set_penalty(&mut self, mu: f64) {
-        for knot in 0..=self.horizon() {
-            if let Some(constrained) = self.constrained(knot) {
-                constrained.mu = mu;
-            }
+        for t in 0..=self.horizon() {
+            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.set_mu(mu));
         }
+        self.share_multipliers();
     }
 
-    /// y ← (z − Π z) / μ at the trajectory (xs, us).
-    pub(crate) fn update_multipliers(&mut self, xs: &[f64], us: &[f64]) {
-        for knot in 0..=self.horizon() {
-            let (x, u) = (self.shape().x(knot), self.shape().u(knot));
-            if let Some(constrained) = self.constrained(knot) {
-                _ = constrained.evaluate(knot, &xs[x], &us[u]);
-                constrained.update_multipliers(knot);
-            }
+    /// y ← (z − Π z) / μ at the trajectory at which derivatives were computed last.
+    pub(crate) fn update_multipliers(&mut self) {
+        for t in 0..=self.horizon() {
+            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.update(t));
         }
+        self.share_multipliers();
     }
 
-    /// y of knot t.
-    pub(crate) fn multipliers(&mut self, t: usize) -> Vec<f64> {
-        let of = |c: &mut Constrained| c.multipliers[t * c.size()..(t + 1) * c.size()].to_vec();
-        self.constrained(t).map(of).unwrap_or_default()
+    /// The largest distance of a constraint from its bounds, infinite if one is not a number, and the sum of the cost's
+    /// terms, at the trajectory at which derivatives were computed last.
+    pub(crate) fn measure_constraints(&mut self) -> (f64, f64) {
+        let (mut worst, mut sum) = (0.0_f64, 0.0);
+        for t in 0..=self.horizon() {
+            self.action_mut(t).constraints(t, &mut |bounded| {
+                let [violation, term] = bounded.multipliers.measured(t);
+                worst = worst.max(if violation.is_nan() { f64::INFINITY } else { violation });
+                sum += term;
+            });
+        }
+        (worst, sum)
+    }
+
+    /// y of each knot. Allocates at the first call.
+    pub(crate) fn multipliers(&mut self, out: &mut Vec<Vec<f64>>) {
+        out.resize(self.horizon() + 1, vec![]);
+        for (t, out) in out.iter_mut().enumerate() {
+            out.clear();
+            self.action_mut(t).constraints(t, &mut |bounded| {
+                out.extend_from_slice(bounded.multipliers.of(t, bounded.count));
+            });
+        }
     }
 }

@@ -91,6 +91,17 @@ pub enum Error {
         what: String,
     },
 
+    /// A limit does not fit the robot.
+    #[error("limit `{name}`{}: {what}", at(*.knot))]
+    Limit {
+        /// The limit's name.
+        name: String,
+        /// The knot, if it is a limit of one.
+        knot: Option<usize>,
+        /// What does not fit, with the numbers.
+        what: String,
+    },
+
     /// A contact does not fit the robot, or the contacts before it.
     #[error("contact `{name}`: {what}")]
     Contact {
@@ -124,6 +135,11 @@ pub enum Error {
         /// The range.
         allowed: &'static str,
     },
+}
+
+/// Which knot an error is about.
+fn at(knot: Option<usize>) -> String {
+    knot.map_or_else(String::new, |t| format!(" of knot {t}"))
 }
 
 impl Error {

@@ -12,7 +12,8 @@
 //!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
-//! - [`AugmentedLagrangian`] repeats that until general constraints hold, those of [`Constrained`] actions.
+//! - [`AugmentedLagrangian`] repeats that until general constraints hold, those of [`Constrained`] actions and a robot's
+//!   [`Limit`](robot::Limit)s.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
 //! - [`AutoDiff`] makes an action of dynamics and a cost that are written for any scalar: exact derivatives by dual numbers.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
@@ -79,6 +80,7 @@ mod fddp;
 mod implicit;
 mod lq;
 mod lqr;
+mod multipliers;
 mod numdiff;
 mod parallel;
 mod problem;

@@ -297,14 +297,16 @@ impl Problem {
         self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
     }
 
-    /// Checks the lengths, and lets nothing be known of the forms of A and B: the action says if it is.
+    /// Checks the lengths, and lets nothing be known of the forms of A and B: the action says if it is. Asks none for the
+    /// implicit form that has none.
     #[track_caller]
     pub(crate) fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         self.assert_trajectory(xs, us);
         assert_length("nodes", nodes.len(), self.horizon() + 1);
-        for node in nodes {
+        for (t, node) in nodes.iter_mut().enumerate() {
             node.structure.set_dense();
             node.implicit.active = false;
+            node.implicit.wanted &= self.action(t).implicit().is_some();
         }
     }
 

@@ -111,6 +111,27 @@ impl Horizon<'_> {
 }
 
 impl Problem {
+    /// Gives copies the multipliers of their models.
+    pub(crate) fn share_multipliers(&mut self) {
+        let Self { models, runs, copies, .. } = self;
+        for copies in &mut copies.of {
+            for (model, run) in runs.iter() {
+                let Some(copy) = &mut copies[*model] else { continue };
+                let mut k = 0;
+                copy.constraints(run.start, &mut |theirs| {
+                    let mut i = 0;
+                    models[*model].constraints(run.start, &mut |ours| {
+                        if i == k {
+                            theirs.multipliers.clone_from(ours.multipliers);
+                        }
+                        i += 1;
+                    });
+                    k += 1;
+                });
+            }
+        }
+    }
+
     /// [`calc_diff`](Self::calc_diff) on `threads` threads of the rayon pool in which it is called, else of the global one;
     /// the same to the last bit. The knots of models without a copy ([`fork`](ActionModel::fork)) come last, on one thread.
     ///

@@ -7,9 +7,9 @@ use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight}
 use condyle_dynamics::{Constraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
-    Integrator, Residual,
+    Integrator, Limit, Residual,
 };
-use condyle_optimal::{Fddp, Method, Problem, Sweep};
+use condyle_optimal::{AugmentedLagrangian, Fddp, Method, Problem, Status, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -228,6 +228,42 @@ fn a_gait_allocates_nothing() {
         })
     });
     assert_eq!(count, 0);
+}
+
+/// Multipliers, bounds and penalties move in place.
+#[test]
+fn a_constrained_solve_of_a_robot_allocates_nothing() {
+    let arm = std::sync::Arc::new(robots::arm7());
+    let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    let control = || Residual::Control { reference: vec![0.0; 7] };
+    let costs = vec![
+        Cost::new("rest", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic),
+        Cost::new("effort", 1e-3, control(), Activation::Quadratic),
+    ];
+    let weak = Limit::new("weak", control(), vec![-30.0; 7], vec![30.0; 7]);
+    let target = Vec3::new(0.35, 0.2, 0.6);
+    let reach = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target };
+    let reach = Limit::equality("reach", reach);
+    let mut knot = FreeDynamics::running(arm.clone(), 0.05, costs).unwrap().with_limits(vec![weak]).unwrap();
+    knot.set_limits(3, vec![]).unwrap();
+    let us = knot.quasi_static(&x0).repeat(10);
+    let end = FreeDynamics::terminal(arm, vec![]).unwrap().with_limits(vec![reach]).unwrap();
+    let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 10], Box::new(end)).unwrap();
+    let mut solver = AugmentedLagrangian::new(&problem);
+    let xs = x0.repeat(11);
+    for threads in [1, 2] {
+        solver.inner.threads = threads;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let count = pool.install(|| {
+            solver.solve(&mut problem, &xs, &us).unwrap();
+            allocations(|| {
+                solver.solve(&mut problem, &xs, &us).unwrap();
+            })
+        });
+        assert_eq!(count, 0, "{threads} threads");
+        assert_eq!(solver.solution().status, Status::Converged);
+        assert!(solver.outcome().multipliers.iter().flatten().any(|y| *y != 0.0));
+    }
 }
 
 /// The feet stand at first; then they push harder than they may, and rows awake that were not there.

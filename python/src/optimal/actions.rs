@@ -1,6 +1,7 @@
 //! Actions: the robot's, and those written in Python.
 
 use super::costs::Cost;
+use super::limits::Limit;
 use super::{exception, rust};
 use crate::arrays::{Give, matrix, vector};
 use crate::constrained::constraint;
@@ -30,7 +31,7 @@ pub(super) struct Described {
 #[derive(Clone)]
 pub(super) enum Part {
     Knot(Box<robot::Knot>),
-    Terminal(Vec<robot::Cost>),
+    Terminal(Vec<robot::Cost>, Vec<robot::Limit>),
 }
 
 /// A robot's action, as it is and as data.
@@ -65,8 +66,9 @@ impl Described {
     fn build(&self) -> PyResult<Box<dyn ActionModel>> {
         match &self.part {
             Part::Knot(knot) => knot.build(&self.robot),
-            Part::Terminal(costs) => {
-                robot::FreeDynamics::terminal(self.robot.clone(), costs.clone()).map(|end| Box::new(end) as _)
+            Part::Terminal(costs, limits) => {
+                let end = robot::FreeDynamics::terminal(self.robot.clone(), costs.clone());
+                end.and_then(|end| end.with_limits(limits.clone())).map(|end| Box::new(end) as _)
             }
         }
         .map_err(exception)
@@ -75,7 +77,7 @@ impl Described {
     /// Changes the weights of the terms called `name`.
     pub(super) fn set_weight(&mut self, name: &str, weight: f64) {
         let all: &mut dyn Iterator<Item = &mut robot::Cost> = match &mut self.part {
-            Part::Terminal(costs) => &mut costs.iter_mut(),
+            Part::Terminal(costs, _) => &mut costs.iter_mut(),
             Part::Knot(knot) => &mut knot.costs.iter_mut().chain(knot.costs_at.values_mut().flatten()),
         };
         all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
@@ -83,7 +85,7 @@ impl Described {
 
     fn kind(&self) -> Model {
         match &self.part {
-            Part::Terminal(_) => Model::Free,
+            Part::Terminal(..) => Model::Free,
             Part::Knot(knot) => match knot.dynamics {
                 Dynamics::Free { .. } => Model::Free,
                 Dynamics::Contact { .. } => Model::Contact,
@@ -184,8 +186,15 @@ fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
     costs.iter().map(|c| c.0.clone()).collect()
 }
 
-/// Costs of single knots.
-type CostsAt<'py> = Option<BTreeMap<usize, Vec<PyRef<'py, Cost>>>>;
+/// Costs, or limits, of single knots.
+type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
+
+/// Limits of all knots, if there are any.
+type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
+
+fn limits(limits: Limits<'_>) -> Vec<robot::Limit> {
+    limits.into_iter().flatten().map(|limit| limit.0.clone()).collect()
+}
 
 /// Contacts with the names that residuals call them by.
 fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Vec<robot::Contact>> {
@@ -214,13 +223,14 @@ fn bounds(
 /// A knot as data.
 fn knot(
     dynamics: Dynamics,
-    costs: &[PyRef<'_, Cost>],
-    costs_at: CostsAt<'_>,
+    (costs, costs_at): (&[PyRef<'_, Cost>], At<'_, Cost>),
+    (all, limits_at): (Limits<'_>, At<'_, Limit>),
     bounds: Option<[Vec<f64>; 2]>,
-) -> PyResult<Part> {
+) -> Part {
     let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(&costs))).collect();
+    let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(Some(those)))).collect();
     let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
-    Ok(Part::Knot(Box::new(Knot { dynamics, costs: terms(costs), costs_at, bounds })))
+    Part::Knot(Box::new(Knot { dynamics, costs: terms(costs), costs_at, limits: limits(all), limits_at, bounds }))
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.
@@ -235,32 +245,38 @@ fn knot(
 /// actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+/// limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
+/// limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
 ///
-/// Raises `ProblemError` for a cost or drives that do not fit.
+/// Raises `ProblemError` for a cost, a limit or drives that do not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct FreeDynamics(RobotAction<robot::FreeDynamics>);
 
 #[pymethods]
 impl FreeDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
+    #[pyo3(signature = (model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None, limits=None, limits_at=None))]
     fn new(
         model: &Bound<'_, Robot>,
         dt: Option<f64>,
         costs: Vec<PyRef<'_, Cost>>,
-        costs_at: CostsAt<'_>,
+        costs_at: At<'_, Cost>,
         actuation: Option<&Bound<'_, PyAny>>,
         integrator: &str,
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
+        limits: Limits<'_>,
+        limits_at: At<'_, Limit>,
     ) -> PyResult<Self> {
         let Some(dt) = dt else {
-            return Ok(Self(RobotAction::new(model, |_| Ok(Part::Terminal(terms(&costs))))?));
+            let part = |_: &_| Ok(Part::Terminal(terms(&costs), self::limits(limits)));
+            return Ok(Self(RobotAction::new(model, part)?));
         };
         let integrator = self::integrator(integrator)?;
         Ok(Self(RobotAction::new(model, |model| {
             let (actuation, nu) = self::actuation(model, actuation)?;
-            knot(Dynamics::Free { actuation, integrator, dt }, &costs, costs_at, bounds(nu, lower, upper)?)
+            let dynamics = Dynamics::Free { actuation, integrator, dt };
+            Ok(knot(dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
@@ -279,9 +295,10 @@ impl FreeDynamics {
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`.
 /// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-/// costs_at, actuation, integrator, lower, upper: as of `FreeDynamics`.
+/// costs_at, actuation, integrator, lower, upper, limits, limits_at: as of `FreeDynamics`.
 ///
-/// Raises `ProblemError` for a contact, cost or drives that do not fit, and two contacts on one body without damping.
+/// Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
+/// damping.
 ///
 /// >>> from condyle.optimal import ContactDynamics
 /// >>> quadruped = condyle.robots.quadruped()
@@ -293,24 +310,26 @@ pub(crate) struct ContactDynamics(RobotAction<robot::ContactDynamics>);
 #[pymethods]
 impl ContactDynamics {
     #[new]
-    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None))]
+    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None, limits=None, limits_at=None))]
     fn new(
         model: &Bound<'_, Robot>,
         contacts: &Bound<'_, PyDict>,
         dt: f64,
         costs: Vec<PyRef<'_, Cost>>,
         damping: f64,
-        costs_at: CostsAt<'_>,
+        costs_at: At<'_, Cost>,
         actuation: Option<&Bound<'_, PyAny>>,
         integrator: &str,
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
+        limits: Limits<'_>,
+        limits_at: At<'_, Limit>,
     ) -> PyResult<Self> {
         let integrator = self::integrator(integrator)?;
         Ok(Self(RobotAction::new(model, |model| {
             let ((actuation, nu), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);
             let dynamics = Dynamics::Contact { contacts, damping, actuation, integrator, dt };
-            knot(dynamics, &costs, costs_at, bounds(nu, lower, upper)?)
+            Ok(knot(dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
@@ -331,6 +350,7 @@ impl ContactDynamics {
 /// costs: a list of `Cost`; they look at the state before the impact.
 /// restitution: ε, 0 to 1.
 /// damping: μ (1/kg).
+/// limits: a list of `Limit`, or None; they too look at the state before the impact.
 ///
 /// Raises `ProblemError` as `ContactDynamics` does.
 #[pyclass(frozen, module = "condyle.optimal")]
@@ -339,17 +359,19 @@ pub(crate) struct ImpulseDynamics(RobotAction<robot::ImpulseDynamics>);
 #[pymethods]
 impl ImpulseDynamics {
     #[new]
-    #[pyo3(signature = (model, contacts, costs, restitution=0.0, damping=0.0))]
+    #[pyo3(signature = (model, contacts, costs, restitution=0.0, damping=0.0, limits=None))]
     fn new(
         model: &Bound<'_, Robot>,
         contacts: &Bound<'_, PyDict>,
         costs: Vec<PyRef<'_, Cost>>,
         restitution: f64,
         damping: f64,
+        limits: Limits<'_>,
     ) -> PyResult<Self> {
         Ok(Self(RobotAction::new(model, |model| {
             let contacts = self::contacts(model, contacts)?;
-            knot(Dynamics::Impulse { contacts, restitution, damping }, &costs, None, None)
+            let dynamics = Dynamics::Impulse { contacts, restitution, damping };
+            Ok(knot(dynamics, (&costs, None), (limits, None), None))
         })?))
     }
 }
@@ -359,16 +381,16 @@ impl ImpulseDynamics {
 /// model: the robot.
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
-/// integrator, lower, upper: as of `FreeDynamics`.
+/// integrator, lower, upper, limits: as of `FreeDynamics`.
 ///
-/// Raises `ProblemError` for a cost that does not fit.
+/// Raises `ProblemError` for a cost or a limit that does not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct InverseDynamics(RobotAction<robot::InverseDynamics>);
 
 #[pymethods]
 impl InverseDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None))]
+    #[pyo3(signature = (model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None, limits=None))]
     fn new(
         model: &Bound<'_, Robot>,
         dt: f64,
@@ -376,10 +398,12 @@ impl InverseDynamics {
         integrator: &str,
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
+        limits: Limits<'_>,
     ) -> PyResult<Self> {
         let integrator = self::integrator(integrator)?;
         Ok(Self(RobotAction::new(model, |model| {
-            knot(Dynamics::Inverse { integrator, dt }, &costs, None, bounds(model.nv(), lower, upper)?)
+            let bounds = bounds(model.nv(), lower, upper)?;
+            Ok(knot(Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds))
         })?))
     }
 }

@@ -1,28 +1,11 @@
 //! Costs: activations, cones, and a constructor of `Cost` for each residual.
 
-use super::numbers;
-use crate::arrays::{matrix, output, pose, three, vector};
-use crate::functions::{Argument, Reference};
-use crate::model::{Model, frame_index};
+use super::{numbers, residuals};
+use crate::arrays::output;
+use crate::model::Model;
 use condyle::optimal::robot;
-use condyle::{Force, Mat3, Motion};
 use pyo3::prelude::*;
 use robot::Residual;
-
-/// A rotation as a 3 × 3 matrix; the identity if there is none.
-fn rotation(argument: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Mat3<f64>> {
-    let Some(value) = value else { return Ok(Mat3::identity()) };
-    let m = matrix(argument, value, [3, 3])?;
-    let column = |c: usize| [m[c], m[3 + c], m[6 + c]].into();
-    Ok(Mat3 { x: column(0), y: column(1), z: column(2) })
-}
-
-/// Six numbers, linear first; zeros if there are none.
-fn six(argument: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
-    let Some(value) = value else { return Ok([0.0; 6]) };
-    let x = vector(argument, value, 6)?;
-    Ok(core::array::from_fn(|k| x[k]))
-}
 
 /// Rows of inequalities, and their bounds.
 fn rows<'py, const N: usize>(py: Python<'py>, rows: &[[f64; N]]) -> PyResult<Bound<'py, PyAny>> {
@@ -100,7 +83,7 @@ impl Activation {
 /// >>> condyle.optimal.FrictionCone(0.5).rows()[0]
 /// array([ 1. ,  0. , -0.5])
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct FrictionCone(robot::FrictionCone);
+pub(crate) struct FrictionCone(pub(super) robot::FrictionCone);
 
 #[pymethods]
 impl FrictionCone {
@@ -114,7 +97,7 @@ impl FrictionCone {
         least: f64,
         greatest: f64,
     ) -> PyResult<Self> {
-        let rotation = self::rotation("rotation", rotation)?;
+        let rotation = residuals::rotation("rotation", rotation)?;
         Ok(Self(robot::FrictionCone { rotation, mu, facets, inner, least, greatest }))
     }
 
@@ -137,7 +120,7 @@ impl FrictionCone {
 /// >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
 /// (17, 6)
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct WrenchCone(robot::WrenchCone);
+pub(crate) struct WrenchCone(pub(super) robot::WrenchCone);
 
 #[pymethods]
 impl WrenchCone {
@@ -182,8 +165,7 @@ impl Cost {
         reference: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let reference = numbers("reference", reference)?;
-        Ok(Self::make(name, weight, Residual::State { reference }, activation))
+        Ok(Self::make(name, weight, residuals::state(reference)?, activation))
     }
 
     /// r = u − reference, nu numbers.
@@ -195,8 +177,7 @@ impl Cost {
         reference: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let reference = numbers("reference", reference)?;
-        Ok(Self::make(name, weight, Residual::Control { reference }, activation))
+        Ok(Self::make(name, weight, residuals::control(reference)?, activation))
     }
 
     /// r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still.
@@ -215,8 +196,7 @@ impl Cost {
         reference: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let reference = numbers("reference", reference)?;
-        Ok(Self::make(name, weight, Residual::JointEffort { reference }, activation))
+        Ok(Self::make(name, weight, residuals::joint_effort(reference)?, activation))
     }
 
     /// r = q̈ − reference, nv numbers.
@@ -228,8 +208,7 @@ impl Cost {
         reference: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let reference = numbers("reference", reference)?;
-        Ok(Self::make(name, weight, Residual::JointAcceleration { reference }, activation))
+        Ok(Self::make(name, weight, residuals::joint_acceleration(reference)?, activation))
     }
 
     /// r = c − target, 3 numbers in the world, of the centre of mass.
@@ -241,8 +220,7 @@ impl Cost {
         target: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let target = three("target", target)?;
-        Ok(Self::make(name, weight, Residual::CenterOfMass { target }, activation))
+        Ok(Self::make(name, weight, residuals::center_of_mass(target)?, activation))
     }
 
     /// r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass.
@@ -254,8 +232,7 @@ impl Cost {
         target: Option<&Bound<'_, PyAny>>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let target = Force::from(six("target", target)?);
-        Ok(Self::make(name, weight, Residual::CentroidalMomentum { target }, activation))
+        Ok(Self::make(name, weight, residuals::centroidal_momentum(target)?, activation))
     }
 
     /// r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix.
@@ -269,9 +246,7 @@ impl Cost {
         target: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let target = pose("target", target)?;
-        let frame = frame_index(&model.get().inner, frame)?;
-        Ok(Self::make(name, weight, Residual::FramePlacement { frame, target }, activation))
+        Ok(Self::make(name, weight, residuals::frame_placement(model, frame, target)?, activation))
     }
 
     /// r = p − target, 3 numbers in the world, of the origin of a frame of the model.
@@ -285,9 +260,7 @@ impl Cost {
         target: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let target = three("target", target)?;
-        let frame = frame_index(&model.get().inner, frame)?;
-        Ok(Self::make(name, weight, Residual::FrameTranslation { frame, target }, activation))
+        Ok(Self::make(name, weight, residuals::frame_translation(model, frame, target)?, activation))
     }
 
     /// r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix.
@@ -301,9 +274,7 @@ impl Cost {
         target: &Bound<'_, PyAny>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let target = rotation("target", Some(target))?;
-        let frame = frame_index(&model.get().inner, frame)?;
-        Ok(Self::make(name, weight, Residual::FrameRotation { frame, target }, activation))
+        Ok(Self::make(name, weight, residuals::frame_rotation(model, frame, target)?, activation))
     }
 
     /// r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
@@ -319,10 +290,7 @@ impl Cost {
         reference: &str,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let target = Motion::from(six("target", target)?);
-        let model = &model.get().inner;
-        let (frame, reference) = (frame_index(model, frame)?, Reference::read("reference", reference, model)?);
-        Ok(Self::make(name, weight, Residual::FrameVelocity { frame, target, reference }, activation))
+        Ok(Self::make(name, weight, residuals::frame_velocity(model, frame, target, reference)?, activation))
     }
 
     /// r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6.
@@ -335,8 +303,7 @@ impl Cost {
         target: Option<&Bound<'_, PyAny>>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let target = Force::from(six("target", target)?);
-        Ok(Self::make(name, weight, Residual::ContactForce { contact, target }, activation))
+        Ok(Self::make(name, weight, residuals::contact_force(contact, target)?, activation))
     }
 
     /// r = A f of a contact's force, and by default the barrier of the cone's bounds.
@@ -386,11 +353,9 @@ impl Cost {
         rotation: Option<&Bound<'_, PyAny>>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> PyResult<Self> {
-        let rotation = self::rotation("rotation", rotation)?;
         let bounds = robot::Activation::Barrier { lower: vec![f64::NEG_INFINITY; 4], upper: vec![0.0; 4] };
         let activation = activation.map_or(bounds, |a| a.get().0.clone());
-        let residual = Residual::CenterOfPressure { contact, rotation, size };
-        Ok(Self(robot::Cost::new(name, weight, residual, activation)))
+        Ok(Self(robot::Cost::new(name, weight, residuals::center_of_pressure(contact, size, rotation)?, activation)))
     }
 
     /// r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass.

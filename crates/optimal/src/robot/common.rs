@@ -5,8 +5,10 @@ use super::costs::{Cost, Costs};
 use super::elimination::Elimination;
 use super::integrated::Wanted;
 use super::lanes::{Outcome, SideBySide};
+use super::limits::{Limit, Limits};
 use super::state::{GroupHessian, groups};
-use super::watch::{Needs, Offer, Scene, Slopes, Watch};
+use super::terms::Room;
+use super::watch::{Offer, Scene, Slopes, Watch};
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
 use condyle_dynamics::{IntegrateArgument, Model, integrate_jacobian};
@@ -59,7 +61,7 @@ impl Robot {
         let nx = self.model.nq() + self.model.nv();
         let (count, nu) = (xs.len() / nx, self.actuation.nu());
         (0..count).for_each(|k| self.actuation.effort(&us[k * nu..(k + 1) * nu], lanes.tau_mut(k)));
-        lanes.run(&self.model, count, xs, self.schedule.look_at_forces(), wanted);
+        lanes.run(&self.model, count, xs, self.schedule.room().forces, wanted);
     }
 
     /// Writes a knot of Δt = `scale` seconds in implicit form, from the equations of a state that was prepared; says
@@ -104,79 +106,127 @@ impl Robot {
     }
 }
 
-/// Which costs serve which knot.
+/// One for all knots of the horizon, and others for some of them.
 #[derive(Clone, Debug)]
-pub(super) struct Schedule {
-    model: Arc<Model>,
-    offer: Offer,
-    /// The costs of all knots, then those of knots with costs of their own.
-    variants: Vec<Costs>,
+pub(super) struct Variants<T> {
+    /// That of all knots, then those of knots with one of their own.
+    all: Vec<T>,
     /// Which of them serves a knot; beyond its end the first.
     of: Vec<usize>,
-    /// The most rows that a knot has of Jacobians with respect to (u, v, q), and to q alone.
-    pub most: [usize; 2],
-    watch: Watch,
 }
 
-impl Schedule {
-    fn new(model: Arc<Model>, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
-        let costs = Costs::new(model.clone(), offer.clone(), costs)?;
-        let most = costs.rows();
-        let watch = Watch::new(&model, offer.nu, costs.longest(), most, costs.needs());
-        Ok(Self { variants: vec![costs], of: Vec::new(), most, watch, offer, model })
+impl<T> Variants<T> {
+    pub(super) fn new(common: T) -> Self {
+        Self { all: vec![common], of: Vec::new() }
     }
 
     fn index(&self, t: usize) -> usize {
         self.of.get(t).copied().unwrap_or(0)
     }
 
+    pub(super) fn all(&self) -> &[T] {
+        &self.all
+    }
+
+    /// That of knot t.
+    pub(super) fn at(&self, t: usize) -> &T {
+        &self.all[self.index(t)]
+    }
+
+    /// That of knot t, or that of all knots without one of their own.
+    fn at_mut(&mut self, t: Option<usize>) -> &mut T {
+        let k = t.map_or(0, |t| self.index(t));
+        &mut self.all[k]
+    }
+
+    /// Sets that of knot t, or that of all knots without one of their own.
+    pub(super) fn set(&mut self, t: Option<usize>, variant: T) {
+        let Some(t) = t else {
+            self.all[0] = variant;
+            return;
+        };
+        if t >= self.of.len() {
+            self.of.resize(t + 1, 0);
+        }
+        match self.of[t] {
+            0 => {
+                self.of[t] = self.all.len();
+                self.all.push(variant);
+            }
+            k => self.all[k] = variant,
+        }
+    }
+}
+
+/// Which costs and limits serve which knot.
+#[derive(Clone, Debug)]
+pub(super) struct Schedule {
+    model: Arc<Model>,
+    offer: Offer,
+    costs: Variants<Costs>,
+    pub limits: Limits,
+    /// What they take at any knot.
+    room: Room,
+    watch: Watch,
+}
+
+impl Schedule {
+    fn new(model: Arc<Model>, offer: Offer, costs: Vec<Cost>) -> Result<Self, Error> {
+        let costs = Costs::new(model.clone(), offer.clone(), costs)?;
+        let room = costs.room();
+        let watch = Watch::new(&model, offer.nu, room);
+        Ok(Self { costs: Variants::new(costs), limits: Limits::none(), room, watch, offer, model })
+    }
+
     /// The costs of knot t, or those of all knots without costs of their own.
     pub(super) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
-        let k = t.map_or(0, |t| self.index(t));
-        &mut self.variants[k]
+        self.costs.at_mut(t)
     }
 
     /// Changes the weights of the terms called `name`, of all knots; says whether there is one.
     pub(super) fn set_weight(&mut self, name: &str, weight: f64) -> bool {
         let mut found = false;
-        for costs in &mut self.variants {
+        for costs in &mut self.costs.all {
             found |= costs.set_weight(name, weight);
         }
         found
     }
 
     /// Gives knot t costs of its own.
-    pub(super) fn set(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
-        let costs = Costs::new(self.model.clone(), self.offer.clone(), costs)?;
-        if t >= self.of.len() {
-            self.of.resize(t + 1, 0);
-        }
-        match self.of[t] {
-            0 => {
-                self.of[t] = self.variants.len();
-                self.variants.push(costs);
-            }
-            k => self.variants[k] = costs,
-        }
-        let longest = self.variants.iter().map(Costs::longest).max().unwrap_or(0);
-        let needs = self.variants.iter().map(Costs::needs).fold(Needs::default(), |a, b| a | b);
-        self.most = self.variants.iter().map(Costs::rows).fold([0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
-        self.watch.resize(self.offer.nu, longest, self.most, needs);
+    pub(super) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
+        self.costs.set(Some(t), Costs::new(self.model.clone(), self.offer.clone(), costs)?);
+        self.make_room();
         Ok(())
     }
 
-    /// Whether a residual of some knot looks at forces.
-    pub(super) fn look_at_forces(&self) -> bool {
-        self.variants.iter().any(Costs::look_at_forces)
+    /// Gives knot t limits of its own, or all knots that have none of their own.
+    pub(super) fn set_limits(&mut self, t: Option<usize>, limits: Vec<Limit>) -> Result<(), Error> {
+        self.limits.set(&self.model, &self.offer, t, limits)?;
+        self.make_room();
+        Ok(())
     }
 
-    /// ℓ at knot t.
+    fn make_room(&mut self) {
+        let costs = self.costs.all.iter().fold(Room::default(), |most, costs| most.or(costs.room()));
+        self.room = costs + self.limits.most_room();
+        self.watch.resize(self.offer.nu, self.room);
+    }
+
+    /// What costs and limits take at any knot.
+    pub(super) fn room(&self) -> Room {
+        self.room
+    }
+
+    /// ℓ at knot t; writes the limits' term.
     pub(super) fn calc(&mut self, t: usize, scene: &Scene<'_>) -> f64 {
-        let k = self.index(t);
-        self.variants[k].calc(&mut self.watch, scene)
+        let Self { model, costs, limits, watch, .. } = self;
+        let costs = costs.at(t);
+        let mut view = watch.look(model, costs.room().needs | limits.room(t).needs, scene, false);
+        limits.calc(t, &mut view);
+        costs.calc(&mut view)
     }
 
-    /// The derivatives of `scale` · ℓ at knot t.
+    /// The derivatives of `scale` · ℓ and the limits' term at knot t.
     pub(super) fn calc_diff(
         &mut self,
         t: usize,
@@ -185,12 +235,19 @@ impl Schedule {
         scale: f64,
         node: &mut LqNode,
     ) {
-        let k = self.index(t);
-        self.variants[k].calc_diff(&mut self.watch, scene, slopes, scale, node);
+        let Self { model, costs, limits, watch, .. } = self;
+        let costs = costs.at(t);
+        let mut view = watch.look(model, costs.room().needs | limits.room(t).needs, scene, true);
+        view.scratch.rows.clear();
+        costs.push_rows(&mut view, slopes, scale);
+        limits.push_rows(t, &mut view, slopes);
+        view.scratch.rows.write(node);
+        costs.add_diagonals(&mut view, scale, node);
+        limits.add_diagonals(t, &mut view, node);
     }
 }
 
-/// The methods that a robot's knots share: their model and their costs.
+/// The methods that a robot's knots share: their model, their costs and their limits.
 macro_rules! robot_knot {
     ($knot:ty $(, $inner:ident)?) => {
         impl $knot {
@@ -220,14 +277,31 @@ macro_rules! robot_knot {
             /// # Errors
             /// [`Error::Cost`](crate::Error::Cost) for a term that does not fit.
             pub fn set_costs(&mut self, t: usize, costs: Vec<super::Cost>) -> Result<(), crate::Error> {
-                self$(.$inner)?.robot.schedule.set(t, costs)
+                self$(.$inner)?.robot.schedule.set_costs(t, costs)
+            }
+
+            /// The same with limits at all knots that have none of their own.
+            ///
+            /// # Errors
+            /// [`Error::Limit`](crate::Error::Limit) for one that does not fit.
+            pub fn with_limits(mut self, limits: Vec<super::Limit>) -> Result<Self, crate::Error> {
+                self$(.$inner)?.robot.schedule.set_limits(None, limits)?;
+                Ok(self)
+            }
+
+            /// Gives knot t of the horizon limits of its own, between solves. Allocates.
+            ///
+            /// # Errors
+            /// [`Error::Limit`](crate::Error::Limit) for one that does not fit.
+            pub fn set_limits(&mut self, t: usize, limits: Vec<super::Limit>) -> Result<(), crate::Error> {
+                self$(.$inner)?.robot.schedule.set_limits(Some(t), limits)
             }
         }
     };
 }
 pub(super) use robot_knot;
 
-/// The methods of a [`ContinuousModel`](super::ContinuousModel) that a robot's positions answer.
+/// The methods of a [`ContinuousModel`](super::ContinuousModel) that a robot's positions and limits answer.
 macro_rules! robot_positions {
     () => {
         fn groups(&self) -> &[core::ops::Range<usize>] {
@@ -255,6 +329,10 @@ macro_rules! robot_positions {
             self.robot.integrate_hessian(dq, lambda, hessian);
             true
         }
+
+        fn limits(&mut self) -> Option<&mut super::limits::Limits> {
+            Some(&mut self.robot.schedule.limits)
+        }
     };
 }
 pub(super) use robot_positions;
@@ -274,7 +352,7 @@ macro_rules! robot_lanes {
 
         fn implicit(&self) -> Option<[usize; 2]> {
             let elimination = self.elimination.as_ref().filter(|_| self.lanes.is_some())?;
-            Some([elimination.most_dependent(), self.robot.schedule.most[0]])
+            Some([elimination.most_dependent(), self.robot.schedule.room().rows[0]])
         }
 
         fn equations_prepared(

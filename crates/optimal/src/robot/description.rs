@@ -2,7 +2,7 @@
 
 use super::{
     Actuation, Contact, Contacts, ContinuousModel, Cost, Free, FreeDynamics, ImpulseDynamics, Integrated, Integrator,
-    Inverse,
+    Inverse, Limit,
 };
 use crate::action::ActionModel;
 use crate::{Error, Problem};
@@ -22,13 +22,13 @@ use std::sync::Arc;
 /// use condyle_optimal::robot::{Activation, Cost, Dynamics, Integrator, Knot, Residual, RobotProblem};
 /// let rest = Cost::new("rest", 1.0, Residual::State { reference: vec![0.0; 14] }, Activation::Quadratic);
 /// let step = Dynamics::Free { actuation: None, integrator: Integrator::SemiImplicitEuler, dt: 0.05 };
-/// let knot = Knot { dynamics: step, costs: vec![rest.clone()], costs_at: Default::default(), bounds: None };
 /// let data = RobotProblem {
 ///     model: robots::arm7(),
 ///     x0: vec![0.1; 14],
-///     knots: vec![knot],
+///     knots: vec![Knot::new(step, vec![rest.clone()])],
 ///     stages: vec![0; 20],
 ///     terminal: vec![rest],
+///     terminal_limits: vec![],
 /// };
 /// let text = serde_json::to_string(&data)?;
 /// let problem = serde_json::from_str::<RobotProblem>(&text)?.build()?;
@@ -48,6 +48,9 @@ pub struct RobotProblem {
     pub stages: Vec<usize>,
     /// The costs after the last knot.
     pub terminal: Vec<Cost>,
+    /// The limits there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub terminal_limits: Vec<Limit>,
 }
 
 /// A knot as data.
@@ -61,6 +64,12 @@ pub struct Knot {
     /// Other costs in their place, by the number of a knot of the horizon.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub costs_at: BTreeMap<usize, Vec<Cost>>,
+    /// Its limits.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<Limit>,
+    /// Other limits in their place, by the number of a knot of the horizon.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub limits_at: BTreeMap<usize, Vec<Limit>>,
     /// Bounds on its controls, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bounds: Option<ControlBounds>,
@@ -132,23 +141,33 @@ impl RobotProblem {
     pub fn build(&self) -> Result<Problem, Error> {
         let model = Arc::new(self.model.clone());
         let knots = self.knots.iter().map(|knot| knot.build(&model)).collect::<Result<_, _>>()?;
-        let terminal = FreeDynamics::terminal(model, self.terminal.clone())?;
+        let terminal =
+            FreeDynamics::terminal(model, self.terminal.clone())?.with_limits(self.terminal_limits.clone())?;
         Problem::new(self.x0.clone(), knots, self.stages.clone(), Box::new(terminal))
     }
 }
 
-/// An action with the costs of single knots.
-macro_rules! with_costs_at {
+/// An action with its limits, and the costs and limits of single knots.
+macro_rules! complete {
     ($knot:expr, $action:expr) => {{
-        let mut action = $action;
+        let mut action = $action.with_limits($knot.limits.clone())?;
         for (&t, costs) in &$knot.costs_at {
             action.set_costs(t, costs.clone())?;
+        }
+        for (&t, limits) in &$knot.limits_at {
+            action.set_limits(t, limits.clone())?;
         }
         action
     }};
 }
 
 impl Knot {
+    /// With these costs at all knots that it serves, and without limits and bounds.
+    pub fn new(dynamics: Dynamics, costs: Vec<Cost>) -> Self {
+        let (costs_at, limits_at) = (BTreeMap::new(), BTreeMap::new());
+        Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None }
+    }
+
     /// The action. Allocates.
     ///
     /// # Errors
@@ -162,20 +181,20 @@ impl Knot {
         match &self.dynamics {
             Dynamics::Free { actuation, integrator, dt } => {
                 let inner = Free::new(model.clone(), drives(actuation)?, costs)?;
-                self.bounded(with_costs_at!(self, Integrated::new(inner, *integrator, *dt)?))
+                self.bounded(complete!(self, Integrated::new(inner, *integrator, *dt)?))
             }
             Dynamics::Contact { contacts, damping, actuation, integrator, dt } => {
                 let inner = Contacts::new(model.clone(), drives(actuation)?, contacts, *damping, costs)?;
-                self.bounded(with_costs_at!(self, Integrated::new(inner, *integrator, *dt)?))
+                self.bounded(complete!(self, Integrated::new(inner, *integrator, *dt)?))
             }
             Dynamics::Inverse { integrator, dt } => {
                 let inner = Inverse::new(model.clone(), costs)?;
-                self.bounded(with_costs_at!(self, Integrated::new(inner, *integrator, *dt)?))
+                self.bounded(complete!(self, Integrated::new(inner, *integrator, *dt)?))
             }
             Dynamics::Impulse { contacts, restitution, damping } => {
                 let action = ImpulseDynamics::new(model.clone(), contacts, *restitution, *damping, costs)?;
                 self.check_bounds(0)?;
-                Ok(Box::new(with_costs_at!(self, action)))
+                Ok(Box::new(complete!(self, action)))
             }
         }
     }

@@ -1,14 +1,15 @@
-//! Semi-implicit Euler, as Crocoddyl's: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt.
+//! Semi-implicit Euler, as Crocoddyl's: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt; the limits' term as it is.
 #![allow(non_snake_case)] // E
 
 use super::integrated::{ContinuousModel, Derivatives};
+use super::limits::limit_term;
 use crate::lq::LqNode;
 use crate::structure::{EulerBlock, LARGEST_BLOCK};
 use crate::vector::{Dense, Vector, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// The next state; returns ℓ Δt. Of a state that was prepared, `lane` is its number.
+/// The next state; returns the cost. Of a state that was prepared, `lane` is its number.
 pub(super) fn calc<M: ContinuousModel>(
     model: &mut M,
     lane: Option<usize>,
@@ -30,7 +31,7 @@ pub(super) fn calc<M: ContinuousModel>(
         dq[k] = v[k] * dt + a[k] * dt * dt; // v Δt + a Δt²
     }
     model.integrate(q, dq, q_next);
-    dt * cost
+    dt * cost + limit_term(model)
 }
 
 /// Its derivatives, with T = ∂(q ⊕ dq)/∂q and E = ∂(q ⊕ dq)/∂dq, the identity but for the groups' blocks:

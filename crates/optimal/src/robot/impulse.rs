@@ -10,6 +10,7 @@ use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::action::ActionModel;
 use crate::lq::LqNode;
+use crate::multipliers::Visit;
 use condyle_dynamics::{
     ConstraintSet, Data, ImpulseDerivatives, Model, impulse_dynamics, impulse_dynamics_derivatives,
 };
@@ -91,6 +92,10 @@ impl ActionModel for ImpulseDynamics {
         0
     }
 
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        self.robot.schedule.limits.visit(t, visit);
+    }
+
     fn fork(&self) -> Option<Box<dyn ActionModel>> {
         Some(Box::new(self.clone()))
     }
@@ -103,7 +108,8 @@ impl ActionModel for ImpulseDynamics {
         q_next.copy_from_slice(q);
         v_next.copy_from_slice(after.v);
         (0..v.len()).for_each(|k| change[k] = after.v[k] - v[k]);
-        robot.schedule.calc(t, &Scene { x, u, a: change, tau: &[], lambda: after.lambda })
+        let cost = robot.schedule.calc(t, &Scene { x, u, a: change, tau: &[], lambda: after.lambda });
+        cost + robot.schedule.limits.term
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {

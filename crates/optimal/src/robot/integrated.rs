@@ -3,11 +3,13 @@
 use super::curvature::Curvature;
 use super::euler;
 use super::lanes::WORTHWHILE;
+use super::limits::{Limits, limit_term};
 use super::runge_kutta::RungeKutta;
 use crate::Error;
 use crate::action::ActionModel;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
+use crate::multipliers::Visit;
 use core::ops::Range;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -131,6 +133,12 @@ pub trait ContinuousModel: Send + 'static {
     ) -> Derivatives<'_> {
         let _ = i;
         self.calc_diff(t, x, u, scale, node)
+    }
+
+    /// Its limits, if it is a robot's.
+    #[doc(hidden)]
+    fn limits(&mut self) -> Option<&mut Limits> {
+        None
     }
 
     /// A copy that computes the same, for another thread; `None` by default: see [`ActionModel::fork`].
@@ -404,7 +412,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         match (self.dt, &mut self.method) {
-            (None, _) => self.inner.calc(t, x, u).1,
+            (None, _) => self.inner.calc(t, x, u).1 + limit_term(&mut self.inner),
             (Some(dt), Method::Euler) => euler::calc(&mut self.inner, None, dt, t, x, u, &mut self.dq, next),
             (Some(dt), Method::RungeKutta(method)) => method.calc(&mut self.inner, dt, t, x, u, next),
         }
@@ -419,6 +427,12 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         match &mut self.method {
             Method::Euler => euler::calc_diff(inner, None, dt, t, x, u, dq, [transport, exp], node),
             Method::RungeKutta(method) => method.calc_diff(inner, dt, t, x, u, [transport, exp], node),
+        }
+    }
+
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        if let Some(limits) = self.inner.limits() {
+            limits.visit(t, visit);
         }
     }
 

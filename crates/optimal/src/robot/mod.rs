@@ -1,7 +1,8 @@
 //! Robots as optimal control problems: the state x = (q, v), costs, and the actions of robots that move freely, are in
 //! contact, or hit something.
 //!
-//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name.
+//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name. A [`Limit`] holds a residual
+//!   within bounds, or to zero.
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
 //!   [`InverseDynamics`] the accelerations are the controls. What drives a robot is its [`Actuation`]; how a knot steps through its time, its [`Integrator`].
 //! - A [`RobotProblem`] is a problem as data, in a file for example.
@@ -57,10 +58,12 @@ mod impulse;
 mod integrated;
 mod inverse;
 mod lanes;
+mod limits;
 mod quadratic;
 mod residual;
 mod runge_kutta;
 mod state;
+mod terms;
 mod watch;
 
 pub use activation::Activation;
@@ -74,4 +77,5 @@ pub use free::{Free, FreeDynamics};
 pub use impulse::ImpulseDynamics;
 pub use integrated::{ContinuousModel, Derivatives, Integrated, Integrator, Wanted};
 pub use inverse::{Inverse, InverseDynamics};
+pub use limits::Limit;
 pub use residual::Residual;

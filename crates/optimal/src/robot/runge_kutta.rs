@@ -4,10 +4,13 @@
 //! y₀ = x,   kᵢ = (vᵢ, a(yᵢ, u)),   yᵢ₊₁ = x ⊕ cᵢ₊₁ Δt kᵢ,   x⁺ = x ⊕ Δt Σ bᵢ kᵢ,   cost = Δt Σ bᵢ ℓ(yᵢ, u)
 //! ```
 //!
+//! Limits hold at y₀.
+//!
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), section II.1.
 
 use super::euler::apply_block;
 use super::integrated::{ContinuousModel, Derivatives};
+use super::limits::{activate_limits, limit_term};
 use crate::lq::LqNode;
 use nalgebra::DMatrix;
 
@@ -75,7 +78,7 @@ impl RungeKutta {
         u: &[f64],
         next: &mut [f64],
     ) -> f64 {
-        let (nq, nv, mut cost) = (model.nq(), model.nv(), 0.0);
+        let (nq, nv, mut cost, mut term) = (model.nq(), model.nv(), 0.0, 0.0);
         self.sum.fill(0.0);
         self.k.fill(0.0);
         for i in 0..self.b.len() {
@@ -85,10 +88,15 @@ impl RungeKutta {
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
             (0..2 * nv).for_each(|j| self.sum[j] += dt * self.b[i] * self.k[j]);
+            if i == 0 {
+                term = limit_term(model);
+                activate_limits(model, false);
+            }
         }
+        activate_limits(model, true);
         model.integrate(&x[..nq], &self.sum[..nv], &mut next[..nq]);
         (0..nv).for_each(|j| next[nq + j] = x[nq + j] + self.sum[nv + j]);
-        dt * cost
+        dt * cost + term
     }
 
     /// Its derivatives, by the chain rule through the stages.
@@ -133,11 +141,13 @@ impl RungeKutta {
                 }
             }
             (0..n).for_each(|j| self.sum[j] += weight * self.k[j]);
-            if weight != 0.0 {
+            let limited = i == 0 && activate_limits(model, false);
+            if weight != 0.0 || limited {
                 self.dk.iter().zip(self.dsum.iter_mut()).for_each(|(dk, sum)| *sum += weight * dk);
                 self.add_cost(node, n, nu);
             }
         }
+        activate_limits(model, true);
         chain(model, &self.sum[..nv], [transport, exp], &mut self.dsum);
         node.A.copy_from(&self.dsum.columns(0, n));
         node.B.copy_from(&self.dsum.columns(n, nu));

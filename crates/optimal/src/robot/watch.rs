@@ -1,9 +1,11 @@
 //! What the dynamics of a knot offer to its residuals, and what residuals share.
 
 use super::quadratic::{Row, Rows};
+use super::state::groups;
+use super::terms::{Room, View};
 use condyle_dynamics::{
-    Data, Model, Placements, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
-    forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
+    Data, Model, centroidal_derivatives, centroidal_map, forward_kinematics, forward_velocities, gravity, rnea,
+    rnea_derivatives, static_torque_derivative,
 };
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -135,44 +137,48 @@ pub(super) struct Scratch {
     pub surplus_slopes: [DMatrix<f64>; 3],
     /// J_c (v⁺ − v).
     pub com_change: [f64; 3],
+    /// The coordinates of each group of positions that is no vector space, and of all positions.
+    pub groups: Vec<Range<usize>>,
+    pub all: Vec<usize>,
     /// Zeros. Shape: nv.
     zero: Vec<f64>,
 }
 
 impl Watch {
-    /// For a robot with nu controls, residuals of at most `longest` numbers, and at most so many rows of Jacobians with
-    /// respect to (u, v, q), and to q alone.
-    pub(super) fn new(model: &Model, nu: usize, longest: usize, most: [usize; 2], needs: Needs) -> Self {
+    /// For a robot with nu controls and some residuals.
+    pub(super) fn new(model: &Model, nu: usize, room: Room) -> Self {
         let nv = model.nv();
         let rows = |n| DMatrix::zeros(n, nv);
-        let square = || if needs.surplus { rows(nv) } else { DMatrix::zeros(0, 0) };
+        let square = || if room.needs.surplus { rows(nv) } else { DMatrix::zeros(0, 0) };
         let scratch = Scratch {
-            r: vec![0.0; longest],
-            d: vec![0.0; longest],
-            dd: vec![0.0; longest],
+            r: vec![0.0; room.longest],
+            d: vec![0.0; room.longest],
+            dd: vec![0.0; room.longest],
             J: rows(6),
             Jv: rows(6),
-            rows: Rows::new(nv, nu, most),
+            rows: Rows::new(nv, nu, room.rows),
             D: rows(nv),
             com: [rows(3), rows(3)],
             momentum: [rows(6), rows(6)],
             surplus: vec![0.0; nv],
             surplus_slopes: [square(), square(), square()],
             com_change: [0.0; 3],
+            groups: groups(model),
+            all: (0..nv).collect(),
             zero: vec![0.0; nv],
         };
         Self { data: Data::new(model), scratch }
     }
 
     /// Makes room for other residuals.
-    pub(super) fn resize(&mut self, nu: usize, longest: usize, most: [usize; 2], needs: Needs) {
+    pub(super) fn resize(&mut self, nu: usize, room: Room) {
         let s = &mut self.scratch;
         for numbers in [&mut s.r, &mut s.d, &mut s.dd] {
-            numbers.resize(longest, 0.0);
+            numbers.resize(room.longest, 0.0);
         }
         let nv = s.zero.len();
-        s.rows = Rows::new(nv, nu, most);
-        if needs.surplus && s.surplus_slopes[0].is_empty() {
+        s.rows = Rows::new(nv, nu, room.rows);
+        if room.needs.surplus && s.surplus_slopes[0].is_empty() {
             s.surplus_slopes.fill(DMatrix::zeros(nv, nv));
         }
     }
@@ -182,9 +188,9 @@ impl Watch {
         &'a mut self,
         model: &'a Model,
         needs: Needs,
-        scene: &Scene<'_>,
+        scene: &'a Scene<'a>,
         slopes: bool,
-    ) -> (Option<Placements<'a, f64>>, Option<Velocities<'a, f64>>, &'a mut Scratch) {
+    ) -> View<'a> {
         let Self { data, scratch } = self;
         let (q, v) = scene.x.split_at(model.nq());
         if needs.surplus {
@@ -215,13 +221,14 @@ impl Watch {
             scratch.momentum[0].as_mut_slice().copy_from_slice(d.dh_dq.as_slice());
             scratch.momentum[1].as_mut_slice().copy_from_slice(d.dh_dv.as_slice());
         }
-        if needs.velocities {
+        let (placements, velocities) = if needs.velocities {
             let velocities = forward_velocities(model, data, q, v);
-            (Some(*velocities), Some(velocities), scratch)
+            (Some(*velocities), Some(velocities))
         } else if needs.placements {
-            (Some(forward_kinematics(model, data, q)), None, scratch)
+            (Some(forward_kinematics(model, data, q)), None)
         } else {
-            (None, None, scratch)
-        }
+            (None, None)
+        };
+        View { model, scene, placements, velocities, scratch }
     }
 }

@@ -2,10 +2,11 @@
 
 use super::{DT, contact_costs, feet, random, random_state};
 use condyle_dynamics::{ReferenceFrame, Vec3, robots};
-use condyle_optimal::robot::{Activation, ControlBounds, Cost, Dynamics, Integrator, Knot, Residual, RobotProblem};
+use condyle_optimal::robot::{
+    Activation, ControlBounds, Cost, Dynamics, FrictionCone, Integrator, Knot, Limit, Residual, RobotProblem,
+};
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
-use std::collections::BTreeMap;
 
 /// A problem with every kind of knot, residual and activation, as data.
 fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
@@ -21,16 +22,25 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
         |nu| vec![Cost::new("still", 0.1, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic)];
     let landing = Cost::new("landing", 0.3, Residual::ImpulseCenterOfMass, Activation::Quadratic);
     let (bounds, damping) = (|lower, upper| Some(ControlBounds { lower, upper }), 1e-8);
-    let knot = |dynamics, costs, bounds| Knot { dynamics, costs, costs_at: BTreeMap::new(), bounds };
+    let knot = |dynamics, costs, bounds| Knot { bounds, ..Knot::new(dynamics, costs) };
+    let infinite = f64::INFINITY;
+    let above = |residual: &Residual| Limit::new("above", residual.clone(), vec![0.1; 3], vec![infinite; 3]);
     let actuation = Some(DMatrix::from_fn(nv, 3, |_, _| rng.random()));
     let free = Dynamics::Free { actuation, integrator: Integrator::RungeKutta4, dt: DT };
     let inverse = Dynamics::Inverse { integrator: Integrator::SemiImplicitEuler, dt: 0.1 };
     let impulse = Dynamics::Impulse { contacts: contacts.clone(), restitution: 0.2, damping };
     let integrator = Integrator::RungeKutta2;
+    let stance_foot = contacts[1].name.clone();
     let contact = Dynamics::Contact { contacts, damping, actuation: None, integrator, dt: DT };
     let mut stance = knot(contact, costs, bounds(vec![f64::NEG_INFINITY; nv - 6], vec![9.0; nv - 6]));
     stance.costs_at.insert(2, still(nv - 6));
+    stance.limits.push(above(&point));
+    let cone = FrictionCone::new(0.7);
+    let (lower, upper) = cone.bounds();
+    let grip = Residual::FrictionCone { contact: stance_foot, cone };
+    stance.limits_at.insert(1, vec![Limit::new("grip", grip, lower, upper)]);
     RobotProblem {
+        terminal_limits: vec![above(&point)],
         x0: random_state(&model, rng),
         knots: vec![
             knot(free, still(3), bounds(vec![-1.0; 3], vec![f64::INFINITY; 3])),
@@ -55,7 +65,8 @@ fn a_problem_in_a_file_is_the_same_problem() {
     let text = serde_json::to_string(&data).unwrap();
     let read: RobotProblem = serde_json::from_str(&text).unwrap();
     assert_eq!((&read.x0, &read.knots, &read.stages), (&data.x0, &data.knots, &data.stages));
-    assert_eq!(read.terminal, data.terminal);
+    assert_eq!((&read.terminal, &read.terminal_limits), (&data.terminal, &data.terminal_limits));
+    assert!(text.contains(r#""upper":[null,null,null]"#) && text.contains("limits_at"));
     assert_eq!(serde_json::to_string(&read).unwrap(), text);
     let mut problems = [data, read].map(|data| data.build().unwrap());
     let xs = (0..=problems[0].horizon()).flat_map(|_| problems[0].x0().to_vec()).collect::<Vec<_>>();
@@ -93,6 +104,14 @@ fn what_is_wrong_in_a_file_is_said() {
     );
     assert!(built(&|data| data.stages[1] = 7).contains("there is no action model 7"));
     assert!(built(&|data| data.x0[0] = f64::NAN).contains("`x0[0]` is NaN"));
+    assert_eq!(
+        built(&|data| data.knots[1].limits_at.get_mut(&1).unwrap()[0].lower.truncate(4)),
+        "limit `grip` of knot 1: its lower bound has 4 numbers, expected 5"
+    );
+    assert!(
+        built(&|data| data.knots[0].limits = data.knots[1].limits_at[&1].clone())
+            .starts_with("limit `grip`: there is no contact")
+    );
     assert!(
         built(&|data| data.knots[1].costs_at.get_mut(&2).unwrap()[0].weight = f64::NAN).contains("its weight is NaN")
     );

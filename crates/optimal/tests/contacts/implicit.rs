@@ -17,7 +17,12 @@ const GAINS: f64 = 1e-6;
 const KNOTS: usize = 11;
 
 /// What the sweep of the first iteration finds with and without the implicit form, from random states with gaps.
-fn compare(what: &str, model: &Arc<Model>, action: Box<dyn ActionModel>, states: impl Fn(&mut StdRng) -> Vec<f64>) {
+pub(super) fn compare(
+    what: &str,
+    model: &Arc<Model>,
+    action: Box<dyn ActionModel>,
+    states: impl Fn(&mut StdRng) -> Vec<f64>,
+) {
     let mut rng = StdRng::seed_from_u64(5);
     let (nu, nv) = (action.nu(), model.nv());
     let reference = random_state(model, &mut rng);

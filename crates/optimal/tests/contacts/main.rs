@@ -3,6 +3,7 @@
 
 mod files;
 mod implicit;
+mod limits;
 
 use condyle_dynamics::{
     Constraint, Data, Force, Mat3, Model, Motion, ReferenceFrame, Vec3, centroidal_map, forward_kinematics,

@@ -1,0 +1,172 @@
+//! The multipliers of an action's constraints, and what its cost takes from them.
+
+use crate::error::Error;
+
+/// The multipliers y of constraints lower ≤ g(x, u) ≤ upper at the knots that an action serves, and the penalty 1/μ. To
+/// the action's cost comes, at each knot,
+///
+/// ```text
+/// ½ Σ (e² / μ − μ y²),      e = z − Π z,      z = g(x, u) + μ y,      Π: into the bounds
+/// ```
+///
+/// with the slope e / μ by g, and the curvature of Gauss and Newton: 1/μ outside of the bounds and at equalities, else 0.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Multipliers {
+    mu: f64,
+    /// The most constraints that a knot has.
+    size: usize,
+    /// y of each knot. Shape: knots × size, and zero beyond its end. Written by: `start`, `update`.
+    y: Vec<f64>,
+    /// e / μ at each knot's last derivatives, which are better multipliers. Written by: `slopes`.
+    next: Vec<f64>,
+    /// The largest distance of g from its bounds there, and the cost's term. Written by: `begin`, `slopes`.
+    measured: Vec<[f64; 2]>,
+}
+
+impl Clone for Multipliers {
+    fn clone(&self) -> Self {
+        let Self { mu, size, .. } = *self;
+        Self { mu, size, y: self.y.clone(), next: self.next.clone(), measured: self.measured.clone() }
+    }
+
+    /// Allocates nothing for as many knots.
+    fn clone_from(&mut self, other: &Self) {
+        (self.mu, self.size) = (other.mu, other.size);
+        self.y.clone_from(&other.y);
+        self.next.clone_from(&other.next);
+        self.measured.clone_from(&other.measured);
+    }
+}
+
+/// The constraints of a knot, and their multipliers.
+pub struct Bounded<'a> {
+    /// How many there are.
+    pub(crate) count: usize,
+    pub(crate) lower: &'a [f64],
+    pub(crate) upper: &'a [f64],
+    pub(crate) multipliers: &'a mut Multipliers,
+}
+
+/// What is done with the constraints of a knot.
+pub(crate) type Visit<'a> = dyn FnMut(Bounded<'_>) + 'a;
+
+impl Bounded<'_> {
+    /// # Errors
+    /// [`Error`] if the bounds have a wrong length or leave no value.
+    pub(crate) fn check(&self, knot: usize) -> Result<(), Error> {
+        for (name, found) in [("lower bounds", self.lower.len()), ("upper bounds", self.upper.len())] {
+            if found != self.count {
+                return Err(Error::Dimension { node: knot, name, expected: self.count, found });
+            }
+        }
+        for (row, (&lower, &upper)) in self.lower.iter().zip(self.upper).enumerate() {
+            if !leave_a_value(lower, upper) {
+                return Err(Error::Constraint { knot, row, lower, upper });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether some finite number is within bounds, which are numbers themselves.
+pub(crate) fn leave_a_value(lower: f64, upper: f64) -> bool {
+    lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY // false for NaN
+}
+
+/// 1/μ unless a solve has chosen another.
+pub(crate) const PENALTY: f64 = 10.0;
+
+/// How far z is beyond its bounds, with its sign.
+#[inline(always)]
+fn outside(z: f64, lower: f64, upper: f64) -> f64 {
+    match z {
+        z if z > upper => z - upper,
+        z if z >= lower => 0.0,
+        z => z - lower, // a NaN stays one
+    }
+}
+
+impl Multipliers {
+    /// Zeros, for at most `size` constraints a knot.
+    pub(crate) fn new(size: usize) -> Self {
+        Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], measured: vec![] }
+    }
+
+    /// Zeros at knot t of so many, and μ. Allocates at the first call.
+    pub(crate) fn start(&mut self, t: usize, knots: usize, mu: f64) {
+        self.mu = mu;
+        for numbers in [&mut self.y, &mut self.next] {
+            numbers.resize(knots * self.size, 0.0);
+            numbers[t * self.size..(t + 1) * self.size].fill(0.0);
+        }
+        self.measured.resize(knots, [0.0; 2]);
+    }
+
+    pub(crate) fn set_mu(&mut self, mu: f64) {
+        self.mu = mu;
+    }
+
+    /// The first `count` of y at knot t.
+    pub(crate) fn of(&self, t: usize, count: usize) -> &[f64] {
+        &self.y[t * self.size..][..count]
+    }
+
+    /// y ← e / μ at knot t.
+    pub(crate) fn update(&mut self, t: usize) {
+        let knot = t * self.size..(t + 1) * self.size;
+        self.y[knot.clone()].copy_from_slice(&self.next[knot]);
+    }
+
+    /// The largest distance of g from its bounds and the cost's term, at the last derivatives of knot t.
+    pub(crate) fn measured(&self, t: usize) -> [f64; 2] {
+        self.measured[t]
+    }
+
+    fn y(&self, t: usize, row: usize) -> f64 {
+        self.y.get(t * self.size + row).copied().unwrap_or(0.0)
+    }
+
+    /// The cost's term for the constraints from `first` on whose values are g.
+    pub(crate) fn value(&self, t: usize, first: usize, g: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
+        let mut term = 0.0;
+        for i in 0..g.len() {
+            let y = self.y(t, first + i);
+            let e = outside(g[i] + self.mu * y, lower[i], upper[i]);
+            term += 0.5 * (e * e / self.mu - self.mu * y * y);
+        }
+        term
+    }
+
+    /// Begins the derivatives of knot t.
+    pub(crate) fn begin(&mut self, t: usize) {
+        if let Some(measured) = self.measured.get_mut(t) {
+            *measured = [0.0; 2];
+        }
+    }
+
+    /// The slopes and curvatures of [`value`](Self::value), in `d` and `dd`.
+    pub(crate) fn slopes(
+        &mut self,
+        t: usize,
+        first: usize,
+        g: &[f64],
+        [lower, upper]: [&[f64]; 2],
+        d: &mut [f64],
+        dd: &mut [f64],
+    ) {
+        let term = self.value(t, first, g, lower, upper);
+        let mut violation = 0.0_f64;
+        for i in 0..g.len() {
+            let e = outside(g[i] + self.mu * self.y(t, first + i), lower[i], upper[i]);
+            let active = e != 0.0 || lower[i] == upper[i];
+            (d[i], dd[i]) = (e / self.mu, if active { 1.0 / self.mu } else { 0.0 });
+            violation = violation.max(outside(g[i], lower[i], upper[i]).abs());
+        }
+        if let Some([worst, sum]) = self.measured.get_mut(t) {
+            // `max` drops a NaN, the sum does not
+            *worst = if term.is_nan() { f64::NAN } else { violation.max(*worst) };
+            *sum += term;
+            self.next[t * self.size + first..][..g.len()].copy_from_slice(&d[..g.len()]);
+        }
+    }
+}

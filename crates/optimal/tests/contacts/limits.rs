@@ -1,0 +1,242 @@
+//! Limits: what they add to a knot's cost, and its exact derivatives.
+
+use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
+use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
+use condyle_optimal::robot::{
+    Activation, Actuation, ContactDynamics, Cost, Free, FreeDynamics, ImpulseDynamics, Integrated, Integrator,
+    InverseDynamics, Limit, Residual,
+};
+use condyle_optimal::{ActionModel, Error, LqNode};
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+use std::sync::Arc;
+
+/// 1/μ, unless a solver of constraints has chosen another.
+const PENALTY: f64 = 10.0;
+/// Of central differences: their error is about its square, and the rounding of the cost divided by it.
+const STEP: f64 = 1e-5;
+/// A sum of some dozen squares.
+const ROUNDING: f64 = 1e-12;
+
+/// How many numbers a residual of contact_costs has; `rows` of the contact that it looks at.
+fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
+    match residual {
+        Residual::State { .. } => 2 * model.nv(),
+        Residual::Control { .. } => nu,
+        Residual::ControlGravity | Residual::JointEffort { .. } | Residual::JointAcceleration { .. } => model.nv(),
+        Residual::CentroidalMomentum { .. } | Residual::FramePlacement { .. } | Residual::FrameVelocity { .. } => 6,
+        Residual::ContactForce { .. } => rows,
+        Residual::FrictionCone { cone, .. } => cone.facets + 1,
+        Residual::WrenchCone { cone, .. } => cone.friction.facets + 13,
+        Residual::CenterOfPressure { .. } => 4,
+        _ => 3,
+    }
+}
+
+/// Every residual that there is, some of its numbers held to zero, others within bounds, others free.
+fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
+    let contacts = feet(model, ReferenceFrame::LocalWorldAligned);
+    let rows = contacts[1].constraint.kind.rows();
+    let frame = model.frame(&contacts[0].name).unwrap();
+    let place = Se3 { rotation: rotation(rng), translation: Vec3::new(0.1, 0.3, -0.2) };
+    let mut residuals: Vec<_> = contact_costs(model, &contacts, nu, rng).into_iter().map(|c| c.residual).collect();
+    residuals.push(Residual::FramePlacement { frame, target: place });
+    residuals.push(Residual::FrameTranslation { frame, target: place.translation });
+    residuals.push(Residual::ImpulseCenterOfMass);
+    let limit = |(k, residual): (usize, Residual)| {
+        let n = size(&residual, model, nu, rows);
+        let (mut lower, mut upper) = (vec![0.0; n], vec![0.0; n]);
+        for i in (0..n).filter(|i| i % 3 > 0) {
+            (lower[i], upper[i]) = if i % 3 == 1 { (-0.1, 0.2) } else { (f64::NEG_INFINITY, -0.1) };
+        }
+        Limit::new(&format!("limit {k}"), residual, lower, upper)
+    };
+    residuals.into_iter().enumerate().map(limit).collect()
+}
+
+/// Compares the gradient of a knot's cost with central differences at a random state.
+fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
+    let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
+    let (x, u) = (random_state(model, rng), random(nu, effort, rng));
+    let mut node = LqNode::zeros(ndx, nu);
+    action.calc_diff(0, &x, &u, &mut node);
+    let (mut moved, mut next) = (vec![0.0; nx], vec![0.0; nx]);
+    let mut numeric = vec![];
+    for k in 0..ndx + nu {
+        let costs = [STEP, -STEP].map(|step| {
+            let (mut dx, mut u) = (vec![0.0; ndx], u.clone());
+            if k < ndx {
+                dx[k] = step
+            } else {
+                u[k - ndx] += step
+            }
+            action.integrate(&x, &dx, &mut moved);
+            action.calc(0, &moved, &u, &mut next)
+        });
+        numeric.push((costs[0] - costs[1]) / (2.0 * STEP));
+    }
+    let exact: Vec<_> = node.q.iter().chain(node.r.iter()).copied().collect();
+    let error = largest_difference(&exact, &numeric);
+    assert!(error < DIFFERENCES, "{what}: off by {error:e}");
+    for H in [&node.Q, &node.R] {
+        assert!(largest_difference(H.as_slice(), H.transpose().as_slice()) < ROUNDING, "{what}: not symmetric");
+    }
+}
+
+/// Differentiates an action with each limit that it takes, and with all of them; says how many these are.
+fn check<A: ActionModel>(
+    what: &str,
+    model: &Model,
+    limits: &[Limit],
+    make: impl Fn(Vec<Limit>) -> Result<A, Error>,
+    effort: f64,
+    rng: &mut StdRng,
+) -> usize {
+    let taken: Vec<_> = limits.iter().filter(|limit| make(vec![(*limit).clone()]).is_ok()).cloned().collect();
+    for limit in &taken {
+        let what = format!("{what} with {:?}", limit.residual);
+        check_gradient(&what, make(vec![limit.clone()]).unwrap(), model, effort, rng);
+    }
+    check_gradient(what, make(taken.clone()).unwrap(), model, effort, rng);
+    taken.len()
+}
+
+#[test]
+fn derivatives_of_limits_are_those_of_the_terms() {
+    let mut rng = StdRng::seed_from_u64(31);
+    for model in [robots::quadruped(), robots::humanoid()].map(Arc::new) {
+        let (nv, name) = (model.nv(), model.name().to_owned());
+        let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+        let still =
+            |nu| vec![Cost::new("still", 0.1, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic)];
+        let all = limits(&model, nv - 6, &mut rng);
+        let of_forces = if model.name() == "humanoid" { 4 } else { 2 };
+        let contact = |l| ContactDynamics::running(model.clone(), &contacts, DT, still(nv - 6)).unwrap().with_limits(l);
+        assert_eq!(check(&format!("{name} in contact"), &model, &all, contact, 5.0, &mut rng), all.len() - 1);
+        let free = |l| FreeDynamics::running(model.clone(), DT, still(nv - 6)).unwrap().with_limits(l);
+        assert_eq!(check(&format!("free {name}"), &model, &all, free, 5.0, &mut rng), all.len() - 1 - of_forces);
+
+        let none = limits(&model, 0, &mut rng);
+        let end = |l| FreeDynamics::terminal(model.clone(), still(0)).unwrap().with_limits(l);
+        let of_dynamics = 3;
+        let kinds = none.len() - 1 - of_forces - of_dynamics;
+        assert_eq!(check(&format!("end of the {name}"), &model, &none, end, 0.0, &mut rng), kinds);
+        let impact = |l| ImpulseDynamics::new(model.clone(), &contacts, 0.3, 1e-9, still(0)).unwrap().with_limits(l);
+        let kinds = check(&format!("impact of the {name}"), &model, &none, impact, 0.0, &mut rng);
+        assert_eq!(kinds, none.len() - of_dynamics);
+    }
+}
+
+#[test]
+fn derivatives_of_limits_of_other_steps_are_those_of_the_terms() {
+    let mut rng = StdRng::seed_from_u64(32);
+    let model = Arc::new(robots::quadruped());
+    let all = limits(&model, 12, &mut rng);
+    for method in [Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4] {
+        let make = |l| {
+            let rest = Residual::State { reference: random_state(&model, &mut StdRng::seed_from_u64(1)) };
+            let rest = vec![Cost::new("rest", 0.1, rest, Activation::Quadratic)];
+            let inner = Free::new(model.clone(), Actuation::joints(&model), rest)?;
+            Integrated::new(inner, method, DT)?.with_limits(l)
+        };
+        assert_eq!(check(&format!("{method:?}"), &model, &all, make, 0.3, &mut rng), all.len() - 3);
+    }
+    let all = limits(&model, 18, &mut rng);
+    let inverse = |l| InverseDynamics::running(model.clone(), DT, vec![]).unwrap().with_limits(l);
+    assert_eq!(check("inverse dynamics", &model, &all, inverse, 1.0, &mut rng), all.len() - 3);
+}
+
+/// The term of controls is known, and no Δt and no stage of a step scales it.
+#[test]
+fn a_limit_costs_what_it_should() {
+    let mut rng = StdRng::seed_from_u64(33);
+    let arm = Arc::new(robots::arm7());
+    let (x, u) = (random_state(&arm, &mut rng), random(7, 2.0, &mut rng));
+    let (lower, mut upper) = (vec![-0.5; 7], vec![0.25; 7]);
+    upper[3] = f64::INFINITY;
+    let squares = (0..7).map(|i| (u[i] - u[i].clamp(lower[i], upper[i])).powi(2)).sum::<f64>();
+    let expected = 0.5 * PENALTY * squares;
+    let effort = Residual::Control { reference: vec![0.0; 7] };
+    let limit = || vec![Limit::new("effort", effort.clone(), lower.clone(), upper.clone())];
+    let mut next = vec![0.0; 14];
+    for method in
+        [Integrator::SemiImplicitEuler, Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4]
+    {
+        let cost = vec![Cost::new("effort", 0.3, effort.clone(), Activation::Quadratic)];
+        let inner = Free::new(arm.clone(), Actuation::joints(&arm), cost).unwrap();
+        let mut free = Integrated::new(inner, method, DT).unwrap();
+        let without = free.calc(0, &x, &u, &mut next);
+        let mut limited = free.clone().with_limits(limit()).unwrap();
+        let term = limited.calc(0, &x, &u, &mut next) - without;
+        assert!((term - expected).abs() < ROUNDING * expected, "{method:?}: {term}, expected {expected}");
+        // knot 2 may have limits of its own: none
+        limited.set_limits(2, vec![]).unwrap();
+        let costs = [1, 2, 3].map(|t| limited.calc(t, &x, &u, &mut next) - without);
+        assert_eq!(costs, [term, 0.0, term], "{method:?}");
+    }
+}
+
+/// Knots side by side in lanes find what single ones do.
+#[test]
+fn limits_in_lanes_are_those_of_single_knots() {
+    let mut rng = StdRng::seed_from_u64(34);
+    let model = Arc::new(robots::quadruped());
+    let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+    let all: Vec<_> = limits(&model, 12, &mut rng);
+    let kept = all[..all.len() - 1].to_vec();
+    let mut action = ContactDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap().with_limits(kept).unwrap();
+    let knots: Vec<_> = (0..11).collect();
+    let xs: Vec<_> = knots.iter().flat_map(|_| random_state(&model, &mut rng)).collect();
+    let us: Vec<_> = (0..11 * 12).map(|_| rng.random::<f64>()).collect();
+    let (mut next, mut costs) = (vec![0.0; xs.len()], vec![0.0; 11]);
+    action.calc_group(&knots, &xs, &us, &mut next, &mut costs);
+    let mut unread = vec![0.0; 37];
+    let single: Vec<_> =
+        (0..11).map(|t| action.calc(t, &xs[37 * t..][..37], &us[12 * t..][..12], &mut unread)).collect();
+    assert!(largest_difference(&costs, &single) < ROUNDING);
+}
+
+#[test]
+fn limits_of_implicit_knots_have_the_gains_of_explicit_ones() {
+    let mut rng = StdRng::seed_from_u64(35);
+    for model in [robots::quadruped(), robots::humanoid()].map(Arc::new) {
+        let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+        let nu = model.nv() - 6;
+        let mut kept = limits(&model, nu, &mut rng);
+        kept.truncate(kept.len() - 1);
+        let effort = Cost::new("u", 1.0, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic);
+        let stance = ContactDynamics::running(model.clone(), &contacts, DT, vec![effort]).unwrap();
+        let stance = Box::new(stance.with_limits(kept).unwrap());
+        super::implicit::compare(model.name(), &model, stance, |rng| random_state(&model, rng));
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused_by_the_limits_name() {
+    let arm = Arc::new(robots::arm7());
+    let effort = |n| Residual::Control { reference: vec![0.0; n] };
+    let refused = |limits: Vec<Limit>| {
+        let knot = FreeDynamics::running(arm.clone(), DT, vec![]).unwrap();
+        knot.with_limits(limits).map(|_| ()).unwrap_err().to_string()
+    };
+    let limit = |lower: Vec<f64>, upper| vec![Limit::new("effort", effort(7), lower, upper)];
+    assert_eq!(refused(limit(vec![0.0; 6], vec![0.0; 7])), "limit `effort`: its lower bound has 6 numbers, expected 7");
+    assert_eq!(refused(limit(vec![0.0; 7], vec![0.0; 8])), "limit `effort`: its upper bound has 8 numbers, expected 7");
+    for (lower, upper) in [(1.0, -1.0), (f64::NAN, 1.0), (f64::INFINITY, f64::INFINITY)] {
+        let expected = format!("limit `effort`: entry 0 must be at least {lower} and at most {upper}");
+        assert_eq!(refused(limit(vec![lower; 7], vec![upper; 7])), expected);
+    }
+    let one = Limit::new("effort", effort(6), vec![0.0; 6], vec![1.0; 6]);
+    assert_eq!(refused(vec![one]), "limit `effort`: its reference has 6 numbers, expected 7");
+    let twice = [limit(vec![0.0; 7], vec![1.0; 7]), limit(vec![0.0; 7], vec![1.0; 7])].concat();
+    assert_eq!(refused(twice), "limit `effort`: another limit has this name");
+    let force = Residual::ContactForce { contact: "hand".into(), target: condyle_dynamics::Force::zero() };
+    let force = vec![Limit::new("push", force, vec![0.0; 3], vec![1.0; 3])];
+    assert_eq!(refused(force.clone()), "limit `push`: there is no contact `hand` at this knot; there is none");
+    let mut knot = FreeDynamics::running(arm.clone(), DT, vec![]).unwrap();
+    let error = knot.set_limits(4, force).unwrap_err().to_string();
+    assert_eq!(error, "limit `push` of knot 4: there is no contact `hand` at this knot; there is none");
+    let end = FreeDynamics::terminal(arm.clone(), vec![]).unwrap();
+    let effort = Limit::new("effort", Residual::JointEffort { reference: vec![0.0; 7] }, vec![0.0; 7], vec![1.0; 7]);
+    let error = end.with_limits(vec![effort]).map(|_| ()).unwrap_err().to_string();
+    assert_eq!(error, "limit `effort`: there is no effort at this knot");
+}

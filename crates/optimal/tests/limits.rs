@@ -1,0 +1,356 @@
+//! Robots under limits: closed forms, the optimum of IPOPT, cones that hold, and the same by other ways.
+#![allow(non_snake_case)] // G
+
+use condyle_dynamics::{
+    Constraint as Held, ConstraintSet, Data, Inertia, Joint, Model, ModelBuilder, ReferenceFrame, Se3, Sym3, Vec3,
+    WORLD, constrained_dynamics, forward_kinematics, neutral, robots,
+};
+use condyle_optimal::robot::{
+    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, Integrated, Integrator,
+    InverseDynamics, Limit, Residual,
+};
+use condyle_optimal::{
+    ActionModel, AugmentedLagrangian, Constrained, Constraint, ConstraintSettings, Fddp, Problem, Status,
+};
+use nalgebra::{DMatrix, DVector};
+use serde_json::Value;
+use std::sync::Arc;
+
+/// Both solvers stop at residuals of 1e-7 or less; the cost is flat there, states and controls follow the residuals.
+const COST: f64 = 1e-6;
+const TRAJECTORY: f64 = 1e-4;
+/// How well constraints hold at the end of a solve, and the gradient vanishes.
+const PRIMAL: f64 = 1e-7;
+const DUAL: f64 = 1e-6;
+
+fn quadratic(name: &str, weight: f64, residual: Residual) -> Cost {
+    Cost::new(name, weight, residual, Activation::Quadratic)
+}
+
+fn control(nu: usize) -> Residual {
+    Residual::Control { reference: vec![0.0; nu] }
+}
+
+/// A solver with sharp tolerances.
+fn solver(problem: &Problem) -> AugmentedLagrangian {
+    let mut solver = AugmentedLagrangian::new(problem);
+    solver.settings = ConstraintSettings { tolerance: PRIMAL, tolerance_dual: DUAL, ..ConstraintSettings::default() };
+    solver
+}
+
+/// Solves, and asserts that the residuals are below the tolerances.
+fn solve(problem: &mut Problem, xs: &[f64], us: &[f64]) -> AugmentedLagrangian {
+    let mut solver = solver(problem);
+    let status = solver.solve(problem, xs, us).unwrap().status;
+    let outcome = solver.outcome();
+    println!(
+        "{status:?}: primal {:.1e}, dual {:.1e}, penalty {:e}, {} solves, {} iterations, cost {}",
+        outcome.primal, outcome.dual, outcome.penalty, outcome.solves, outcome.iterations, outcome.cost
+    );
+    assert_eq!(status, Status::Converged);
+    assert!(outcome.primal <= PRIMAL && outcome.dual <= DUAL);
+    solver
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
+}
+
+/// The efforts of the arm may be so large (N m); its second joint alone needs 29.6 to hold it at first.
+const WEAK: f64 = 30.0;
+const ARM: [f64; 14] = [0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+
+/// A cart on rails goes to a place and stops there, G u = d, at the cost ½ Δt ‖u‖²: u = Gᵀ(G Gᵀ)⁻¹ d, and the
+/// multipliers are −Δt (G Gᵀ)⁻¹ d. With a bound on u, that too is held.
+#[test]
+fn a_cart_is_a_closed_form() {
+    let mut builder = ModelBuilder::new("cart");
+    let (mass, dt, horizon) = (2.0, 0.1, 10);
+    let inertia = Inertia::from_com(mass, Vec3::zero(), Sym3::diagonal(0.1));
+    let rails = Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) };
+    builder.body("cart", WORLD, rails, Se3::identity(), inertia);
+    let cart = Arc::new(builder.build().unwrap());
+    let solve_with = |limits: Vec<Limit>| {
+        let costs = vec![quadratic("effort", 1.0, control(1))];
+        let knot = FreeDynamics::running(cart.clone(), dt, costs).unwrap().with_limits(limits).unwrap();
+        let there = Residual::State { reference: vec![1.0, 0.0] };
+        let there = Limit::equality("there", there);
+        let end = FreeDynamics::terminal(cart.clone(), vec![]).unwrap().with_limits(vec![there]).unwrap();
+        let mut problem = Problem::new(vec![0.0; 2], vec![Box::new(knot)], vec![0; horizon], Box::new(end)).unwrap();
+        let solver = solve(&mut problem, &[0.0; 22], &[0.0; 10]);
+        (solver.solution().us.clone(), solver.outcome().multipliers.clone())
+    };
+    // v_N = Σ u Δt / m,  x_N = Σ (N − t) u Δt² / m
+    let G = DMatrix::from_fn(2, horizon, |i, t| {
+        let a = dt / mass;
+        if i == 0 { a * dt * (horizon - t) as f64 } else { a }
+    });
+    let d = DVector::from_vec(vec![1.0, 0.0]);
+    let w = (&G * G.transpose()).lu().solve(&d).unwrap();
+    let (us, multipliers) = solve_with(vec![]);
+    assert!(largest_difference(&us, (G.transpose() * &w).as_slice()) < TRAJECTORY);
+    assert!(largest_difference(&multipliers[horizon], (-dt * w).as_slice()) < 1e-3);
+    assert!(multipliers[..horizon].iter().all(Vec::is_empty));
+    let most = 0.9 * us[0];
+    let (us, multipliers) = solve_with(vec![Limit::new("effort", control(1), vec![-most], vec![most])]);
+    assert!((us[0] - most).abs() < 1e-6 && (us[9] + most).abs() < 1e-6);
+    assert!(multipliers[0][0] > 0.0 && multipliers[9][0] < 0.0 && multipliers[4][0] == 0.0);
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let of = |v: &Value| if v.is_array() { numbers(v) } else { vec![v.as_f64().unwrap()] };
+    value.as_array().unwrap().iter().flat_map(of).collect()
+}
+
+/// The arm comes to rest with its tool at a point, with bounds on efforts and speeds that are active; by efforts and by
+/// accelerations as controls.
+#[test]
+fn reaching_is_ipopts() {
+    let data: Value = serde_json::from_str(include_str!("data/ipopt.json")).unwrap();
+    let data = &data["reach"];
+    let (x0, effort, target) = (numbers(&data["x0"]), numbers(&data["effort"]), numbers(&data["target"]));
+    let (speed, horizon) = (data["speed"].as_f64().unwrap(), data["horizon"].as_u64().unwrap() as usize);
+    let (dt, cost) = (data["dt"].as_f64().unwrap(), data["cost"].as_f64().unwrap());
+    let arm = Arc::new(robots::arm7());
+    let point = Vec3::new(target[0], target[1], target[2]);
+    let state = || Residual::State { reference: x0.clone() };
+    let tau = || Residual::JointEffort { reference: vec![0.0; 7] };
+    let costs = || vec![quadratic("rest", 0.1, state()), quadratic("effort", 1e-3, tau())];
+    let within = |q: f64, v: f64| [vec![q; 7], vec![v; 7]].concat();
+    let infinite = f64::INFINITY;
+    let limits = || {
+        vec![
+            Limit::new("effort", tau(), effort.iter().map(|x| -x).collect(), effort.clone()),
+            Limit::new("speed", state(), within(-infinite, -speed), within(infinite, speed)),
+        ]
+    };
+    let end = || {
+        let reach = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: point };
+        let limits = vec![
+            Limit::equality("reach", reach),
+            Limit::new("stop", state(), within(-infinite, 0.0), within(infinite, 0.0)),
+        ];
+        FreeDynamics::terminal(arm.clone(), vec![]).unwrap().with_limits(limits).unwrap()
+    };
+    let mut free = FreeDynamics::running(arm.clone(), dt, costs()).unwrap().with_limits(limits()).unwrap();
+    let hold = free.quasi_static(&x0).repeat(horizon);
+    let inverse = InverseDynamics::running(arm.clone(), dt, costs()).unwrap().with_limits(limits()).unwrap();
+    let knots: [(Box<dyn ActionModel>, _); 2] = [(Box::new(free), hold), (Box::new(inverse), vec![0.0; 7 * horizon])];
+    for (k, (knot, us)) in knots.into_iter().enumerate() {
+        let mut problem = Problem::new(x0.clone(), vec![knot], vec![0; horizon], Box::new(end())).unwrap();
+        let solver = solve(&mut problem, &x0.repeat(horizon + 1), &us);
+        let (solution, outcome) = (solver.solution(), solver.outcome());
+        assert!((outcome.cost - cost).abs() < COST * (1.0 + cost), "{} {cost}", outcome.cost);
+        let error = largest_difference(&solution.xs, &numbers(&data["xs"]));
+        println!("cost differs by {:e}, states by {error:e}", (outcome.cost - cost).abs());
+        assert!(error < TRAJECTORY, "states differ by {error:e}");
+        if k == 0 {
+            let error = largest_difference(&solution.us, &numbers(&data["us"]));
+            assert!(error < 20.0 * TRAJECTORY, "efforts, of up to 38 N m, differ by {error:e}");
+        }
+        let tool =
+            forward_kinematics(&arm, &mut Data::new(&arm), &solution.x(horizon)[..7]).frame(arm.frame("tool").unwrap());
+        assert!(largest_difference(&tool.translation.to_array(), &target) < 2.0 * PRIMAL);
+        // 7 efforts and 14 states a knot, 3 + 14 at the end; some of them hold
+        assert!(outcome.multipliers[..horizon].iter().all(|y| y.len() == 21));
+        assert_eq!(outcome.multipliers[horizon].len(), 17);
+        assert!(outcome.multipliers.iter().flatten().filter(|y| **y != 0.0).count() > 20);
+    }
+}
+
+/// |u| ≤ bound, as a user writes it.
+struct Weak {
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+impl Constraint for Weak {
+    fn size(&self) -> usize {
+        self.lower.len()
+    }
+    fn bounds(&self, _: usize) -> (&[f64], &[f64]) {
+        (&self.lower, &self.upper)
+    }
+    fn calc(&mut self, _: usize, _: &[f64], u: &[f64], g: &mut [f64]) {
+        g.copy_from_slice(u);
+    }
+    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+        gx.fill(0.0);
+        gu.fill_with_identity();
+    }
+}
+
+/// The same bounds as a robot's limit, as a constraint of the user's, half and half, and with other ways of computing.
+#[test]
+fn limits_and_constraints_find_one_optimum() {
+    let arm = Arc::new(robots::arm7());
+    let bounds = |rows: core::ops::Range<usize>| {
+        let bound = |i: usize| if rows.contains(&i) { WEAK } else { f64::INFINITY };
+        let upper: Vec<_> = (0..7).map(bound).collect();
+        (upper.iter().map(|x| -x).collect::<Vec<_>>(), upper)
+    };
+    let knot = || {
+        let costs = vec![
+            quadratic("rest", 1e-1, Residual::State { reference: ARM.to_vec() }),
+            quadratic("effort", 1e-3, control(7)),
+        ];
+        FreeDynamics::running(arm.clone(), 0.05, costs).unwrap()
+    };
+    let limited = |rows| {
+        let (lower, upper) = bounds(rows);
+        knot().with_limits(vec![Limit::new("weak", control(7), lower, upper)]).unwrap()
+    };
+    let written = |knot: FreeDynamics, rows| {
+        let (lower, upper) = bounds(rows);
+        Box::new(Constrained::new(Box::new(knot), Box::new(Weak { lower, upper })))
+    };
+    let reach = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: Vec3::new(0.35, 0.2, 0.6) };
+    let infinite = vec![f64::INFINITY; 7];
+    let (below, above) = (infinite.iter().map(|x| -x).collect::<Vec<_>>(), infinite);
+    let stop = Residual::State { reference: ARM.to_vec() };
+    let stop = Limit::new("stop", stop, [below, vec![0.0; 7]].concat(), [above, vec![0.0; 7]].concat());
+    let reach = || vec![Limit::equality("reach", reach.clone()), stop.clone()];
+    let horizon = 12;
+    let run = |knot: Box<dyn ActionModel>, change: &dyn Fn(&mut AugmentedLagrangian)| {
+        let end = FreeDynamics::terminal(arm.clone(), vec![]).unwrap().with_limits(reach()).unwrap();
+        let mut problem = Problem::new(ARM.to_vec(), vec![knot], vec![0; horizon], Box::new(end)).unwrap();
+        let mut solver = solver(&problem);
+        change(&mut solver);
+        let us = FreeDynamics::running(arm.clone(), 0.05, vec![]).unwrap().quasi_static(&ARM).repeat(horizon);
+        let solution = solver.solve(&mut problem, &ARM.repeat(horizon + 1), &us).unwrap();
+        assert_eq!(solution.status, Status::Converged);
+        (solution.us.clone(), solver.outcome().clone())
+    };
+    let (us, outcome) = run(Box::new(limited(0..7)), &|_| ());
+    assert!(us.iter().any(|u| (u.abs() - WEAK).abs() < 1e-6) && us.iter().all(|u| u.abs() < WEAK + 1e-6));
+    type Way<'a> = (Box<dyn ActionModel>, &'a dyn Fn(&mut AugmentedLagrangian));
+    let ways: [Way<'_>; 3] = [
+        (written(knot(), 0..7), &|_| ()),
+        (written(limited(0..2), 2..7), &|_| ()),
+        (Box::new(limited(0..7)), &|solver| solver.inner.implicit = false),
+    ];
+    for (k, (knot, change)) in ways.into_iter().enumerate() {
+        let (other, theirs) = run(knot, change);
+        assert!((theirs.cost - outcome.cost).abs() < COST * outcome.cost, "way {k}");
+        assert!(largest_difference(&other, &us) < 10.0 * TRAJECTORY, "way {k}");
+        for (y, found) in outcome.multipliers[..horizon].iter().zip(&theirs.multipliers) {
+            // a robot's limits come first, then those of a constraint around it
+            let found: Vec<_> = match found.len() {
+                7 => found.clone(),
+                _ => [&found[..2], &found[9..]].concat(),
+            };
+            assert!(largest_difference(y, &found) < 1e-3, "way {k}");
+        }
+    }
+    // copies for threads have the multipliers of their models
+    let (threaded, theirs) = run(Box::new(limited(0..7)), &|solver| solver.inner.threads = 2);
+    assert_eq!((threaded, theirs), (us, outcome));
+}
+
+/// A quadruped shifts its trunk so fast that it would slip: the cone of each foot holds, and is active.
+#[test]
+fn a_stance_does_not_slip() {
+    let model = Arc::new(robots::quadruped());
+    let mut q = neutral(&model);
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    let x0 = [q, vec![0.0; 18]].concat();
+    let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
+    let reference = ReferenceFrame::LocalWorldAligned;
+    let held = feet.map(|foot| Held { reference, kd: 20.0, ..Held::point(model.frame(foot).unwrap()) });
+    let contacts: Vec<_> = feet.iter().zip(held).map(|(foot, held)| Contact::new(foot, held)).collect();
+    let com = condyle_dynamics::centroidal_map(&model, &mut Data::new(&model), &x0[..19]).com;
+    let horizon = 12;
+    let (cone, dt) = (FrictionCone { least: 5.0, ..FrictionCone::new(0.3) }, 0.02);
+    let stance = |limits| {
+        let costs = vec![
+            quadratic("state", 1e-1, Residual::State { reference: x0.clone() }),
+            quadratic("effort", 1e-3, control(12)),
+        ];
+        ContactDynamics::running(model.clone(), &contacts, dt, costs).unwrap().with_limits(limits).unwrap()
+    };
+    let (lower, upper) = cone.bounds();
+    let grip = |foot: &str| {
+        let residual = Residual::FrictionCone { contact: foot.into(), cone: cone.clone() };
+        Limit::new(foot, residual, lower.clone(), upper.clone())
+    };
+    // the largest excess of a force beyond its cone along a trajectory, and how many rows are at their bounds
+    let slip = |xs: &[f64], us: &[f64]| {
+        let (mut data, mut set) = (Data::new(&model), ConstraintSet::new(&model, &held).unwrap());
+        let (mut worst, mut active) = (f64::NEG_INFINITY, 0);
+        for t in 0..horizon {
+            let (q, v) = xs[37 * t..][..37].split_at(19);
+            let tau = [&[0.0; 6], &us[12 * t..][..12]].concat();
+            let d = constrained_dynamics(&model, &mut data, &mut set, q, v, &tau, &[]);
+            for f in d.lambda.chunks_exact(3) {
+                for (row, (l, u)) in cone.rows().iter().zip(lower.iter().zip(&upper)) {
+                    let value: f64 = row.iter().zip(f).map(|(w, f)| w * f).sum();
+                    worst = worst.max((value - u).max(l - value));
+                    active += usize::from((value - u).abs().min((value - l).abs()) < 1e-5);
+                }
+            }
+        }
+        (worst, active)
+    };
+    let run = |limits: Vec<Limit>| {
+        let ahead = Residual::CenterOfMass { target: com + Vec3::new(0.04, 0.0, 0.0) };
+        let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
+        let end = end.with_limits(vec![Limit::equality("ahead", ahead)]).unwrap();
+        let mut knot = stance(limits);
+        let us = knot.quasi_static(&x0).repeat(horizon);
+        let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; horizon], Box::new(end)).unwrap();
+        let solver = solve(&mut problem, &x0.repeat(horizon + 1), &us);
+        let found = solver.solution();
+        (slip(&found.xs, &found.us), solver.outcome().clone())
+    };
+    let ((worst, _), free) = run(vec![]);
+    assert!(worst > 1.0, "without limits the feet slip: {worst} N");
+    let ((worst, active), bound) = run(feet.map(grip).into());
+    println!("largest excess {worst:e} N, {active} rows active");
+    assert!(worst < 2.0 * PRIMAL && active > 0);
+    assert!(bound.cost > free.cost, "what is bound costs more");
+}
+
+/// With another integrator limits hold at the knots.
+#[test]
+fn limits_hold_with_runge_kutta() {
+    let arm = Arc::new(robots::arm7());
+    let costs = vec![quadratic("effort", 1e-3, control(7))];
+    let inner = Free::new(arm.clone(), Actuation::joints(&arm), costs).unwrap();
+    let speed = Residual::State { reference: ARM.to_vec() };
+    let bounds = |b: f64| [vec![b * f64::INFINITY; 7], vec![b * 0.3; 7]].concat();
+    let speed = Limit::new("speed", speed, bounds(-1.0), bounds(1.0));
+    let knot = Integrated::new(inner, Integrator::RungeKutta2, 0.05).unwrap().with_limits(vec![speed]).unwrap();
+    let there = Residual::State { reference: [&[0.1; 7][..], &[0.0; 7]].concat() };
+    let end = FreeDynamics::terminal(arm.clone(), vec![quadratic("there", 10.0, there)]).unwrap();
+    let us = FreeDynamics::running(arm.clone(), 0.05, vec![]).unwrap().quasi_static(&ARM).repeat(10);
+    let mut problem = Problem::new(ARM.to_vec(), vec![Box::new(knot)], vec![0; 10], Box::new(end)).unwrap();
+    let solver = solve(&mut problem, &ARM.repeat(11), &us);
+    let speeds: Vec<f64> =
+        (1..10).map(|t| solver.solution().x(t)[7..].iter().fold(0.0, |m: f64, v| m.max(v.abs()))).collect();
+    assert!(speeds.iter().all(|v| *v < 0.3 + PRIMAL) && speeds.iter().any(|v| (v - 0.3).abs() < 1e-6), "{speeds:?}");
+}
+
+/// To FDDP alone a limit is the barrier 10 · ½ (excess)², as a cost of that weight per Δt is.
+#[test]
+fn alone_a_limit_is_a_barrier() {
+    let arm: Arc<Model> = Arc::new(robots::arm7());
+    let (lower, upper, dt) = (vec![-8.0; 7], vec![8.0; 7], 0.05);
+    let costs = || vec![quadratic("rest", 1.0, Residual::State { reference: ARM.to_vec() })];
+    let barrier = Activation::Barrier { lower: lower.clone(), upper: upper.clone() };
+    let barrier = Cost::new("weak", 10.0 / dt, control(7), barrier);
+    let tiny = || quadratic("effort", 1e-2, control(7));
+    let by_cost = FreeDynamics::running(arm.clone(), dt, [costs(), vec![tiny(), barrier]].concat()).unwrap();
+    let limit = Limit::new("weak", control(7), lower, upper);
+    let by_limit = FreeDynamics::running(arm.clone(), dt, [costs(), vec![tiny()]].concat()).unwrap();
+    let by_limit = by_limit.with_limits(vec![limit]).unwrap();
+    let [one, other] = [by_cost, by_limit].map(|knot| {
+        let end = FreeDynamics::terminal(arm.clone(), costs()).unwrap();
+        let mut problem = Problem::new(ARM.to_vec(), vec![Box::new(knot)], vec![0; 10], Box::new(end)).unwrap();
+        // a solver of constraints leaves nothing behind
+        AugmentedLagrangian::new(&problem).solve(&mut problem, &ARM.repeat(11), &[0.0; 70]).unwrap();
+        Fddp::new(&problem).solve(&mut problem, &ARM.repeat(11), &[0.0; 70]).unwrap().clone()
+    });
+    assert_eq!((one.status, other.status), (Status::Converged, Status::Converged));
+    assert!((one.cost - other.cost).abs() < 1e-9 * one.cost && largest_difference(&one.us, &other.us) < 1e-6);
+}

@@ -1,0 +1,165 @@
+"""Limits of robots and their solver from Python: optimality by differences, cones that hold, files, what is refused."""
+
+import pickle
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.optimal import (
+    AugmentedLagrangian,
+    ContactDynamics,
+    Cost,
+    Fddp,
+    FreeDynamics,
+    FrictionCone,
+    ImpulseDynamics,
+    InverseDynamics,
+    Limit,
+    Problem,
+    ProblemError,
+)
+
+ARM = condyle.robots.arm7()
+X0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+TARGET = np.array([0.35, 0.2, 0.6])
+WEAK, DT, KNOTS = 30.0, 0.05, 12
+# The tolerances of the solves, and of central differences of their Lagrangian, whose numbers are of order one.
+PRIMAL, DUAL, DIFFERENCES = 1e-7, 1e-6, 1e-5
+
+
+def reach() -> tuple[Problem, np.ndarray, np.ndarray]:
+    costs = [Cost.state("rest", 1e-1, X0), Cost.control("effort", 1e-3, np.zeros(7))]
+    weak = Limit.control("weak", np.zeros(7), np.full(7, -WEAK), np.full(7, WEAK))
+    knot = FreeDynamics(ARM, DT, costs, limits=[weak], limits_at={KNOTS - 1: []})
+    free = np.full(7, np.inf)
+    stop = Limit.state("stop", X0, np.r_[-free, np.zeros(7)], np.r_[free, np.zeros(7)])
+    end = FreeDynamics(ARM, None, [], limits=[Limit.frame_translation("reach", ARM, "tool", TARGET), stop])
+    problem = Problem(X0, [knot], [0] * KNOTS, end)
+    return problem, np.tile(X0, (KNOTS + 1, 1)), np.tile(knot.quasi_static(X0), (KNOTS, 1))
+
+
+def sharp(problem: Problem) -> AugmentedLagrangian:
+    return AugmentedLagrangian(problem, tolerance=PRIMAL, tolerance_dual=DUAL)
+
+
+def tool(x: np.ndarray) -> np.ndarray:
+    return condyle.frame_placement(ARM, condyle.Data(ARM), x[:7], "tool")[:3, 3]
+
+
+def test_a_solution_satisfies_the_conditions_of_optimality() -> None:
+    problem, xs, us = reach()
+    solver = sharp(problem)
+    solution = solver.solve(xs, us)
+    outcome = solver.outcome
+    assert solution.status == "converged"
+    assert outcome.primal <= PRIMAL and outcome.dual <= DUAL
+    us = np.array(solution.us)
+    np.testing.assert_allclose(tool(solution.xs[-1]), TARGET, atol=2 * PRIMAL)
+    assert np.abs(us[:-1]).max() < WEAK + PRIMAL
+
+    def cost(us: np.ndarray) -> float:
+        xs = problem.rollout(us)
+        return DT * (0.5 * 1e-1 * ((xs[:-1] - X0) ** 2).sum() + 0.5 * 1e-3 * (us**2).sum())
+
+    y = outcome.multipliers
+    assert [len(n) for n in y] == [7] * (KNOTS - 1) + [0, 3 + 14]
+    assert outcome.cost == pytest.approx(cost(us), rel=1e-9)
+
+    def lagrangian(us: np.ndarray) -> float:
+        held = sum(float(n @ u) for n, u in zip(y[: KNOTS - 1], us[:-1], strict=True))
+        x = problem.rollout(us)[-1]
+        return cost(us) + held + float(y[KNOTS] @ np.r_[tool(x) - TARGET, x - X0])
+
+    for k in range(us.size):
+        step = np.zeros(us.size)
+        step[k] = 1e-3
+        step = step.reshape(us.shape)
+        assert abs(lagrangian(us + step) - lagrangian(us - step)) / 2e-3 < DIFFERENCES
+    # a multiplier pushes away from the bound that is reached, and only there
+    for n, u in zip(y[: KNOTS - 1], us, strict=False):
+        assert ((n == 0) | ((np.abs(u) > WEAK - 1e-6) & (np.sign(n) == np.sign(u)))).all()
+    assert any(n.any() for n in y[: KNOTS - 1])
+
+
+@pytest.mark.parametrize("again", [lambda p: Problem.from_json(p.to_json()), lambda p: pickle.loads(pickle.dumps(p))])
+def test_limits_are_in_a_file(again: Callable[[Problem], Problem]) -> None:
+    problem, xs, us = reach()
+    one, other = sharp(problem), sharp(again(problem))
+    np.testing.assert_array_equal(one.solve(xs, us).xs, other.solve(xs, us).xs)
+    for a, b in zip(one.outcome.multipliers, other.outcome.multipliers, strict=True):
+        np.testing.assert_array_equal(a, b)
+    text = problem.to_json()
+    assert '"limits_at":{"11":[]}' in text and '"terminal_limits":[{"name":"reach"' in text
+    with pytest.raises(ProblemError, match="unknown field `limit`"):
+        Problem.from_json(text.replace('"terminal_limits"', '"limit"'))
+
+
+def test_settings_reach_both_solvers() -> None:
+    problem, xs, us = reach()
+    solution = AugmentedLagrangian(problem, max_solves=1, inner={"max_iterations": 2}).solve(xs, us)
+    assert solution.status == "max_iterations" and len(solution.trace) == 2
+    threaded = AugmentedLagrangian(problem, inner={"threads": 2, "implicit": True}, penalty_start=100.0)
+    assert threaded.solve(xs, us).status == "converged" and threaded.outcome.penalty >= 100.0
+    # to FDDP alone limits are costs for leaving their bounds, whatever was solved before
+    alone = Fddp(problem).solve(xs, us)
+    assert alone.status == "converged" and np.abs(tool(alone.xs[-1]) - TARGET).max() > 1e-3
+    with pytest.raises(ValueError, match="there is no setting 'penalty'"):
+        AugmentedLagrangian(problem, penalty=1.0)
+    with pytest.raises(ValueError, match="there is no setting 'tolerence'"):
+        AugmentedLagrangian(problem, inner={"tolerence": 1.0})
+    with pytest.raises(ProblemError, match="setting `penalty_start` is 0"):
+        AugmentedLagrangian(problem, penalty_start=0.0).solve(xs, us)
+
+
+def test_what_cannot_be_held_is_said() -> None:
+    far = Limit.frame_translation("far", ARM, "tool", [3.0, 0.0, 0.0])
+    knot = FreeDynamics(ARM, DT, [Cost.control("effort", 1e-3, np.zeros(7))])
+    problem = Problem(X0, [knot], [0] * 3, FreeDynamics(ARM, None, [Cost.state("rest", 1.0, X0)], limits=[far]))
+    solver = AugmentedLagrangian(problem, penalty_max=1e3, inner={"max_iterations": 20})
+    assert solver.solve(np.tile(X0, (4, 1)), np.zeros((3, 7))).status == "infeasible"
+    assert solver.outcome.primal > 1.0
+
+
+def test_feet_do_not_slip() -> None:
+    quadruped = condyle.robots.quadruped()
+    q = condyle.neutral(quadruped)
+    q[8::3], q[9::3] = 0.7, -1.4  # knees bent
+    x0 = np.r_[q, np.zeros(18)]
+    feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
+    contacts = {f: condyle.Constraint(f, "point", reference="local_world_aligned", kd=20.0) for f in feet}
+    cone = FrictionCone(0.3, least=5.0)
+    grips = [Limit.friction_cone(foot, foot, cone) for foot in feet]
+    costs = [Cost.state("rest", 1e-1, x0), Cost.control("effort", 1e-3, np.zeros(12))]
+    stance = ContactDynamics(quadruped, contacts, 0.02, costs, limits=grips)
+    com = condyle.centroidal_map(quadruped, condyle.Data(quadruped), q).com
+    ahead = Limit.center_of_mass("ahead", com + np.array([0.04, 0.0, 0.0]))
+    problem = Problem(x0, [stance], [0] * 12, FreeDynamics(quadruped, None, [], limits=[ahead]))
+    solver = sharp(problem)
+    solution = solver.solve(np.tile(x0, (13, 1)), np.tile(stance.quasi_static(x0), (12, 1)))
+    assert solution.status == "converged"
+    held, data, excess = condyle.ConstraintSet(quadruped, list(contacts.values())), condyle.Data(quadruped), []
+    lower, upper = cone.bounds()
+    for x, u in zip(solution.xs, solution.us, strict=False):
+        forces = condyle.constrained_dynamics(quadruped, data, held, x[:19], x[19:], np.r_[np.zeros(6), u]).lambda_
+        rows = forces.reshape(4, 3) @ cone.rows().T
+        excess.append(np.maximum(rows - upper, lower - rows).max())
+    assert max(excess) < 2 * PRIMAL and np.abs(excess).min() < 1e-5
+
+
+def test_what_does_not_fit_is_refused_by_name() -> None:
+    effort = Limit.joint_effort("effort", np.zeros(7), upper=np.ones(7))
+    with pytest.raises(ProblemError, match="limit `effort`: there is no effort at this knot"):
+        FreeDynamics(ARM, None, [], limits=[effort])
+    with pytest.raises(ProblemError, match="limit `effort` of knot 3: another limit has this name"):
+        FreeDynamics(ARM, DT, [], limits_at={3: [effort, effort]})
+    with pytest.raises(ProblemError, match="limit `com`: its lower bound has 2 numbers, expected 3"):
+        InverseDynamics(ARM, DT, [], limits=[Limit.center_of_mass("com", np.zeros(3), lower=np.zeros(2))])
+    turn = Limit.frame_rotation("turn", ARM, "tool", np.eye(3), lower=[0, 1, 0], upper=[0, -1, 0])
+    with pytest.raises(ProblemError, match="limit `turn`: entry 1 must be at least 1 and at most -1"):
+        FreeDynamics(ARM, None, [], limits=[turn])
+    feet = {"foot": condyle.Constraint("LF_foot", "point")}
+    with pytest.raises(ProblemError, match="limit `push`: there is no contact `hand` at this knot; there is `foot`"):
+        ImpulseDynamics(condyle.robots.quadruped(), feet, [], limits=[Limit.contact_force("push", "hand")])
+    assert repr(effort) == "<condyle.optimal.Limit 'effort'>"
