@@ -45,31 +45,36 @@ impl Rows {
     /// Notes which blocks are not zero.
     #[inline(always)]
     pub(crate) fn mark(&mut self, stride: usize) {
-        let wide = block(stride) / 8;
-        for (mask, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
-            *mask = 0;
-            let (eights, rest) = row.as_chunks::<8>();
-            for (k, x) in eights.iter().enumerate() {
-                let mut bits = 0;
-                for i in 0..8 {
-                    bits |= x[i].to_bits() << 1; // all but the sign
-                }
-                *mask |= u64::from(bits != 0) << (k / wide);
-            }
-            let rest = rest.iter().any(|x| *x != 0.0);
-            *mask |= u64::from(rest) << (eights.len() / wide);
+        for (to, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
+            *to = mask(row);
         }
     }
 }
 
+/// Which blocks of a row are not zero.
+#[inline(always)]
+pub(crate) fn mask(row: &[f64]) -> u64 {
+    let (wide, mut mask) = (block(row.len()) / 8, 0);
+    let (eights, rest) = row.as_chunks::<8>();
+    for (k, x) in eights.iter().enumerate() {
+        let mut bits = 0;
+        for i in 0..8 {
+            bits |= x[i].to_bits() << 1; // all but the sign
+        }
+        mask |= u64::from(bits != 0) << (k / wide);
+    }
+    let rest = rest.iter().any(|x| *x != 0.0);
+    mask | u64::from(rest) << (eights.len() / wide)
+}
+
 /// How many columns one bit of a mask stands for.
 #[inline(always)]
-fn block(stride: usize) -> usize {
+pub(crate) fn block(stride: usize) -> usize {
     8 * stride.div_ceil(8 * 64)
 }
 
-/// A knot's rows; see the head of the file. `R`'s diagonal, `r`, `q`, and the diagonal of `Q` and its part for δq are those
-/// of the node; its `A`, `B` and `S` are not used.
+/// A knot's rows; see the head of the file. `r`, `q` and the part of `Q` for δq are those of the node; of its `A`, `B`, `S`
+/// and `R` nothing is used.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Implicit {
     /// Whether the solver can use this form.
@@ -89,6 +94,8 @@ pub(crate) struct Implicit {
     /// G, and a′ and a″.
     pub(crate) costs: Rows,
     pub(crate) slopes: Vec<[f64; 2]>,
+    /// The diagonals of Q for δv and of R, one after the other.
+    pub(crate) diagonal: Vec<f64>,
 }
 
 impl Implicit {
@@ -98,6 +105,7 @@ impl Implicit {
         self.own.reserve(nv);
         self.dependent.reserve(dependent);
         self.slopes.reserve(costs);
+        self.diagonal.resize(nv + nu, 0.0);
         for (rows, most) in [(&mut self.efforts, nu), (&mut self.steps, dependent), (&mut self.costs, costs)] {
             rows.resize(most, self.stride);
         }
@@ -107,13 +115,15 @@ impl Implicit {
     pub(crate) fn lend(&mut self) -> Self {
         let Self { wanted, active, stride, .. } = *self;
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
-        core::mem::replace(self, Self { wanted, active, stride, costs, slopes, ..Self::default() })
+        let diagonal = core::mem::take(&mut self.diagonal);
+        core::mem::replace(self, Self { wanted, active, stride, costs, slopes, diagonal, ..Self::default() })
     }
 
     /// Ends what `lend` began.
     pub(crate) fn take_back(&mut self, lent: Self) {
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
-        *self = Self { costs, slopes, ..lent };
+        let diagonal = core::mem::take(&mut self.diagonal);
+        *self = Self { costs, slopes, diagonal, ..lent };
     }
 
     /// Takes over G.
@@ -261,7 +271,7 @@ impl Work {
             let column = &mut H[(m + j) * ld..][..ld];
             copy::<V>(&mut column[m + j..], &Pi[j * ldn + j..][..nv - j]);
             copy::<V>(&mut column[m + nv..], &N[j * ldn..][..nv]);
-            column[m + j] += node.Q[(nv + j, nv + j)];
+            column[m + j] += imp.diagonal[j];
             column[all] = py[j] + node.q[nv + j];
             let column = &mut H[(m + nv + j) * ld..][..ld];
             copy::<V>(&mut column[m + nv + j..], &node.Q.as_slice()[j * n + j..][..nv - j]);
@@ -273,7 +283,7 @@ impl Work {
         form.count = 0;
         form.parts.clear();
         for (k, (row, &mask)) in imp.efforts.numbers.chunks_exact(size).zip(&imp.efforts.masks).enumerate() {
-            form.square::<V>(row, mask, [node.r[k], node.R[(k, k)] + regularisation], all);
+            form.square::<V>(row, mask, [node.r[k], imp.diagonal[nv + k] + regularisation], all);
         }
         for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
             form.square::<V>(row, mask, slopes, all);

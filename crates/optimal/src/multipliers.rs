@@ -164,7 +164,7 @@ impl Multipliers {
         }
         if let Some([worst, sum]) = self.measured.get_mut(t) {
             // `max` drops a NaN, the sum does not
-            *worst = if term.is_nan() { f64::NAN } else { violation.max(*worst) };
+            *worst = if (term + *worst).is_nan() { f64::NAN } else { violation.max(*worst) };
             *sum += term;
             self.next[t * self.size + first..][..g.len()].copy_from_slice(&d[..g.len()]);
         }

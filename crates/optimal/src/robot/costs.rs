@@ -128,7 +128,7 @@ impl Costs {
     pub(super) fn add_diagonals(&self, view: &mut View<'_>, scale: f64, node: &mut LqNode) {
         for (term, plan) in self.weighty().filter(|(term, _)| term.residual.part() == Part::Diagonal) {
             worth(term, plan, view, scale);
-            view.add_diagonal(&term.residual, plan, node);
+            view.add_diagonal(&term.residual, node);
         }
     }
 }

@@ -17,7 +17,7 @@
 use super::quadratic::Row;
 use super::watch::{Signal, Slopes};
 use crate::dense::{SLACK, copy_scaled, max_abs};
-use crate::implicit::{Implicit, Rows};
+use crate::implicit::{Implicit, Rows, block, mask};
 use crate::vector::{Dense, Vector, at_level};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
@@ -147,14 +147,19 @@ struct Run<'a> {
     done: &'a mut bool,
 }
 
-/// y −= a x on whole registers.
+/// y −= a x on the blocks that are not zero in x, in whole registers.
 #[inline(always)]
-fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64) {
-    let (a, mut i) = (V::splat(-a), 0);
-    while i + V::N <= y.len() {
-        let place = &mut y[i..][..V::N];
-        V::load(&x[i..]).mul_add(a, V::load(place)).store(place);
-        i += V::N;
+fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
+    let (a, wide) = (V::splat(-a), block(y.len()));
+    while mask != 0 {
+        let mut i = mask.trailing_zeros() as usize * wide;
+        let end = y.len().min(i + wide);
+        while i + V::N <= end {
+            let place = &mut y[i..][..V::N];
+            V::load(&x[i..]).mul_add(a, V::load(place)).store(place);
+            i += V::N;
+        }
+        mask &= mask - 1;
     }
 }
 
@@ -183,10 +188,11 @@ impl Dense for Run<'_> {
                 *x *= inverse;
             }
             row[k] = 1.0;
+            let mask = mask(row);
             for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride).take(all - r - 1)) {
                 let factor = other[k];
                 if factor != 0.0 {
-                    subtract::<V>(other, row, factor);
+                    subtract::<V>(other, row, factor, mask);
                     other[k] = 0.0;
                 }
             }

@@ -195,7 +195,7 @@ impl Limits {
         let Self { sets, multipliers, active: true, .. } = self else { return };
         for (first, limit, plan) in sets.at(t).each().filter(|(_, limit, _)| limit.residual.part() == Part::Diagonal) {
             worth(multipliers, t, first, limit, plan, view);
-            view.add_diagonal(&limit.residual, plan, node);
+            view.add_diagonal(&limit.residual, node);
         }
     }
 }

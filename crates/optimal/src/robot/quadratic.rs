@@ -8,12 +8,29 @@ use crate::vector::{Dense, Vector, at_level};
 use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
-#[inline(always)]
-pub(super) fn add_diagonal(q: &mut [f64], Q: &mut [f64], entries: Range<usize>, d: &[f64], dd: &[f64]) {
-    let n = q.len();
-    for i in entries {
-        q[i] += d[i];
-        Q[i * n + i] += dd[i];
+pub(super) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[f64], dd: &[f64]) {
+    let (n, implicit) = (node.ndx(), &mut node.implicit);
+    for i in entries.clone() {
+        node.q[i] += d[i];
+    }
+    let explicit = if implicit.active { n / 2 } else { n };
+    for i in entries.start..entries.end.min(explicit) {
+        node.Q.as_mut_slice()[i * (n + 1)] += dd[i];
+    }
+    for i in entries.start.max(explicit)..entries.end {
+        implicit.diagonal[i - n / 2] += dd[i];
+    }
+}
+
+/// r += d and R += diag(dd).
+pub(super) fn add_control_diagonal(node: &mut LqNode, d: &[f64], dd: &[f64]) {
+    let (n, m, implicit) = (node.ndx(), node.nu(), &mut node.implicit);
+    for i in 0..m {
+        node.r[i] += d[i];
+        match implicit.active {
+            true => implicit.diagonal[n / 2 + i] += dd[i],
+            false => node.R.as_mut_slice()[i * (m + 1)] += dd[i],
+        }
     }
 }
 
@@ -129,12 +146,7 @@ impl Dense for Write<'_> {
         let Q = node.Q.as_mut_slice();
         let both = [left.as_slice(), right.as_slice()];
         if implicit {
-            for k in 0..nv {
-                Q[(nv + k) * (n + 1)] = 0.0;
-            }
-            for k in 0..m {
-                node.R[(k, k)] = 0.0;
-            }
+            node.implicit.diagonal.fill(0.0);
             for k in 0..if all == 0 { nv } else { 0 } {
                 Q[k * n..][..nv].fill(0.0);
             }

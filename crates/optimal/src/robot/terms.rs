@@ -1,7 +1,7 @@
 //! Residuals as they are computed, with the rows of their Jacobians; costs and limits say what these are worth.
 
 use super::contact::coordinates_of;
-use super::quadratic::add_diagonal;
+use super::quadratic::{add_control_diagonal, add_state_diagonal};
 use super::residual::{Part, Residual};
 use super::state::state_difference;
 use super::watch::{Needs, Offer, Scene, Scratch, Signal, Slopes, add_matrix_row};
@@ -187,12 +187,12 @@ impl View<'_> {
     }
 
     /// Gradient and Hessian of a state's or a control's residual that was just computed.
-    pub(super) fn add_diagonal(&mut self, residual: &Residual, plan: &Plan, node: &mut LqNode) {
+    pub(super) fn add_diagonal(&mut self, residual: &Residual, node: &mut LqNode) {
         match residual {
             Residual::State { .. } => self.add_state(node),
             _ => {
                 let Scratch { d, dd, .. } = &*self.scratch;
-                add_diagonal(node.r.as_mut_slice(), node.R.as_mut_slice(), 0..plan.n, d, dd);
+                add_control_diagonal(node, d, dd);
             }
         }
     }
@@ -203,7 +203,7 @@ impl View<'_> {
         let nv = model.nv();
         let mut from = 0;
         for group in s.groups.iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
-            add_diagonal(node.q.as_mut_slice(), node.Q.as_mut_slice(), from..group.start, &s.d, &s.dd);
+            add_state_diagonal(node, from..group.start, &s.d, &s.dd);
             from = group.end;
         }
         if s.groups.is_empty() {
