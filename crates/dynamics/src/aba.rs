@@ -18,23 +18,23 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, S
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
-    /// Articulated inertia. Shape: levels. Written by: `factorize`, `pass`.
+    /// Articulated inertia. Shape: levels. Written by: `factorize`, `inward`.
     IA: Vec<ArticulatedInertia<S>>,
-    /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`, `pass`.
+    /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`, `inward`.
     pub U: Vec<Force<S>>,
-    /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`, `pass`.
+    /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`, `inward`.
     pub D_inv: Vec<S>,
-    /// Velocity; the world's stays 0. Shape: levels. Written by: `pass`.
-    v: Vec<Motion<S>>,
-    /// Acceleration, with gravity as the world's. Shape: levels. Written by: `pass`.
-    a: Vec<Motion<S>>,
-    /// v × v_J. Shape: bodies. Written by: `pass`.
-    c: Vec<Motion<S>>,
-    /// Articulated bias force. Shape: levels. Written by: `pass`.
+    /// Velocity; the world's stays 0. Shape: levels. Written by: `inward`.
+    pub v: Vec<Motion<S>>,
+    /// Acceleration, with gravity as the world's. Shape: levels. Written by: `outward`.
+    pub a: Vec<Motion<S>>,
+    /// v × v_J. Shape: bodies. Written by: `inward`.
+    pub c: Vec<Motion<S>>,
+    /// Articulated bias force. Shape: levels. Written by: `inward`.
     pA: Vec<Force<S>>,
-    /// τ − Sᵀ pᴬ. Shape: columns. Written by: `pass`.
-    u: Vec<S>,
-    /// Joint accelerations. Shape: nv. Written by: `pass`.
+    /// τ − Sᵀ pᴬ. Shape: columns. Written by: `inward`.
+    pub u: Vec<S>,
+    /// Joint accelerations. Shape: nv. Written by: `outward`.
     pub qdd: Vec<S>,
 }
 
@@ -86,7 +86,7 @@ pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::
     }
 }
 
-/// The whole algorithm: down and up each branch in turn, then down once more.
+/// The whole algorithm.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
@@ -96,7 +96,21 @@ pub(crate) fn pass<L: Layout>(
     tau: &[L::S],
     f_ext: &[Force<L::S>],
 ) {
-    let Workspace { IA, U, D_inv, v, a, c, pA, u, qdd } = d;
+    inward(l, w, d, qd, tau, f_ext);
+    outward(l, w, d);
+}
+
+/// What each joint feels of all that it carries: down and up each branch in turn.
+#[inline(always)]
+pub(crate) fn inward<L: Layout>(
+    l: &L,
+    w: &World<L::S>,
+    d: &mut Workspace<L::S>,
+    qd: &[L::S],
+    tau: &[L::S],
+    f_ext: &[Force<L::S>],
+) {
+    let Workspace { IA, U, D_inv, v, c, pA, u, .. } = d;
     let (oX, S) = (&w.oX, &w.S);
     for i in l.bodies() {
         let mut vJ = Motion::zero();
@@ -125,6 +139,12 @@ pub(crate) fn pass<L: Layout>(
             l.lift(pA, j, pa + Ia * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
         }
     }
+}
+
+/// The accelerations: down once more.
+#[inline(always)]
+pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
+    let (Workspace { U, D_inv, a, c, u, qdd, .. }, S) = (d, &w.S);
     a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
     qdd.fill(L::S::zero());
     for i in l.bodies() {

@@ -19,6 +19,7 @@ use crate::data::{Data, Size};
 use crate::dispatch::Kernel;
 use crate::kinematics::{World, place};
 use crate::layout::{Pairs, Single};
+use crate::limbs;
 use crate::ltdl::Ltdl;
 use crate::model::Model;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
@@ -139,8 +140,8 @@ impl<S: Scalar> ConstraintSet<S> {
         for r in 0..b.len() {
             self.lambda[r] = -b[r]; // −(γ + J M⁻¹ (τ − h))
         }
-        self.delassus.factorize(&self.plans, &self.J, factor, self.proximal.mu);
-        self.delassus.solve(self.proximal, &mut self.lambda);
+        self.delassus.multiply(&self.plans, &self.J, factor);
+        self.delassus.decompose(self.proximal, &mut self.lambda);
         x.copy_from_slice(effort);
         self.add_effort(x);
         factor.solve(x); // q̈ = M⁻¹ (τ − h + Jᵀ λ)
@@ -187,11 +188,13 @@ pub struct Constrained<'d, S> {
 
 /// q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that make J q̈ + γ = 0: forward dynamics under constraints.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (N, N m), number 0 being the world's; or empty for
-/// none. Works on the tree's zeros: O(n d²) for a tree of depth d, O(d) for each pair of rows, O(rows³). Allocates
-/// nothing. Constraints that contradict each other, or themselves at a singular posture, give finite numbers and a
-/// residual; [`Proximal`](crate::Proximal) settings decide how redundant ones share their forces. Source: Carpentier,
-/// Budhiraja, Mansard (2021), on the factorisation of Featherstone (2005).
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (N, N m), number 0 being the world's; or empty
+/// for none. Works on the tree's zeros: O(n d²) for a tree of depth d, O(d) for each pair of rows, O(rows³); of robots
+/// with limbs ([`Model::with_limbs`]) on the articulated bodies, in O(n) beside the rows. Allocates nothing.
+/// Constraints that contradict each other, or themselves at a singular posture, give finite numbers and a residual;
+/// [`Proximal`](crate::Proximal) settings decide how redundant ones share their forces. Source: Carpentier, Budhiraja,
+/// Mansard (2021), on the factorisation of Featherstone (2005); Wensing, Featherstone, Orin, *A reduced-order recursive
+/// algorithm for the computation of the operational-space inertia matrix* (2012).
 ///
 /// ```
 /// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics, neutral, robots};
@@ -220,7 +223,9 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
 ) -> Constrained<'d, S> {
     let inputs = Inputs { q, v, tau, f_ext };
     constrained_work::check_arguments(model, data, constraints, &inputs);
-    constrained_work::run(Forward, model, data, constraints, inputs);
+    if !limbs::run_constrained(model, data, constraints, inputs) {
+        constrained_work::run(Forward, model, data, constraints, inputs);
+    }
     Constrained {
         a: &data.constrained_dynamics.qdd,
         lambda: &constraints.lambda,

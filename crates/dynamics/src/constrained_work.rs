@@ -49,16 +49,25 @@ impl<A: Algorithm, S: Scalar, R: Constant<S>> Kernel for Work<'_, A, S, R> {
             return self.run();
         }
         let Inputs { q, v, tau, f_ext } = self.inputs;
-        assert!(size_of::<ConstraintSet<S>>() == size_of::<ConstraintSet<Fused>>());
-        // SAFETY: S and R are f64, and by contract the processor has the level. `ConstraintSet` and what is in it are
-        // `repr(C)`, as `Data` is: see `fused`.
+        // SAFETY: S and R are f64, and by contract the processor has the level.
         unsafe {
             let model: &Model<f64> = same(self.model);
-            let constraints: &mut ConstraintSet<Fused> = &mut *core::ptr::from_mut(self.constraints).cast();
+            let (data, constraints) = (fused(self.data), fused_set(self.constraints));
             let inputs = Inputs { q: slice(q), v: slice(v), tau: slice(tau), f_ext: slice(f_ext) };
-            short(Work { algorithm: self.algorithm, model, data: fused(self.data), constraints, inputs });
+            short(Work { algorithm: self.algorithm, model, data, constraints, inputs });
         }
     }
+}
+
+/// Constraints whose numbers are looked at as [`Fused`].
+///
+/// # Safety
+/// `S` is `f64`.
+#[inline(always)]
+pub(crate) unsafe fn fused_set<S>(constraints: &mut ConstraintSet<S>) -> &mut ConstraintSet<Fused> {
+    assert!(size_of::<ConstraintSet<S>>() == size_of::<ConstraintSet<Fused>>());
+    // SAFETY: `ConstraintSet` and what is in it are `repr(C)`, as `Data` is: see `fused`.
+    unsafe { &mut *core::ptr::from_mut(constraints).cast() }
 }
 
 /// Panics unless the arguments of forward dynamics fit.

@@ -69,12 +69,19 @@ fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
 }
 
 impl<S: Scalar> Ends<S> {
+    /// Of bodies in these poses, at rest.
+    #[inline(always)]
+    pub(crate) fn between(plan: &Plan, target: &Target<S>, [one, other]: [Se3<S>; 2]) -> Self {
+        let x1 = one * plan.turned[0].lift();
+        let x2 = other * plan.turned[1].lift() * target.placement;
+        Self { x1, x2, v: [Motion::zero(); 2], a: [Motion::zero(); 2] }
+    }
+
     /// Of bodies that are placed and at rest.
     #[inline(always)]
     pub(crate) fn at_rest(plan: &Plan, target: &Target<S>, World { oX, .. }: &World<S>) -> Self {
-        let x1 = oX[plan.bodies[0]] * plan.turned[0].lift();
-        let x2 = oX[plan.bodies[1]] * plan.turned[1].lift() * target.placement;
-        Self { x1, x2, v: [Motion::zero(); 2], a: [Motion::zero(); 2] }
+        let [i, j] = plan.bodies;
+        Self::between(plan, target, [oX[i], oX[j]])
     }
 
     /// Of bodies that move.

@@ -9,6 +9,7 @@ use crate::delassus::Delassus;
 use crate::elimination::NONE;
 use crate::error::Error;
 use crate::frames::ReferenceFrame;
+use crate::limbs::Held;
 use crate::ltdl::Ltdl;
 use crate::model::{Coupled, Model};
 use condyle_spatial::{Scalar, Se3, Vec3};
@@ -160,6 +161,8 @@ pub struct ConstraintSet<S> {
     pub(crate) dlambda_dq: DMatrix<S>,
     pub(crate) dlambda_dv: DMatrix<S>,
     pub(crate) dlambda_dtau: DMatrix<S>,
+    /// Of single calls on robots with limbs.
+    pub(crate) limbs: Option<Box<Held>>,
 }
 
 impl<S: Scalar> ConstraintSet<S> {
@@ -262,6 +265,7 @@ impl<S: Scalar> ConstraintSet<S> {
             dlambda_dq: wide.clone(),
             dlambda_dv: wide.clone(),
             dlambda_dtau: wide,
+            limbs: Held::new::<S, R>(model, &plans),
             plans,
         })
     }

@@ -8,6 +8,9 @@
 //! All four must have joints of one kind, but whatever their axes: these are turned to z already. Robots with less than two
 //! bodies a step, chains above all, are computed one body after the other.
 
+mod constrained;
+mod forces;
+mod held;
 mod inverse;
 mod lanes;
 mod links;
@@ -18,6 +21,8 @@ mod steps;
 use crate::joint::Joint;
 use crate::model::{Model, Node};
 use condyle_spatial::moves::Move;
+pub(crate) use constrained::run as run_constrained;
+pub(crate) use held::Held;
 pub(crate) use pass::{Scratch, Task, run};
 pub(crate) use seen::Seen;
 
@@ -165,8 +170,9 @@ impl Model {
     /// The same robot, with its limbs side by side in single calls or one body after the other.
     ///
     /// Where it has limbs enough (four legs, two legs and two arms, fingers), [`rnea`](crate::rnea()),
-    /// [`aba`](crate::aba()), [`crba`](crate::crba()), [`minv`](crate::minv()) and the derivatives of the first two compute
-    /// four bodies of one state at a time if the processor has AVX2 or NEON, up to twice as fast. A
+    /// [`aba`](crate::aba()), [`crba`](crate::crba()), [`minv`](crate::minv()), the derivatives of the first two and
+    /// [`constrained_dynamics`](crate::constrained_dynamics()) compute four bodies of one state at a time if the processor
+    /// has AVX2 or NEON, two to three times as fast. A
     /// [`Batch`](crate::Batch) never does, since its lanes hold states. The two ways add up in different orders, so their
     /// results differ in the last digits; without limbs a single call gives the bits of a batch.
     ///

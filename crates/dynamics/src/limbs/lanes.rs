@@ -38,6 +38,28 @@ unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
     unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(x).cast(), size_of::<T>() / size_of::<Four>()) }
 }
 
+/// The numbers of structs, those of a vector side by side.
+///
+/// # Safety
+/// As for `vectors`.
+#[inline(always)]
+pub(super) unsafe fn numbers<T>(of: &[T]) -> &[f64] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
+    // SAFETY: by the caller; a vector is its numbers.
+    unsafe { core::slice::from_raw_parts(of.as_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
+}
+
+/// The same, to be written.
+///
+/// # Safety
+/// As for `vectors`.
+#[inline(always)]
+pub(super) unsafe fn numbers_mut<T>(of: &mut [T]) -> &mut [f64] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
+    // SAFETY: by the caller; a vector is its numbers.
+    unsafe { core::slice::from_raw_parts_mut(of.as_mut_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
+}
+
 #[inline(always)]
 fn moved<T: Copy>(mut x: T, by: &Move) -> T {
     // SAFETY: passes keep structs of vectors.

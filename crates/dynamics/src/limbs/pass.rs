@@ -17,22 +17,22 @@ use condyle_spatial::{Constant, Force, Inertia, Scalar};
 use core::any::TypeId;
 use core::marker::PhantomData;
 
-type Eight = <f64 as Real>::Long;
+pub(super) type Eight = <f64 as Real>::Long;
 
 /// What passes in lanes write.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     /// The arguments. Shape: positions, coordinates, coordinates, steps of the plan. Written by: `load`.
-    q: Vec<Four>,
-    v: Vec<Four>,
-    x: Vec<Four>,
-    f_ext: Vec<Force<Four>>,
+    pub q: Vec<Four>,
+    pub v: Vec<Four>,
+    pub x: Vec<Four>,
+    pub f_ext: Vec<Force<Four>>,
     /// An argument, with a 0 for the lanes that have no joint. Shape: the larger of nq and nv, + 1.
     /// Written by: `gather`.
     padded: Vec<Fused>,
     pub world: World<Four>,
     rnea: rnea::Workspace<Four>,
-    aba: aba::Workspace<Four>,
+    pub aba: aba::Workspace<Four>,
     /// Composite inertias. Shape: steps. Written by: `crba::pass`.
     IC: Vec<Inertia<Four>>,
     pub bodies: rnea_derivatives::Bodies<Four>,
@@ -72,17 +72,17 @@ impl Scratch {
 
 /// What a call is given.
 #[derive(Clone, Copy)]
-struct Arguments<'a> {
-    q: &'a [Fused],
-    v: &'a [Fused],
+pub(super) struct Arguments<'a> {
+    pub q: &'a [Fused],
+    pub v: &'a [Fused],
     /// An acceleration or an effort.
-    x: &'a [Fused],
-    f_ext: &'a [Force<Fused>],
+    pub x: &'a [Fused],
+    pub f_ext: &'a [Force<Fused>],
 }
 
 /// Brings the arguments into lanes.
 #[inline(always)]
-fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
+pub(super) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
     gather(&plan.positions, &mut to.padded, from.q, &mut to.q);
     if !from.v.is_empty() {
         gather(&plan.coordinates, &mut to.padded, from.v, &mut to.v);
@@ -122,7 +122,7 @@ fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]
 
 /// Takes a vector in coordinates out of the lanes: the transpose of `gather`.
 #[inline(always)]
-fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
+pub(super) fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
     let numbers = lanes(from);
     for (to, &at) in to.iter_mut().zip(&plan.leaders) {
         *to = Fused(numbers[at]);
@@ -197,6 +197,13 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
     }
 }
 
+/// The plan, where this model and `data` have limbs side by side, and the processor can.
+#[inline]
+pub(super) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
+    let (Some(plan), Some(scratch)) = (&model.limbs, &data.limbs) else { return None };
+    (is_f64::<S, R>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
+}
+
 /// An algorithm with the limbs side by side, where this model and `data` have them; whether they have. Arguments that it
 /// does not take are empty.
 #[inline]
@@ -209,10 +216,9 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     x: &[S],
     f_ext: &[Force<S>],
 ) -> bool {
-    let (Some(plan), Some(scratch)) = (&model.limbs, &data.limbs) else { return false };
-    let adds = matches!(task, Task::Rnea) || !model.has_mimic(); // joints that share a coordinate
-    if !adds || !is_f64::<S, R>() || !scratch.fits(plan) || level() == Level::Baseline {
-        return false;
+    let Some(plan) = ready(model, data) else { return false };
+    if model.has_mimic() && !matches!(task, Task::Rnea) {
+        return false; // joints that share a coordinate
     }
     // SAFETY: S and R are f64, and the processor has the level.
     unsafe {

@@ -1,9 +1,10 @@
 //! The limbs of one robot side by side: the numbers of body after body. (At the baseline, both are that.)
 
+use crate::common::contacts::random_constraints;
 use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
-    Data, Inertia, Input, Joint, Model, ModelBuilder, Se3, Sym3, WORLD, aba, aba_derivatives, crba, minv,
-    nonlinear_effects, rnea, rnea_derivatives, robots,
+    Constraint, ConstraintSet, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, Se3, Sym3, WORLD, aba,
+    aba_derivatives, constrained_dynamics, crba, minv, nonlinear_effects, rnea, rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
 
@@ -142,6 +143,57 @@ fn the_numbers_of_body_after_body() {
     for (seed, model) in all_models(12).iter().enumerate() {
         compare(model, &mut worst, seed as u64);
     }
+}
+
+/// Compares q̈, λ and J; the residuals are the same to rounding.
+fn compare_constrained(m: &Model, constraints: &[Constraint], proximal: Proximal, worst: &mut [Worst; 2], s: &State) {
+    let in_turn = m.clone().with_limbs(false);
+    let (mut data, mut one) = (Data::new(m), Data::new(&in_turn));
+    let [mut set, mut other] = [m, &in_turn].map(|m| ConstraintSet::new(m, constraints).expect("they are right"));
+    (set.proximal, other.proximal) = (proximal, proximal);
+    for f_ext in [&s.f_ext[..], &[]] {
+        let expected = constrained_dynamics(&in_turn, &mut one, &mut other, &s.q, &s.v, &s.tau, f_ext);
+        let found = constrained_dynamics(m, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+        worst[1].see(m, found.a, expected.a);
+        worst[1].see(m, found.lambda, expected.lambda);
+        worst[1].see(m, &[found.residual], &[expected.residual]);
+        assert_eq!(found.redundant, expected.redundant);
+        let [mut J, mut K] = [(); 2].map(|()| DMatrix::from_element(set.rows(), m.nv(), f64::NAN));
+        set.jacobian(&mut J);
+        other.jacobian(&mut K);
+        worst[0].see(m, J.as_slice(), K.as_slice());
+    }
+}
+
+/// Contacts and loops between all kinds of bodies, the one that carries all others and the world among them.
+#[test]
+fn constrained_dynamics_of_body_after_body() {
+    let mut worst = sums_and_inverses();
+    let axis = [0.0, 0.6, 0.8].into();
+    let roots = [Joint::FreeFlyer, Joint::Revolute { axis }, Joint::Planar];
+    let models = (0..24).map(|seed| many_limbs(seed, roots[seed as usize % 3])).chain(all_models(12));
+    for (seed, model) in models.enumerate().filter(|(_, model)| model.singular_joints().is_empty()) {
+        let mut rng = rng(seed as u64);
+        let state = State::random(&model, &mut rng);
+        let constraints = random_constraints(&model, &state, &mut rng);
+        for proximal in [Proximal::default(), Proximal { mu: 1e-6, iterations: 3 }] {
+            compare_constrained(&model, &constraints, proximal, &mut worst, &state);
+        }
+    }
+}
+
+/// The humanoid on a sole that is held twice, by rows of which six depend on others, and on its other sole's points.
+#[test]
+fn redundant_constraints_of_body_after_body() {
+    let mut worst = sums_and_inverses();
+    let model = robots::humanoid();
+    let [left, right] = ["left_sole", "right_sole"].map(|name| model.frame(name).unwrap());
+    let body = model.frames()[left].body;
+    let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
+    let constraints = [Constraint::rigid(left), Constraint::point(right), Constraint::rigid(again)];
+    let state = State::random(&model, &mut rng(0));
+    compare_constrained(&model, &constraints, Proximal::default(), &mut worst, &state);
+    compare_constrained(&model, &[], Proximal::default(), &mut worst, &state);
 }
 
 /// Another armature, gravity or inertia is seen by the same `Data`.
