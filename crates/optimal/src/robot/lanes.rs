@@ -1,8 +1,8 @@
 //! The dynamics of several knots side by side, in the lanes of a vector register, and their results one by one.
 //!
 //! A robot's coordinates are packed so that each number has a lane for each knot; the algorithms of dynamics then run
-//! once for all of them, with the bits of single calls. What they give is unpacked in blocks, since the costs and the
-//! sweep look at one knot after the other.
+//! once for all of them. What they give is unpacked in blocks, since the costs and the sweep look at one knot after the
+//! other.
 
 use super::contact::Contact;
 use super::elimination::Tableau;
