@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds it; to [`Fddp`](crate::Fddp) alone it is a cost for leaving the
 /// bounds. It shares dynamics and kinematics with the costs of its knot, and holds at the knot's beginning, whatever the
-/// integrator and its Δt.
+/// integrator and its Δt. One penalty serves all numbers, whatever their units.
 ///
 /// ```
 /// use condyle_dynamics::robots;
