@@ -336,20 +336,24 @@ impl All {
         }
     }
 
-    /// What the root's joint adds to J M⁻¹ Jᵀ, in place of what was there.
+    /// What the root's joint adds to J M⁻¹ Jᵀ, in place of what was there: of a multiple of three rows.
     #[inline(always)]
     pub(super) fn multiply<V: Block<Number = f64>, const N: usize>(&self, rows: usize, G: &mut [f64], stride: usize) {
         for first in (0..self.stride - WIDE).step_by(WIDE) {
-            for j in 0..rows.min(first + WIDE) {
-                let mut sum = [V::zero(); N];
+            for j in (0..rows.min(first + WIDE)).step_by(3) {
+                let mut sums = [[V::zero(); N]; 3];
                 for k in 0..self.nv {
                     let y = read::<V, N>(&self.Y[k * self.stride + first..]);
-                    let yd = V::splat(self.YD[k * self.stride + j]);
-                    for n in 0..N {
-                        sum[n] = y[n].mul_add(yd, sum[n]); // Σ Y D⁻¹ Yᵀ
+                    let yd = &self.YD[k * self.stride + j..][..3];
+                    for e in 0..3 {
+                        for n in 0..N {
+                            sums[e][n] = y[n].mul_add(V::splat(yd[e]), sums[e][n]); // Σ Y D⁻¹ Yᵀ
+                        }
                     }
                 }
-                write(sum, &mut G[j * stride + first..]);
+                for e in 0..3 {
+                    write(sums[e], &mut G[(j + e) * stride + first..]);
+                }
             }
         }
     }
