@@ -3,16 +3,19 @@
 mod actions;
 mod costs;
 mod limits;
+mod own;
 mod residuals;
 mod solvers;
 
 use crate::arrays::{matrix, output, vector};
 use crate::exceptions::ProblemError;
-pub(crate) use actions::{Action, ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics, Lqr};
-use actions::{Boxed, Described, Fault, Model, Part};
+use actions::{Boxed, Described, Model, Part};
+pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
 use condyle::optimal as rust;
 pub(crate) use costs::{Activation, Cost, FrictionCone, WrenchCone};
 pub(crate) use limits::Limit;
+use own::Fault;
+pub(crate) use own::{Action, Lqr};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 pub(crate) use solvers::{AugmentedLagrangian, Fddp};

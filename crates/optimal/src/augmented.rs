@@ -9,8 +9,9 @@ use crate::solution::{Solution, Status};
 use nalgebra::DVector;
 
 /// The method of multipliers around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and robots with
-/// [`Limit`](crate::robot::Limit)s, with the rules of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP
-/// has them (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier, 2023).
+/// [`Limit`](crate::robot::Limit)s, with the rules of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991;
+/// Nocedal and Wright, algorithm 17.4), as ProxDDP has them (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier,
+/// 2023).
 ///
 /// ```text
 /// repeat   minimise   Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,   z = g + μ y        by FDDP, to a tolerance ω

@@ -81,10 +81,26 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     Ok(())
 }
 
-/// A warm start as the solvers take it.
-fn warm_start(problem: &rust::Problem, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<f64>)> {
-    let xs = matrix("xs", xs, [problem.horizon() + 1, problem.nx()])?.to_vec();
-    Ok((xs, controls(problem, us)?))
+/// A solve, from a warm start (xs, us) if there is one; other threads run meanwhile.
+fn run<'py, S: Send>(
+    py: Python<'py>,
+    problem: &Py<Problem>,
+    solver: &Mutex<S>,
+    warm_start: Option<[&Bound<'_, PyAny>; 2]>,
+    solve: impl for<'a> FnOnce(&'a mut S, &mut rust::Problem, &[f64], &[f64]) -> Result<&'a rust::Solution, rust::Error>
+    + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut inner = lock("problem", &problem.get().inner)?;
+    let mut solver = lock("solver", solver)?;
+    let (mut x, mut u) = (vec![], vec![]);
+    if let Some([xs, us]) = warm_start {
+        x = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
+        u = controls(&inner, us)?;
+    }
+    let (inner, solver) = (&mut *inner, &mut *solver);
+    let solution = py.detach(|| solve(solver, inner, &x, &u)).map_err(exception)?;
+    problem.get().raise()?;
+    give(py, inner, solution)
 }
 
 /// Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
@@ -127,25 +143,14 @@ impl Fddp {
     /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises. How the solve
     /// ended is the solution's status.
     fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let mut problem = lock("problem", &self.problem.get().inner)?;
-        let mut solver = lock("solver", &self.solver)?;
-        let (xs, us) = warm_start(&problem, xs, us)?;
-        let (problem, solver) = (&mut *problem, &mut *solver);
-        py.detach(|| solver.solve(problem, &xs, &us).map(|_| ())).map_err(exception)?;
-        self.problem.get().raise()?;
-        give(py, problem, solver.solution())
+        run(py, &self.problem, &self.solver, Some([xs, us]), |solver, problem, xs, us| solver.solve(problem, xs, us))
     }
 
     /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
     ///
     /// Raises `ProblemError` as `solve`.
     fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let mut problem = lock("problem", &self.problem.get().inner)?;
-        let mut solver = lock("solver", &self.solver)?;
-        let (problem, solver) = (&mut *problem, &mut *solver);
-        py.detach(|| solver.resume(problem).map(|_| ())).map_err(exception)?;
-        self.problem.get().raise()?;
-        give(py, problem, solver.solution())
+        run(py, &self.problem, &self.solver, None, |solver, problem, _, _| solver.resume(problem))
     }
 
     /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
@@ -236,13 +241,7 @@ impl AugmentedLagrangian {
     ///
     /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
     fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let mut problem = lock("problem", &self.problem.get().inner)?;
-        let mut solver = lock("solver", &self.solver)?;
-        let (xs, us) = warm_start(&problem, xs, us)?;
-        let (problem, solver) = (&mut *problem, &mut *solver);
-        py.detach(|| solver.solve(problem, &xs, &us).map(|_| ())).map_err(exception)?;
-        self.problem.get().raise()?;
-        give(py, problem, solver.solution())
+        run(py, &self.problem, &self.solver, Some([xs, us]), |solver, problem, xs, us| solver.solve(problem, xs, us))
     }
 
     /// What the last solve says of the limits, an `Outcome`.

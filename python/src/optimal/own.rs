@@ -1,0 +1,228 @@
+//! Actions of one's own: given as matrices, or written in Python.
+
+use super::actions::bounds;
+use super::rust;
+use crate::arrays::{matrix, vector};
+use nalgebra::DMatrix;
+use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rust::{ActionModel, LqNode};
+use std::sync::{Arc, Mutex};
+
+/// What an action written in Python raised during a solve.
+pub(super) type Fault = Arc<Mutex<Option<PyErr>>>;
+
+/// Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
+///
+/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
+/// bound; without R and B it has no controls, as at a terminal knot.
+///
+/// >>> from condyle.optimal import Lqr
+/// >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Lqr(pub(super) rust::Lqr);
+
+#[pymethods]
+impl Lqr {
+    #[new]
+    #[pyo3(signature = (A, B=None, f=None, Q=None, S=None, R=None, q=None, r=None, lower=None, upper=None))]
+    #[allow(non_snake_case, clippy::too_many_arguments)]
+    fn new(
+        A: &Bound<'_, PyAny>,
+        B: Option<&Bound<'_, PyAny>>,
+        f: Option<&Bound<'_, PyAny>>,
+        Q: Option<&Bound<'_, PyAny>>,
+        S: Option<&Bound<'_, PyAny>>,
+        R: Option<&Bound<'_, PyAny>>,
+        q: Option<&Bound<'_, PyAny>>,
+        r: Option<&Bound<'_, PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let nx = A.len()?;
+        let nu = match (R, B) {
+            (Some(R), _) => R.len()?,
+            (None, Some(B)) => B.get_item(0)?.len()?,
+            (None, None) => 0,
+        };
+        let mut node = LqNode::zeros(nx, nu);
+        for (name, given, to, shape) in [
+            ("A", Some(A), &mut node.A, [nx, nx]),
+            ("B", B, &mut node.B, [nx, nu]),
+            ("Q", Q, &mut node.Q, [nx, nx]),
+            ("S", S, &mut node.S, [nx, nu]),
+            ("R", R, &mut node.R, [nu, nu]),
+        ] {
+            if let Some(given) = given {
+                *to = matrix(name, given, shape)?.to_matrix();
+            }
+        }
+        for (name, given, to) in [
+            ("f", f, &mut node.f),
+            ("q", q, &mut node.q),
+            ("r", r, &mut node.r),
+            ("lower", lower, &mut node.lower),
+            ("upper", upper, &mut node.upper),
+        ] {
+            if let Some(given) = given {
+                let length = to.len();
+                to.copy_from_slice(&vector(name, given, length)?);
+            }
+        }
+        Ok(Self(rust::Lqr::new(node)))
+    }
+}
+
+/// An action written in Python.
+///
+/// nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
+/// calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+/// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
+///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+///
+/// >>> from condyle.optimal import Action, Fddp, Problem
+/// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
+/// >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+/// >>> problem = Problem([1.0], [knot], [0] * 30, end)
+/// >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
+/// 0.809017
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Action {
+    nx: usize,
+    nu: usize,
+    calc: Py<PyAny>,
+    calc_diff: Option<Py<PyAny>>,
+    bounds: Option<[Vec<f64>; 2]>,
+}
+
+#[pymethods]
+impl Action {
+    #[new]
+    #[pyo3(signature = (nx, nu, calc, calc_diff=None, lower=None, upper=None))]
+    fn new(
+        nx: usize,
+        nu: usize,
+        calc: Py<PyAny>,
+        calc_diff: Option<Py<PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        Ok(Self { nx, nu, calc, calc_diff, bounds: bounds(nu, lower, upper)? })
+    }
+}
+
+impl Action {
+    pub(super) fn copy(&self, py: Python<'_>) -> Own {
+        Own {
+            nx: self.nx,
+            nu: self.nu,
+            calc: self.calc.clone_ref(py),
+            calc_diff: self.calc_diff.as_ref().map(|f| f.clone_ref(py)),
+            bounds: self.bounds.clone(),
+            fault: Fault::default(),
+        }
+    }
+}
+
+/// An `Action` as the solver calls it. What it raises becomes a cost that is not a number, and is raised after the solve.
+pub(super) struct Own {
+    nx: usize,
+    nu: usize,
+    calc: Py<PyAny>,
+    pub(super) calc_diff: Option<Py<PyAny>>,
+    bounds: Option<[Vec<f64>; 2]>,
+    pub(super) fault: Fault,
+}
+
+impl Own {
+    fn keep<T>(&self, result: PyResult<T>) -> Option<T> {
+        match result {
+            Ok(value) => Some(value),
+            Err(error) => {
+                let mut fault = self.fault.lock().expect("nobody panics while holding it");
+                fault.get_or_insert(error);
+                None
+            }
+        }
+    }
+
+    fn call<'py>(&self, py: Python<'py>, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        f.bind(py).call1((t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
+    }
+
+    fn try_calc(&self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> PyResult<f64> {
+        Python::attach(|py| {
+            let (state, cost): (Bound<'_, PyAny>, f64) = self.call(py, &self.calc, t, x, u)?.extract()?;
+            if !state.is_none() {
+                next.copy_from_slice(&vector("the next state", &state, self.nx)?);
+            }
+            Ok(cost)
+        })
+    }
+
+    fn try_calc_diff(&self, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) -> PyResult<()> {
+        Python::attach(|py| {
+            let given = self.call(py, f, t, x, u)?.cast_into::<PyDict>()?;
+            let LqNode { A, B, Q, S, R, q, r, .. } = node;
+            for (name, entry) in given.iter() {
+                let name: String = name.extract()?;
+                let (to, shape): (&mut DMatrix<f64>, _) = match name.as_str() {
+                    "A" => (&mut *A, [self.nx, self.nx]),
+                    "B" => (&mut *B, [self.nx, self.nu]),
+                    "Q" => (&mut *Q, [self.nx, self.nx]),
+                    "S" => (&mut *S, [self.nx, self.nu]),
+                    "R" => (&mut *R, [self.nu, self.nu]),
+                    "q" => {
+                        q.copy_from_slice(&vector("q", &entry, self.nx)?);
+                        continue;
+                    }
+                    "r" => {
+                        r.copy_from_slice(&vector("r", &entry, self.nu)?);
+                        continue;
+                    }
+                    other => {
+                        let what = format!("calc_diff: expected A, B, Q, S, R, q or r, found '{other}'");
+                        return Err(PyValueError::new_err(what));
+                    }
+                };
+                to.copy_from(&matrix(&name, &entry, shape)?.to_matrix());
+            }
+            Ok(())
+        })
+    }
+}
+
+impl ActionModel for Own {
+    fn nx(&self) -> usize {
+        self.nx
+    }
+
+    fn nu(&self) -> usize {
+        self.nu
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let result = self.try_calc(t, x, u, next);
+        self.keep(result).unwrap_or(f64::NAN)
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        for field in [&mut node.A, &mut node.B, &mut node.Q, &mut node.S, &mut node.R] {
+            field.fill(0.0);
+        }
+        node.q.fill(0.0);
+        node.r.fill(0.0);
+        let f = self.calc_diff.as_ref().expect("an action without it is differentiated by differences");
+        let result = self.try_calc_diff(f, t, x, u, node);
+        if self.keep(result).is_none() {
+            node.q.fill(f64::NAN);
+        }
+    }
+}
