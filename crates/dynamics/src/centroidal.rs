@@ -197,6 +197,7 @@ kernel! {
 ///
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
+#[inline(always)]
 pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -252,6 +253,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// kg m²/s), in O(n).
     ///
     /// Not a number if nothing that moves has a mass. Allocates nothing.
+    #[inline(always)]
     pub fn centroidal_momentum(&self) -> Force<S> {
         let l = Single::<S, R>::new(self.model);
         let mut momentum = Force::zero();

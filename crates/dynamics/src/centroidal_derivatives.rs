@@ -191,6 +191,7 @@ kernel! {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another size.
+#[inline(always)]
 pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

@@ -45,6 +45,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// let com = forward_kinematics(&quadruped, &mut data, &neutral(&quadruped)).com();
     /// assert!(f64::abs(com.y) < 1e-12); // left and right weigh the same
     /// ```
+    #[inline(always)]
     pub fn com(&self) -> Vec3<S> {
         let (mass, moment) = self.mass_and_moment();
         moment.scale(mass.recip())

@@ -68,6 +68,15 @@ pub(crate) unsafe fn fused<S>(data: &mut Data<S>) -> &mut Data<Fused> {
     unsafe { &mut *core::ptr::from_mut(data).cast() }
 }
 
+impl Data<f64> {
+    /// The same scratch, for one who computes as algorithms on `f64` do.
+    #[doc(hidden)]
+    pub fn fused(&mut self) -> &mut Data<Fused> {
+        // SAFETY: S is f64.
+        unsafe { fused(self) }
+    }
+}
+
 /// A function that runs its body, generic over the scalar `S` and the model's constants `R`, compiled for the right level.
 ///
 /// The body may return nothing: what it computes is in the data.

@@ -43,10 +43,12 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame, or `dv_dq` is not 6 × nv.
+    #[inline(always)]
     pub fn frame_velocity_derivative(&self, frame: usize, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
         self.velocity_derivative(self.model.frames[frame].body, self.frame(frame), reference, dv_dq);
     }
 
+    #[inline(always)]
     fn velocity_derivative(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
         clear("dv_dq", dv_dq, self.model.nv);
         let (oXr, v) = (reference.pose(oXf), self.moving.v[body]);

@@ -99,6 +99,7 @@ pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, 
 }
 
 /// Fills a Jacobian with zeros, if it is 6 × nv.
+#[inline(always)]
 pub(crate) fn clear<S: Scalar>(name: &str, J: &mut DMatrix<S>, nv: usize) {
     assert!(J.shape() == (6, nv), "{name}: expected 6 × {nv}, found {:?}", J.shape());
     J.as_mut_slice().fill(S::zero());
@@ -119,6 +120,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame.
+    #[inline(always)]
     pub fn frame(&self, frame: usize) -> Se3<S> {
         let frame = &self.model.frames[frame];
         self.body(frame.body) * frame.placement.lift()
@@ -136,6 +138,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame, or `J` is not 6 × nv.
+    #[inline(always)]
     pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
         self.jacobian(self.model.frames[frame].body, self.frame(frame), reference, J);
     }
@@ -165,6 +168,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame.
+    #[inline(always)]
     pub fn frame_velocity(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
         reference.pose(self.frame(frame)).act_inv(self.moving.v[self.model.frames[frame].body])
     }

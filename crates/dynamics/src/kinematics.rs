@@ -6,6 +6,7 @@ use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Placements, Velocities};
 use crate::joint::{Joint, Turns};
 use crate::layout::{Layout, Single};
+use crate::limbs;
 use crate::model::Model;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
@@ -19,6 +20,19 @@ pub(crate) struct World<S> {
     pub oX: Vec<Se3<S>>,
     /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
     pub S: Vec<Motion<S>>,
+    /// Where the last call has placed the bodies. Written by: `place`, by `rnea`, and by limbs.
+    pub placed: Placed,
+}
+
+/// Where the bodies' placements stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Placed {
+    /// They were not computed.
+    Nowhere,
+    /// Body by body.
+    Bodies,
+    /// In the steps of limbs side by side.
+    Limbs,
 }
 
 impl<S: Scalar> World<S> {
@@ -27,13 +41,15 @@ impl<S: Scalar> World<S> {
             turns: Turns::new(size.bodies),
             oX: vec![Se3::identity(); size.bodies],
             S: vec![Motion::zero(); size.columns],
+            placed: Placed::Nowhere,
         }
     }
 }
 
 /// oXi = oXλ λXi, and the columns of S, for all bodies.
 #[inline(always)]
-pub(crate) fn place<L: Layout>(l: &L, World { turns, oX, S }: &mut World<L::S>, q: &[L::S]) {
+pub(crate) fn place<L: Layout>(l: &L, World { turns, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
+    *placed = Placed::Bodies;
     Joint::turns(l, q, turns);
     for i in l.bodies() {
         oX[i] = l.parent(oX, i) * Joint::turned_placement(l, i, q, turns.sin[i], turns.cos[i]); // oXi = oXλ λXi
@@ -118,6 +134,31 @@ kernel! {
     /// The accelerations of bodies whose velocities are known.
     pub(crate) fn accelerations(model, data, a: &[S]) {
         accelerate(&Single::new(model), &data.world, &mut data.moving, a);
+    }
+}
+
+impl<S: Scalar> Data<S> {
+    /// The placements at the position of the last call on this data: they need not be computed again. There are none if it
+    /// did without them, as [`rnea`](crate::rnea()) does.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, aba, forward_kinematics, robots};
+    /// let arm = robots::arm7();
+    /// let (tool, mut data, q) = (arm.frame("tool")?, Data::new(&arm), [0.3; 7]);
+    /// aba(&arm, &mut data, &q, &[0.0; 7], &[0.0; 7], &[]);
+    /// let there = data.placements(&arm).unwrap().frame(tool);
+    /// assert_eq!(there, forward_kinematics(&arm, &mut data, &q).frame(tool));
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If this was made for a model of another tree.
+    pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
+        self.check(model);
+        if self.world.placed == Placed::Limbs {
+            limbs::spread(model, self);
+        }
+        (self.world.placed == Placed::Bodies).then_some(Placements { model, world: &self.world })
     }
 }
 

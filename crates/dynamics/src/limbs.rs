@@ -23,7 +23,7 @@ use crate::model::{Model, Node};
 use condyle_spatial::moves::Move;
 pub(crate) use constrained::run as run_constrained;
 pub(crate) use held::Held;
-pub(crate) use pass::{Scratch, Task, run};
+pub(crate) use pass::{Scratch, Task, run, spread};
 pub(crate) use seen::Seen;
 
 /// How many bodies stand side by side.

@@ -8,6 +8,7 @@
 use crate::data::{Data, Size, check, check_forces};
 use crate::dispatch::kernel;
 use crate::joint::{Joint, Turning, Turns};
+use crate::kinematics::Placed;
 use crate::layout::{Layout, Single};
 use crate::limbs;
 use crate::model::Model;
@@ -109,6 +110,7 @@ pub(crate) fn pass<L: Layout>(
 
 kernel! {
     fn one_by_one(model, data, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
+        data.world.placed = Placed::Nowhere;
         pass(&Single::new(model), &mut data.world.turns, &mut data.rnea, q, v, a, f_ext);
     }
 }

@@ -1,6 +1,9 @@
 //! A single number that computes as a lane does.
+#![allow(unsafe_code)]
 
-use crate::lanes::{Lanes, Number, operators};
+use crate::block::Block;
+use crate::lanes::{Kernel, Lanes, Number, operators, short};
+use crate::level::{Level, level};
 use crate::scalar::Scalar;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -8,6 +11,40 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
 pub struct Fused(pub f64);
+
+impl Fused {
+    /// Numbers under this name.
+    #[inline(always)]
+    pub fn of(x: &[f64]) -> &[Self] {
+        // SAFETY: it is a transparent wrapper.
+        unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) }
+    }
+}
+
+/// Runs a kernel on such numbers with the instructions that fuse, or else tells that the processor has none.
+#[inline]
+pub fn fused(kernel: impl Kernel) -> bool {
+    let can = level() > Level::Baseline;
+    if can {
+        // SAFETY: the processor has the level.
+        unsafe { short(kernel) };
+    }
+    can
+}
+
+impl Block for Fused {
+    type Number = f64;
+    #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        Self(from[0])
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to[0] = self.0;
+    }
+    #[inline(always)]
+    fn transpose(_: &mut [Self]) {}
+}
 
 macro_rules! fused_operators {
     ($($trait:ident $name:ident),*) => {$(

@@ -27,7 +27,7 @@ use crate::constraint_motion::Ends;
 use crate::constraint_set::{ConstraintSet, Plan as Constraint};
 use crate::data::Data;
 use crate::dispatch::{fused, same, slice, slice_mut};
-use crate::kinematics::place;
+use crate::kinematics::{Placed, place};
 use crate::model::Model;
 use condyle_spatial::block::Block;
 use condyle_spatial::lanes::{Fused, Kernel};
@@ -128,6 +128,7 @@ impl<V: Block<Number = f64>> Call<'_, V> {
         let f_ext = if arguments.f_ext.is_empty() { &[] } else { &f_ext[..] };
         let l = Limbs::new(plan, model);
         place(&l, world, q);
+        data.world.placed = Placed::Limbs;
         aba::inward(&l, world, aba, v, x, f_ext);
         held.carry::<V, N>(Left::new(plan, model, world, aba), set);
         for r in 0..set.lambda.len() {

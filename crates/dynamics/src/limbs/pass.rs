@@ -1,19 +1,19 @@
 //! A pass over steps of four bodies.
 #![allow(unsafe_code)]
 
-use super::lanes::{Four, Limbs};
+use super::lanes::{Four, Limbs, numbers};
 use super::steps::Source;
 use super::{LANES, Plan, inverse};
 use crate::data::{Data, Size};
 use crate::dispatch::{fused, is_f64, same, slice};
-use crate::kinematics::{World, place};
+use crate::kinematics::{Placed, World, place};
 use crate::layout::{Columns, Layout, Single};
 use crate::model::Model;
 use crate::{aba, crba, rnea, rnea_derivatives};
 use condyle_spatial::block::{Block, Real, lanes};
 use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::level::{Level, level};
-use condyle_spatial::{Constant, Force, Inertia, Scalar};
+use condyle_spatial::{Constant, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 use core::any::TypeId;
 use core::marker::PhantomData;
 
@@ -164,12 +164,14 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
         let f_ext = if arguments.f_ext.is_empty() { &[] } else { &f_ext[..] };
         let l = Limbs::new(plan, model);
         if let Task::Rnea = task {
+            data.world.placed = Placed::Nowhere;
             rnea::pass(&l, &mut world.turns, rnea, q, v, x, f_ext);
             scatter(plan, &rnea.tau, &mut data.rnea.tau);
             Single::<Fused, f64>::new(model).add_armature_torque(arguments.x, &mut data.rnea.tau);
             return;
         }
         place(&l, world, q);
+        data.world.placed = Placed::Limbs;
         l.share(&mut world.S);
         if let Task::Crba = task {
             crba::pass(&l, world, IC, data.crba.M.as_mut_slice());
@@ -231,4 +233,27 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
         }
     }
     true
+}
+
+/// Takes the placements that a call left in lanes to where those of single bodies stand.
+pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
+    let Some(plan) = ready(model, data) else { return };
+    // SAFETY: S is f64.
+    let Data { limbs: Some(scratch), world: World { oX, S, placed, .. }, .. } = (unsafe { fused(data) }) else {
+        return;
+    };
+    // SAFETY: poses and motions are made of vectors.
+    let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
+    for i in 1..oX.len() {
+        let ((step, lane), column) = (plan.place[i], model.nodes[i].column);
+        let pose = |k: usize| Fused(poses[(12 * step + k) * LANES + lane]);
+        let axis = |k: usize| Vec3::new(pose(k), pose(k + 1), pose(k + 2));
+        oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));
+        for k in 0..model.nodes[i].joint.nv() {
+            let slot = plan.steps[step].idx_v + k;
+            let number = |r: usize| Fused(motions[(6 * slot + r) * LANES + lane]);
+            S[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));
+        }
+    }
+    *placed = Placed::Bodies;
 }

@@ -3,8 +3,9 @@
 use crate::common::contacts::random_constraints;
 use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
-    Constraint, ConstraintSet, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, Se3, Sym3, WORLD, aba,
-    aba_derivatives, constrained_dynamics, crba, minv, nonlinear_effects, rnea, rnea_derivatives, robots,
+    Constraint, ConstraintSet, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, ReferenceFrame, Se3, Sym3,
+    WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, nonlinear_effects, rnea,
+    rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
 
@@ -271,5 +272,41 @@ fn fingers_of_all_lengths() {
             }
         }
         compare(&tree.build(), &mut worst, seed as u64);
+    }
+}
+
+/// The placements that a call leaves behind are those of its position, whichever way it took; after one that needs none
+/// there are none.
+#[test]
+fn calls_leave_their_placements() {
+    let mut worst = Worst::new("placements left behind", TOLERANCE);
+    let models = all_models(10).into_iter().chain((0..8).map(|seed| many_limbs(seed, Joint::FreeFlyer)));
+    for (seed, model) in models.enumerate().filter(|(_, model)| model.singular_joints().is_empty()) {
+        let (mut rng, nv, m) = (rng(seed as u64), model.nv(), &model);
+        let (mut data, mut own) = (Data::new(m), Data::new(m));
+        assert!(data.placements(m).is_none(), "{}: nothing was computed yet", m.name());
+        let mut set = ConstraintSet::new(m, &random_constraints(m, &State::random(m, &mut rng), &mut rng)).unwrap();
+        set.proximal = Proximal { mu: 1e-6, ..Proximal::default() };
+        for call in 0..4 {
+            let State { q, v, tau, .. } = State::random(m, &mut rng);
+            match call {
+                0 => _ = aba(m, &mut data, &q, &v, &tau, &[]),
+                1 => _ = constrained_dynamics(m, &mut data, &mut set, &q, &v, &tau, &[]),
+                2 => _ = aba_derivatives(m, &mut data, &q, &v, &tau, &[]),
+                _ => _ = crba(m, &mut data, &q),
+            }
+            let (left, expected) = (data.placements(m).unwrap(), forward_kinematics(m, &mut own, &q));
+            let (mut J, mut J_expected) = (DMatrix::zeros(6, nv), DMatrix::zeros(6, nv));
+            for frame in 0..m.frames().len() {
+                let (found, pose) = (left.frame(frame), expected.frame(frame));
+                worst.see(m, &found.translation.to_array(), &pose.translation.to_array());
+                worst.see(m, &(found.rotation - pose.rotation).x.to_array(), &[0.0; 3]);
+                left.frame_jacobian(frame, ReferenceFrame::Local, &mut J);
+                expected.frame_jacobian(frame, ReferenceFrame::Local, &mut J_expected);
+                worst.see(m, J.as_slice(), J_expected.as_slice());
+            }
+            rnea(m, &mut data, &q, &v, &tau, &[]);
+            assert!(data.placements(m).is_none(), "{}: rnea places no bodies", m.name());
+        }
     }
 }

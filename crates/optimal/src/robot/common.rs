@@ -6,6 +6,7 @@ use super::elimination::Elimination;
 use super::integrated::Wanted;
 use super::lanes::{Outcome, SideBySide};
 use super::limits::{Limit, Limits};
+use super::sight::{Known, Stack};
 use super::state::{GroupHessian, groups};
 use super::terms::Room;
 use super::watch::{Offer, Scene, Slopes, Watch};
@@ -57,11 +58,10 @@ impl Robot {
     }
 
     /// Computes the dynamics of some states side by side.
-    pub(super) fn prepare(&self, lanes: &mut SideBySide, xs: &[f64], us: &[f64], wanted: Wanted) {
-        let nx = self.model.nq() + self.model.nv();
-        let (count, nu) = (xs.len() / nx, self.actuation.nu());
-        (0..count).for_each(|k| self.actuation.effort(&us[k * nu..(k + 1) * nu], lanes.tau_mut(k)));
-        lanes.run(&self.model, count, xs, self.schedule.room().forces, wanted);
+    pub(super) fn prepare(&self, lanes: &mut SideBySide, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
+        let nu = self.actuation.nu();
+        (0..knots.len()).for_each(|k| self.actuation.effort(&us[k * nu..(k + 1) * nu], lanes.tau_mut(k)));
+        lanes.run(&self.model, knots, xs, &self.schedule, wanted);
     }
 
     /// Writes a knot of Δt = `scale` seconds in implicit form, from the equations of a state that was prepared; says
@@ -83,7 +83,7 @@ impl Robot {
         let scene = Scene { x, u, a: &outcome.a, tau: &self.tau, lambda: &outcome.lambda };
         node.implicit.active = true;
         let form = node.implicit.lend();
-        self.schedule.calc_diff(t, &scene, &elimination.slopes(&form, scale), scale, node);
+        self.schedule.calc_diff(t, &scene, outcome.known(), &elimination.slopes(&form, scale), scale, node);
         node.implicit.take_back(form);
         true
     }
@@ -217,13 +217,20 @@ impl Schedule {
         self.room
     }
 
+    /// The costs of knot t, and the limits that count there.
+    pub(super) fn stack(&self, t: usize) -> Stack<'_> {
+        Stack { costs: self.costs.at(t), limits: self.limits.at(t) }
+    }
+
     /// ℓ at knot t; writes the limits' term.
-    pub(super) fn calc(&mut self, t: usize, scene: &Scene<'_>) -> f64 {
+    pub(super) fn calc(&mut self, t: usize, scene: &Scene<'_>, known: Known<'_>) -> f64 {
         let Self { model, costs, limits, watch, .. } = self;
         let costs = costs.at(t);
-        let mut view = watch.look(model, costs.room().needs | limits.room(t).needs, scene, false);
+        let mut view = watch.look(model, Stack { costs, limits: limits.at(t) }, scene, false, known);
+        let cost = costs.calc(&mut view);
+        view.sight = view.sight.after(costs.room().seen);
         limits.calc(t, &mut view);
-        costs.calc(&mut view)
+        cost
     }
 
     /// The derivatives of `scale` · ℓ and the limits' term at knot t.
@@ -231,18 +238,23 @@ impl Schedule {
         &mut self,
         t: usize,
         scene: &Scene<'_>,
+        known: Known<'_>,
         slopes: &dyn Slopes,
         scale: f64,
         node: &mut LqNode,
     ) {
         let Self { model, costs, limits, watch, .. } = self;
         let costs = costs.at(t);
-        let mut view = watch.look(model, costs.room().needs | limits.room(t).needs, scene, true);
+        let mut view = watch.look(model, Stack { costs, limits: limits.at(t) }, scene, true, known);
         view.scratch.rows.clear();
         costs.push_rows(&mut view, slopes, scale);
+        let (own, others) = (view.sight, view.sight.after(costs.room().seen));
+        view.sight = others;
         limits.push_rows(t, &mut view, slopes);
         view.scratch.rows.write(node);
+        view.sight = own;
         costs.add_diagonals(&mut view, scale, node);
+        view.sight = others;
         limits.add_diagonals(t, &mut view, node);
     }
 }
@@ -344,9 +356,9 @@ macro_rules! robot_lanes {
             self.lanes.as_ref().map_or(1, SideBySide::lanes)
         }
 
-        fn prepare(&mut self, xs: &[f64], us: &[f64], wanted: super::Wanted) {
+        fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: super::Wanted) {
             if let Some(lanes) = &mut self.lanes {
-                self.robot.prepare(lanes, xs, us, wanted);
+                self.robot.prepare(lanes, knots, xs, us, wanted);
             }
         }
 

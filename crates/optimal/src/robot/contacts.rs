@@ -8,6 +8,7 @@ use super::elimination::Elimination;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::lanes::{Held, Outcome, SideBySide};
 use super::quadratic::Row;
+use super::sight::Known;
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::LqNode;
@@ -21,6 +22,9 @@ pub struct Contacts {
     pub(super) robot: Robot,
     set: ConstraintSet<f64>,
     data: Data<f64>,
+    /// q̈ and λ of a single call.
+    a: Vec<f64>,
+    lambda: Vec<f64>,
     lanes: Option<SideBySide>,
     elimination: Option<Elimination>,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
@@ -71,13 +75,22 @@ impl Contacts {
     ) -> Result<Self, Error> {
         let set = constraint_set(&model, contacts, damping)?;
         let own = Offer { nu: actuation.nu(), effort: true, ..Offer::default() };
-        let data = Data::new(&model);
+        let (data, a) = (Data::new(&model), vec![0.0; model.nv()]);
         let lanes = SideBySide::new(&model, Some(Held { contacts, proximal: set.proximal }));
         let da_du = actuation.scratch();
         let moved_by = moved_by(&model, contacts);
         let robot = Robot::new(model, actuation, offer(own, contacts), costs)?;
         robot.check_regular()?;
-        Ok(Self { elimination: robot.elimination(&moved_by), robot, set, data, lanes, da_du })
+        Ok(Self {
+            elimination: robot.elimination(&moved_by),
+            robot,
+            lambda: vec![0.0; set.rows()],
+            set,
+            data,
+            a,
+            lanes,
+            da_du,
+        })
     }
 }
 
@@ -133,8 +146,10 @@ impl ContinuousModel for Contacts {
         robot.actuation.effort(u, &mut robot.tau); // τ = S u
         let (q, v) = x.split_at(robot.model.nq());
         let d = constrained_dynamics(&robot.model, data, set, q, v, &robot.tau, &[]);
-        let scene = Scene { x, u, a: d.a, tau: &robot.tau, lambda: d.lambda };
-        (d.a, robot.schedule.calc(t, &scene))
+        self.a.copy_from_slice(d.a);
+        self.lambda.copy_from_slice(d.lambda);
+        let scene = Scene { x, u, a: &self.a, tau: &robot.tau, lambda: &self.lambda };
+        (&self.a, robot.schedule.calc(t, &scene, Known::Placed(data)))
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_> {
@@ -145,7 +160,14 @@ impl ContinuousModel for Contacts {
         let scene = Scene { x, u, a: d.a, tau: &robot.tau, lambda: d.lambda };
         let da = [d.da_dq, d.da_dv, d.da_dtau];
         let dlambda = [d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau];
-        robot.schedule.calc_diff(t, &scene, &ContactSlopes { da, dlambda, actuation: &robot.actuation }, scale, node);
+        robot.schedule.calc_diff(
+            t,
+            &scene,
+            Known::Nothing,
+            &ContactSlopes { da, dlambda, actuation: &robot.actuation },
+            scale,
+            node,
+        );
         let da_du = robot.actuation.columns(d.da_dtau, &mut self.da_du); // P S
         Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
     }
@@ -154,10 +176,11 @@ impl ContinuousModel for Contacts {
 
     fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
         let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc(t, x, u) };
-        let Outcome { a, lambda, .. } = &lanes.outcomes[i];
+        let outcome = &lanes.outcomes[i];
+        let Outcome { a, lambda, .. } = outcome;
         robot.actuation.effort(u, &mut robot.tau);
         let scene = Scene { x, u, a, tau: &robot.tau, lambda };
-        (a, robot.schedule.calc(t, &scene))
+        (a, robot.schedule.calc(t, &scene, outcome.known()))
     }
 
     fn calc_diff_prepared(
@@ -170,11 +193,12 @@ impl ContinuousModel for Contacts {
         node: &mut LqNode,
     ) -> Derivatives<'_> {
         let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc_diff(t, x, u, scale, node) };
-        let Outcome { a, lambda, da, dlambda, .. } = &lanes.outcomes[i];
+        let outcome = &lanes.outcomes[i];
+        let Outcome { a, lambda, da, dlambda, .. } = outcome;
         robot.actuation.effort(u, &mut robot.tau);
         let scene = Scene { x, u, a, tau: &robot.tau, lambda };
         let slopes = ContactSlopes { da: da.each_ref(), dlambda: dlambda.each_ref(), actuation: &robot.actuation };
-        robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
+        robot.schedule.calc_diff(t, &scene, outcome.known(), &slopes, scale, node);
         let da_du = robot.actuation.columns(&da[2], &mut self.da_du);
         Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
     }

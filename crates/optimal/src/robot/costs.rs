@@ -2,6 +2,7 @@
 
 use super::activation::Activation;
 use super::residual::{Part, Residual};
+use super::sight::seat;
 use super::terms::{Plan, Room, View};
 use super::watch::{Offer, Slopes};
 use crate::Error;
@@ -41,6 +42,8 @@ pub struct Costs {
     offer: Offer,
     terms: Vec<Cost>,
     plans: Vec<Plan>,
+    /// The terms that look at kinematics.
+    looks: Vec<usize>,
     room: Room,
 }
 
@@ -63,9 +66,11 @@ impl Costs {
                 return Err(Error::Cost { name: term.name.clone(), what });
             }
         }
-        let plans = terms.iter().map(|term| plan(&model, &offer, term)).collect::<Result<Vec<_>, _>>()?;
-        let room = terms.iter().zip(&plans).map(|(term, plan)| Room::of(&term.residual, plan)).sum();
-        Ok(Self { model, offer, terms, plans, room })
+        let mut plans = terms.iter().map(|term| plan(&model, &offer, term)).collect::<Result<Vec<_>, _>>()?;
+        let nv = model.nv();
+        let looks = seat(nv, terms.iter().map(|term| &term.residual).zip(&mut plans));
+        let room = terms.iter().zip(&plans).map(|(term, plan)| Room::of(nv, &term.residual, plan)).sum();
+        Ok(Self { model, offer, terms, plans, looks, room })
     }
 
     /// The terms.
@@ -88,10 +93,11 @@ impl Costs {
         let wrong = |what: &str| Error::Cost { name: name.to_owned(), what: what.to_owned() };
         let k = self.terms.iter().position(|t| t.name == name).ok_or_else(|| wrong("there is no such term"))?;
         let term = Cost { residual, ..self.terms[k].clone() };
-        let plan = plan(&self.model, &self.offer, &term)?;
-        if Room::of(&term.residual, &plan) != Room::of(&self.terms[k].residual, &self.plans[k]) {
+        let (mut plan, nv) = (plan(&self.model, &self.offer, &term)?, self.model.nv());
+        if Room::of(nv, &term.residual, &plan) != Room::of(nv, &self.terms[k].residual, &self.plans[k]) {
             return Err(wrong("its residual is of another kind than before"));
         }
+        plan.seat = self.plans[k].seat;
         (self.terms[k], self.plans[k]) = (term, plan);
         Ok(())
     }
@@ -99,6 +105,11 @@ impl Costs {
     /// What its residuals take, whatever their weights.
     pub(super) fn room(&self) -> Room {
         self.room
+    }
+
+    /// The terms that look at kinematics, whatever their weights.
+    pub(super) fn looks(&self) -> impl Iterator<Item = (&Cost, &Plan)> {
+        self.looks.iter().map(|&k| (&self.terms[k], &self.plans[k]))
     }
 
     /// The terms that have a weight.

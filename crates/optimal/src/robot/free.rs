@@ -7,6 +7,7 @@ use super::elimination::Elimination;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::lanes::{Outcome, SideBySide};
 use super::quadratic::Row;
+use super::sight::Known;
 use super::watch::{NoSlopes, Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
@@ -19,6 +20,8 @@ use std::sync::Arc;
 pub struct Free {
     pub(super) robot: Robot,
     data: Data<f64>,
+    /// q̈ of a single call.
+    a: Vec<f64>,
     lanes: Option<SideBySide>,
     elimination: Option<Elimination>,
     /// Whether this is the end of a horizon, where nothing moves.
@@ -72,6 +75,7 @@ impl Free {
         let robot = Robot::new(model, actuation, offer, costs)?;
         Ok(Self {
             data,
+            a: vec![0.0; nv],
             lanes,
             elimination: robot.elimination(&[]),
             da_du,
@@ -138,20 +142,20 @@ impl ContinuousModel for Free {
         let Self { robot, data, .. } = self;
         if self.still {
             let scene = Scene { x, u, a: &[], tau: &[], lambda: &[] };
-            return (&[], robot.schedule.calc(t, &scene));
+            return (&[], robot.schedule.calc(t, &scene, Known::Nothing));
         }
         robot.actuation.effort(u, &mut robot.tau); // τ = S u
         let (q, v) = x.split_at(robot.model.nq());
-        let a = aba(&robot.model, data, q, v, &robot.tau, &[]);
-        let scene = Scene { x, u, a, tau: &robot.tau, lambda: &[] };
-        (a, robot.schedule.calc(t, &scene))
+        self.a.copy_from_slice(aba(&robot.model, data, q, v, &robot.tau, &[]));
+        let scene = Scene { x, u, a: &self.a, tau: &robot.tau, lambda: &[] };
+        (&self.a, robot.schedule.calc(t, &scene, Known::Placed(data)))
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_> {
         let Self { robot, data, zeros, .. } = self;
         if self.still {
             let scene = Scene { x, u, a: &[], tau: &[], lambda: &[] };
-            robot.schedule.calc_diff(t, &scene, &NoSlopes, scale, node);
+            robot.schedule.calc_diff(t, &scene, Known::Nothing, &NoSlopes, scale, node);
             return Derivatives { a: &[], da_dq: zeros, da_dv: zeros, da_du: &[] };
         }
         robot.actuation.effort(u, &mut robot.tau);
@@ -159,7 +163,7 @@ impl ContinuousModel for Free {
         let d = aba_derivatives(&robot.model, data, q, v, &robot.tau, &[]);
         let scene = Scene { x, u, a: d.a, tau: &robot.tau, lambda: &[] };
         let slopes = FreeSlopes { da: [d.da_dq, d.da_dv, d.da_dtau], actuation: &robot.actuation };
-        robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
+        robot.schedule.calc_diff(t, &scene, Known::Nothing, &slopes, scale, node);
         let da_du = robot.actuation.columns(d.da_dtau, &mut self.da_du); // M⁻¹ S
         Derivatives { a: d.a, da_dq: d.da_dq, da_dv: d.da_dv, da_du }
     }
@@ -168,10 +172,11 @@ impl ContinuousModel for Free {
 
     fn calc_prepared(&mut self, i: usize, t: usize, x: &[f64], u: &[f64]) -> (&[f64], f64) {
         let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc(t, x, u) };
-        let a = &lanes.outcomes[i].a;
+        let outcome = &lanes.outcomes[i];
+        let a = &outcome.a;
         robot.actuation.effort(u, &mut robot.tau);
         let scene = Scene { x, u, a, tau: &robot.tau, lambda: &[] };
-        (a, robot.schedule.calc(t, &scene))
+        (a, robot.schedule.calc(t, &scene, outcome.known()))
     }
 
     fn calc_diff_prepared(
@@ -184,11 +189,12 @@ impl ContinuousModel for Free {
         node: &mut LqNode,
     ) -> Derivatives<'_> {
         let Self { robot, lanes: Some(lanes), .. } = self else { return self.calc_diff(t, x, u, scale, node) };
-        let Outcome { a, da, .. } = &lanes.outcomes[i];
+        let outcome = &lanes.outcomes[i];
+        let Outcome { a, da, .. } = outcome;
         robot.actuation.effort(u, &mut robot.tau);
         let scene = Scene { x, u, a, tau: &robot.tau, lambda: &[] };
         let slopes = FreeSlopes { da: da.each_ref(), actuation: &robot.actuation };
-        robot.schedule.calc_diff(t, &scene, &slopes, scale, node);
+        robot.schedule.calc_diff(t, &scene, outcome.known(), &slopes, scale, node);
         let da_du = robot.actuation.columns(&da[2], &mut self.da_du);
         Derivatives { a, da_dq: &da[0], da_dv: &da[1], da_du }
     }

@@ -5,6 +5,7 @@ use super::common::{Robot, robot_knot};
 use super::contact::{Contact, constraint_set, offer};
 use super::costs::Cost;
 use super::quadratic::Row;
+use super::sight::Known;
 use super::state::{state_difference, state_integrate};
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
@@ -108,7 +109,7 @@ impl ActionModel for ImpulseDynamics {
         q_next.copy_from_slice(q);
         v_next.copy_from_slice(after.v);
         (0..v.len()).for_each(|k| change[k] = after.v[k] - v[k]);
-        let cost = robot.schedule.calc(t, &Scene { x, u, a: change, tau: &[], lambda: after.lambda });
+        let cost = robot.schedule.calc(t, &Scene { x, u, a: change, tau: &[], lambda: after.lambda }, Known::Nothing);
         cost + robot.schedule.limits.term
     }
 
@@ -119,7 +120,7 @@ impl ActionModel for ImpulseDynamics {
         let d = impulse_dynamics_derivatives(&robot.model, data, set, q, v, self.restitution);
         (0..nv).for_each(|k| change[k] = d.v[k] - v[k]);
         let scene = Scene { x, u, a: change, tau: &[], lambda: d.lambda };
-        robot.schedule.calc_diff(t, &scene, &ImpulseSlopes { d }, 1.0, node);
+        robot.schedule.calc_diff(t, &scene, Known::Nothing, &ImpulseSlopes { d }, 1.0, node);
         // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v]: that of an Euler step that takes no time
         node.structure.set_euler(0.0, &[]);
         node.A.view_mut((0, 0), (nv, nv)).fill_with_identity();

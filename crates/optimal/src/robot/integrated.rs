@@ -87,10 +87,10 @@ pub trait ContinuousModel: Send + 'static {
         1
     }
 
-    /// Computes the dynamics of some states, at most [`lanes`](Self::lanes), side by side, so that the calls for each of
-    /// them that follow need not. Nothing by default.
-    fn prepare(&mut self, xs: &[f64], us: &[f64], wanted: Wanted) {
-        let _ = (xs, us, wanted);
+    /// Computes the dynamics of some states at these knots, at most [`lanes`](Self::lanes), side by side, so that the calls
+    /// for each of them that follow need not. Nothing by default.
+    fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
+        let _ = (knots, xs, us, wanted);
     }
 
     /// For dynamics that can be written in implicit form: the most coordinates and the most rows of costs that this takes.
@@ -364,7 +364,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
             let to = (from + lanes).min(knots.len());
             let side_by_side = to - from >= WORTHWHILE;
             if side_by_side {
-                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], Wanted::Motion);
+                let (xs, us) = (&xs[from * nx..to * nx], &us[from * nu..to * nu]);
+                self.inner.prepare(&knots[from..to], xs, us, Wanted::Motion);
             }
             for i in from..to {
                 let (x, u, next) = (&xs[i * nx..][..nx], &us[i * nu..][..nu], &mut next[i * nx..][..nx]);
@@ -390,7 +391,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
             let side_by_side = implicit || to - from >= WORTHWHILE;
             if side_by_side {
                 let wanted = if implicit { Wanted::Equations } else { Wanted::Derivatives };
-                self.inner.prepare(&xs[from * nx..to * nx], &us[from * nu..to * nu], wanted);
+                let (xs, us) = (&xs[from * nx..to * nx], &us[from * nu..to * nu]);
+                self.inner.prepare(&knots[from..to], xs, us, wanted);
             }
             for i in from..to {
                 let (x, u, node) = (&xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);

@@ -5,6 +5,7 @@ use super::common::{Robot, robot_knot, robot_positions};
 use super::costs::Cost;
 use super::integrated::{ContinuousModel, Derivatives, Integrated, Integrator};
 use super::quadratic::Row;
+use super::sight::Known;
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
@@ -98,7 +99,7 @@ impl ContinuousModel for Inverse {
         let (q, v) = x.split_at(robot.model.nq());
         a.copy_from_slice(u); // q̈ = u
         let tau = rnea(&robot.model, data, q, v, u, &[]);
-        (a, robot.schedule.calc(t, &Scene { x, u, a: u, tau, lambda: &[] }))
+        (a, robot.schedule.calc(t, &Scene { x, u, a: u, tau, lambda: &[] }, Known::Nothing))
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], scale: f64, node: &mut LqNode) -> Derivatives<'_> {
@@ -108,7 +109,7 @@ impl ContinuousModel for Inverse {
         robot.tau.copy_from_slice(rnea(&robot.model, data, q, v, u, &[]));
         let d = rnea_derivatives(&robot.model, data, q, v, u, &[]);
         let scene = Scene { x, u, a: u, tau: &robot.tau, lambda: &[] };
-        robot.schedule.calc_diff(t, &scene, &InverseSlopes { d }, scale, node);
+        robot.schedule.calc_diff(t, &scene, Known::Nothing, &InverseSlopes { d }, scale, node);
         Derivatives { a, da_dq: zeros, da_dv: zeros, da_du: identity.as_slice() }
     }
 

@@ -4,9 +4,11 @@
 //! once for all of them. What they give is unpacked in blocks, since the costs and the sweep look at one knot after the
 //! other.
 
+use super::common::Schedule;
 use super::contact::Contact;
 use super::elimination::Tableau;
 use super::integrated::Wanted;
+use super::sight::{Eyes, Known, Seen};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
     ConstraintSet, Data, Model, Proximal, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
@@ -21,7 +23,7 @@ type Short = <f64 as Real>::Short;
 type Long = <f64 as Real>::Long;
 
 /// Most lanes that there are.
-const WIDEST: usize = 8;
+pub(super) const WIDEST: usize = 8;
 
 /// What the dynamics of one knot give.
 #[derive(Clone, Debug)]
@@ -34,11 +36,28 @@ pub(super) struct Outcome {
     pub dlambda: [DMatrix<f64>; 3],
     /// The equations differentiated, row by row. Shape: that of the [`Tableau`].
     pub equations: Vec<f64>,
+    /// What its residuals see, if that was computed too.
+    seen: Seen,
+    has_seen: bool,
+}
+
+impl Outcome {
+    /// What its residuals see, if that was computed too.
+    pub(super) fn known(&self) -> Known<'_> {
+        if self.has_seen { Known::Seen(&self.seen) } else { Known::Nothing }
+    }
+}
+
+impl AsMut<Seen> for Outcome {
+    fn as_mut(&mut self) -> &mut Seen {
+        &mut self.seen
+    }
 }
 
 #[derive(Clone, Debug)]
 struct Group<S> {
     data: Data<S>,
+    eyes: Eyes<S>,
     /// None of a robot that touches nothing.
     set: Option<ConstraintSet<S>>,
     q: Vec<S>,
@@ -115,14 +134,14 @@ impl<S: Block<Number = f64>> Kernel for Unpack<'_, '_, S> {
 }
 
 /// Writes the numbers of each lane, times a factor, to rows of a place of its own.
-struct UnpackRows<'a, 'b, S> {
-    from: &'a [S],
+pub(super) struct UnpackRows<'a, 'b, S> {
+    pub from: &'a [S],
     /// How far it is from one row to the next, and from one column to the next, where they come from.
-    strides: [usize; 2],
-    shape: [usize; 2],
-    factor: f64,
-    to: &'a mut [&'b mut [f64]],
-    stride: usize,
+    pub strides: [usize; 2],
+    pub shape: [usize; 2],
+    pub factor: f64,
+    pub to: &'a mut [&'b mut [f64]],
+    pub stride: usize,
 }
 
 impl<S: Block<Number = f64>> Kernel for UnpackRows<'_, '_, S> {
@@ -200,11 +219,20 @@ impl<S: Block<Number = f64>> Group<S> {
         let o = S::zero();
         let (q, v) = (vec![o; model.nq()], vec![o; model.nv()]);
         let J = DMatrix::from_element(set.as_ref().map_or(0, ConstraintSet::rows), model.nv(), o);
-        Self { data: Data::new(model), set, q, tau: v.clone(), a: v.clone(), v, J }
+        Self { data: Data::new(model), eyes: Eyes::new(model), set, q, tau: v.clone(), a: v.clone(), v, J }
     }
 
-    fn run(&mut self, model: &Model, xs: &[f64], taus: &[f64], forces: bool, wanted: Wanted, out: &mut [Outcome]) {
-        let (nq, nv, count) = (model.nq(), model.nv(), out.len());
+    fn run(
+        &mut self,
+        model: &Model,
+        knots: &[usize],
+        xs: &[f64],
+        taus: &[f64],
+        schedule: &Schedule,
+        wanted: Wanted,
+        out: &mut [Outcome],
+    ) {
+        let (nq, nv, count, forces) = (model.nq(), model.nv(), out.len(), schedule.room().forces);
         let Self { data, set, q, v, tau, .. } = self;
         S::enter(Pack { from: xs, stride: nq + nv, count, to: q });
         S::enter(Pack { from: &xs[nq..], stride: nq + nv, count, to: v });
@@ -237,11 +265,28 @@ impl<S: Block<Number = f64>> Group<S> {
                 }
             }
         }
+        self.look(model, knots, schedule, wanted != Wanted::Motion, out);
+    }
+
+    /// What the residuals see of those knots that look at the same as the first one.
+    fn look(&mut self, model: &Model, knots: &[usize], schedule: &Schedule, slopes: bool, out: &mut [Outcome]) {
+        let first = schedule.stack(knots[0]);
+        let mut stacks = [first; WIDEST];
+        for (k, outcome) in out.iter_mut().enumerate() {
+            let stack = schedule.stack(knots[k]);
+            outcome.has_seen = stack.is_alike(first);
+            if outcome.has_seen {
+                stacks[k] = stack;
+            }
+            outcome.seen.make_room(schedule.room().seen);
+        }
+        let Self { data, eyes, q, v, .. } = self;
+        eyes.look(model, data, [q, v], slopes, &stacks[..out.len()], out);
     }
 
     /// The tableau [J μ1 c_v c_q; M −Jᵀ r_v r_q].
     fn equations(&mut self, model: &Model, out: &mut [Outcome]) {
-        let Self { data, set, q, v, tau, a, J } = self;
+        let Self { data, set, q, v, tau, a, J, .. } = self;
         let tableau = Tableau { nv: model.nv(), rows: J.nrows() };
         let Tableau { nv, rows } = tableau;
         let x = nv + rows;
@@ -332,6 +377,8 @@ impl SideBySide {
             da: [square(), square(), square()],
             dlambda: [wide(), wide(), wide()],
             equations: vec![0.0; Tableau { nv, rows }.len()],
+            seen: Seen::default(),
+            has_seen: false,
         };
         Some(Self { width: Box::new(width), taus: vec![0.0; lanes * nv], outcomes: vec![outcome; lanes] })
     }
@@ -347,12 +394,14 @@ impl SideBySide {
         &mut self.taus[k * nv..(k + 1) * nv]
     }
 
-    /// Computes what is wanted of some states; the slopes of forces only if they are asked for.
-    pub(super) fn run(&mut self, model: &Model, count: usize, xs: &[f64], forces: bool, wanted: Wanted) {
+    /// Computes what is wanted of the states of some knots, and what their residuals see; the slopes of forces only if
+    /// these look at them.
+    pub(super) fn run(&mut self, model: &Model, knots: &[usize], xs: &[f64], schedule: &Schedule, wanted: Wanted) {
         let Self { width, taus, outcomes } = self;
+        let out = &mut outcomes[..knots.len()];
         match &mut **width {
-            Width::Short(group) => group.run(model, xs, taus, forces, wanted, &mut outcomes[..count]),
-            Width::Long(group) => group.run(model, xs, taus, forces, wanted, &mut outcomes[..count]),
+            Width::Short(group) => group.run(model, knots, xs, taus, schedule, wanted, out),
+            Width::Long(group) => group.run(model, knots, xs, taus, schedule, wanted, out),
         }
     }
 }

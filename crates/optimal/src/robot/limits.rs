@@ -3,6 +3,7 @@
 use super::common::Variants;
 use super::integrated::ContinuousModel;
 use super::residual::{Part, Residual};
+use super::sight::seat;
 use super::terms::{Plan, Room, View};
 use super::watch::{Offer, Slopes};
 use crate::Error;
@@ -89,6 +90,8 @@ impl Limit {
 pub(super) struct Set {
     limits: Vec<Limit>,
     plans: Vec<Plan>,
+    /// Those that look at kinematics.
+    looks: Vec<usize>,
     room: Room,
     /// The bounds of all, one after the other.
     lower: Vec<f64>,
@@ -106,13 +109,24 @@ impl Set {
                 return Err(wrong("another limit has this name".to_owned()));
             }
             let plan = limit.plan(model, offer).map_err(wrong)?;
-            set.room = set.room + Room::of(&limit.residual, &plan);
+            set.room = set.room + Room::of(model.nv(), &limit.residual, &plan);
             set.lower.extend(&limit.lower);
             set.upper.extend(&limit.upper);
             set.plans.push(plan);
             set.limits.push(limit);
         }
+        set.looks = seat(model.nv(), set.limits.iter().map(|limit| &limit.residual).zip(&mut set.plans));
         Ok(set)
+    }
+
+    /// What its residuals take.
+    pub(super) fn room(&self) -> Room {
+        self.room
+    }
+
+    /// The limits that look at kinematics.
+    pub(super) fn looks(&self) -> impl Iterator<Item = (&Limit, &Plan)> {
+        self.looks.iter().map(|&k| (&self.limits[k], &self.plans[k]))
     }
 
     /// The limits, with the place of the first number of each.
@@ -129,6 +143,7 @@ impl Set {
 #[derive(Clone, Debug)]
 pub struct Limits {
     sets: Variants<Set>,
+    none: Set,
     multipliers: Multipliers,
     /// Whether they count: not at later stages of a step.
     pub(super) active: bool,
@@ -138,7 +153,8 @@ pub struct Limits {
 
 impl Limits {
     pub(super) fn none() -> Self {
-        Self { sets: Variants::new(Set::default()), multipliers: Multipliers::new(0), active: true, term: 0.0 }
+        let none = Set::default();
+        Self { sets: Variants::new(none.clone()), none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
     }
 
     /// Sets those of knot t, or of all knots without limits of their own. Forgets multipliers.
@@ -160,9 +176,9 @@ impl Limits {
         self.sets.all().iter().fold(Room::default(), |most, set| most.or(set.room))
     }
 
-    /// What they take at knot t.
-    pub(super) fn room(&self, t: usize) -> Room {
-        if self.active { self.sets.at(t).room } else { Room::default() }
+    /// Those that count at knot t.
+    pub(super) fn at(&self, t: usize) -> &Set {
+        if self.active { self.sets.at(t) } else { &self.none }
     }
 
     pub(super) fn visit(&mut self, t: usize, visit: &mut Visit<'_>) {
@@ -172,7 +188,7 @@ impl Limits {
 
     /// The term at knot t.
     pub(super) fn calc(&mut self, t: usize, view: &mut View<'_>) {
-        let Self { sets, multipliers, active: true, term } = self else { return };
+        let Self { sets, multipliers, active: true, term, .. } = self else { return };
         *term = 0.0;
         for (first, limit, plan) in sets.at(t).each() {
             view.residual(&limit.residual, plan);

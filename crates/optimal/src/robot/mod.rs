@@ -62,6 +62,7 @@ mod limits;
 mod quadratic;
 mod residual;
 mod runge_kutta;
+mod sight;
 mod state;
 mod terms;
 mod watch;

@@ -75,10 +75,10 @@ impl Rows {
         (self.whole, self.positions) = (0, 0);
     }
 
-    /// A row of zeros, to be written.
-    pub(super) fn push(&mut self, d: f64, dd: f64) -> Row<'_> {
+    /// A row of zeros, to be written, for the a′ and a″ that it is worth.
+    pub(super) fn push(&mut self, worth: [f64; 2]) -> Row<'_> {
         let k = self.whole;
-        self.slopes[k] = [d, dd];
+        self.slopes[k] = worth;
         self.whole += 1;
         let row = &mut self.rows[k * self.stride..][..self.nu + 2 * self.nv];
         row.fill(0.0);
@@ -87,18 +87,12 @@ impl Rows {
         Row { u, v, q }
     }
 
-    /// The rows of a Jacobian with respect to q that has entries in some columns alone; J has at least as many rows.
-    pub(super) fn push_positions(&mut self, J: &[f64], height: usize, columns: &[usize], d: &[f64], dd: &[f64]) {
-        for i in 0..d.len() {
-            self.positions += 1;
-            let k = self.slopes.len() - self.positions;
-            self.slopes[k] = [d[i], dd[i]];
-            let row = &mut self.rows[k * self.stride + self.nu + self.nv..][..self.nv];
-            row.fill(0.0);
-            for &c in columns {
-                row[c] = J[c * height + i];
-            }
-        }
+    /// A row of a Jacobian with respect to q alone.
+    pub(super) fn push_positions(&mut self, row: &[f64], worth: [f64; 2]) {
+        self.positions += 1;
+        let k = self.slopes.len() - self.positions;
+        self.slopes[k] = worth;
+        self.rows[k * self.stride + self.nu + self.nv..][..self.nv].copy_from_slice(row);
     }
 
     /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in implicit form, it writes q and the

@@ -147,6 +147,37 @@ impl Residual {
         }
     }
 
+    /// Whether it looks at kinematics alone.
+    pub(super) fn is_seen(&self) -> bool {
+        self.frame().is_some() || matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. })
+    }
+
+    /// Whether another one looks at the same, with a target of its own.
+    pub(super) fn looks_like(&self, other: &Self) -> bool {
+        let reference = |residual: &Self| match residual {
+            Self::FrameVelocity { reference, .. } => Some(*reference),
+            _ => None,
+        };
+        core::mem::discriminant(self) == core::mem::discriminant(other)
+            && (self.frame(), reference(self)) == (other.frame(), reference(other))
+    }
+
+    /// Writes the numbers of its target, positions and twists first, to lane k.
+    pub(super) fn write_target<const N: usize>(&self, k: usize, to: &mut [[f64; N]; 12]) {
+        let mut write = |from: usize, numbers: &[f64]| (0..numbers.len()).for_each(|i| to[from + i][k] = numbers[i]);
+        match self {
+            Self::CenterOfMass { target } | Self::FrameTranslation { target, .. } => write(0, &target.to_array()),
+            Self::CentroidalMomentum { target } => write(0, &target.to_array()),
+            Self::FrameVelocity { target, .. } => write(0, &target.to_array()),
+            Self::FramePlacement { target, .. } => {
+                write(0, &target.translation.to_array());
+                write(3, target.rotation.columns().map(Vec3::to_array).as_flattened());
+            }
+            Self::FrameRotation { target, .. } => write(3, target.columns().map(Vec3::to_array).as_flattened()),
+            _ => {}
+        }
+    }
+
     /// The frame that it looks at.
     pub(super) fn frame(&self) -> Option<usize> {
         match self {

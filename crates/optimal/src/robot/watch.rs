@@ -1,11 +1,12 @@
 //! What the dynamics of a knot offer to its residuals, and what residuals share.
 
 use super::quadratic::{Row, Rows};
+use super::sight::{Known, OwnEyes, Seen, Stack};
 use super::state::groups;
 use super::terms::{Room, View};
 use condyle_dynamics::{
-    Data, Model, centroidal_derivatives, centroidal_map, forward_kinematics, forward_velocities, gravity, rnea,
-    rnea_derivatives, static_torque_derivative,
+    Data, Model, centroidal_derivatives, forward_kinematics, forward_velocities, gravity, rnea, rnea_derivatives,
+    static_torque_derivative,
 };
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -91,6 +92,13 @@ pub(super) struct Needs {
     pub impulse_com: bool,
 }
 
+impl Needs {
+    /// Whether one looks at kinematics.
+    pub(super) fn kinematics(self) -> bool {
+        self.placements || self.velocities
+    }
+}
+
 impl core::ops::BitOr for Needs {
     type Output = Self;
     fn bitor(self, o: Self) -> Self {
@@ -109,6 +117,8 @@ impl core::ops::BitOr for Needs {
 #[derive(Clone, Debug)]
 pub(super) struct Watch {
     data: Data<f64>,
+    eyes: OwnEyes,
+    seen: Seen,
     pub scratch: Scratch,
 }
 
@@ -119,27 +129,20 @@ pub(super) struct Scratch {
     pub r: Vec<f64>,
     pub d: Vec<f64>,
     pub dd: Vec<f64>,
-    /// The Jacobian of a residual with respect to q. Shape: 6 × nv.
-    pub J: DMatrix<f64>,
-    /// The same with respect to v. Shape: 6 × nv.
-    pub Jv: DMatrix<f64>,
     /// The rows of all Jacobians.
     pub rows: Rows,
     /// The Jacobian of the difference of configurations. Shape: nv × nv.
     pub D: DMatrix<f64>,
-    /// ∂c/∂q, and ∂ċ/∂q for the change of velocity at an impact. Shape: 3 × nv.
+    /// At an impact ∂c/∂q, and ∂ċ/∂q for the change of velocity there. Shape: 3 × nv.
     pub com: [DMatrix<f64>; 2],
-    /// ∂h_G/∂q, ∂h_G/∂v. Shape: 6 × nv.
-    pub momentum: [DMatrix<f64>; 2],
     /// M q̈ + h − g. Shape: nv.
     pub surplus: Vec<f64>,
     /// Its derivatives with respect to q, v, q̈. Shape: nv × nv, nothing if no residual needs them.
     pub surplus_slopes: [DMatrix<f64>; 3],
     /// J_c (v⁺ − v).
     pub com_change: [f64; 3],
-    /// The coordinates of each group of positions that is no vector space, and of all positions.
+    /// The coordinates of each group of positions that is no vector space.
     pub groups: Vec<Range<usize>>,
-    pub all: Vec<usize>,
     /// Zeros. Shape: nv.
     zero: Vec<f64>,
 }
@@ -154,24 +157,23 @@ impl Watch {
             r: vec![0.0; room.longest],
             d: vec![0.0; room.longest],
             dd: vec![0.0; room.longest],
-            J: rows(6),
-            Jv: rows(6),
             rows: Rows::new(nv, nu, room.rows),
             D: rows(nv),
             com: [rows(3), rows(3)],
-            momentum: [rows(6), rows(6)],
             surplus: vec![0.0; nv],
             surplus_slopes: [square(), square(), square()],
             com_change: [0.0; 3],
             groups: groups(model),
-            all: (0..nv).collect(),
             zero: vec![0.0; nv],
         };
-        Self { data: Data::new(model), scratch }
+        let mut seen = Seen::default();
+        seen.make_room(room.seen);
+        Self { data: Data::new(model), eyes: OwnEyes::new(model), seen, scratch }
     }
 
     /// Makes room for other residuals.
     pub(super) fn resize(&mut self, nu: usize, room: Room) {
+        self.seen.make_room(room.seen);
         let s = &mut self.scratch;
         for numbers in [&mut s.r, &mut s.d, &mut s.dd] {
             numbers.resize(room.longest, 0.0);
@@ -183,15 +185,17 @@ impl Watch {
         }
     }
 
-    /// Computes what the residuals need of a scene, with its slopes if they are asked for.
+    /// Computes what the residuals of a knot need of a scene, with its slopes if they are asked for; what they see of its
+    /// kinematics only if it is not known.
     pub(super) fn look<'a>(
         &'a mut self,
         model: &'a Model,
-        needs: Needs,
+        stack: Stack<'_>,
         scene: &'a Scene<'a>,
         slopes: bool,
+        known: Known<'a>,
     ) -> View<'a> {
-        let Self { data, scratch } = self;
+        let (Self { data, eyes, seen: own, scratch }, needs) = (self, stack.needs());
         let (q, v) = scene.x.split_at(model.nq());
         if needs.surplus {
             scratch.surplus.copy_from_slice(rnea(model, data, q, v, scene.a, &[]));
@@ -213,22 +217,24 @@ impl Watch {
             let d = centroidal_derivatives(model, data, q, scene.a, &scratch.zero);
             scratch.com[0].as_mut_slice().copy_from_slice(d.dcom_dq.as_slice());
             scratch.com[1].as_mut_slice().copy_from_slice(d.dvcom_dq.as_slice());
-        } else if slopes && needs.com {
-            scratch.com[0].as_mut_slice().copy_from_slice(centroidal_map(model, data, q).Jcom.as_slice());
         }
-        if slopes && needs.momentum {
-            let d = centroidal_derivatives(model, data, q, v, &scratch.zero);
-            scratch.momentum[0].as_mut_slice().copy_from_slice(d.dh_dq.as_slice());
-            scratch.momentum[1].as_mut_slice().copy_from_slice(d.dh_dv.as_slice());
-        }
-        let (placements, velocities) = if needs.velocities {
-            let velocities = forward_velocities(model, data, q, v);
-            (Some(*velocities), Some(velocities))
-        } else if needs.placements {
-            (Some(forward_kinematics(model, data, q)), None)
-        } else {
-            (None, None)
+        let mut look = |data| {
+            eyes.look(model, data, [q, v], slopes, stack, own);
         };
-        View { model, scene, placements, velocities, scratch }
+        let sight = match known {
+            Known::Seen(seen) => seen.all(),
+            Known::Placed(data) => {
+                look(data);
+                own.all()
+            }
+            Known::Nothing => {
+                if needs.placements && !needs.velocities {
+                    forward_kinematics(model, data, q);
+                }
+                look(data);
+                own.all()
+            }
+        };
+        View { model, scene, sight, scratch }
     }
 }

@@ -11,7 +11,7 @@ use condyle_dynamics::{
 };
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Contacts, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
-    Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
+    Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;
@@ -466,6 +466,39 @@ fn knots_side_by_side_are_single_knots() {
     let flight = FreeDynamics::running(model.clone(), DT, free).unwrap();
     check_group(stance, &model, &mut rng);
     check_group(flight, &model, &mut rng);
+}
+
+/// The same where knots of a group differ in targets, in weights, and in what they look at at all.
+#[test]
+fn knots_with_costs_of_their_own_are_single_knots() {
+    let mut rng = StdRng::seed_from_u64(19);
+    let model = Arc::new(robots::quadruped().with_limbs(false));
+    let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+    let costs = contact_costs(&model, &contacts, 12, &mut rng);
+    let mut stance = ContactDynamics::running(model.clone(), &contacts, DT, costs.clone()).unwrap();
+    let frame = model.frame("LH_foot").unwrap();
+    let mut other = |knot: usize, turn: bool| {
+        let mut own = costs.clone();
+        for cost in &mut own {
+            match &mut cost.residual {
+                Residual::CenterOfMass { target } => *target = Vec3::new(rng.random(), rng.random(), 0.3),
+                Residual::FrameRotation { target, .. } => *target = rotation(&mut rng),
+                Residual::FrameVelocity { frame: own, .. } if turn => *own = frame,
+                Residual::CentroidalMomentum { .. } if knot == 5 => cost.weight = 0.0,
+                _ => {}
+            }
+        }
+        own
+    };
+    for (knot, turn) in [(1, false), (4, true), (5, false), (6, true), (9, true), (13, false)] {
+        stance.set_costs(knot, other(knot, turn)).unwrap();
+    }
+    let lift =
+        vec![Cost::new("lift", 1.0, Residual::FrameTranslation { frame, target: Vec3::zero() }, Activation::Quadratic)];
+    stance.set_costs(2, lift).unwrap();
+    let height = Residual::FrameTranslation { frame, target: Vec3::new(0.0, 0.0, 0.1) };
+    stance.set_limits(3, vec![Limit::equality("height", height)]).unwrap();
+    check_group(stance, &model, &mut rng);
 }
 
 fn check_group(mut action: impl ActionModel, model: &Model, rng: &mut StdRng) {

@@ -1,0 +1,376 @@
+//! Residuals that look at where the bodies are and how they move, with their Jacobians: of one knot, or of several side
+//! by side in the lanes of a vector register.
+
+use super::costs::Costs;
+use super::lanes::{UnpackRows, WIDEST};
+use super::limits::Set;
+use super::residual::{Part, Residual};
+use super::terms::Plan;
+use super::watch::Needs;
+use condyle_dynamics::{
+    Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
+    forward_velocities,
+};
+use condyle_spatial::block::Block;
+use condyle_spatial::lanes::{Fused, Kernel, fused};
+use condyle_spatial::{Force, Mat3, Motion, Quaternion, Se3, Vec3, lie};
+use nalgebra::DMatrix;
+
+/// The numbers of each such residual stand so far from those of the next one.
+const STRIDE: usize = 8;
+
+/// Where a residual stands in what is [`Seen`]: which one it is, and where its rows begin.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seat {
+    index: usize,
+    rows: usize,
+}
+
+/// Gives the residuals of a list that look at kinematics their seats; returns which ones they are.
+pub(super) fn seat<'a>(nv: usize, all: impl Iterator<Item = (&'a Residual, &'a mut Plan)>) -> Vec<usize> {
+    let (mut looks, mut rows) = (Vec::new(), 0);
+    for (k, (residual, plan)) in all.enumerate().filter(|(_, (residual, _))| residual.is_seen()) {
+        plan.seat = Seat { index: looks.len(), rows };
+        looks.push(k);
+        rows += seen_rows(nv, residual, plan.n);
+    }
+    looks
+}
+
+/// How many numbers the rows of such a residual have: with respect to q, or to (v, q).
+pub(super) fn seen_rows(nv: usize, residual: &Residual, n: usize) -> usize {
+    n * width(nv, residual)
+}
+
+fn width(nv: usize, residual: &Residual) -> usize {
+    if residual.part() == Part::Positions { nv } else { 2 * nv }
+}
+
+/// What the residuals of a knot see.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Seen {
+    r: Vec<f64>,
+    rows: Vec<f64>,
+}
+
+impl Seen {
+    /// Room for so many residuals, and for so many numbers in their rows.
+    pub(super) fn make_room(&mut self, [looks, rows]: [usize; 2]) {
+        if self.r.len() < looks * STRIDE {
+            self.r.resize(looks * STRIDE, 0.0);
+        }
+        if self.rows.len() < rows {
+            self.rows.resize(rows, 0.0);
+        }
+    }
+
+    /// All of it.
+    pub(super) fn all(&self) -> Sight<'_> {
+        Sight { r: &self.r, rows: &self.rows }
+    }
+}
+
+impl AsMut<Self> for Seen {
+    fn as_mut(&mut self) -> &mut Self {
+        self
+    }
+}
+
+/// What is known of the kinematics of a knot.
+pub(super) enum Known<'a> {
+    Nothing,
+    /// Scratch whose last call was at its position.
+    Placed(&'a mut Data<f64>),
+    Seen(&'a Seen),
+}
+
+/// What the residuals of a list see.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<'a> {
+    r: &'a [f64],
+    rows: &'a [f64],
+}
+
+impl<'a> Sight<'a> {
+    /// Without what comes first in both.
+    pub(super) fn after(self, [looks, rows]: [usize; 2]) -> Self {
+        Self { r: &self.r[looks * STRIDE..], rows: &self.rows[rows..] }
+    }
+
+    /// r of a residual.
+    pub(super) fn residual(self, plan: &Plan) -> &'a [f64] {
+        &self.r[plan.seat.index * STRIDE..][..plan.n]
+    }
+
+    /// Its rows, as wide as they are.
+    pub(super) fn rows(self, nv: usize, residual: &Residual, plan: &Plan) -> core::slice::ChunksExact<'a, f64> {
+        self.rows[plan.seat.rows..][..seen_rows(nv, residual, plan.n)].chunks_exact(width(nv, residual))
+    }
+}
+
+/// The costs and the limits of a knot.
+#[derive(Clone, Copy)]
+pub(super) struct Stack<'a> {
+    pub costs: &'a Costs,
+    pub limits: &'a Set,
+}
+
+impl<'a> Stack<'a> {
+    /// What its residuals look at.
+    pub(super) fn needs(self) -> Needs {
+        self.costs.room().needs | self.limits.room().needs
+    }
+
+    /// The residuals that look at kinematics, with their weights and where their numbers and rows begin.
+    fn looks(self) -> impl Iterator<Item = (&'a Residual, f64, [usize; 2])> {
+        let at = |plan: &Plan, [looks, rows]: [usize; 2]| [(looks + plan.seat.index) * STRIDE, rows + plan.seat.rows];
+        let first = self.costs.room().seen;
+        let costs = self.costs.looks().map(move |(term, plan)| (&term.residual, term.weight, at(plan, [0, 0])));
+        costs.chain(self.limits.looks().map(move |(limit, plan)| (&limit.residual, 1.0, at(plan, first))))
+    }
+
+    /// Whether another knot looks at the same with its own targets.
+    pub(super) fn is_alike(self, other: Self) -> bool {
+        let same = core::ptr::eq(self.costs, other.costs) && core::ptr::eq(self.limits, other.limits);
+        same || {
+            let (ours, theirs) = (self.looks().map(|look| look.0), other.looks().map(|look| look.0));
+            self.costs.room().seen == other.costs.room().seen
+                && self.limits.room().seen == other.limits.room().seen
+                && ours.zip(theirs).all(|(a, b)| a.looks_like(b))
+        }
+    }
+}
+
+/// Scratch of those who look.
+#[derive(Clone, Debug)]
+pub(super) struct Eyes<S> {
+    /// ∂r/∂q and ∂r/∂v. Shape: 6 × nv.
+    J: DMatrix<S>,
+    Jv: DMatrix<S>,
+    /// Zeros. Shape: nv.
+    zero: Vec<S>,
+    /// ∂c/∂q. Shape: 3 × nv.
+    com: DMatrix<S>,
+    /// ∂h_G/∂q, ∂h_G/∂v. Shape: 6 × nv.
+    momentum: [DMatrix<S>; 2],
+}
+
+impl<S: Block<Number = f64>> Eyes<S> {
+    pub(super) fn new(model: &Model) -> Self {
+        let wide = |rows| DMatrix::from_element(rows, model.nv(), S::zero());
+        let zero = vec![S::zero(); model.nv()];
+        Self { J: wide(6), Jv: wide(6), zero, com: wide(3), momentum: [wide(6), wide(6)] }
+    }
+
+    /// Computes what some knots see, whose stacks are alike, at a state (q, v) with a lane for each of them; with the rows
+    /// of Jacobians if slopes are asked for. The last call on `data` was at q.
+    pub(super) fn look(
+        &mut self,
+        model: &Model,
+        data: &mut Data<S>,
+        [q, v]: [&[S]; 2],
+        slopes: bool,
+        stacks: &[Stack<'_>],
+        to: &mut [impl AsMut<Seen>],
+    ) {
+        if stacks[0].needs().kinematics() {
+            S::enter(Look { eyes: self, model, data, q, v, slopes, stacks, to });
+        }
+    }
+}
+
+/// The eyes of a single knot, which sees what a lane does.
+#[derive(Clone, Debug)]
+pub(super) struct OwnEyes {
+    /// Where products are fused.
+    fused: Eyes<Fused>,
+    plain: Eyes<f64>,
+}
+
+impl OwnEyes {
+    pub(super) fn new(model: &Model) -> Self {
+        Self { fused: Eyes::new(model), plain: Eyes::new(model) }
+    }
+
+    /// As [`Eyes::look`].
+    pub(super) fn look(
+        &mut self,
+        model: &Model,
+        data: &mut Data<f64>,
+        [q, v]: [&[f64]; 2],
+        slopes: bool,
+        stack: Stack<'_>,
+        to: &mut Seen,
+    ) {
+        if !stack.needs().kinematics() {
+            return;
+        }
+        let (stacks, to) = (&[stack], core::slice::from_mut(to));
+        data.placements(model); // of limbs side by side, too
+        let (q_fused, v_fused) = (Fused::of(q), Fused::of(v));
+        let look =
+            Look { eyes: &mut self.fused, model, data: data.fused(), q: q_fused, v: v_fused, slopes, stacks, to };
+        if !fused(look) {
+            self.plain.look(model, data, [q, v], slopes, stacks, to);
+        }
+    }
+}
+
+struct Look<'a, S, T> {
+    eyes: &'a mut Eyes<S>,
+    model: &'a Model,
+    data: &'a mut Data<S>,
+    q: &'a [S],
+    v: &'a [S],
+    slopes: bool,
+    stacks: &'a [Stack<'a>],
+    to: &'a mut [T],
+}
+
+impl<S: Block<Number = f64>, T: AsMut<Seen>> Kernel for Look<'_, S, T> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { eyes, model, data, q, v, slopes, stacks, to } = self;
+        let needs = stacks[0].needs();
+        if slopes && needs.com {
+            eyes.com.as_mut_slice().copy_from_slice(centroidal_map(model, data, q).Jcom.as_slice());
+        }
+        if slopes && needs.momentum {
+            let d = centroidal_derivatives(model, data, q, v, &eyes.zero);
+            eyes.momentum[0].as_mut_slice().copy_from_slice(d.dh_dq.as_slice());
+            eyes.momentum[1].as_mut_slice().copy_from_slice(d.dh_dv.as_slice());
+        }
+        let (placed, motion) = if needs.velocities {
+            let motion = forward_velocities(model, data, q, v);
+            (*motion, Some(motion))
+        } else {
+            if data.placements(model).is_none() {
+                forward_kinematics(model, data, q);
+            }
+            (data.placements(model).expect("kinematics place the bodies"), None)
+        };
+        let mut lanes: [_; WIDEST] = core::array::from_fn(|k| stacks[k.min(stacks.len() - 1)].looks());
+        loop {
+            let mut targets = [[0.0; WIDEST]; 12];
+            let mut first = None;
+            let mut weighty = false;
+            for (k, looks) in lanes[..stacks.len()].iter_mut().enumerate() {
+                let Some((residual, weight, at)) = looks.next() else { return };
+                residual.write_target(k, &mut targets);
+                weighty |= weight != 0.0;
+                first.get_or_insert((residual, at));
+            }
+            let Some((residual, at)) = first.filter(|_| weighty) else { continue };
+            let target = targets.map(|target| S::load(&target));
+            let (n, r, slopes_of) = eyes.see(residual, target, &placed, motion.as_ref(), slopes);
+            write(r, at[0], to);
+            if slopes {
+                let width = width(model.nv(), residual);
+                for (J, first) in slopes_of.into_iter().flatten().zip([width - model.nv(), 0]) {
+                    write_rows(J, n, width, at[1] + first, to);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn run_fused(self) {
+        self.run();
+    }
+}
+
+/// r of a residual, its number of rows, and ∂r/∂q, ∂r/∂v.
+type Looked<'a, S> = (usize, [S; 6], [Option<&'a DMatrix<S>>; 2]);
+
+impl<S: Block<Number = f64>> Eyes<S> {
+    /// r of a residual with a target, and its Jacobians.
+    #[inline(always)]
+    fn see(
+        &mut self,
+        residual: &Residual,
+        t: [S; 12],
+        placed: &Placements<'_, S>,
+        motion: Option<&Velocities<'_, S>>,
+        slopes: bool,
+    ) -> Looked<'_, S> {
+        let motion = || motion.expect("velocities are computed where a residual needs them");
+        let Self { J, Jv, com, momentum, .. } = self;
+        let position = Vec3::new(t[0], t[1], t[2]);
+        let rotation =
+            Mat3 { x: Vec3::new(t[3], t[4], t[5]), y: Vec3::new(t[6], t[7], t[8]), z: Vec3::new(t[9], t[10], t[11]) };
+        let six = [t[0], t[1], t[2], t[3], t[4], t[5]];
+        let long = |x: Vec3<S>| [x.x, x.y, x.z, S::zero(), S::zero(), S::zero()];
+        match *residual {
+            Residual::CenterOfMass { .. } => (3, long(placed.com() - position), [Some(com), None]),
+            Residual::CentroidalMomentum { .. } => {
+                let r = motion().centroidal_momentum() - Force::from(six);
+                (6, r.to_array(), [Some(&momentum[0]), Some(&momentum[1])])
+            }
+            Residual::FramePlacement { frame, .. } => {
+                let X = Se3::new(rotation, position).inverse() * placed.frame(frame);
+                let r = lie::log6(Quaternion::from_rotation(X.rotation), X.translation); // log(refXo oXf)
+                if slopes {
+                    placed.frame_jacobian(frame, ReferenceFrame::Local, J);
+                    let Jlog = lie::jlog6(r);
+                    for column in J.as_mut_slice().chunks_exact_mut(6) {
+                        let m = Motion::from([column[0], column[1], column[2], column[3], column[4], column[5]]);
+                        column.copy_from_slice(&(Jlog * m).to_array()); // Jlog J
+                    }
+                }
+                (6, r.to_array(), [Some(J), None])
+            }
+            Residual::FrameTranslation { frame, .. } => {
+                if slopes {
+                    placed.frame_jacobian(frame, ReferenceFrame::LocalWorldAligned, J);
+                }
+                (3, long(placed.frame(frame).translation - position), [Some(J), None])
+            }
+            Residual::FrameRotation { frame, .. } => {
+                let R = rotation.transpose() * placed.frame(frame).rotation;
+                let r = lie::log3(Quaternion::from_rotation(R)); // log(R_refᵀ R)
+                if slopes {
+                    placed.frame_jacobian(frame, ReferenceFrame::Local, J);
+                    let Jlog = lie::jlog3(r);
+                    for column in J.as_mut_slice().chunks_exact_mut(6) {
+                        let turned = Jlog * Vec3::new(column[3], column[4], column[5]);
+                        column[..3].copy_from_slice(&turned.to_array());
+                    }
+                }
+                (3, long(r), [Some(J), None])
+            }
+            Residual::FrameVelocity { frame, reference, .. } => {
+                let r = motion().frame_velocity(frame, reference) - Motion::from(six);
+                if slopes {
+                    motion().frame_velocity_derivative(frame, reference, J);
+                    placed.frame_jacobian(frame, reference, Jv);
+                }
+                (6, r.to_array(), [Some(J), Some(Jv)])
+            }
+            _ => unreachable!("it does not look at kinematics"),
+        }
+    }
+}
+
+/// Writes r, a lane for each knot.
+#[inline(always)]
+fn write<S: Block<Number = f64>>(r: [S; 6], at: usize, to: &mut [impl AsMut<Seen>]) {
+    let mut numbers = [S::zero(); STRIDE];
+    numbers[..6].copy_from_slice(&r);
+    for (i, block) in numbers.chunks_exact_mut(S::LANES).enumerate() {
+        S::transpose(block);
+        for (to, lane) in to.iter_mut().zip(block) {
+            lane.store(&mut to.as_mut().r[at + i * S::LANES..]);
+        }
+    }
+}
+
+/// Writes the first n rows of a Jacobian, each to the beginning of one of `width` numbers.
+#[inline(always)]
+fn write_rows<S: Block<Number = f64>>(J: &DMatrix<S>, n: usize, width: usize, at: usize, to: &mut [impl AsMut<Seen>]) {
+    let (mut places, count): ([&mut [f64]; WIDEST], _) = (Default::default(), to.len());
+    for (place, to) in places.iter_mut().zip(to) {
+        *place = &mut to.as_mut().rows[at..];
+    }
+    let (strides, shape, to) = ([1, J.nrows()], [n, J.ncols()], &mut places[..count]);
+    UnpackRows { from: J.as_slice(), strides, shape, factor: 1.0, to, stride: width }.run();
+}
