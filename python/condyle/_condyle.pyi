@@ -45,6 +45,7 @@ __all__ = [
     "AugmentedLagrangian",
     "BodyId",
     "Cholesky",
+    "ConstrainedAction",
     "ConstraintSet",
     "ContactDynamics",
     "Cost",
@@ -166,7 +167,9 @@ _Input: TypeAlias = (
     | tuple[Literal["force", "inertia"], str | int]
     | tuple[Literal["friction"], float]
 )
-_Action: TypeAlias = FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action
+_Action: TypeAlias = (
+    FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction
+)
 _Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
 _RneaOut: TypeAlias = RneaDerivatives | tuple[_Array, _Array, _Array]
 _AbaOut: TypeAlias = AbaDerivatives | tuple[_Array, _Array, _Array, _Array]
@@ -2565,11 +2568,44 @@ class Action:
     ) -> Action: ...
 
 @final
+class ConstrainedAction:
+    """An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
+
+    To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+
+    action: the action.
+    size: how many numbers g has.
+    calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
+    calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
+        space of the state. Without it, central differences of calc.
+    lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
+
+    >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
+    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
+    >>> end = ConstrainedAction(Action(1, 0, lambda t, x, u: (None, 0.0)), 1, lambda t, x, u: x - 3.0)  # x = 3
+    >>> problem = Problem([0.0], [knot], [0] * 6, end)
+    >>> solver = AugmentedLagrangian(problem)
+    >>> solver.solve(np.zeros((7, 1)), np.zeros((6, 1))).us.round(6).ravel().tolist()
+    [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
+    """
+
+    def __new__(
+        cls,
+        action: _Action,
+        size: int,
+        calc: Callable[[int, _Array, _Array], ArrayLike],
+        calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> ConstrainedAction: ...
+
+@final
 class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`,
+        `ConstrainedAction`.
     stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
     terminal: the model of the end, without controls.
 
@@ -2593,7 +2629,8 @@ class Problem:
     def to_json(self) -> str:
         """The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
 
-        Raises `ProblemError` if an action is an `Lqr` or an `Action`, or knots are of different robots.
+        Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
+        robots.
         """
 
     @property
@@ -2665,13 +2702,14 @@ class Fddp:
 
 @final
 class AugmentedLagrangian:
-    """The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s.
+    """The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s and for
+    `ConstrainedAction`s.
 
     repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
     y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 
     problem: what is solved; the solver allocates for its shape once.
-    inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen.
+    inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen, `time_budget` is for all.
     settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
         gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
         `penalty_max`, `penalty_factor` (by which it rises).
@@ -2705,6 +2743,21 @@ class AugmentedLagrangian:
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
 
         Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+        """
+    def resume(self) -> Solution:
+        """Solves the problem from the last solution, its multipliers and its penalty; returns a `Solution`.
+
+        The initial state may be another one, or the problem be shifted. After a solve that ended as "infeasible" or
+        "not_finite" the multipliers are zero.
+
+        Raises `ProblemError` as `solve`.
+        """
+    def shift(self, last: int) -> None:
+        """Moves the horizon of the problem on by a knot, and the last solution with its multipliers, as `Fddp.shift`.
+
+        last: the index of the model that serves the last knot.
+
+        Raises `ProblemError` if there is no such model.
         """
     @property
     def outcome(self) -> Outcome:

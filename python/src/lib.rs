@@ -87,8 +87,8 @@ mod _condyle {
     use model::Model;
     #[pymodule_export]
     use optimal::{
-        Action, Activation, AugmentedLagrangian, ContactDynamics, Cost, Fddp, FreeDynamics, FrictionCone,
-        ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, WrenchCone,
+        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, Fddp, FreeDynamics,
+        FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

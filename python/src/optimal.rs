@@ -9,13 +9,13 @@ mod solvers;
 
 use crate::arrays::{matrix, output, vector};
 use crate::exceptions::ProblemError;
-use actions::{Boxed, Described, Model, Part};
+use actions::{Boxed, Described, Model};
 pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
 use condyle::optimal as rust;
 pub(crate) use costs::{Activation, Cost, FrictionCone, WrenchCone};
 pub(crate) use limits::Limit;
 use own::Fault;
-pub(crate) use own::{Action, Lqr};
+pub(crate) use own::{Action, ConstrainedAction, Lqr};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 pub(crate) use solvers::{AugmentedLagrangian, Fddp};
@@ -61,7 +61,8 @@ fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResult<Vec<f64>
 /// An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 ///
 /// x0: the initial state, nx numbers.
-/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`.
+/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`,
+///     `ConstrainedAction`.
 /// stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
 /// terminal: the model of the end, without controls.
 ///
@@ -100,15 +101,18 @@ impl Problem {
         let data: rust::robot::RobotProblem =
             serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("no problem: {error}")))?;
         let robot = Arc::new(data.model);
-        let knots = data.knots.into_iter().map(|knot| Part::Knot(Box::new(knot)));
-        let parts = knots.chain([Part::Terminal(data.terminal, data.terminal_limits)]);
-        let all = parts.map(|part| Described { robot: robot.clone(), part }.boxed()).collect::<PyResult<Vec<_>>>()?;
+        if data.knots.iter().any(|knot| knot.dynamics == rust::robot::Dynamics::End) {
+            return Err(exception(rust::Error::TimeStep { dt: 0.0 }));
+        }
+        let knots = data.knots.into_iter().chain([data.terminal]);
+        let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
         Self::make(data.x0, all, data.stages, Vec::new())
     }
 
     /// The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
     ///
-    /// Raises `ProblemError` if an action is an `Lqr` or an `Action`, or knots are of different robots.
+    /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
+    /// robots.
     fn to_json(&self) -> PyResult<String> {
         let problem = lock("problem", &self.inner)?;
         let described = lock("problem", &self.described)?;
@@ -116,10 +120,10 @@ impl Problem {
             let name = if k < self.models.len() { format!("models[{k}]") } else { "terminal".to_owned() };
             ProblemError::new_err(format!("{name}: {what}"))
         };
-        let (mut knots, mut end) = (Vec::new(), (Vec::new(), Vec::new()));
+        let mut knots = Vec::new();
         let mut first: Option<(&Arc<condyle::Model>, Vec<u8>)> = None;
         for (k, described) in described.iter().enumerate() {
-            let Some(Described { robot, part }) = described else {
+            let Some(Described { robot, knot }) = described else {
                 return Err(wrong(k, "expected an action of a robot, which alone can be JSON"));
             };
             let bytes = postcard::to_allocvec(&**robot).map_err(|error| ProblemError::new_err(error.to_string()))?;
@@ -128,17 +132,15 @@ impl Problem {
                 Some((_, other)) if *other == bytes => {}
                 Some(_) => return Err(wrong(k, "expected the robot of the first model, found another one")),
             }
-            match (part, k < self.models.len()) {
-                (Part::Knot(knot), true) => knots.push((**knot).clone()),
-                (Part::Terminal(costs, limits), false) => end = (costs.clone(), limits.clone()),
-                (Part::Terminal(..), true) => return Err(wrong(k, "expected a knot with a duration")),
-                (Part::Knot(_), false) => return Err(wrong(k, "expected a knot without a duration")),
+            if k < self.models.len() && knot.dynamics == rust::robot::Dynamics::End {
+                return Err(wrong(k, "expected a knot with a duration"));
             }
+            knots.push(knot.clone());
         }
+        let terminal = knots.pop().expect("the terminal one is there");
         let (model, _) = first.expect("the terminal one is there");
         let (x0, stages) = (problem.x0().to_vec(), problem.stages().to_vec());
-        let (model, (terminal, terminal_limits)) = ((**model).clone(), end);
-        let data = rust::robot::RobotProblem { model, x0, knots, stages, terminal, terminal_limits };
+        let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, stages, terminal };
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 

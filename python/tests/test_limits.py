@@ -2,13 +2,16 @@
 
 import pickle
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 import condyle
 from condyle.optimal import (
+    Action,
     AugmentedLagrangian,
+    ConstrainedAction,
     ContactDynamics,
     Cost,
     Fddp,
@@ -91,9 +94,9 @@ def test_limits_are_in_a_file(again: Callable[[Problem], Problem]) -> None:
     for a, b in zip(one.outcome.multipliers, other.outcome.multipliers, strict=True):
         np.testing.assert_array_equal(a, b)
     text = problem.to_json()
-    assert '"limits_at":{"11":[]}' in text and '"terminal_limits":[{"name":"reach"' in text
+    assert '"limits_at":{"11":[]}' in text and '"limits":[{"name":"reach"' in text
     with pytest.raises(ProblemError, match="unknown field `limit`"):
-        Problem.from_json(text.replace('"terminal_limits"', '"limit"'))
+        Problem.from_json(text.replace('"limits"', '"limit"'))
 
 
 def test_settings_reach_both_solvers() -> None:
@@ -163,3 +166,75 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
     with pytest.raises(ProblemError, match="limit `push`: there is no contact `hand` at this knot; there is `foot`"):
         ImpulseDynamics(condyle.robots.quadruped(), feet, [], limits=[Limit.contact_force("push", "hand")])
     assert repr(effort) == "<condyle.optimal.Limit 'effort'>"
+
+
+def test_constraints_of_ones_own_are_limits() -> None:
+    """The arm's limits, written in Python: with derivatives and without, around one another, and at the end."""
+    problem, xs, us = reach()
+    expected = sharp(problem)
+    solution = expected.solve(xs, us)
+    costs = [Cost.state("rest", 0.3, X0), Cost.control("effort", 1e-3, np.zeros(7))]
+    plain = FreeDynamics(ARM, DT, costs)
+    some = {"lower": np.full(3, -WEAK), "upper": np.full(3, WEAK)}
+
+    def diff(t: int, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros((3, 14)), np.eye(7)[:3]
+
+    held = ConstrainedAction(plain, 3, lambda t, x, u: u[:3], diff, **some)
+    rest = {"lower": np.full(4, -WEAK), "upper": np.full(4, WEAK)}
+    held = ConstrainedAction(held, 4, lambda t, x, u: u[3:], **rest)
+    last = FreeDynamics(ARM, DT, costs)
+    end = ConstrainedAction(FreeDynamics(ARM, None, []), 10, lambda t, x, u: np.r_[tool(x) - TARGET, x[7:]])
+    problem = Problem(X0, [held, last], [0] * (KNOTS - 1) + [1], end)
+    problem.set_weight("rest", 1e-1)  # of knots within constraints, too
+    ours = sharp(problem)
+    found = ours.solve(xs, us)
+    assert found.status == "converged"
+    np.testing.assert_allclose(np.array(found.us), np.array(solution.us), atol=1e-4)
+    assert ours.outcome.cost == pytest.approx(expected.outcome.cost, rel=1e-6)
+    with pytest.raises(ProblemError, match=r"models\[0\]: expected an action of a robot"):
+        problem.to_json()
+
+
+@pytest.mark.parametrize(
+    ("calc", "diff", "error"),
+    [
+        (lambda t, x, u: 1 / 0, None, ZeroDivisionError),
+        (lambda t, x, u: [1.0, 2.0], None, ValueError),
+        (lambda t, x, u: x[:1], lambda t, x, u: 1 / 0, ZeroDivisionError),
+        (lambda t, x, u: x[:1], lambda t, x, u: (np.zeros((1, 2)), np.zeros((2, 1))), ValueError),
+    ],
+)
+def test_what_a_constraint_raises_is_raised(calc: Any, diff: Any, error: type[Exception]) -> None:
+    knot = Action(2, 1, lambda t, x, u: (x + u, float(u @ u)))
+    end = Action(2, 0, lambda t, x, u: (None, 0.0))
+    problem = Problem([1.0, 0.0], [ConstrainedAction(knot, 1, calc, diff)], [0] * 3, end)
+    with pytest.raises(error):
+        AugmentedLagrangian(problem).solve(np.zeros((4, 2)), np.zeros((3, 1)))
+
+
+def test_bounds_that_exclude_each_other_are_refused() -> None:
+    knot = Action(1, 1, lambda t, x, u: (x + u, float(u @ u)))
+    end = ConstrainedAction(Action(1, 0, lambda t, x, u: (None, 0.0)), 1, lambda t, x, u: x, lower=[2.0], upper=[1.0])
+    problem = Problem([1.0], [knot], [0], end)
+    with pytest.raises(ProblemError, match="knot 1: constraint 0 must be at least 2 and at most 1"):
+        AugmentedLagrangian(problem).solve(np.zeros((2, 1)), np.zeros((1, 1)))
+    with pytest.raises(ValueError, match="lower"):
+        ConstrainedAction(knot, 2, lambda t, x, u: x, lower=[0.0])
+
+
+def test_a_receding_horizon_goes_on_from_its_multipliers() -> None:
+    problem, xs, us = reach()
+    solver = sharp(problem)
+    before = solver.solve(xs, us)
+    multipliers, iterations = solver.outcome.multipliers, solver.outcome.iterations
+    problem.set_x0(before.xs[1] + 1e-4)
+    solver.shift(0)
+    for t in range(KNOTS - 2):
+        np.testing.assert_array_equal(solver.outcome.multipliers[t], multipliers[t + 1])
+    warm = solver.resume()
+    assert warm.status == "converged" and 2 * solver.outcome.iterations < iterations
+    fresh = sharp(problem).solve(np.array(before.xs), np.array(before.us))
+    np.testing.assert_allclose(np.array(warm.us), np.array(fresh.us), atol=1e-4)
+    with pytest.raises(ProblemError, match="there is no action model 7"):
+        solver.shift(7)

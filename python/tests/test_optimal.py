@@ -138,7 +138,7 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
         Problem(X0, [3], [0], end())  # type: ignore[list-item]
 
 
-def every_kind_of_knot() -> Problem:
+def every_kind_of_knot(landing: bool = False) -> Problem:
     feet = {foot: condyle.Constraint(foot, "point", kd=20.0) for foot in ("LF_foot", "RH_foot")}
     cone = Cost.friction_cone("cone", 1e-2, "LF_foot", FrictionCone(0.7, greatest=200.0))
     rest, still = Cost.state("rest", 1.0, STANDING), Cost.control("still", 1e-2, np.zeros(12))
@@ -148,12 +148,14 @@ def every_kind_of_knot() -> Problem:
         ImpulseDynamics(QUADRUPED, feet, [Cost.impulse_center_of_mass("landing", 1e-3)], restitution=0.1),
         FreeDynamics(QUADRUPED, 0.02, [still], actuation=np.eye(18)[:, 6:], integrator="runge_kutta_2"),
     ]
-    return Problem(STANDING, models, [0, 0, 2, 1, 0], FreeDynamics(QUADRUPED, None, [rest]))
+    end = ImpulseDynamics(QUADRUPED, feet, [rest]) if landing else FreeDynamics(QUADRUPED, None, [rest])
+    return Problem(STANDING, models, [0, 0, 2, 1, 0], end)
 
 
+@pytest.mark.parametrize("landing", [False, True])
 @pytest.mark.parametrize("again", [lambda p: Problem.from_json(p.to_json()), lambda p: pickle.loads(pickle.dumps(p))])
-def test_a_problem_in_a_file(again: Any) -> None:
-    problem = every_kind_of_knot()
+def test_a_problem_in_a_file(again: Any, landing: bool) -> None:
+    problem = every_kind_of_knot(landing)
     problem.set_weight("rest", 3.0)
     problem.set_x0(STANDING + np.r_[0.0, 0.0, 0.1, np.zeros(34)])
     us = [np.zeros(12)] * 3 + [np.zeros(0)] + [np.zeros(12)]

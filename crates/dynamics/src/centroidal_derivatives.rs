@@ -107,13 +107,18 @@ fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d
     }
 }
 
+/// −∂c × f, what a force's moment changes by with the point that it is about.
+#[inline(always)]
+fn moved<S: Scalar>(dcom: Vec3<S>, f: Vec3<S>) -> Force<S> {
+    Force::new(Vec3::zero(), -dcom.cross(f))
+}
+
 /// The derivatives about the centre of mass, after `pass`.
 #[inline(always)]
 fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalDerivatives<'d, S> {
     let per_mass = d.IC[0].mass.recip();
     let com = d.IC[0].mass_com.scale(per_mass);
     let (p, f) = (d.BC[0].momentum.linear, d.F[0].linear);
-    let moved = |dcom: Vec3<S>, x: Vec3<S>| Force::new(Vec3::zero(), -dcom.cross(x)); // −∂c × f
     for matrix in [&mut d.dh_dq, &mut d.drate_dq, &mut d.drate_dv, &mut d.drate_da] {
         matrix.as_mut_slice().fill(S::zero());
     }

@@ -7,6 +7,7 @@ use crate::problem::Problem;
 use crate::settings::{ConstraintSettings, Settings};
 use crate::solution::{Solution, Status};
 use nalgebra::DVector;
+use std::time::{Duration, Instant};
 
 /// The method of multipliers around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and robots with
 /// [`Limit`](crate::robot::Limit)s, with the rules of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991;
@@ -20,7 +21,8 @@ use nalgebra::DVector;
 /// until    the constraints and the gradient of the Lagrangian ℓ + yᵀg, along the dynamics, vanish to the tolerances
 /// ```
 ///
-/// Bounds of the actions' controls hold as in [`Fddp`], beside the constraints.
+/// Bounds of the actions' controls hold as in [`Fddp`], beside the constraints. A receding horizon goes on from the last
+/// solution, its multipliers and its penalty: [`shift`](Self::shift), then [`resume`](Self::resume).
 ///
 /// # Examples
 /// ```
@@ -51,9 +53,10 @@ use nalgebra::DVector;
 ///     fn size(&self) -> usize { 1 }
 ///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[3.0], &[3.0]) }
 ///     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) { g[0] = x[0]; }
-///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
 ///         gx.fill(1.0);
 ///         gu.fill(0.0);
+///         true
 ///     }
 /// }
 ///
@@ -71,12 +74,14 @@ use nalgebra::DVector;
 pub struct AugmentedLagrangian {
     /// May be changed between solves.
     pub settings: ConstraintSettings,
-    /// The settings of the inner solves; their tolerances are chosen.
+    /// The settings of the inner solves; their tolerances are chosen, and the time budget is that of all of them.
     pub inner: Settings,
     solver: Fddp,
     outcome: Outcome,
     /// The adjoint state, and its predecessor.
     adjoint: [DVector<f64>; 2],
+    /// How long the residuals took the last time.
+    measuring: Duration,
 }
 
 /// What a constrained solve says beside its [`Solution`].
@@ -105,7 +110,8 @@ impl AugmentedLagrangian {
     pub fn new(problem: &Problem) -> Self {
         let adjoint = [(); 2].map(|()| DVector::zeros(problem.ndx()));
         let (settings, inner) = (ConstraintSettings::default(), Settings::default());
-        Self { settings, inner, solver: Fddp::new(problem), outcome: Outcome::default(), adjoint }
+        let (solver, outcome) = (Fddp::new(problem), Outcome::default());
+        Self { settings, inner, solver, outcome, adjoint, measuring: Duration::ZERO }
     }
 
     /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of zero.
@@ -118,25 +124,69 @@ impl AugmentedLagrangian {
     /// # Errors
     /// [`Error`] as for [`Fddp::solve`], or if a constraint's bounds leave no value.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        let result = self.run(problem, xs, us);
+        self.run(problem, Some([xs, us]))
+    }
+
+    /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new references
+    /// or, after [`shift`](Self::shift), for the next horizon. After a solve that ended as [`Status::Infeasible`] or
+    /// [`Status::NotFinite`] the multipliers are zero and the penalty is the first one.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
+        self.run(problem, None)
+    }
+
+    /// Makes the solution and its multipliers a warm start for a problem that was [shifted](Problem::shift) by a knot
+    /// since, as [`Fddp::shift`] does. The new last knot has the multipliers of the one before it, if it has as many
+    /// constraints.
+    ///
+    /// # Errors
+    /// [`Error`] if the problem is not the one solved before, shifted once.
+    pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
+        self.solver.shift(problem)?;
+        let horizon = problem.horizon();
+        if let Some(knots) = self.outcome.multipliers.get_mut(..horizon) {
+            knots.rotate_left(1);
+            if let [.., before, last] = knots {
+                last.clone_from(before);
+            }
+        }
+        Ok(())
+    }
+
+    fn run(&mut self, problem: &mut Problem, warm_start: Option<[&[f64]; 2]>) -> Result<&Solution, Error> {
+        let begin = Instant::now();
+        let result = self.iterate(problem, warm_start, begin);
         if result.is_ok() {
             problem.multipliers(&mut self.outcome.multipliers);
         }
         problem.forget_multipliers();
         self.solver.solution.status = result?;
+        self.solver.solution.timings.total = begin.elapsed();
         Ok(&self.solver.solution)
     }
 
     /// The outer iterations.
-    fn run(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<Status, Error> {
-        let Self { settings, inner, solver, .. } = self;
-        settings.check()?;
-        problem.start_constraints(1.0 / settings.penalty_start)?;
-        solver.settings = inner.clone();
+    fn iterate(
+        &mut self,
+        problem: &mut Problem,
+        warm_start: Option<[&[f64]; 2]>,
+        begin: Instant,
+    ) -> Result<Status, Error> {
+        self.settings.check()?;
+        self.solver.settings = self.inner.clone();
+        let lost = matches!(self.solver.solution.status, Status::Infeasible | Status::NotFinite);
+        let goes_on = warm_start.is_none() && !lost && self.outcome.solves > 0;
         let multipliers = std::mem::take(&mut self.outcome.multipliers);
-        self.outcome = Outcome { multipliers, penalty: settings.penalty_start, ..Outcome::default() };
-        let (tolerance, tolerance_dual) = (self.settings.tolerance, self.settings.tolerance_dual);
-        let mut mu = 1.0 / self.settings.penalty_start;
+        let ConstraintSettings { tolerance, tolerance_dual, penalty_start, penalty_max, .. } = self.settings;
+        let penalty = if goes_on { self.outcome.penalty.clamp(penalty_start, penalty_max) } else { penalty_start };
+        let mut mu = 1.0 / penalty;
+        problem.start_constraints(mu)?;
+        if goes_on {
+            problem.set_multipliers(&multipliers);
+        }
+        self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
         // the tolerances of one inner solve, which follow μ
         let (mut eta, mut omega) = (mu.powf(0.1), mu);
         let mut status = Status::MaxIterations;
@@ -144,18 +194,24 @@ impl AugmentedLagrangian {
             // the expected decrease of an inner solve is about the square of its gradient
             let dual = omega.max(0.1 * tolerance_dual);
             (self.solver.settings.tolerance, self.solver.settings.tolerance_bounded) = (dual * dual, dual * dual);
-            let result = match solve {
-                0 => self.solver.solve(problem, xs, us)?,
+            let over = begin.elapsed() + self.measuring;
+            self.solver.settings.time_budget = self.inner.time_budget.map(|budget| budget.saturating_sub(over));
+            let result = match warm_start {
+                Some([xs, us]) if solve == 0 => self.solver.solve(problem, xs, us)?,
                 _ => self.solver.resume(problem)?,
             };
             self.outcome.solves += 1;
             self.outcome.iterations += result.trace.len();
-            if matches!(result.status, Status::NotFinite | Status::TimeLimit) {
-                status = result.status;
-                break;
+            let stopped = result.status;
+            if stopped == Status::NotFinite {
+                (self.outcome.primal, self.outcome.dual) = (f64::NAN, f64::NAN);
+                return Ok(stopped);
             }
             // z − Π z at the iterate, and how far it is from a solution
             self.measure(problem);
+            if stopped == Status::TimeLimit {
+                return Ok(stopped);
+            }
             if self.outcome.primal <= eta.max(tolerance) {
                 problem.update_multipliers();
                 if self.outcome.primal <= tolerance && self.outcome.dual <= tolerance_dual {
@@ -165,16 +221,16 @@ impl AugmentedLagrangian {
                 eta = (eta * mu.powf(0.9)).max(0.1 * tolerance);
                 omega *= mu;
             } else {
-                if mu <= 1.0 / self.settings.penalty_max {
+                if mu <= 1.0 / penalty_max {
                     status = Status::Infeasible;
                     break;
                 }
-                mu = (mu / self.settings.penalty_factor).max(1.0 / self.settings.penalty_max);
+                mu = (mu / self.settings.penalty_factor).max(1.0 / penalty_max);
                 (eta, omega) = (mu.powf(0.1), mu);
                 problem.set_penalty(mu);
+                self.outcome.penalty = 1.0 / mu;
             }
         }
-        self.outcome.penalty = 1.0 / mu;
         Ok(status)
     }
 
@@ -192,7 +248,7 @@ impl AugmentedLagrangian {
     /// are yᵀ∂g of the multipliers that an update would give.
     fn measure(&mut self, problem: &mut Problem) {
         let Self { solver, outcome, adjoint: [lambda, before], .. } = self;
-        let horizon = problem.horizon();
+        let (horizon, begin) = (problem.horizon(), Instant::now());
         let Solution { xs, us, gap, cost, .. } = &solver.solution;
         for node in &mut solver.nodes {
             node.implicit.wanted = false; // r and B are read
@@ -217,5 +273,6 @@ impl AugmentedLagrangian {
             before.gemv_tr(1.0, &node.A, lambda, 1.0);
             std::mem::swap(lambda, before);
         }
+        self.measuring = begin.elapsed();
     }
 }

@@ -5,6 +5,7 @@ use crate::action::ActionModel;
 use crate::error::{Error, assert_length};
 use crate::lq::{Hessian, LqNode};
 use crate::multipliers::{Bounded, Multipliers, PENALTY, Visit};
+use crate::numdiff;
 use crate::problem::Problem;
 use nalgebra::DMatrix;
 use std::any::Any;
@@ -24,9 +25,10 @@ use std::any::Any;
 ///     fn size(&self) -> usize { 1 }
 ///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[f64::NEG_INFINITY], &[1.0]) }
 ///     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) { g[0] = x[1]; }
-///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
 ///         gx.copy_from_slice(&[0.0, 1.0]);
 ///         gu.fill(0.0);
+///         true
 ///     }
 /// }
 /// ```
@@ -40,8 +42,12 @@ pub trait Constraint: Any + Send {
     /// gₜ(x, u) into `g`.
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]);
 
-    /// ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu).
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>);
+    /// ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu); says whether it
+    /// did. It does not by default: they are central differences of [`calc`](Self::calc) then, right to about 1e-9.
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
+        let _ = (t, x, u, gx, gu);
+        false
+    }
 }
 
 /// An action with constraints. To its cost comes, with the multipliers y and the penalty 1/μ that
@@ -97,7 +103,10 @@ impl Constrained {
     /// curvature D by g.
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         self.constraint.calc(t, x, u, &mut self.g);
-        self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu);
+        if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
+            let Self { action, constraint, gx, gu, .. } = self;
+            numdiff::constraint(&**action, &mut **constraint, t, x, u, [gx, gu]);
+        }
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.begin(t);
         self.multipliers.slopes(t, 0, &self.g, [lower, upper], &mut self.d, &mut self.dd);
@@ -216,6 +225,24 @@ impl Problem {
         }
         self.share_multipliers();
         Ok(())
+    }
+
+    /// The multipliers of each knot, where it has as many constraints as are given.
+    pub(crate) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
+        for (t, y) in y.iter().enumerate().take(self.horizon() + 1) {
+            let mut all = 0;
+            self.action_mut(t).constraints(t, &mut |bounded| all += bounded.count);
+            if all != y.len() {
+                continue;
+            }
+            let mut rest = &y[..];
+            self.action_mut(t).constraints(t, &mut |bounded| {
+                let (own, others) = rest.split_at(bounded.count);
+                bounded.multipliers.set(t, own);
+                rest = others;
+            });
+        }
+        self.share_multipliers();
     }
 
     /// Multipliers of zero and the penalty of actions by themselves, everywhere.

@@ -106,6 +106,11 @@ impl Multipliers {
         self.mu = mu;
     }
 
+    /// Sets the first ones of y at knot t, after `start`.
+    pub(crate) fn set(&mut self, t: usize, y: &[f64]) {
+        self.y[t * self.size..][..y.len()].copy_from_slice(y);
+    }
+
     /// The first `count` of y at knot t.
     pub(crate) fn of(&self, t: usize, count: usize) -> &[f64] {
         &self.y[t * self.size..][..count]

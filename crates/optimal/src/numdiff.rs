@@ -1,7 +1,9 @@
 //! Derivatives of any action by finite differences: the oracle against which written derivatives are tested.
 
 use crate::action::ActionModel;
+use crate::constrained::Constraint;
 use crate::lq::{Hessian, LqNode};
+use nalgebra::DMatrix;
 
 /// The step of first differences, about ε^⅓: truncation h² meets rounding ε/h.
 const FIRST: f64 = 6e-6;
@@ -95,6 +97,38 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
                 (false, true) => node.S[(j, i - ndx)] = curvature,
                 (false, false) => (node.R[(i - ndx, j - ndx)], node.R[(j - ndx, i - ndx)]) = (curvature, curvature),
             }
+        }
+    }
+}
+
+/// The derivatives of a constraint of an action by differences.
+pub(crate) fn constraint(
+    action: &dyn ActionModel,
+    constraint: &mut dyn Constraint,
+    t: usize,
+    x: &[f64],
+    u: &[f64],
+    [gx, gu]: [&mut DMatrix<f64>; 2],
+) {
+    let (ndx, size) = (action.ndx(), constraint.size());
+    let (mut moved, mut dx, mut du) = (x.to_vec(), vec![0.0; ndx], u.to_vec());
+    let mut sides = [vec![0.0; size], vec![0.0; size]];
+    for j in 0..ndx + u.len() {
+        for (g, step) in sides.iter_mut().zip([FIRST, -FIRST]) {
+            if j < ndx {
+                dx[j] = step;
+                action.integrate(x, &dx, &mut moved);
+                constraint.calc(t, &moved, u, g);
+                dx[j] = 0.0;
+            } else {
+                du[j - ndx] = u[j - ndx] + step;
+                constraint.calc(t, x, &du, g);
+                du[j - ndx] = u[j - ndx];
+            }
+        }
+        for i in 0..size {
+            let slope = (sides[0][i] - sides[1][i]) / (2.0 * FIRST);
+            if j < ndx { gx[(i, j)] = slope } else { gu[(i, j - ndx)] = slope }
         }
     }
 }

@@ -48,13 +48,14 @@ impl Constraint for Rows {
             g[0] = (x[0] - a).powi(2) + (x[1] - b).powi(2);
         }
     }
-    fn calc_diff(&mut self, _: usize, x: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         let n = x.len();
         gx.copy_from(&self.c.columns(0, n));
         gu.copy_from(&self.c.columns(n, self.c.ncols() - n));
         if let Some([a, b]) = self.disc {
             (gx[(0, 0)], gx[(0, 1)]) = (2.0 * (x[0] - a), 2.0 * (x[1] - b));
         }
+        true
     }
 }
 
@@ -220,9 +221,10 @@ impl Constraint for Broken {
     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) {
         g[0] = if x[0] < 0.1 { x[0] } else { f64::NAN };
     }
-    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         gx.copy_from_slice(&[1.0, 0.0, 0.0]);
         gu.fill(0.0);
+        true
     }
 }
 

@@ -10,11 +10,12 @@ use condyle_optimal::robot::{
     InverseDynamics, Limit, Residual,
 };
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Constrained, Constraint, ConstraintSettings, Fddp, Problem, Status,
+    ActionModel, AugmentedLagrangian, Constrained, Constraint, ConstraintSettings, Fddp, LqNode, Problem, Status,
 };
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Both solvers stop at residuals of 1e-7 or less; the cost is flat there, states and controls follow the residuals.
 const COST: f64 = 1e-6;
@@ -175,9 +176,10 @@ impl Constraint for Weak {
     fn calc(&mut self, _: usize, _: &[f64], u: &[f64], g: &mut [f64]) {
         g.copy_from_slice(u);
     }
-    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) {
+    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         gx.fill(0.0);
         gu.fill_with_identity();
+        true
     }
 }
 
@@ -353,4 +355,120 @@ fn alone_a_limit_is_a_barrier() {
     });
     assert_eq!((one.status, other.status), (Status::Converged, Status::Converged));
     assert!((one.cost - other.cost).abs() < 1e-9 * one.cost && largest_difference(&one.us, &other.us) < 1e-6);
+}
+
+/// The height of a foot and its product with a control, without derivatives or with those of the Jacobian.
+struct Step {
+    model: Arc<Model>,
+    frame: usize,
+    data: Data<f64>,
+    written: bool,
+}
+
+impl Constraint for Step {
+    fn size(&self) -> usize {
+        2
+    }
+    fn bounds(&self, _: usize) -> (&[f64], &[f64]) {
+        (&[0.0, -1.0], &[0.0, -0.5])
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], g: &mut [f64]) {
+        let height = forward_kinematics(&self.model, &mut self.data, &x[..19]).frame(self.frame).translation.z;
+        g.copy_from_slice(&[height, height * u[3]]);
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
+        if !self.written {
+            return false;
+        }
+        let mut J = DMatrix::zeros(6, 18);
+        let placed = forward_kinematics(&self.model, &mut self.data, &x[..19]);
+        placed.frame_jacobian(self.frame, ReferenceFrame::LocalWorldAligned, &mut J);
+        gx.fill(0.0);
+        gu.fill(0.0);
+        for k in 0..18 {
+            (gx[(0, k)], gx[(1, k)]) = (J[(2, k)], J[(2, k)] * u[3]);
+        }
+        gu[(1, 3)] = placed.frame(self.frame).translation.z;
+        true
+    }
+}
+
+/// Constraints without derivatives have those of differences in the tangent space.
+#[test]
+fn constraints_need_no_derivatives() {
+    let model = Arc::new(robots::quadruped());
+    let mut q = vec![0.0; 19];
+    condyle_dynamics::integrate(&model, &neutral(&model), &[0.3; 18], &mut q);
+    let (x, u) = ([q, vec![0.2; 18]].concat(), [0.7; 12]);
+    let [written, other] = [true, false].map(|written| {
+        let frame = model.frame("RH_foot").unwrap();
+        let step = Step { model: model.clone(), frame, data: Data::new(&model), written };
+        let knot = FreeDynamics::running(model.clone(), 0.02, vec![]).unwrap();
+        let mut node = LqNode::zeros(36, 12);
+        Constrained::new(Box::new(knot), Box::new(step)).calc_diff(0, &x, &u, &mut node);
+        node
+    });
+    for (name, a, b) in
+        [("q", written.q.as_slice(), other.q.as_slice()), ("r", written.r.as_slice(), other.r.as_slice())]
+    {
+        assert!(largest_difference(a, b) < 1e-7, "{name}");
+        assert!(a.iter().any(|x| x.abs() > 1e-2), "{name}");
+    }
+    assert!((written.Q - other.Q).amax() < 1e-7 && (written.S - other.S).amax() < 1e-7);
+}
+
+/// A receding horizon that goes on from its multipliers finds what one without them does, in fewer iterations.
+#[test]
+fn a_receding_horizon_keeps_its_multipliers() {
+    let (arm, horizon) = (Arc::new(robots::arm7()), 12);
+    let rest = Residual::State { reference: ARM.to_vec() };
+    let costs = vec![quadratic("rest", 1e-1, rest.clone()), quadratic("effort", 1e-3, control(7))];
+    let weak = Limit::new("weak", control(7), vec![-WEAK; 7], vec![WEAK; 7]);
+    let knot = FreeDynamics::running(arm.clone(), 0.05, costs).unwrap().with_limits(vec![weak]).unwrap();
+    let tool = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: Vec3::new(0.35, 0.2, 0.6) };
+    let reach = Limit::equality("reach", tool);
+    let end = FreeDynamics::terminal(arm.clone(), vec![quadratic("rest", 1.0, rest)]).unwrap();
+    let end = end.with_limits(vec![reach]).unwrap();
+    let us = knot.clone().quasi_static(&ARM).repeat(horizon);
+    let mut problem = Problem::new(ARM.to_vec(), vec![Box::new(knot)], vec![0; horizon], Box::new(end)).unwrap();
+    let mut solver = solver(&problem);
+    solver.solve(&mut problem, &ARM.repeat(horizon + 1), &us).unwrap();
+    let (mut iterations, mut active) = ([0, 0], 0);
+    for step in 0..6 {
+        let before = (solver.solution().clone(), solver.outcome().clone());
+        problem.shift(0).unwrap();
+        solver.shift(&mut problem).unwrap();
+        let moved = solver.outcome();
+        assert!((0..horizon - 1).all(|t| moved.multipliers[t] == before.1.multipliers[t + 1]));
+        assert_eq!(moved.multipliers[horizon - 1], before.1.multipliers[horizon - 1]);
+        let measured: Vec<f64> = before.0.x(1).iter().map(|x| x + 1e-3 * f64::from(step % 3 - 1)).collect();
+        problem.set_x0(&measured).unwrap();
+        let (xs, us) = (solver.solution().xs.clone(), solver.solution().us.clone());
+        let warm = solver.resume(&mut problem).unwrap().clone();
+        let mut cold_solver = self::solver(&problem);
+        let cold = cold_solver.solve(&mut problem, &xs, &us).unwrap();
+        assert_eq!((warm.status, cold.status), (Status::Converged, Status::Converged), "step {step}");
+        assert!(largest_difference(&warm.us, &cold.us) < 10.0 * TRAJECTORY, "step {step}");
+        assert!(warm.us.iter().all(|u| u.abs() <= WEAK + PRIMAL));
+        active += warm.us.iter().filter(|u| u.abs() > WEAK - 1e-6).count();
+        for (sum, solver) in iterations.iter_mut().zip([&solver, &cold_solver]) {
+            *sum += solver.outcome().iterations;
+        }
+    }
+    println!("{} iterations with multipliers, {} without, {active} controls at a limit", iterations[0], iterations[1]);
+    assert!(active > 0 && 3 * iterations[0] < 2 * iterations[1]);
+    // once more from where it is: nothing is left to do
+    let (us, multipliers) = (solver.solution().us.clone(), solver.outcome().multipliers.clone());
+    let again = solver.resume(&mut problem).unwrap();
+    assert!(again.status == Status::Converged && largest_difference(&again.us, &us) < TRAJECTORY);
+    let us = again.us.clone();
+    assert_eq!(solver.outcome().solves, 1);
+    let worst = multipliers.iter().zip(&solver.outcome().multipliers).map(|(a, b)| largest_difference(a, b));
+    assert!(worst.fold(0.0, f64::max) < 1e-3);
+    // the time is that of all solves, and what is left of it is measured
+    solver.inner.time_budget = Some(Duration::ZERO);
+    problem.set_x0(&ARM).unwrap();
+    let late = solver.resume(&mut problem).unwrap();
+    assert_eq!((late.status, &late.us), (Status::TimeLimit, &us));
+    assert!(solver.outcome().primal > 1e-3 && solver.outcome().solves == 1);
 }

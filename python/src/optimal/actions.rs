@@ -2,7 +2,7 @@
 
 use super::costs::Cost;
 use super::limits::Limit;
-use super::own::{Action, Fault, Lqr};
+use super::own::{Action, ConstrainedAction, Fault, Lqr};
 use super::{exception, rust};
 use crate::arrays::{Give, matrix, vector};
 use crate::constrained::constraint;
@@ -22,13 +22,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub(super) struct Described {
     pub robot: Arc<condyle::Model>,
-    pub part: Part,
-}
-
-#[derive(Clone)]
-pub(super) enum Part {
-    Knot(Box<robot::Knot>),
-    Terminal(Vec<robot::Cost>, Vec<robot::Limit>),
+    pub knot: Knot,
 }
 
 /// A robot's action, as it is and as data.
@@ -38,9 +32,9 @@ struct RobotAction<A> {
 }
 
 impl<A: ActionModel + Clone> RobotAction<A> {
-    fn new(robot: &Bound<'_, Robot>, part: impl FnOnce(&condyle::Model) -> PyResult<Part>) -> PyResult<Self> {
+    fn new(robot: &Bound<'_, Robot>, knot: impl FnOnce(&condyle::Model) -> PyResult<Knot>) -> PyResult<Self> {
         let robot = Arc::new(robot.get().inner.clone());
-        let described = Described { part: part(&robot)?, robot };
+        let described = Described { knot: knot(&robot)?, robot };
         let action: Box<dyn Any> = described.build()?;
         Ok(Self { action: *action.downcast().expect("the class asks for its own kind of knot"), described })
     }
@@ -61,34 +55,21 @@ impl Described {
     }
 
     fn build(&self) -> PyResult<Box<dyn ActionModel>> {
-        match &self.part {
-            Part::Knot(knot) => knot.build(&self.robot),
-            Part::Terminal(costs, limits) => {
-                let end = robot::FreeDynamics::terminal(self.robot.clone(), costs.clone());
-                end.and_then(|end| end.with_limits(limits.clone())).map(|end| Box::new(end) as _)
-            }
-        }
-        .map_err(exception)
+        self.knot.build(&self.robot).map_err(exception)
     }
 
     /// Changes the weights of the terms called `name`.
     pub(super) fn set_weight(&mut self, name: &str, weight: f64) {
-        let all: &mut dyn Iterator<Item = &mut robot::Cost> = match &mut self.part {
-            Part::Terminal(costs, _) => &mut costs.iter_mut(),
-            Part::Knot(knot) => &mut knot.costs.iter_mut().chain(knot.costs_at.values_mut().flatten()),
-        };
+        let all = self.knot.costs.iter_mut().chain(self.knot.costs_at.values_mut().flatten());
         all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
     }
 
     fn kind(&self) -> Model {
-        match &self.part {
-            Part::Terminal(..) => Model::Free,
-            Part::Knot(knot) => match knot.dynamics {
-                Dynamics::Free { .. } => Model::Free,
-                Dynamics::Contact { .. } => Model::Contact,
-                Dynamics::Impulse { .. } => Model::Impulse,
-                Dynamics::Inverse { .. } => Model::Inverse,
-            },
+        match self.knot.dynamics {
+            Dynamics::Free { .. } | Dynamics::End => Model::Free,
+            Dynamics::Contact { .. } => Model::Contact,
+            Dynamics::Impulse { .. } => Model::Impulse,
+            Dynamics::Inverse { .. } => Model::Inverse,
         }
     }
 }
@@ -119,11 +100,24 @@ impl Model {
                 None => problem.terminal_mut(),
             }
         }
+        fn set<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>, set: impl Fn(&mut A) -> bool) -> bool {
+            if let Some(action) = find(problem, k) {
+                return set(action);
+            }
+            let mut around = find::<rust::Constrained>(problem, k);
+            loop {
+                let Some(constrained) = around else { return false };
+                if constrained.action_mut::<A>().is_some() {
+                    return constrained.action_mut().is_some_and(set);
+                }
+                around = constrained.action_mut();
+            }
+        }
         match self {
-            Self::Free => find::<robot::FreeDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
-            Self::Contact => find::<robot::ContactDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
-            Self::Impulse => find::<robot::ImpulseDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
-            Self::Inverse => find::<robot::InverseDynamics>(problem, k).is_some_and(|m| m.set_weight(name, weight)),
+            Self::Free => set(problem, k, |m: &mut robot::FreeDynamics| m.set_weight(name, weight)),
+            Self::Contact => set(problem, k, |m: &mut robot::ContactDynamics| m.set_weight(name, weight)),
+            Self::Impulse => set(problem, k, |m: &mut robot::ImpulseDynamics| m.set_weight(name, weight)),
+            Self::Inverse => set(problem, k, |m: &mut robot::InverseDynamics| m.set_weight(name, weight)),
             Self::Own => false,
         }
     }
@@ -146,6 +140,14 @@ pub(super) fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResu
     let own = |action| Boxed { action, kind: Model::Own, described: None };
     if let Ok(lqr) = model.cast::<Lqr>() {
         return Ok(own(Box::new(lqr.get().0.clone())));
+    }
+    if let Ok(constrained) = model.cast::<ConstrainedAction>() {
+        let (py, constrained) = (model.py(), constrained.get());
+        let Boxed { action, kind, .. } = boxed(constrained.action.bind(py), faults)?;
+        let constraint = constrained.constraint(py, &*action);
+        faults.push(constraint.fault.clone());
+        let action = Box::new(rust::Constrained::new(action, Box::new(constraint)));
+        return Ok(Boxed { action, kind, described: None });
     }
     let Ok(action) = model.cast::<Action>() else {
         let found = model.get_type().name()?;
@@ -223,11 +225,11 @@ fn knot(
     (costs, costs_at): (&[PyRef<'_, Cost>], At<'_, Cost>),
     (all, limits_at): (Limits<'_>, At<'_, Limit>),
     bounds: Option<[Vec<f64>; 2]>,
-) -> Part {
+) -> Knot {
     let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(&costs))).collect();
     let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(Some(those)))).collect();
     let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
-    Part::Knot(Box::new(Knot { dynamics, costs: terms(costs), costs_at, limits: limits(all), limits_at, bounds }))
+    Knot { dynamics, costs: terms(costs), costs_at, limits: limits(all), limits_at, bounds }
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.
@@ -266,8 +268,8 @@ impl FreeDynamics {
         limits_at: At<'_, Limit>,
     ) -> PyResult<Self> {
         let Some(dt) = dt else {
-            let part = |_: &_| Ok(Part::Terminal(terms(&costs), self::limits(limits)));
-            return Ok(Self(RobotAction::new(model, part)?));
+            let end = |_: &_| Ok(Knot { limits: self::limits(limits), ..Knot::new(Dynamics::End, terms(&costs)) });
+            return Ok(Self(RobotAction::new(model, end)?));
         };
         let integrator = self::integrator(integrator)?;
         Ok(Self(RobotAction::new(model, |model| {

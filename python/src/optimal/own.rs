@@ -137,25 +137,26 @@ pub(super) struct Own {
     pub(super) fault: Fault,
 }
 
-impl Own {
-    fn keep<T>(&self, result: PyResult<T>) -> Option<T> {
-        match result {
-            Ok(value) => Some(value),
-            Err(error) => {
-                let mut fault = self.fault.lock().expect("nobody panics while holding it");
-                fault.get_or_insert(error);
-                None
-            }
+/// What came without an error, which otherwise is kept if it is the first one.
+fn keep<T>(fault: &Fault, result: PyResult<T>) -> Option<T> {
+    match result {
+        Ok(value) => Some(value),
+        Err(error) => {
+            fault.lock().expect("nobody panics while holding it").get_or_insert(error);
+            None
         }
     }
+}
 
-    fn call<'py>(&self, py: Python<'py>, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
-        f.bind(py).call1((t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
-    }
+/// A function of (t, x, u).
+fn call<'py>(py: Python<'py>, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+    f.bind(py).call1((t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
+}
 
+impl Own {
     fn try_calc(&self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> PyResult<f64> {
         Python::attach(|py| {
-            let (state, cost): (Bound<'_, PyAny>, f64) = self.call(py, &self.calc, t, x, u)?.extract()?;
+            let (state, cost): (Bound<'_, PyAny>, f64) = call(py, &self.calc, t, x, u)?.extract()?;
             if !state.is_none() {
                 next.copy_from_slice(&vector("the next state", &state, self.nx)?);
             }
@@ -165,7 +166,7 @@ impl Own {
 
     fn try_calc_diff(&self, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) -> PyResult<()> {
         Python::attach(|py| {
-            let given = self.call(py, f, t, x, u)?.cast_into::<PyDict>()?;
+            let given = call(py, f, t, x, u)?.cast_into::<PyDict>()?;
             let LqNode { A, B, Q, S, R, q, r, .. } = node;
             for (name, entry) in given.iter() {
                 let name: String = name.extract()?;
@@ -210,7 +211,7 @@ impl ActionModel for Own {
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         let result = self.try_calc(t, x, u, next);
-        self.keep(result).unwrap_or(f64::NAN)
+        keep(&self.fault, result).unwrap_or(f64::NAN)
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
@@ -221,8 +222,111 @@ impl ActionModel for Own {
         node.r.fill(0.0);
         let f = self.calc_diff.as_ref().expect("an action without it is differentiated by differences");
         let result = self.try_calc_diff(f, t, x, u, node);
-        if self.keep(result).is_none() {
+        if keep(&self.fault, result).is_none() {
             node.q.fill(f64::NAN);
         }
+    }
+}
+
+/// An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
+///
+/// To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+///
+/// action: the action.
+/// size: how many numbers g has.
+/// calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
+/// calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
+///     space of the state. Without it, central differences of calc.
+/// lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
+///
+/// >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
+/// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
+/// >>> end = ConstrainedAction(Action(1, 0, lambda t, x, u: (None, 0.0)), 1, lambda t, x, u: x - 3.0)  # x = 3
+/// >>> problem = Problem([0.0], [knot], [0] * 6, end)
+/// >>> solver = AugmentedLagrangian(problem)
+/// >>> solver.solve(np.zeros((7, 1)), np.zeros((6, 1))).us.round(6).ravel().tolist()
+/// [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct ConstrainedAction {
+    pub(super) action: Py<PyAny>,
+    calc: Py<PyAny>,
+    calc_diff: Option<Py<PyAny>>,
+    bounds: [Vec<f64>; 2],
+}
+
+#[pymethods]
+impl ConstrainedAction {
+    #[new]
+    #[pyo3(signature = (action, size, calc, calc_diff=None, lower=None, upper=None))]
+    fn new(
+        action: Py<PyAny>,
+        size: usize,
+        calc: Py<PyAny>,
+        calc_diff: Option<Py<PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let bounds = bounds(size, lower, upper)?.unwrap_or_else(|| [vec![0.0; size], vec![0.0; size]]);
+        Ok(Self { action, calc, calc_diff, bounds })
+    }
+}
+
+impl ConstrainedAction {
+    /// What holds its action.
+    pub(super) fn constraint(&self, py: Python<'_>, action: &dyn ActionModel) -> Written {
+        Written {
+            calc: self.calc.clone_ref(py),
+            calc_diff: self.calc_diff.as_ref().map(|f| f.clone_ref(py)),
+            bounds: self.bounds.clone(),
+            columns: [action.ndx(), action.nu()],
+            fault: Fault::default(),
+        }
+    }
+}
+
+/// The constraint of a `ConstrainedAction` as the solver calls it. What it raises becomes a value that is not a number,
+/// and is raised after the solve.
+pub(super) struct Written {
+    calc: Py<PyAny>,
+    calc_diff: Option<Py<PyAny>>,
+    bounds: [Vec<f64>; 2],
+    /// Of ∂g/∂x and ∂g/∂u.
+    columns: [usize; 2],
+    pub(super) fault: Fault,
+}
+
+impl rust::Constraint for Written {
+    fn size(&self) -> usize {
+        self.bounds[0].len()
+    }
+
+    fn bounds(&self, _: usize) -> (&[f64], &[f64]) {
+        (&self.bounds[0], &self.bounds[1])
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]) {
+        let result = Python::attach(|py| {
+            let value = call(py, &self.calc, t, x, u)?;
+            g.copy_from_slice(&vector("the constraint", &value, g.len())?);
+            Ok(())
+        });
+        if keep(&self.fault, result).is_none() {
+            g.fill(f64::NAN);
+        }
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
+        let Some(f) = &self.calc_diff else { return false };
+        let (size, [ndx, nu]) = (self.bounds[0].len(), self.columns);
+        let result = Python::attach(|py| {
+            let (by_x, by_u): (Bound<'_, PyAny>, Bound<'_, PyAny>) = call(py, f, t, x, u)?.extract()?;
+            gx.copy_from(&matrix("∂g/∂x", &by_x, [size, ndx])?.to_matrix());
+            gu.copy_from(&matrix("∂g/∂u", &by_u, [size, nu])?.to_matrix());
+            Ok(())
+        });
+        if keep(&self.fault, result).is_none() {
+            gx.fill(f64::NAN);
+        }
+        true
     }
 }

@@ -103,6 +103,20 @@ fn run<'py, S: Send>(
     give(py, inner, solution)
 }
 
+/// Moves a problem on by a knot, and a solver's solution with it.
+fn shift<S>(
+    problem: &Py<Problem>,
+    solver: &Mutex<S>,
+    last: usize,
+    solution: impl Fn(&mut S, &mut rust::Problem) -> Result<(), rust::Error>,
+) -> PyResult<()> {
+    let mut inner = lock("problem", &problem.get().inner)?;
+    let mut solver = lock("solver", solver)?;
+    inner.shift(last).map_err(exception)?;
+    solution(&mut solver, &mut inner).map_err(exception)?;
+    problem.get().raise()
+}
+
 /// Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
 ///
 /// Where controls are bounded, these are those of its box solvers.
@@ -161,21 +175,18 @@ impl Fddp {
     ///
     /// Raises `ProblemError` if there is no such model.
     fn shift(&self, last: usize) -> PyResult<()> {
-        let mut problem = lock("problem", &self.problem.get().inner)?;
-        let mut solver = lock("solver", &self.solver)?;
-        problem.shift(last).map_err(exception)?;
-        solver.shift(&mut problem).map_err(exception)?;
-        self.problem.get().raise()
+        shift(&self.problem, &self.solver, last, rust::Fddp::shift)
     }
 }
 
-/// The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s.
+/// The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s and for
+/// `ConstrainedAction`s.
 ///
 /// repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
 /// y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 ///
 /// problem: what is solved; the solver allocates for its shape once.
-/// inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen.
+/// inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen, `time_budget` is for all.
 /// settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
 ///     gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
 ///     `penalty_max`, `penalty_factor` (by which it rises).
@@ -242,6 +253,25 @@ impl AugmentedLagrangian {
     /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
     fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         run(py, &self.problem, &self.solver, Some([xs, us]), |solver, problem, xs, us| solver.solve(problem, xs, us))
+    }
+
+    /// Solves the problem from the last solution, its multipliers and its penalty; returns a `Solution`.
+    ///
+    /// The initial state may be another one, or the problem be shifted. After a solve that ended as "infeasible" or
+    /// "not_finite" the multipliers are zero.
+    ///
+    /// Raises `ProblemError` as `solve`.
+    fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        run(py, &self.problem, &self.solver, None, |solver, problem, _, _| solver.resume(problem))
+    }
+
+    /// Moves the horizon of the problem on by a knot, and the last solution with its multipliers, as `Fddp.shift`.
+    ///
+    /// last: the index of the model that serves the last knot.
+    ///
+    /// Raises `ProblemError` if there is no such model.
+    fn shift(&self, last: usize) -> PyResult<()> {
+        shift(&self.problem, &self.solver, last, rust::AugmentedLagrangian::shift)
     }
 
     /// What the last solve says of the limits, an `Outcome`.

@@ -27,8 +27,7 @@ use std::sync::Arc;
 ///     x0: vec![0.1; 14],
 ///     knots: vec![Knot::new(step, vec![rest.clone()])],
 ///     stages: vec![0; 20],
-///     terminal: vec![rest],
-///     terminal_limits: vec![],
+///     terminal: Knot::new(Dynamics::End, vec![rest]),
 /// };
 /// let text = serde_json::to_string(&data)?;
 /// let problem = serde_json::from_str::<RobotProblem>(&text)?.build()?;
@@ -46,11 +45,8 @@ pub struct RobotProblem {
     pub knots: Vec<Knot>,
     /// For each knot of the horizon the index of one of them.
     pub stages: Vec<usize>,
-    /// The costs after the last knot.
-    pub terminal: Vec<Cost>,
-    /// The limits there.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub terminal_limits: Vec<Limit>,
+    /// What comes after the last one: the end, or an impact.
+    pub terminal: Knot,
 }
 
 /// A knot as data.
@@ -131,19 +127,22 @@ pub enum Dynamics {
         /// Δt (s).
         dt: f64,
     },
+    /// [`FreeDynamics::terminal`], after the last knot.
+    End,
 }
 
 impl RobotProblem {
     /// The problem. Allocates.
     ///
     /// # Errors
-    /// Those of the knots' constructors and of [`Problem::new`].
+    /// Those of the knots' constructors and of [`Problem::new`]; [`Error::TimeStep`] for an end among the knots.
     pub fn build(&self) -> Result<Problem, Error> {
         let model = Arc::new(self.model.clone());
+        if self.knots.iter().any(|knot| knot.dynamics == Dynamics::End) {
+            return Err(Error::TimeStep { dt: 0.0 });
+        }
         let knots = self.knots.iter().map(|knot| knot.build(&model)).collect::<Result<_, _>>()?;
-        let terminal =
-            FreeDynamics::terminal(model, self.terminal.clone())?.with_limits(self.terminal_limits.clone())?;
-        Problem::new(self.x0.clone(), knots, self.stages.clone(), Box::new(terminal))
+        Problem::new(self.x0.clone(), knots, self.stages.clone(), self.terminal.build(&model)?)
     }
 }
 
@@ -195,6 +194,10 @@ impl Knot {
                 let action = ImpulseDynamics::new(model.clone(), contacts, *restitution, *damping, costs)?;
                 self.check_bounds(0)?;
                 Ok(Box::new(complete!(self, action)))
+            }
+            Dynamics::End => {
+                self.check_bounds(0)?;
+                Ok(Box::new(complete!(self, FreeDynamics::terminal(model, costs)?)))
             }
         }
     }

@@ -39,8 +39,16 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     let (lower, upper) = cone.bounds();
     let grip = Residual::FrictionCone { contact: stance_foot, cone };
     stance.limits_at.insert(1, vec![Limit::new("grip", grip, lower, upper)]);
+    let mut end = Knot::new(
+        Dynamics::End,
+        vec![
+            Cost::new("stand", 1.0, stand, Activation::Quadratic),
+            Cost::new("point", 1.0, point.clone(), Activation::Quadratic),
+            Cost::new("rest", 1.0, rest, Activation::Quadratic),
+        ],
+    );
+    end.limits.push(above(&point));
     RobotProblem {
-        terminal_limits: vec![above(&point)],
         x0: random_state(&model, rng),
         knots: vec![
             knot(free, still(3), bounds(vec![-1.0; 3], vec![f64::INFINITY; 3])),
@@ -49,11 +57,7 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
             knot(inverse, still(nv), None),
         ],
         stages: vec![0, 1, 1, 2, 3, 0],
-        terminal: vec![
-            Cost::new("stand", 1.0, stand, Activation::Quadratic),
-            Cost::new("point", 1.0, point, Activation::Quadratic),
-            Cost::new("rest", 1.0, rest, Activation::Quadratic),
-        ],
+        terminal: end,
         model,
     }
 }
@@ -65,7 +69,7 @@ fn a_problem_in_a_file_is_the_same_problem() {
     let text = serde_json::to_string(&data).unwrap();
     let read: RobotProblem = serde_json::from_str(&text).unwrap();
     assert_eq!((&read.x0, &read.knots, &read.stages), (&data.x0, &data.knots, &data.stages));
-    assert_eq!((&read.terminal, &read.terminal_limits), (&data.terminal, &data.terminal_limits));
+    assert_eq!(read.terminal, data.terminal);
     assert!(text.contains(r#""upper":[null,null,null]"#) && text.contains("limits_at"));
     assert_eq!(serde_json::to_string(&read).unwrap(), text);
     let mut problems = [data, read].map(|data| data.build().unwrap());
@@ -103,6 +107,12 @@ fn what_is_wrong_in_a_file_is_said() {
         "`lower`: expected length 0, found 1"
     );
     assert!(built(&|data| data.stages[1] = 7).contains("there is no action model 7"));
+    assert_eq!(built(&|data| data.knots[0].dynamics = Dynamics::End), "a knot of 0 s: its duration must be above 0");
+    assert_eq!(built(&|data| data.terminal = data.knots[0].clone()), "node 6: expected nu = 0, found 3");
+    let landing = |data: &mut RobotProblem| data.terminal = data.knots[2].clone();
+    let mut landed = data.clone();
+    landing(&mut landed);
+    assert_eq!(landed.build().map(|problem| problem.horizon()).unwrap(), 6); // an impact may come last
     assert!(built(&|data| data.x0[0] = f64::NAN).contains("`x0[0]` is NaN"));
     assert_eq!(
         built(&|data| data.knots[1].limits_at.get_mut(&1).unwrap()[0].lower.truncate(4)),
