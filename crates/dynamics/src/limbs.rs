@@ -5,8 +5,8 @@
 //! done, those with the longest way to their tips first, and leaves each in its parent's lane, which it waits for if there
 //! is time. The body on which all others hang stands in all lanes, each of which adds up what its own limbs exert on it.
 //!
-//! All four must have joints of one kind, but whatever their axes: these are turned to z already. Robots with less than two
-//! bodies a step, chains above all, are computed one body after the other.
+//! All four must have joints of one kind, but whatever their axes: these are turned to z already. Robots with less than about
+//! two bodies a step, chains above all, are computed one body after the other.
 
 mod constrained;
 mod forces;
@@ -29,7 +29,7 @@ pub(crate) use seen::Seen;
 /// How many bodies stand side by side.
 pub(crate) const LANES: usize = 4;
 
-/// From how many bodies a step on it pays.
+/// From how many bodies a step on it pays, the world counted: two legs of six joints each, under one trunk, just do.
 const WORTH: usize = 2;
 
 /// A schedule, and what a pass needs of it. Step 0 is the world.
@@ -83,7 +83,7 @@ impl Plan {
         let hasty = Self::schedule_until(nodes, 0);
         let patient = Self::schedule_until(nodes, hasty.bodies.len() - 1);
         let plan = if patient.bodies.len() > hasty.bodies.len() { hasty } else { patient };
-        (nodes.len() > WORTH * (plan.bodies.len() - 1)).then_some(plan)
+        (nodes.len() >= WORTH * (plan.bodies.len() - 1)).then_some(plan)
     }
 
     /// A schedule in which bodies that must not wait, if `last` is to be the last step, are served first.

@@ -6,7 +6,7 @@ use crate::dense::max_abs;
 use crate::error::Error;
 use crate::lq::LqNode;
 use crate::problem::{Problem, Shape};
-use crate::rollout::Trials;
+use crate::rollout::{Sum, Trials};
 use crate::search::Search;
 use crate::settings::{Method, Settings};
 use crate::solution::{Iteration, Solution, Status, Timings};
@@ -288,7 +288,9 @@ impl Fddp {
     fn calc(&mut self, problem: &mut Problem) {
         let clock = Instant::now();
         problem.calc(&self.solution.xs, &self.solution.us, &mut self.next, &mut self.costs);
-        self.solution.cost = self.costs.iter().sum();
+        let mut sum = Sum::default();
+        self.costs.iter().for_each(|cost| sum.add(*cost));
+        self.solution.cost = sum.value();
         self.solution.timings.calc += clock.elapsed();
     }
 

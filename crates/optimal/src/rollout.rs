@@ -5,6 +5,27 @@ use crate::lq::{DIVERGED, LqKnot};
 use crate::problem::{Problem, Shape};
 use crate::vector::{Dense, Vector, at_level};
 
+/// A sum that is rounded once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sum {
+    sum: f64,
+    /// What rounding took.
+    lost: f64,
+}
+
+impl Sum {
+    pub(crate) fn add(&mut self, x: f64) {
+        let sum = self.sum + x;
+        let (large, small) = if self.sum.abs() >= x.abs() { (self.sum, x) } else { (x, self.sum) };
+        self.lost += (large - sum) + small;
+        self.sum = sum;
+    }
+
+    pub(crate) fn value(self) -> f64 {
+        self.sum + self.lost
+    }
+}
+
 /// Trial trajectories, one per step length, that go through the horizon together: at each knot the trials are one
 /// group. Storage is knot after knot and, within a knot, trial after trial.
 #[derive(Debug, Clone)]
@@ -18,7 +39,7 @@ pub(crate) struct Trials {
     /// φₜ(xₜ, uₜ), N knots. It differs from the next x by what is left of the gap.
     next: Vec<f64>,
     /// Sum of the costs; meaningless where `failed`.
-    costs: Vec<f64>,
+    costs: Vec<Sum>,
     /// Trials in which something grew beyond bounds.
     failed: Vec<bool>,
     knot_costs: Vec<f64>,
@@ -65,7 +86,7 @@ impl Trials {
             xs: vec![0.0; (horizon + 1) * shape.nx * width],
             us: vec![0.0; shape.offsets[horizon] * width],
             next: vec![0.0; horizon * shape.nx * width],
-            costs: vec![0.0; width],
+            costs: vec![Sum::default(); width],
             failed: vec![false; width],
             knot_costs: vec![0.0; width],
             knot: vec![0; width],
@@ -95,7 +116,7 @@ impl Trials {
         let Self { shape, xs, us, next, costs, failed, knot_costs, knot, dx, unread, .. } = self;
         let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
         self.count = count;
-        costs[..count].fill(0.0);
+        costs[..count].fill(Sum::default());
         failed[..count].fill(false);
         for t in 0..=horizon {
             let nu = shape.nu(t);
@@ -136,17 +157,17 @@ impl Trials {
             let action = problem.action_mut(t);
             action.calc_group(&knot[..count], x_all, u_all, next_all, &mut knot_costs[..count]);
             for i in 0..count {
-                costs[i] += knot_costs[i];
+                costs[i].add(knot_costs[i]);
                 let bounded = |x: f64| x.abs() < DIVERGED; // false for NaN
                 let finite = |x: &[f64]| x.iter().all(|x| bounded(*x));
-                failed[i] |= !(bounded(costs[i]) && (t == horizon || finite(&next_all[i * nx..][..nx])));
+                failed[i] |= !(bounded(costs[i].value()) && (t == horizon || finite(&next_all[i * nx..][..nx])));
             }
         }
     }
 
     /// The cost of trial `i`, or `None` if it left all bounds.
     pub(crate) fn cost(&self, i: usize) -> Option<f64> {
-        (!self.failed[i]).then_some(self.costs[i])
+        (!self.failed[i]).then_some(self.costs[i].value())
     }
 
     /// The state xₜ of trial `i`.
