@@ -178,7 +178,6 @@ impl<S: Scalar> Data<S> {
 ///
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
-#[inline(always)]
 pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -206,7 +205,6 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
-#[inline(always)]
 pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,

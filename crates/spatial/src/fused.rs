@@ -21,17 +21,6 @@ impl Fused {
     }
 }
 
-/// Runs a kernel on such numbers with the instructions that fuse, or else tells that the processor has none.
-#[inline]
-pub fn fused(kernel: impl Kernel) -> bool {
-    let can = level() > Level::Baseline;
-    if can {
-        // SAFETY: the processor has the level.
-        unsafe { short(kernel) };
-    }
-    can
-}
-
 impl Block for Fused {
     type Number = f64;
     #[inline(always)]
@@ -72,6 +61,15 @@ impl Scalar for Fused {
     type Mask = bool;
     const LANES: usize = 1;
 
+    #[inline(always)]
+    fn enter(kernel: impl Kernel) {
+        if level() > Level::Baseline {
+            // SAFETY: the processor has the level.
+            unsafe { short(kernel) }
+        } else {
+            kernel.run();
+        }
+    }
     #[inline(always)]
     fn splat(x: f64) -> Self {
         Self(x)

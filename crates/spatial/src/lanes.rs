@@ -10,7 +10,7 @@
 //! What a processor does is in the file of its kind, x86.rs or neon.rs, as an implementation of [`Register`].
 #![allow(unsafe_code)]
 
-pub use crate::fused::{Fused, fused};
+pub use crate::fused::Fused;
 use crate::scalar::{Constant, Scalar};
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};

@@ -95,9 +95,9 @@ impl<S: Block<Number = f64>> Kernel for Pack<'_, S> {
 }
 
 /// Writes the numbers of each lane to a place of its own.
-struct Unpack<'a, 'b, S> {
-    from: &'a [S],
-    to: &'a mut [&'b mut [f64]],
+pub(super) struct Unpack<'a, 'b, S> {
+    pub from: &'a [S],
+    pub to: &'a mut [&'b mut [f64]],
 }
 
 impl<S: Block<Number = f64>> Kernel for Unpack<'_, '_, S> {
@@ -233,7 +233,7 @@ impl<S: Block<Number = f64>> Group<S> {
         out: &mut [Outcome],
     ) {
         let (nq, nv, count, forces) = (model.nq(), model.nv(), out.len(), schedule.room().forces);
-        let Self { data, set, q, v, tau, .. } = self;
+        let Self { data, set, q, v, tau, a, .. } = self;
         S::enter(Pack { from: xs, stride: nq + nv, count, to: q });
         S::enter(Pack { from: &xs[nq..], stride: nq + nv, count, to: v });
         S::enter(Pack { from: taus, stride: nv, count, to: tau });
@@ -249,11 +249,13 @@ impl<S: Block<Number = f64>> Group<S> {
             }
             (Some(set), Wanted::Motion) => {
                 let d = constrained_dynamics(model, data, set, q, v, tau, &[]);
+                a.copy_from_slice(d.a);
                 unpack(d.a, out, |o| &mut o.a);
                 unpack(d.lambda, out, |o| &mut o.lambda);
             }
             (Some(set), Wanted::Derivatives) => {
                 let d = constrained_dynamics_derivatives(model, data, set, q, v, tau, &[]);
+                a.copy_from_slice(d.a);
                 unpack(d.a, out, |o| &mut o.a);
                 unpack(d.lambda, out, |o| &mut o.lambda);
                 for (k, da) in [d.da_dq, d.da_dv, d.da_dtau].into_iter().enumerate() {
@@ -278,10 +280,10 @@ impl<S: Block<Number = f64>> Group<S> {
             if outcome.has_seen {
                 stacks[k] = stack;
             }
-            outcome.seen.make_room(schedule.room().seen);
+            outcome.seen.make_room(model.nv(), schedule.room());
         }
-        let Self { data, eyes, q, v, .. } = self;
-        eyes.look(model, data, [q, v], slopes, &stacks[..out.len()], out);
+        let Self { data, eyes, q, v, a, .. } = self;
+        eyes.look(model, data, [q, v, a], slopes, &stacks[..out.len()], out);
     }
 
     /// The tableau [J μ1 c_v c_q; M −Jᵀ r_v r_q].
@@ -304,6 +306,7 @@ impl<S: Block<Number = f64>> Group<S> {
             }
             Some(set) => {
                 let d = constrained_dynamics_equations(model, data, set, q, v, tau, &[]);
+                a.copy_from_slice(d.a);
                 unpack(d.a, out, |o| &mut o.a);
                 unpack(d.lambda, out, |o| &mut o.lambda);
                 unpack_rows(d.dgamma_dv.as_slice(), [1, rows], [rows, nv], 1.0, out, [0, x], tableau);

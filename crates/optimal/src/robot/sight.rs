@@ -2,17 +2,18 @@
 //! by side in the lanes of a vector register.
 
 use super::costs::Costs;
-use super::lanes::{UnpackRows, WIDEST};
+use super::lanes::{Unpack, UnpackRows, WIDEST};
 use super::limits::Set;
 use super::residual::{Part, Residual};
-use super::terms::Plan;
+use super::terms::{Plan, Room};
 use super::watch::Needs;
+use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
     Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
-    forward_velocities,
+    forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
 };
 use condyle_spatial::block::Block;
-use condyle_spatial::lanes::{Fused, Kernel, fused};
+use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::{Force, Mat3, Motion, Quaternion, Se3, Vec3, lie};
 use nalgebra::DMatrix;
 
@@ -51,22 +52,31 @@ fn width(nv: usize, residual: &Residual) -> usize {
 pub(super) struct Seen {
     r: Vec<f64>,
     rows: Vec<f64>,
+    /// M q̈ + h − g at a knot with contacts, else −g.
+    surplus: Vec<f64>,
+    /// Its derivatives with respect to q, v, q̈; of −g that with respect to q.
+    surplus_slopes: [DMatrix<f64>; 3],
 }
 
 impl Seen {
-    /// Room for so many residuals, and for so many numbers in their rows.
-    pub(super) fn make_room(&mut self, [looks, rows]: [usize; 2]) {
+    /// Room for the residuals of a robot's knots.
+    pub(super) fn make_room(&mut self, nv: usize, Room { seen: [looks, rows], needs, .. }: Room) {
         if self.r.len() < looks * STRIDE {
             self.r.resize(looks * STRIDE, 0.0);
         }
         if self.rows.len() < rows {
             self.rows.resize(rows, 0.0);
         }
+        if needs.gravity && self.surplus.is_empty() {
+            self.surplus.resize(nv, 0.0);
+            self.surplus_slopes.fill(DMatrix::zeros(nv, nv));
+        }
     }
 
     /// All of it.
     pub(super) fn all(&self) -> Sight<'_> {
-        Sight { r: &self.r, rows: &self.rows }
+        let Self { r, rows, surplus, surplus_slopes } = self;
+        Sight { r, rows, surplus, surplus_slopes: surplus_slopes.each_ref() }
     }
 }
 
@@ -89,12 +99,14 @@ pub(super) enum Known<'a> {
 pub(super) struct Sight<'a> {
     r: &'a [f64],
     rows: &'a [f64],
+    pub surplus: &'a [f64],
+    pub surplus_slopes: [&'a DMatrix<f64>; 3],
 }
 
 impl<'a> Sight<'a> {
     /// Without what comes first in both.
     pub(super) fn after(self, [looks, rows]: [usize; 2]) -> Self {
-        Self { r: &self.r[looks * STRIDE..], rows: &self.rows[rows..] }
+        Self { r: &self.r[looks * STRIDE..], rows: &self.rows[rows..], ..self }
     }
 
     /// r of a residual.
@@ -134,7 +146,8 @@ impl<'a> Stack<'a> {
         let same = core::ptr::eq(self.costs, other.costs) && core::ptr::eq(self.limits, other.limits);
         same || {
             let (ours, theirs) = (self.looks().map(|look| look.0), other.looks().map(|look| look.0));
-            self.costs.room().seen == other.costs.room().seen
+            self.needs() == other.needs()
+                && self.costs.room().seen == other.costs.room().seen
                 && self.limits.room().seen == other.limits.room().seen
                 && ours.zip(theirs).all(|(a, b)| a.looks_like(b))
         }
@@ -153,28 +166,33 @@ pub(super) struct Eyes<S> {
     com: DMatrix<S>,
     /// ∂h_G/∂q, ∂h_G/∂v. Shape: 6 × nv.
     momentum: [DMatrix<S>; 2],
+    /// M q̈ + h − g, or −g. Shape: nv.
+    surplus: Vec<S>,
+    /// Its derivative with respect to q. Shape: nv × nv.
+    by_q: DMatrix<S>,
 }
 
 impl<S: Block<Number = f64>> Eyes<S> {
     pub(super) fn new(model: &Model) -> Self {
         let wide = |rows| DMatrix::from_element(rows, model.nv(), S::zero());
         let zero = vec![S::zero(); model.nv()];
-        Self { J: wide(6), Jv: wide(6), zero, com: wide(3), momentum: [wide(6), wide(6)] }
+        let (surplus, by_q) = (zero.clone(), wide(model.nv()));
+        Self { J: wide(6), Jv: wide(6), zero, com: wide(3), momentum: [wide(6), wide(6)], surplus, by_q }
     }
 
-    /// Computes what some knots see, whose stacks are alike, at a state (q, v) with a lane for each of them; with the rows
-    /// of Jacobians if slopes are asked for. The last call on `data` was at q.
+    /// Computes what some knots see, whose stacks are alike, at a state (q, v) and q̈ with a lane for each of them; with the
+    /// rows of Jacobians if slopes are asked for. The last call on `data` was at q.
     pub(super) fn look(
         &mut self,
         model: &Model,
         data: &mut Data<S>,
-        [q, v]: [&[S]; 2],
+        x: [&[S]; 3],
         slopes: bool,
         stacks: &[Stack<'_>],
         to: &mut [impl AsMut<Seen>],
     ) {
-        if stacks[0].needs().kinematics() {
-            S::enter(Look { eyes: self, model, data, q, v, slopes, stacks, to });
+        if stacks[0].needs().eyes() {
+            S::enter(Look { eyes: self, model, data, x, slopes, stacks, to });
         }
     }
 }
@@ -197,22 +215,20 @@ impl OwnEyes {
         &mut self,
         model: &Model,
         data: &mut Data<f64>,
-        [q, v]: [&[f64]; 2],
+        x: [&[f64]; 3],
         slopes: bool,
         stack: Stack<'_>,
         to: &mut Seen,
     ) {
-        if !stack.needs().kinematics() {
+        if !stack.needs().eyes() {
             return;
         }
         let (stacks, to) = (&[stack], core::slice::from_mut(to));
-        data.placements(model); // of limbs side by side, too
-        let (q_fused, v_fused) = (Fused::of(q), Fused::of(v));
-        let look =
-            Look { eyes: &mut self.fused, model, data: data.fused(), q: q_fused, v: v_fused, slopes, stacks, to };
-        if !fused(look) {
-            self.plain.look(model, data, [q, v], slopes, stacks, to);
+        if level() == Level::Baseline {
+            return self.plain.look(model, data, x, slopes, stacks, to);
         }
+        data.placements(model); // of limbs side by side, too
+        self.fused.look(model, data.fused(), x.map(Fused::of), slopes, stacks, to);
     }
 }
 
@@ -220,8 +236,8 @@ struct Look<'a, S, T> {
     eyes: &'a mut Eyes<S>,
     model: &'a Model,
     data: &'a mut Data<S>,
-    q: &'a [S],
-    v: &'a [S],
+    /// q, v and q̈.
+    x: [&'a [S]; 3],
     slopes: bool,
     stacks: &'a [Stack<'a>],
     to: &'a mut [T],
@@ -230,8 +246,14 @@ struct Look<'a, S, T> {
 impl<S: Block<Number = f64>, T: AsMut<Seen>> Kernel for Look<'_, S, T> {
     #[inline(always)]
     fn run(self) {
-        let Self { eyes, model, data, q, v, slopes, stacks, to } = self;
+        let Self { eyes, model, data, x: [q, v, a], slopes, stacks, to } = self;
         let needs = stacks[0].needs();
+        if needs.gravity {
+            eyes.weigh(model, data, [q, v, a], slopes, needs.inertia, to);
+        }
+        if !needs.placements && !needs.velocities {
+            return;
+        }
         if slopes && needs.com {
             eyes.com.as_mut_slice().copy_from_slice(centroidal_map(model, data, q).Jcom.as_slice());
         }
@@ -244,7 +266,7 @@ impl<S: Block<Number = f64>, T: AsMut<Seen>> Kernel for Look<'_, S, T> {
             let motion = forward_velocities(model, data, q, v);
             (*motion, Some(motion))
         } else {
-            if data.placements(model).is_none() {
+            if needs.gravity || data.placements(model).is_none() {
                 forward_kinematics(model, data, q);
             }
             (data.placements(model).expect("kinematics place the bodies"), None)
@@ -283,6 +305,40 @@ impl<S: Block<Number = f64>, T: AsMut<Seen>> Kernel for Look<'_, S, T> {
 type Looked<'a, S> = (usize, [S; 6], [Option<&'a DMatrix<S>>; 2]);
 
 impl<S: Block<Number = f64>> Eyes<S> {
+    /// M q̈ + h − g or, without `inertia`, −g, and its slopes.
+    #[inline(always)]
+    fn weigh(
+        &mut self,
+        model: &Model,
+        data: &mut Data<S>,
+        [q, v, a]: [&[S]; 3],
+        slopes: bool,
+        inertia: bool,
+        to: &mut [impl AsMut<Seen>],
+    ) {
+        let Self { zero, surplus, by_q, .. } = self;
+        surplus.copy_from_slice(if inertia { rnea(model, data, q, v, a, &[]) } else { zero });
+        for (surplus, g) in surplus.iter_mut().zip(gravity(model, data, q)) {
+            *surplus -= *g;
+        }
+        write_all(surplus, to, |seen| &mut seen.surplus);
+        if !slopes {
+            return;
+        }
+        by_q.as_mut_slice().fill(S::zero());
+        if inertia {
+            let d = rnea_derivatives(model, data, q, v, a, &[]);
+            by_q.as_mut_slice().copy_from_slice(d.dtau_dq.as_slice());
+            write_all(d.dtau_dv.as_slice(), to, |seen| seen.surplus_slopes[1].as_mut_slice());
+            write_all(d.dtau_da.as_slice(), to, |seen| seen.surplus_slopes[2].as_mut_slice());
+        }
+        let dg = static_torque_derivative(model, data, q, &[]);
+        for (by_q, dg) in by_q.as_mut_slice().iter_mut().zip(dg.as_slice()) {
+            *by_q -= *dg;
+        }
+        write_all(by_q.as_slice(), to, |seen| seen.surplus_slopes[0].as_mut_slice());
+    }
+
     /// r of a residual with a target, and its Jacobians.
     #[inline(always)]
     fn see(
@@ -362,6 +418,16 @@ fn write<S: Block<Number = f64>>(r: [S; 6], at: usize, to: &mut [impl AsMut<Seen
             lane.store(&mut to.as_mut().r[at + i * S::LANES..]);
         }
     }
+}
+
+/// Writes numbers with a lane for each knot to where each knot has them.
+#[inline(always)]
+fn write_all<S: Block<Number = f64>>(from: &[S], to: &mut [impl AsMut<Seen>], place: impl Fn(&mut Seen) -> &mut [f64]) {
+    let (mut places, count): ([&mut [f64]; WIDEST], _) = (Default::default(), to.len());
+    for (own, to) in places.iter_mut().zip(to) {
+        *own = place(to.as_mut());
+    }
+    Unpack { from, to: &mut places[..count] }.run();
 }
 
 /// Writes the first n rows of a Jacobian, each to the beginning of one of `width` numbers.

@@ -18,6 +18,8 @@ pub(super) struct Plan {
     pub seat: Seat,
     /// Where its contact's rows stand in λ.
     rows: Range<usize>,
+    /// Whether its knot has contacts.
+    touching: bool,
     /// W of a residual W f.
     W: Vec<f64>,
 }
@@ -27,7 +29,8 @@ impl Plan {
     pub(super) fn new(model: &Model, offer: &Offer, residual: &Residual) -> Result<Self, String> {
         let n = residual.check(model, offer)?;
         let rows = residual.contact().map_or(Ok(0..0), |name| offer.contact(name))?;
-        Ok(Self { n, seat: Seat::default(), W: residual.force_rows(rows.len()), rows })
+        let touching = !offer.contacts.is_empty();
+        Ok(Self { n, seat: Seat::default(), touching, W: residual.force_rows(rows.len()), rows })
     }
 }
 
@@ -55,7 +58,7 @@ impl Room {
         };
         let forces = residual.signal() == Some(Signal::Force);
         let seen = if residual.is_seen() { [1, seen_rows(nv, residual, plan.n)] } else { [0, 0] };
-        Self { longest: plan.n, rows, seen, forces, needs: needs_of(residual) }
+        Self { longest: plan.n, rows, seen, forces, needs: needs_of(residual, plan.touching) }
     }
 
     /// Of knots of either kind.
@@ -85,10 +88,10 @@ impl core::iter::Sum for Room {
     }
 }
 
-fn needs_of(residual: &Residual) -> Needs {
+fn needs_of(residual: &Residual, touching: bool) -> Needs {
     let mut needs = Needs::default();
     match residual {
-        Residual::ControlGravity => needs.surplus = true,
+        Residual::ControlGravity => (needs.gravity, needs.inertia) = (true, touching),
         Residual::CenterOfMass { .. } => (needs.com, needs.placements) = (true, true),
         Residual::CentroidalMomentum { .. } => (needs.momentum, needs.velocities) = (true, true),
         Residual::FrameVelocity { .. } => needs.velocities = true,
@@ -116,7 +119,12 @@ impl View<'_> {
         match residual {
             Residual::State { reference } => state_difference(model, reference, scene.x, r), // x ⊖ x_ref
             Residual::Control { reference } => minus(r, scene.u, reference),
-            Residual::ControlGravity => r.copy_from_slice(&s.surplus),
+            Residual::ControlGravity => {
+                r.copy_from_slice(sight.surplus);
+                if !plan.touching {
+                    r.iter_mut().zip(scene.tau).for_each(|(r, tau)| *r += tau); // τ − g
+                }
+            }
             Residual::JointEffort { reference } => minus(r, scene.tau, reference),
             Residual::JointAcceleration { reference } => minus(r, scene.a, reference),
             Residual::ImpulseCenterOfMass => r.copy_from_slice(&s.com_change),
@@ -156,7 +164,7 @@ impl View<'_> {
         }
         for i in 0..plan.n {
             if active(&[s.d[i], s.dd[i]]) {
-                add_slope_row(residual, plan, i, slopes, nv, s);
+                add_slope_row(residual, plan, i, slopes, self.sight, nv, s);
             }
         }
     }
@@ -208,14 +216,27 @@ impl View<'_> {
 }
 
 /// Row i of ∂r/∂(u, v, q) of a residual that depends on more than q, to the others.
-fn add_slope_row(residual: &Residual, plan: &Plan, i: usize, slopes: &dyn Slopes, nv: usize, s: &mut Scratch) {
-    let Scratch { rows, d, dd, com, surplus_slopes, .. } = s;
+fn add_slope_row(
+    residual: &Residual,
+    plan: &Plan,
+    i: usize,
+    slopes: &dyn Slopes,
+    sight: Sight<'_>,
+    nv: usize,
+    s: &mut Scratch,
+) {
+    let Scratch { rows, d, dd, com, .. } = s;
     let g = &mut rows.push([d[i], dd[i]]);
     match residual {
         Residual::ControlGravity => {
-            add_matrix_row(&surplus_slopes[0], i, 1.0, g.q);
-            add_matrix_row(&surplus_slopes[1], i, 1.0, g.v);
-            (0..nv).for_each(|k| slopes.add_row(Signal::Acceleration, k, surplus_slopes[2][(i, k)], g)); // M ∂q̈
+            let [by_q, by_v, by_a] = sight.surplus_slopes;
+            add_matrix_row(by_q, i, 1.0, g.q);
+            if plan.touching {
+                add_matrix_row(by_v, i, 1.0, g.v);
+                (0..nv).for_each(|k| slopes.add_row(Signal::Acceleration, k, by_a[(i, k)], g)); // M ∂q̈
+            } else {
+                slopes.add_row(Signal::Effort, i, 1.0, g);
+            }
         }
         Residual::ImpulseCenterOfMass => {
             add_matrix_row(&com[1], i, 1.0, g.q);

@@ -4,10 +4,7 @@ use super::quadratic::{Row, Rows};
 use super::sight::{Known, OwnEyes, Seen, Stack};
 use super::state::groups;
 use super::terms::{Room, View};
-use condyle_dynamics::{
-    Data, Model, centroidal_derivatives, forward_kinematics, forward_velocities, gravity, rnea, rnea_derivatives,
-    static_torque_derivative,
-};
+use condyle_dynamics::{Data, Model, centroidal_derivatives, forward_kinematics, forward_velocities};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -87,15 +84,17 @@ pub(super) struct Needs {
     /// The Jacobian of the centre of mass.
     pub com: bool,
     pub momentum: bool,
-    /// M q̈ + h − g.
-    pub surplus: bool,
+    /// g, the efforts that hold the robot still.
+    pub gravity: bool,
+    /// M q̈ + h, the efforts of joints and contacts.
+    pub inertia: bool,
     pub impulse_com: bool,
 }
 
 impl Needs {
-    /// Whether one looks at kinematics.
-    pub(super) fn kinematics(self) -> bool {
-        self.placements || self.velocities
+    /// Whether there is anything to see.
+    pub(super) fn eyes(self) -> bool {
+        self.placements || self.velocities || self.gravity
     }
 }
 
@@ -107,7 +106,8 @@ impl core::ops::BitOr for Needs {
             velocities: self.velocities | o.velocities,
             com: self.com | o.com,
             momentum: self.momentum | o.momentum,
-            surplus: self.surplus | o.surplus,
+            gravity: self.gravity | o.gravity,
+            inertia: self.inertia | o.inertia,
             impulse_com: self.impulse_com | o.impulse_com,
         }
     }
@@ -135,10 +135,6 @@ pub(super) struct Scratch {
     pub D: DMatrix<f64>,
     /// At an impact ∂c/∂q, and ∂ċ/∂q for the change of velocity there. Shape: 3 × nv.
     pub com: [DMatrix<f64>; 2],
-    /// M q̈ + h − g. Shape: nv.
-    pub surplus: Vec<f64>,
-    /// Its derivatives with respect to q, v, q̈. Shape: nv × nv, nothing if no residual needs them.
-    pub surplus_slopes: [DMatrix<f64>; 3],
     /// J_c (v⁺ − v).
     pub com_change: [f64; 3],
     /// The coordinates of each group of positions that is no vector space.
@@ -152,7 +148,6 @@ impl Watch {
     pub(super) fn new(model: &Model, nu: usize, room: Room) -> Self {
         let nv = model.nv();
         let rows = |n| DMatrix::zeros(n, nv);
-        let square = || if room.needs.surplus { rows(nv) } else { DMatrix::zeros(0, 0) };
         let scratch = Scratch {
             r: vec![0.0; room.longest],
             d: vec![0.0; room.longest],
@@ -160,29 +155,23 @@ impl Watch {
             rows: Rows::new(nv, nu, room.rows),
             D: rows(nv),
             com: [rows(3), rows(3)],
-            surplus: vec![0.0; nv],
-            surplus_slopes: [square(), square(), square()],
             com_change: [0.0; 3],
             groups: groups(model),
             zero: vec![0.0; nv],
         };
         let mut seen = Seen::default();
-        seen.make_room(room.seen);
+        seen.make_room(nv, room);
         Self { data: Data::new(model), eyes: OwnEyes::new(model), seen, scratch }
     }
 
     /// Makes room for other residuals.
     pub(super) fn resize(&mut self, nu: usize, room: Room) {
-        self.seen.make_room(room.seen);
-        let s = &mut self.scratch;
+        let (nv, s) = (self.scratch.zero.len(), &mut self.scratch);
+        self.seen.make_room(nv, room);
         for numbers in [&mut s.r, &mut s.d, &mut s.dd] {
             numbers.resize(room.longest, 0.0);
         }
-        let nv = s.zero.len();
         s.rows = Rows::new(nv, nu, room.rows);
-        if room.needs.surplus && s.surplus_slopes[0].is_empty() {
-            s.surplus_slopes.fill(DMatrix::zeros(nv, nv));
-        }
     }
 
     /// Computes what the residuals of a knot need of a scene, with its slopes if they are asked for; what they see of its
@@ -197,18 +186,6 @@ impl Watch {
     ) -> View<'a> {
         let (Self { data, eyes, seen: own, scratch }, needs) = (self, stack.needs());
         let (q, v) = scene.x.split_at(model.nq());
-        if needs.surplus {
-            scratch.surplus.copy_from_slice(rnea(model, data, q, v, scene.a, &[]));
-            let g = gravity(model, data, q);
-            scratch.surplus.iter_mut().zip(g).for_each(|(s, g)| *s -= g); // M q̈ + h − g
-            if slopes {
-                let d = rnea_derivatives(model, data, q, v, scene.a, &[]);
-                for (to, from) in scratch.surplus_slopes.iter_mut().zip([d.dtau_dq, d.dtau_dv, d.dtau_da]) {
-                    to.copy_from(from);
-                }
-                scratch.surplus_slopes[0] -= static_torque_derivative(model, data, q, &[]);
-            }
-        }
         if needs.impulse_com {
             let change = forward_velocities(model, data, q, scene.a).com_velocity();
             scratch.com_change = change.to_array();
@@ -219,7 +196,7 @@ impl Watch {
             scratch.com[1].as_mut_slice().copy_from_slice(d.dvcom_dq.as_slice());
         }
         let mut look = |data| {
-            eyes.look(model, data, [q, v], slopes, stack, own);
+            eyes.look(model, data, [q, v, scene.a], slopes, stack, own);
         };
         let sight = match known {
             Known::Seen(seen) => seen.all(),
