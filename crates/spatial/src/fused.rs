@@ -63,12 +63,9 @@ impl Scalar for Fused {
 
     #[inline(always)]
     fn enter(kernel: impl Kernel) {
-        if level() > Level::Baseline {
-            // SAFETY: the processor has the level.
-            unsafe { short(kernel) }
-        } else {
-            kernel.run();
-        }
+        assert!(level() > Level::Baseline, "products are fused from AVX2 and NEON on");
+        // SAFETY: the processor has the level.
+        unsafe { short(kernel) }
     }
     #[inline(always)]
     fn splat(x: f64) -> Self {

@@ -328,16 +328,17 @@ impl<S: Block<Number = f64>> Group<S> {
     }
 }
 
+/// Few trials take few lanes, which are faster. For derivatives they are not: too rarely used to stay in the caches.
 #[derive(Clone, Debug)]
-enum Width {
-    Short(Group<Short>),
-    Long(Group<Long>),
+struct Groups {
+    short: Group<Short>,
+    long: Option<Group<Long>>,
 }
 
 /// The dynamics of as many knots as this processor has lanes.
 #[derive(Clone, Debug)]
 pub(super) struct SideBySide {
-    width: Box<Width>,
+    groups: Box<Groups>,
     taus: Vec<f64>,
     pub outcomes: Vec<Outcome>,
 }
@@ -365,11 +366,12 @@ fn group<S: Block<Number = f64>>(model: &Model, held: Option<Held<'_>>) -> Group
 impl SideBySide {
     /// None at the level without lanes.
     pub(super) fn new(model: &Model, held: Option<Held<'_>>) -> Option<Self> {
-        let (lanes, width) = match level() {
+        let (lanes, long) = match level() {
             Level::Baseline => return None,
-            Level::Neon | Level::Avx2 => (Short::LANES, Width::Short(group(model, held))),
-            Level::Avx512 => (Long::LANES, Width::Long(group(model, held))),
+            Level::Neon | Level::Avx2 => (Short::LANES, None),
+            Level::Avx512 => (Long::LANES, Some(group(model, held))),
         };
+        let groups = Box::new(Groups { short: group(model, held), long });
         let nv = model.nv();
         let rows = held.map_or(0, |held| held.contacts.iter().map(|c| c.constraint.kind.rows()).sum());
         let square = || DMatrix::zeros(nv, nv);
@@ -383,7 +385,7 @@ impl SideBySide {
             seen: Seen::default(),
             has_seen: false,
         };
-        Some(Self { width: Box::new(width), taus: vec![0.0; lanes * nv], outcomes: vec![outcome; lanes] })
+        Some(Self { groups, taus: vec![0.0; lanes * nv], outcomes: vec![outcome; lanes] })
     }
 
     /// How many knots it takes.
@@ -400,11 +402,13 @@ impl SideBySide {
     /// Computes what is wanted of the states of some knots, and what their residuals see; the slopes of forces only if
     /// these look at them.
     pub(super) fn run(&mut self, model: &Model, knots: &[usize], xs: &[f64], schedule: &Schedule, wanted: Wanted) {
-        let Self { width, taus, outcomes } = self;
+        let Self { groups, taus, outcomes } = self;
         let out = &mut outcomes[..knots.len()];
-        match &mut **width {
-            Width::Short(group) => group.run(model, knots, xs, taus, schedule, wanted, out),
-            Width::Long(group) => group.run(model, knots, xs, taus, schedule, wanted, out),
+        match &mut **groups {
+            Groups { long: Some(long), .. } if knots.len() > Short::LANES || wanted != Wanted::Motion => {
+                long.run(model, knots, xs, taus, schedule, wanted, out);
+            }
+            Groups { short, .. } => short.run(model, knots, xs, taus, schedule, wanted, out),
         }
     }
 }
