@@ -186,6 +186,16 @@ impl<S: Block<Number = f64>> Kernel for UnpackRows<'_, '_, S> {
     }
 }
 
+/// The part of each of some things that is to be written.
+#[inline(always)]
+pub(super) fn places<T>(of: &mut [T], part: impl Fn(&mut T) -> &mut [f64]) -> [&mut [f64]; WIDEST] {
+    let mut places: [&mut [f64]; WIDEST] = Default::default();
+    for (place, of) in places.iter_mut().zip(of) {
+        *place = part(of);
+    }
+    places
+}
+
 /// Unpacks a block of the equations: `at` is its first row and column there.
 fn unpack_rows<S: Block<Number = f64>>(
     from: &[S],
@@ -197,20 +207,14 @@ fn unpack_rows<S: Block<Number = f64>>(
     tableau: Tableau,
 ) {
     let (stride, count) = (tableau.stride(), to.len());
-    let mut places: [&mut [f64]; WIDEST] = Default::default();
-    for (place, outcome) in places.iter_mut().zip(to) {
-        *place = &mut outcome.equations[at[0] * stride + at[1]..];
-    }
+    let mut places = places(to, |outcome| &mut outcome.equations[at[0] * stride + at[1]..]);
     S::enter(UnpackRows { from, strides, shape, factor, to: &mut places[..count], stride });
 }
 
 /// Unpacks to the part of each outcome that `part` names.
 fn unpack<S: Block<Number = f64>>(from: &[S], to: &mut [Outcome], part: impl Fn(&mut Outcome) -> &mut [f64]) {
-    let mut places: [&mut [f64]; WIDEST] = Default::default();
     let count = to.len();
-    for (place, outcome) in places.iter_mut().zip(to) {
-        *place = part(outcome);
-    }
+    let mut places = places(to, part);
     S::enter(Unpack { from, to: &mut places[..count] });
 }
 

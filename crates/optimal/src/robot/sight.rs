@@ -2,7 +2,7 @@
 //! by side in the lanes of a vector register.
 
 use super::costs::Costs;
-use super::lanes::{Unpack, UnpackRows, WIDEST};
+use super::lanes::{Unpack, UnpackRows, WIDEST, places};
 use super::limits::Set;
 use super::residual::{Part, Residual};
 use super::terms::{Plan, Room};
@@ -423,20 +423,14 @@ fn write<S: Block<Number = f64>>(r: [S; 6], at: usize, to: &mut [impl AsMut<Seen
 /// Writes numbers with a lane for each knot to where each knot has them.
 #[inline(always)]
 fn write_all<S: Block<Number = f64>>(from: &[S], to: &mut [impl AsMut<Seen>], place: impl Fn(&mut Seen) -> &mut [f64]) {
-    let (mut places, count): ([&mut [f64]; WIDEST], _) = (Default::default(), to.len());
-    for (own, to) in places.iter_mut().zip(to) {
-        *own = place(to.as_mut());
-    }
-    Unpack { from, to: &mut places[..count] }.run();
+    let count = to.len();
+    Unpack { from, to: &mut places(to, |to| place(to.as_mut()))[..count] }.run();
 }
 
 /// Writes the first n rows of a Jacobian, each to the beginning of one of `width` numbers.
 #[inline(always)]
 fn write_rows<S: Block<Number = f64>>(J: &DMatrix<S>, n: usize, width: usize, at: usize, to: &mut [impl AsMut<Seen>]) {
-    let (mut places, count): ([&mut [f64]; WIDEST], _) = (Default::default(), to.len());
-    for (place, to) in places.iter_mut().zip(to) {
-        *place = &mut to.as_mut().rows[at..];
-    }
-    let (strides, shape, to) = ([1, J.nrows()], [n, J.ncols()], &mut places[..count]);
+    let (strides, shape, count) = ([1, J.nrows()], [n, J.ncols()], to.len());
+    let to = &mut places(to, |to| &mut to.as_mut().rows[at..])[..count];
     UnpackRows { from: J.as_slice(), strides, shape, factor: 1.0, to, stride: width }.run();
 }
