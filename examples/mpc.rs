@@ -22,34 +22,30 @@ fn target(time: f64) -> Vec3<f64> {
     Vec3::new(0.45, 0.15 * cos, 0.45 + 0.15 * sin)
 }
 
-/// The model whose costs lead the tool to a point.
-fn knot(arm: &Arc<Model>, rest: &[f64], point: Vec3<f64>, dt: Option<f64>) -> FreeDynamics {
+/// What leads the tool to where it should be after some steps, with so many controls.
+fn costs(arm: &Model, rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
     let frame = arm.frame("tool").expect("the arm has a tool");
-    let mut costs = vec![
-        Cost::new("follow", 1e3, Residual::FrameTranslation { frame, target: point }, Activation::Quadratic),
+    let follow = Residual::FrameTranslation { frame, target: target(step as f64 * DT) };
+    let effort = Residual::Control { reference: vec![0.0; controls] };
+    vec![
+        Cost::new("follow", 1e3, follow, Activation::Quadratic),
         Cost::new("rest", 1e-1, Residual::State { reference: rest.to_vec() }, Activation::Quadratic),
-    ];
-    let knot = match dt {
-        Some(dt) => {
-            let effort = Residual::Control { reference: vec![0.0; arm.nv()] };
-            costs.push(Cost::new("effort", 1e-3, effort, Activation::Quadratic));
-            FreeDynamics::running(arm.clone(), dt, costs)
-        }
-        None => FreeDynamics::terminal(arm.clone(), costs),
-    };
-    knot.expect("the costs fit the arm")
+        Cost::new("effort", 1e-3, effort, Activation::Quadratic),
+    ]
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arm = Arc::new(robots::arm7());
     let rest = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
-    // One model for each knot of a ring as long as the horizon: a model keeps its target while its knot moves to the front.
-    let models =
-        (0..HORIZON).map(|t| Box::new(knot(&arm, &rest, target(t as f64 * DT), Some(DT))) as Box<dyn ActionModel>);
-    let end = Box::new(knot(&arm, &rest, target(HORIZON as f64 * DT), None));
-    let mut problem = Problem::new(rest.clone(), models.collect(), (0..HORIZON).collect(), end)?;
-    let mut plant = knot(&arm, &rest, target(0.0), Some(DT));
+    // One model for all knots, each with a target of its own, which it keeps while it moves to the front.
+    let mut knot = FreeDynamics::running(arm.clone(), DT, vec![])?;
+    for t in 0..HORIZON {
+        knot.set_costs(t, costs(&arm, &rest, t, 7))?;
+    }
+    let mut plant = knot.clone();
     let hold = plant.quasi_static(&rest);
+    let end = FreeDynamics::terminal(arm.clone(), costs(&arm, &rest, HORIZON, 0))?;
+    let mut problem = Problem::new(rest.clone(), vec![Box::new(knot)], vec![0; HORIZON], Box::new(end))?;
 
     let mut solver = Fddp::new(&problem);
     solver.solve(&mut problem, &rest.repeat(HORIZON + 1), &hold.repeat(HORIZON))?;
@@ -78,11 +74,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         x.copy_from_slice(&next);
 
-        // the horizon moves on: its last knot is served by the model of the first, with a new target
-        let last = problem.stages()[0];
-        let ahead = target((step + 1 + HORIZON) as f64 * DT);
-        *problem.model_mut(last).expect("there is one for each knot") = knot(&arm, &rest, ahead, Some(DT));
-        problem.shift(last)?;
+        // the horizon moves on: its last knot and its end have new targets
+        problem.shift(0)?;
+        let knots: &mut FreeDynamics = problem.model_mut(0).expect("it serves all knots");
+        knots.set_costs(HORIZON - 1, costs(&arm, &rest, step + HORIZON, 7))?;
+        let end: &mut FreeDynamics = problem.terminal_mut().expect("it is a robot's");
+        end.set_costs(HORIZON, costs(&arm, &rest, step + 1 + HORIZON, 0))?;
         solver.shift(&mut problem)?;
         problem.set_x0(&x)?;
         let plan = solver.resume(&mut problem)?;

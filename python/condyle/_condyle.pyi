@@ -2649,6 +2649,14 @@ class Problem:
         Raises `KeyError` if there is no such term.
         """
 
+    def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
+        """Gives a knot costs of its own, between solves: an MPC's new targets. They move with their knot at a `shift`.
+
+        knot: its number, 0 to N; N is the terminal one.
+        costs: a list of `Cost`.
+
+        Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
+        """
     def rollout(self, us: _Controls) -> _Array:
         """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 

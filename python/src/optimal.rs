@@ -180,6 +180,35 @@ impl Problem {
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
     }
 
+    /// Gives a knot costs of its own, between solves: an MPC's new targets. They move with their knot at a `shift`.
+    ///
+    /// knot: its number, 0 to N; N is the terminal one.
+    /// costs: a list of `Cost`.
+    ///
+    /// Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
+    fn set_costs(&self, knot: usize, costs: Vec<PyRef<'_, Cost>>) -> PyResult<()> {
+        let mut problem = lock("problem", &self.inner)?;
+        let horizon = problem.horizon();
+        if knot > horizon {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {horizon}")));
+        }
+        let (k, kind) = match problem.stages().get(knot) {
+            Some(&k) => (Some(k), self.models[k]),
+            None => (None, self.terminal),
+        };
+        let costs = actions::terms(&costs);
+        let set = kind.change(&mut problem, k, |robot| robot.set_costs(knot, costs.clone()));
+        let Some(result) = set else {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
+        };
+        result.map_err(exception)?;
+        let mut described = lock("problem", &self.described)?;
+        if let Some(described) = &mut described[k.unwrap_or(self.models.len())] {
+            described.knot.costs_at.insert(knot, costs);
+        }
+        Ok(())
+    }
+
     /// The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
     ///
     /// us: (N, nu), or a list of N arrays where knots differ in nu.
@@ -200,6 +229,13 @@ impl Problem {
         let (actions, models) = all.into_iter().map(|boxed| (boxed.action, boxed.kind)).unzip();
         let problem = rust::Problem::new(x0, actions, stages, end).map_err(exception)?;
         Ok(Self { inner: Mutex::new(problem), models, terminal, described, faults })
+    }
+
+    /// The horizon has moved on by a knot.
+    fn describe_shift(&self) -> PyResult<()> {
+        let mut described = lock("problem", &self.described)?;
+        described[..self.models.len()].iter_mut().flatten().for_each(Described::shift);
+        Ok(())
     }
 
     /// Raises what an action written in Python raised.

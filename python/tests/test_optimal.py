@@ -180,3 +180,45 @@ def test_what_no_file_can_hold() -> None:
         Problem.from_json(text.replace('"stages":[0],', ""))
     with pytest.raises(ProblemError, match="there is no action model 3"):
         Problem.from_json(text.replace('"stages":[0]', '"stages":[3]'))
+
+
+def test_costs_of_a_knot_move_with_it() -> None:
+    """A horizon that moves on with new targets at its end is the horizon that has them from the start."""
+    horizon = 12
+
+    def follow(time: int) -> list[Cost]:
+        point = [0.4, 0.01 * time, 0.5]
+        reach = Cost.frame_translation("reach", 10.0 + time, ARM, "tool", point)
+        return [Cost.state("rest", 1e-1, X0), Cost.control("effort", 1e-3, np.zeros(7)), reach]
+
+    def end_costs(time: int) -> list[Cost]:
+        rest, _, reach = follow(time)
+        return [rest, reach]
+
+    def problem(start: int, x0: np.ndarray) -> Problem:
+        costs_at = {t: follow(start + t) for t in range(horizon)}
+        end = FreeDynamics(ARM, None, end_costs(start + horizon))
+        return Problem(x0, [FreeDynamics(ARM, 0.05, [], costs_at)], [0] * horizon, end)
+
+    moving = problem(0, X0)
+    solver = Fddp(moving)
+    last = solver.solve(np.tile(X0, (horizon + 1, 1)), np.zeros((horizon, 7)))
+    for start in range(1, 4):
+        x0 = last.xs[1] + 1e-3
+        moving.set_x0(x0)
+        solver.shift(0)
+        moving.set_costs(horizon - 1, follow(start + horizon - 1))
+        moving.set_costs(horizon, end_costs(start + horizon))
+        last = solver.resume()
+        for fresh in (Problem.from_json(moving.to_json()), problem(start, x0)):
+            expected = Fddp(fresh).solve(np.array(last.xs), np.array(last.us))
+            assert expected.status == "converged"
+            np.testing.assert_allclose(np.array(expected.us), np.array(last.us), atol=1e-4)
+            assert expected.cost == pytest.approx(last.cost, rel=1e-9)
+    with pytest.raises(ProblemError, match="knot 13: expected 0 to 12"):
+        moving.set_costs(13, [])
+    with pytest.raises(ProblemError, match="cost `cone`"):
+        moving.set_costs(3, [Cost.friction_cone("cone", 1.0, "hand", FrictionCone(0.7))])
+    own = Problem([0.0], [Action(1, 1, lambda t, x, u: (x + u, 0.0))], [0], Action(1, 0, lambda t, x, u: (None, 0.0)))
+    with pytest.raises(ProblemError, match="knot 0: expected an action of a robot"):
+        own.set_costs(0, [])

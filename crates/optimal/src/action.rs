@@ -146,6 +146,10 @@ pub trait ActionModel: Any + Send {
         }
     }
 
+    /// The horizon has [moved on](crate::Problem::shift) by a knot: what was said of knot t now holds of knot t − 1. Nothing by
+    /// default. May not allocate.
+    fn shift(&mut self) {}
+
     /// A copy that computes the same, for another thread; `None`, unless an implementation gives one: then its knots are
     /// all differentiated on one thread, whatever [`threads`](crate::Settings::threads) says.
     fn fork(&self) -> Option<Box<dyn ActionModel>> {

@@ -195,6 +195,10 @@ impl ActionModel for Constrained {
         visit(Bounded { count: self.g.len(), lower, upper, multipliers: &mut self.multipliers });
     }
 
+    fn shift(&mut self) {
+        self.action.shift();
+    }
+
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         self.action.dynamics_hessian(t, x, u, lambda, hessian)
     }

@@ -150,6 +150,10 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
         self.0.bounds(t)
     }
 
+    fn shift(&mut self) {
+        self.0.shift();
+    }
+
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.0.calc(t, x, u, next)
     }

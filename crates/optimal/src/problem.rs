@@ -161,8 +161,9 @@ impl Problem {
         }
     }
 
-    /// Moves the horizon on by a knot, as an MPC does after each step: knot t becomes knot t − 1, and the last one is
-    /// served by the model `last`. The models are told their knots by these new numbers. Allocates nothing.
+    /// Moves the horizon on by a knot, as an MPC does after each step: knot t becomes knot t − 1, with the costs and limits
+    /// that a robot's knot has of its own, and the last one is served by the model `last`, with the costs that it has for
+    /// all knots. The models are [told](ActionModel::shift), and told their knots by the new numbers. Allocates nothing.
     ///
     /// The solver's trajectory moves along with [`Fddp::shift`](crate::Fddp::shift).
     ///
@@ -176,6 +177,8 @@ impl Problem {
         self.stages.rotate_left(1);
         self.stages[horizon - 1] = last;
         self.arrange();
+        self.models.iter_mut().for_each(|model| model.shift());
+        self.copies.shift();
         Ok(())
     }
 

@@ -24,6 +24,11 @@ impl Copies {
         }
     }
 
+    /// The horizon has moved on by a knot.
+    pub(crate) fn shift(&mut self) {
+        self.of.iter_mut().flatten().flatten().for_each(|copy| copy.shift());
+    }
+
     /// Makes those that are missing of the models that can be copied, for `threads` threads in all.
     fn renew(&mut self, threads: usize, models: &[Box<dyn ActionModel>]) {
         self.of.resize_with(threads - 1, || models.iter().map(|_| None).collect());

@@ -3,7 +3,10 @@
 mod common;
 
 use common::{HANGING, Linear, cartpole, random, random_matrix, random_node, straight};
+use condyle_dynamics::{Vec3, robots};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Limit, Residual};
 use condyle_optimal::{ActionModel, Error, Fddp, Problem, Solution, Status};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Solves of the same problem from different warm starts differ by the regularisation, 1e-9 of entries of size one that
@@ -151,4 +154,98 @@ fn a_solution_survives_a_file() {
     assert!(read.K.iter().zip(&solution.K).all(|(a, b)| close(a.as_slice(), b.as_slice())));
     assert!(read.status == solution.status && read.trace.len() == solution.trace.len());
     assert!(text.contains("\"status\":\"converged\""));
+}
+
+/// What knots have of their own moves with them: costs and limits, also of copies on other threads. A new last knot has
+/// what all have, until it is given something.
+#[test]
+fn costs_and_limits_of_a_knot_move_with_it() {
+    const HORIZON: usize = 9;
+    let (arm, tool) = (Arc::new(robots::arm7()), robots::arm7().frame("tool").unwrap());
+    let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    let cost = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
+    let common = || {
+        let effort = Residual::Control { reference: vec![0.0; 7] };
+        vec![cost("effort", 1e-3, effort), cost("rest", 1e-1, Residual::State { reference: x0.clone() })]
+    };
+    // of the knot that is the `time`-th since the beginning
+    let own = |time: usize| {
+        let target = Vec3::new(0.4, 0.01 * time as f64, 0.5);
+        let follow = cost("follow", 10.0 + time as f64, Residual::FrameTranslation { frame: tool, target });
+        [common(), vec![follow]].concat()
+    };
+    let limits = |time: usize| {
+        let weak = 5.0 + time as f64;
+        let effort = Residual::Control { reference: vec![0.0; 7] };
+        if time % 3 == 1 { vec![Limit::new("weak", effort, vec![-weak; 7], vec![weak; 7])] } else { vec![] }
+    };
+    // knots with and without something of their own
+    let problem = |start: usize| {
+        let mut knot = FreeDynamics::running(arm.clone(), 0.05, common()).unwrap();
+        for t in 0..HORIZON {
+            if (start + t) % 4 != 2 {
+                knot.set_costs(t, own(start + t)).unwrap();
+            }
+            knot.set_limits(t, limits(start + t)).unwrap();
+        }
+        let end = FreeDynamics::terminal(arm.clone(), vec![]).unwrap();
+        Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; HORIZON], Box::new(end)).unwrap()
+    };
+    let mut moving = problem(0);
+    let mut solver = Fddp::new(&moving);
+    (solver.settings.max_iterations, solver.settings.threads) = (2, 3);
+    let us = vec![0.3; 7 * HORIZON];
+    solver.solve(&mut moving, &x0.repeat(HORIZON + 1), &us).unwrap();
+    for start in 1..3 * HORIZON {
+        moving.shift(0).unwrap();
+        solver.shift(&mut moving).unwrap();
+        let costs = |problem: &mut Problem| {
+            let (mut next, mut costs) = (vec![0.0; HORIZON * 14], vec![0.0; HORIZON + 1]);
+            problem.calc(&x0.repeat(HORIZON + 1), &us, &mut next, &mut costs);
+            costs
+        };
+        // the last knot has what all have
+        let (mut plain, mut fresh) = (problem(start), problem(start));
+        let last: &mut FreeDynamics = plain.model_mut(0).unwrap();
+        last.set_costs(HORIZON - 1, common()).unwrap();
+        last.set_limits(HORIZON - 1, vec![]).unwrap();
+        assert_eq!(costs(&mut moving), costs(&mut plain), "{start}");
+        let now = start + HORIZON - 1;
+        let last: &mut FreeDynamics = moving.model_mut(0).unwrap();
+        if now % 4 != 2 {
+            last.set_costs(HORIZON - 1, own(now)).unwrap();
+        }
+        last.set_limits(HORIZON - 1, limits(now)).unwrap();
+        assert_eq!(costs(&mut moving), costs(&mut fresh), "{start}");
+        // on threads whose copies have moved along, and on one
+        let (xs, warm) = (solver.solution().xs.clone(), solver.solution().us.clone());
+        let ours = solver.resume(&mut moving).unwrap();
+        let mut other = Fddp::new(&fresh);
+        other.settings.max_iterations = 2;
+        assert_eq!(other.solve(&mut fresh, &xs, &warm).unwrap().xs, ours.xs, "{start}");
+    }
+}
+
+/// The copies of other threads are moved, not made anew, when nothing else has changed.
+#[test]
+fn copies_move_along() {
+    let (arm, x0) = (Arc::new(robots::arm7()), [vec![0.1; 7], vec![0.0; 7]].concat());
+    let rest =
+        |weight| vec![Cost::new("rest", weight, Residual::State { reference: x0.clone() }, Activation::Quadratic)];
+    let solve = |threads: usize| {
+        let mut knot = FreeDynamics::running(arm.clone(), 0.05, rest(1.0)).unwrap();
+        (0..24).step_by(5).for_each(|t| knot.set_costs(t, rest(t as f64)).unwrap());
+        let end = FreeDynamics::terminal(arm.clone(), rest(1.0)).unwrap();
+        let mut problem = Problem::new(vec![0.2; 14], vec![Box::new(knot)], vec![0; 24], Box::new(end)).unwrap();
+        let mut solver = Fddp::new(&problem);
+        (solver.settings.max_iterations, solver.settings.threads) = (1, threads);
+        solver.solve(&mut problem, &x0.repeat(25), &[0.0; 168]).unwrap();
+        for _ in 0..7 {
+            problem.shift(0).unwrap();
+            solver.shift(&mut problem).unwrap();
+            solver.resume(&mut problem).unwrap();
+        }
+        solver.solution().xs.clone()
+    };
+    assert_eq!(solve(3), solve(1));
 }

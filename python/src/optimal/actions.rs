@@ -64,6 +64,15 @@ impl Described {
         all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
     }
 
+    /// Knot t becomes knot t − 1.
+    pub(super) fn shift(&mut self) {
+        fn moved<T>(at: &mut BTreeMap<usize, T>) {
+            *at = std::mem::take(at).into_iter().filter_map(|(t, own)| Some((t.checked_sub(1)?, own))).collect();
+        }
+        moved(&mut self.knot.costs_at);
+        moved(&mut self.knot.limits_at);
+    }
+
     fn kind(&self) -> Model {
         match self.knot.dynamics {
             Dynamics::Free { .. } | Dynamics::End => Model::Free,
@@ -94,34 +103,63 @@ pub(super) enum Model {
 impl Model {
     /// Changes a weight of model k, or of the terminal one; says whether there is such a term.
     pub(super) fn set_weight(self, problem: &mut rust::Problem, k: Option<usize>, name: &str, weight: f64) -> bool {
+        self.change(problem, k, |robot| robot.set_weight(name, weight)).unwrap_or(false)
+    }
+
+    /// Changes a robot's model k, or the terminal one, if it is one, whatever constraints are around it.
+    pub(super) fn change<T>(
+        self,
+        problem: &mut rust::Problem,
+        k: Option<usize>,
+        change: impl FnOnce(&mut dyn RobotKnot) -> T,
+    ) -> Option<T> {
         fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
             match k {
                 Some(k) => problem.model_mut(k),
                 None => problem.terminal_mut(),
             }
         }
-        fn set<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>, set: impl Fn(&mut A) -> bool) -> bool {
-            if let Some(action) = find(problem, k) {
-                return set(action);
+        fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
+            if find::<A>(problem, k).is_some() {
+                return find(problem, k);
             }
-            let mut around = find::<rust::Constrained>(problem, k);
-            loop {
-                let Some(constrained) = around else { return false };
-                if constrained.action_mut::<A>().is_some() {
-                    return constrained.action_mut().is_some_and(set);
-                }
-                around = constrained.action_mut();
+            let mut around = find::<rust::Constrained>(problem, k)?;
+            while around.action_mut::<A>().is_none() {
+                around = around.action_mut()?;
             }
+            around.action_mut()
         }
-        match self {
-            Self::Free => set(problem, k, |m: &mut robot::FreeDynamics| m.set_weight(name, weight)),
-            Self::Contact => set(problem, k, |m: &mut robot::ContactDynamics| m.set_weight(name, weight)),
-            Self::Impulse => set(problem, k, |m: &mut robot::ImpulseDynamics| m.set_weight(name, weight)),
-            Self::Inverse => set(problem, k, |m: &mut robot::InverseDynamics| m.set_weight(name, weight)),
-            Self::Own => false,
-        }
+        let knot: &mut dyn RobotKnot = match self {
+            Self::Free => inside::<robot::FreeDynamics>(problem, k)?,
+            Self::Contact => inside::<robot::ContactDynamics>(problem, k)?,
+            Self::Impulse => inside::<robot::ImpulseDynamics>(problem, k)?,
+            Self::Inverse => inside::<robot::InverseDynamics>(problem, k)?,
+            Self::Own => return None,
+        };
+        Some(change(knot))
     }
 }
+
+/// What all knots of robots have.
+pub(super) trait RobotKnot {
+    fn set_weight(&mut self, name: &str, weight: f64) -> bool;
+    fn set_costs(&mut self, t: usize, costs: Vec<robot::Cost>) -> Result<(), rust::Error>;
+}
+
+macro_rules! robot_knots {
+    ($($knot:ident),*) => {$(
+        impl RobotKnot for robot::$knot {
+            fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+                self.set_weight(name, weight)
+            }
+
+            fn set_costs(&mut self, t: usize, costs: Vec<robot::Cost>) -> Result<(), rust::Error> {
+                self.set_costs(t, costs)
+            }
+        }
+    )*};
+}
+robot_knots!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics);
 
 /// A copy of any action.
 pub(super) fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<Boxed> {
@@ -181,7 +219,7 @@ fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult
     Ok((Some(matrix("actuation", map, [model.nv(), nu])?.to_matrix()), nu))
 }
 
-fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
+pub(super) fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
     costs.iter().map(|c| c.0.clone()).collect()
 }
 

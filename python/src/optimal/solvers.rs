@@ -113,6 +113,7 @@ fn shift<S>(
     let mut inner = lock("problem", &problem.get().inner)?;
     let mut solver = lock("solver", solver)?;
     inner.shift(last).map_err(exception)?;
+    problem.get().describe_shift()?;
     solution(&mut solver, &mut inner).map_err(exception)?;
     problem.get().raise()
 }

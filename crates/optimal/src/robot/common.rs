@@ -113,11 +113,13 @@ pub(super) struct Variants<T> {
     all: Vec<T>,
     /// Which of them serves a knot; beyond its end the first.
     of: Vec<usize>,
+    /// Those whose knots have left the horizon.
+    free: Vec<usize>,
 }
 
 impl<T> Variants<T> {
     pub(super) fn new(common: T) -> Self {
-        Self { all: vec![common], of: Vec::new() }
+        Self { all: vec![common], of: Vec::new(), free: Vec::new() }
     }
 
     fn index(&self, t: usize) -> usize {
@@ -148,12 +150,25 @@ impl<T> Variants<T> {
         if t >= self.of.len() {
             self.of.resize(t + 1, 0);
         }
-        match self.of[t] {
-            0 => {
+        match (self.of[t], self.free.pop()) {
+            (0, None) => {
                 self.of[t] = self.all.len();
                 self.all.push(variant);
+                self.free.reserve(self.all.len());
             }
-            k => self.all[k] = variant,
+            (0, Some(k)) => (self.of[t], self.all[k]) = (k, variant),
+            (k, free) => {
+                self.all[k] = variant;
+                self.free.extend(free);
+            }
+        }
+    }
+
+    /// Knot t becomes knot t − 1.
+    pub(super) fn shift(&mut self) {
+        if !self.of.is_empty() {
+            let first = self.of.remove(0);
+            self.free.extend((first > 0).then_some(first));
         }
     }
 }
@@ -204,6 +219,12 @@ impl Schedule {
         self.limits.set(&self.model, &self.offer, t, limits)?;
         self.make_room();
         Ok(())
+    }
+
+    /// Knot t becomes knot t − 1.
+    pub(super) fn shift(&mut self) {
+        self.costs.shift();
+        self.limits.shift();
     }
 
     fn make_room(&mut self) {
@@ -284,7 +305,7 @@ macro_rules! robot_knot {
             }
 
             /// Gives knot t of the horizon costs of its own, so that one action serves knots that differ in their
-            /// targets. Allocates.
+            /// targets. They move with their knot when the horizon is [shifted](crate::Problem::shift). Allocates.
             ///
             /// # Errors
             /// [`Error::Cost`](crate::Error::Cost) for a term that does not fit.
@@ -301,7 +322,7 @@ macro_rules! robot_knot {
                 Ok(self)
             }
 
-            /// Gives knot t of the horizon limits of its own, between solves. Allocates.
+            /// Gives knot t of the horizon limits of its own, between solves; they too move with their knot. Allocates.
             ///
             /// # Errors
             /// [`Error::Limit`](crate::Error::Limit) for one that does not fit.
@@ -340,6 +361,10 @@ macro_rules! robot_positions {
         fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut crate::Hessian) -> bool {
             self.robot.integrate_hessian(dq, lambda, hessian);
             true
+        }
+
+        fn shift(&mut self) {
+            self.robot.schedule.shift();
         }
 
         fn limits(&mut self) -> Option<&mut super::limits::Limits> {

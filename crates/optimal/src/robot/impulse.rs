@@ -93,6 +93,10 @@ impl ActionModel for ImpulseDynamics {
         0
     }
 
+    fn shift(&mut self) {
+        self.robot.schedule.shift();
+    }
+
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         self.robot.schedule.limits.visit(t, visit);
     }

@@ -135,6 +135,9 @@ pub trait ContinuousModel: Send + 'static {
         self.calc_diff(t, x, u, scale, node)
     }
 
+    /// The horizon has moved on by a knot, see [`ActionModel::shift`]. Nothing by default.
+    fn shift(&mut self) {}
+
     /// Its limits, if it is a robot's.
     #[doc(hidden)]
     fn limits(&mut self) -> Option<&mut Limits> {
@@ -332,6 +335,10 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
             (Some(_), Method::Euler) => self.inner.lanes(),
             _ => 1,
         }
+    }
+
+    fn shift(&mut self) {
+        self.inner.shift();
     }
 
     fn implicit(&self) -> Option<[usize; 2]> {

@@ -171,6 +171,11 @@ impl Limits {
         Ok(())
     }
 
+    /// Knot t becomes knot t − 1.
+    pub(super) fn shift(&mut self) {
+        self.sets.shift();
+    }
+
     /// What they take at any knot.
     pub(super) fn most_room(&self) -> Room {
         self.sets.all().iter().fold(Room::default(), |most, set| most.or(set.room))
