@@ -2701,7 +2701,8 @@ class Fddp:
     def shift(self, last: int) -> None:
         """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
 
-        `resume` then starts from there. Knot t becomes knot t − 1; the last one is served by a model of the problem.
+        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the last one
+        is served by a model of the problem, with those that it has for all knots.
 
         last: the index of that model.
 
