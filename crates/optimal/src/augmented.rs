@@ -156,36 +156,30 @@ impl AugmentedLagrangian {
     }
 
     fn run(&mut self, problem: &mut Problem, warm_start: Option<[&[f64]; 2]>) -> Result<&Solution, Error> {
-        let begin = Instant::now();
-        let result = self.iterate(problem, warm_start, begin);
+        let result = self.iterate(problem, warm_start);
         if result.is_ok() {
             problem.multipliers(&mut self.outcome.multipliers);
         }
         problem.forget_multipliers();
         self.solver.solution.status = result?;
-        self.solver.solution.timings.total = begin.elapsed();
         Ok(&self.solver.solution)
     }
 
     /// The outer iterations.
-    fn iterate(
-        &mut self,
-        problem: &mut Problem,
-        warm_start: Option<[&[f64]; 2]>,
-        begin: Instant,
-    ) -> Result<Status, Error> {
+    fn iterate(&mut self, problem: &mut Problem, warm_start: Option<[&[f64]; 2]>) -> Result<Status, Error> {
+        let begin = Instant::now();
         self.settings.check()?;
         self.solver.settings = self.inner.clone();
         let lost = matches!(self.solver.solution.status, Status::Infeasible | Status::NotFinite);
         let goes_on = warm_start.is_none() && !lost && self.outcome.solves > 0;
-        let multipliers = std::mem::take(&mut self.outcome.multipliers);
         let ConstraintSettings { tolerance, tolerance_dual, penalty_start, penalty_max, .. } = self.settings;
         let penalty = if goes_on { self.outcome.penalty.clamp(penalty_start, penalty_max) } else { penalty_start };
         let mut mu = 1.0 / penalty;
         problem.start_constraints(mu)?;
         if goes_on {
-            problem.set_multipliers(&multipliers);
+            problem.set_multipliers(&self.outcome.multipliers);
         }
+        let multipliers = std::mem::take(&mut self.outcome.multipliers);
         self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
         // the tolerances of one inner solve, which follow μ
         let (mut eta, mut omega) = (mu.powf(0.1), mu);

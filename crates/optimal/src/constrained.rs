@@ -43,7 +43,8 @@ pub trait Constraint: Any + Send {
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]);
 
     /// ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu); says whether it
-    /// did. It does not by default: they are central differences of [`calc`](Self::calc) then, right to about 1e-9.
+    /// did. It does not by default: they are central differences of [`calc`](Self::calc) then, slow, allocating, and
+    /// right to about 1e-9.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         let _ = (t, x, u, gx, gu);
         false

@@ -4,7 +4,7 @@ use crate::common::contacts::random_constraints;
 use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
     Constraint, ConstraintSet, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, ReferenceFrame, Se3, Sym3,
-    WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, nonlinear_effects, rnea,
+    Vec3, WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, nonlinear_effects, rnea,
     rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
@@ -300,7 +300,8 @@ fn calls_leave_their_placements() {
             for frame in 0..m.frames().len() {
                 let (found, pose) = (left.frame(frame), expected.frame(frame));
                 worst.see(m, &found.translation.to_array(), &pose.translation.to_array());
-                worst.see(m, &(found.rotation - pose.rotation).x.to_array(), &[0.0; 3]);
+                let [R, R_expected] = [found, pose].map(|X| X.rotation.columns().map(Vec3::to_array).concat());
+                worst.see(m, &R, &R_expected);
                 left.frame_jacobian(frame, ReferenceFrame::Local, &mut J);
                 expected.frame_jacobian(frame, ReferenceFrame::Local, &mut J_expected);
                 worst.see(m, J.as_slice(), J_expected.as_slice());

@@ -150,16 +150,14 @@ impl<T> Variants<T> {
         if t >= self.of.len() {
             self.of.resize(t + 1, 0);
         }
-        match (self.of[t], self.free.pop()) {
-            (0, None) => {
-                self.of[t] = self.all.len();
+        if self.of[t] == 0 {
+            self.of[t] = self.free.pop().unwrap_or(self.all.len());
+        }
+        match self.all.get_mut(self.of[t]) {
+            Some(old) => *old = variant,
+            None => {
                 self.all.push(variant);
-                self.free.reserve(self.all.len());
-            }
-            (0, Some(k)) => (self.of[t], self.all[k]) = (k, variant),
-            (k, free) => {
-                self.all[k] = variant;
-                self.free.extend(free);
+                self.free.reserve(self.all.len()); // so that a shift need not
             }
         }
     }

@@ -319,7 +319,7 @@ impl<S: Block<Number = f64>> Eyes<S> {
         let Self { zero, surplus, by_q, .. } = self;
         surplus.copy_from_slice(if inertia { rnea(model, data, q, v, a, &[]) } else { zero });
         for (surplus, g) in surplus.iter_mut().zip(gravity(model, data, q)) {
-            *surplus -= *g;
+            *surplus -= *g; // M q̈ + h − g
         }
         write_all(surplus, to, |seen| &mut seen.surplus);
         if !slopes {
@@ -334,7 +334,7 @@ impl<S: Block<Number = f64>> Eyes<S> {
         }
         let dg = static_torque_derivative(model, data, q, &[]);
         for (by_q, dg) in by_q.as_mut_slice().iter_mut().zip(dg.as_slice()) {
-            *by_q -= *dg;
+            *by_q -= *dg; // ∂τ/∂q − ∂g/∂q
         }
         write_all(by_q.as_slice(), to, |seen| seen.surplus_slopes[0].as_mut_slice());
     }
@@ -357,9 +357,10 @@ impl<S: Block<Number = f64>> Eyes<S> {
         let six = [t[0], t[1], t[2], t[3], t[4], t[5]];
         let long = |x: Vec3<S>| [x.x, x.y, x.z, S::zero(), S::zero(), S::zero()];
         match *residual {
+            // c − c_ref
             Residual::CenterOfMass { .. } => (3, long(placed.com() - position), [Some(com), None]),
             Residual::CentroidalMomentum { .. } => {
-                let r = motion().centroidal_momentum() - Force::from(six);
+                let r = motion().centroidal_momentum() - Force::from(six); // h_G − h_ref
                 (6, r.to_array(), [Some(&momentum[0]), Some(&momentum[1])])
             }
             Residual::FramePlacement { frame, .. } => {
@@ -379,7 +380,8 @@ impl<S: Block<Number = f64>> Eyes<S> {
                 if slopes {
                     placed.frame_jacobian(frame, ReferenceFrame::LocalWorldAligned, J);
                 }
-                (3, long(placed.frame(frame).translation - position), [Some(J), None])
+                let r = placed.frame(frame).translation - position; // p − p_ref
+                (3, long(r), [Some(J), None])
             }
             Residual::FrameRotation { frame, .. } => {
                 let R = rotation.transpose() * placed.frame(frame).rotation;
@@ -389,16 +391,16 @@ impl<S: Block<Number = f64>> Eyes<S> {
                     let Jlog = lie::jlog3(r);
                     for column in J.as_mut_slice().chunks_exact_mut(6) {
                         let turned = Jlog * Vec3::new(column[3], column[4], column[5]);
-                        column[..3].copy_from_slice(&turned.to_array());
+                        column[..3].copy_from_slice(&turned.to_array()); // Jlog J
                     }
                 }
                 (3, long(r), [Some(J), None])
             }
             Residual::FrameVelocity { frame, reference, .. } => {
-                let r = motion().frame_velocity(frame, reference) - Motion::from(six);
+                let r = motion().frame_velocity(frame, reference) - Motion::from(six); // v − v_ref
                 if slopes {
-                    motion().frame_velocity_derivative(frame, reference, J);
-                    placed.frame_jacobian(frame, reference, Jv);
+                    motion().frame_velocity_derivative(frame, reference, J); // ∂v/∂q
+                    placed.frame_jacobian(frame, reference, Jv); // ∂v/∂q̇
                 }
                 (6, r.to_array(), [Some(J), Some(Jv)])
             }
