@@ -1,8 +1,8 @@
-//! Activations: how much a residual costs.
+//! Activations: functions that say how much a residual costs.
 
 use serde::{Deserialize, Serialize};
 
-/// How much a residual r costs: a(r).
+/// A function a(r) that says how much a residual r costs.
 ///
 /// ```
 /// use condyle_optimal::robot::Activation;
@@ -52,12 +52,6 @@ pub enum Activation {
     },
 }
 
-/// How far r is beyond its bounds, with its sign.
-#[inline(always)]
-fn excess(r: f64, lower: f64, upper: f64) -> f64 {
-    (r - lower).min(0.0) + (r - upper).max(0.0)
-}
-
 impl Activation {
     /// a(r).
     ///
@@ -66,68 +60,49 @@ impl Activation {
     pub fn value(&self, r: &[f64]) -> f64 {
         let mut sum = 0.0;
         match self {
-            Self::Quadratic => r.iter().for_each(|r| sum += 0.5 * r * r),
-            Self::Weighted(w) => (0..r.len()).for_each(|i| sum += 0.5 * w[i] * r[i] * r[i]),
-            Self::Barrier { lower, upper } => {
-                for i in 0..r.len() {
-                    let e = excess(r[i], lower[i], upper[i]);
-                    sum += 0.5 * e * e;
-                }
-            }
-            Self::WeightedBarrier { lower, upper, weights } => {
-                for i in 0..r.len() {
-                    let e = excess(r[i], lower[i], upper[i]);
-                    sum += 0.5 * weights[i] * e * e;
-                }
-            }
-            Self::Smooth1 { epsilon } => r.iter().for_each(|r| sum += (epsilon + r * r).sqrt()),
             Self::Smooth2 { epsilon } => sum = (epsilon + square(r)).sqrt(),
+            _ => self.each(r, |_, [value, ..]| sum += value),
         }
         sum
     }
 
-    /// a′ᵢ and a″ᵢ, the gradient and the diagonal of the Hessian.
+    /// Writes a′ᵢ and a″ᵢ, the gradient and the diagonal of the Hessian.
     pub(super) fn derivatives(&self, r: &[f64], d: &mut [f64], dd: &mut [f64]) {
         let (d, dd) = (&mut d[..r.len()], &mut dd[..r.len()]);
         match self {
-            Self::Quadratic => {
-                d.copy_from_slice(r);
-                dd.fill(1.0);
-            }
-            Self::Weighted(w) => {
-                for i in 0..r.len() {
-                    (d[i], dd[i]) = (w[i] * r[i], w[i]);
-                }
-            }
-            Self::Barrier { lower, upper } => {
-                for i in 0..r.len() {
-                    let e = excess(r[i], lower[i], upper[i]);
-                    (d[i], dd[i]) = (e, f64::from(u8::from(e != 0.0)));
-                }
-            }
-            Self::WeightedBarrier { lower, upper, weights } => {
-                for i in 0..r.len() {
-                    let e = excess(r[i], lower[i], upper[i]);
-                    (d[i], dd[i]) = (weights[i] * e, weights[i] * f64::from(u8::from(e != 0.0)));
-                }
-            }
-            Self::Smooth1 { epsilon } => {
-                for i in 0..r.len() {
-                    let a = (epsilon + r[i] * r[i]).sqrt();
-                    (d[i], dd[i]) = (r[i] / a, epsilon / (a * a * a));
-                }
-            }
             Self::Smooth2 { epsilon } => {
                 let a = (epsilon + square(r)).sqrt();
-                for i in 0..r.len() {
-                    d[i] = r[i] / a;
-                }
+                (0..r.len()).for_each(|i| d[i] = r[i] / a);
                 dd.fill(epsilon / (a * a * a));
             }
+            _ => self.each(r, |i, [_, first, second]| (d[i], dd[i]) = (first, second)),
         }
     }
 
-    /// What does not fit a residual of n numbers.
+    /// Calls a function for each entry of r with its part of the value, and that part's derivatives, for sums over entries.
+    #[inline(always)]
+    fn each(&self, r: &[f64], mut visit: impl FnMut(usize, [f64; 3])) {
+        let beyond = |i: usize, lower: &[f64], upper: &[f64]| {
+            let e = (r[i] - lower[i]).min(0.0) + (r[i] - upper[i]).max(0.0); // with its sign
+            [0.5 * e * e, e, f64::from(u8::from(e != 0.0))]
+        };
+        let entries = 0..r.len();
+        match self {
+            Self::Quadratic => entries.for_each(|i| visit(i, [0.5 * r[i] * r[i], r[i], 1.0])),
+            Self::Weighted(w) => entries.for_each(|i| visit(i, [0.5 * w[i] * r[i] * r[i], w[i] * r[i], w[i]])),
+            Self::Barrier { lower, upper } => entries.for_each(|i| visit(i, beyond(i, lower, upper))),
+            Self::WeightedBarrier { lower, upper, weights: w } => {
+                entries.for_each(|i| visit(i, beyond(i, lower, upper).map(|x| w[i] * x)));
+            }
+            Self::Smooth1 { epsilon } => entries.for_each(|i| {
+                let a = (epsilon + r[i] * r[i]).sqrt();
+                visit(i, [a, r[i] / a, epsilon / (a * a * a)]);
+            }),
+            Self::Smooth2 { .. } => {} // not a sum over entries
+        }
+    }
+
+    /// A message for what does not fit a residual of n numbers.
     pub(super) fn wrong(&self, n: usize) -> Option<String> {
         let length = |name: &str, numbers: &[f64]| match numbers.len() == n {
             true if numbers.iter().any(|x| x.is_nan()) => Some(format!("its {name} holds a NaN")),

@@ -70,7 +70,7 @@ impl Actuation {
         }
     }
 
-    /// How many coordinates, the first ones, nothing drives, if each of the others has a control of its own.
+    /// The number of coordinates, the first ones, that nothing drives, if each of the others has a control of its own.
     pub(super) fn passive(&self) -> Option<usize> {
         match self.map {
             Map::After(passive) => Some(passive),
@@ -148,7 +148,7 @@ impl Actuation {
         }
     }
 
-    /// How many numbers `columns` needs for nv rows.
+    /// The scratch that `columns` needs for nv rows.
     pub(super) fn scratch(&self) -> Vec<f64> {
         match &self.map {
             Map::After(_) => Vec::new(),

@@ -1,8 +1,9 @@
 //! Contacts of a knot, by name, and what makes a set of them singular.
 
-use super::watch::Offer;
 use crate::Error;
-use condyle_dynamics::{Constraint, ConstraintKind, ConstraintSet, Model, Proximal};
+use condyle_dynamics::{Constraint, ConstraintSet, Model, Proximal};
+use condyle_spatial::Scalar;
+use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 /// A contact of a frame with the world, and the name by which residuals call it.
@@ -23,9 +24,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// How it is called.
+    /// The name by which residuals call it.
     pub name: String,
-    /// What is held.
+    /// The constraint that it imposes.
     pub constraint: Constraint,
 }
 
@@ -37,7 +38,25 @@ impl Contact {
 }
 
 /// The constraints of some contacts, with the damping μ of J M⁻¹ Jᵀ + μ 1.
-pub(super) fn constraint_set(model: &Model, contacts: &[Contact], damping: f64) -> Result<ConstraintSet<f64>, Error> {
+pub(super) fn constraint_set<S: Scalar>(
+    model: &Model,
+    contacts: &[Contact],
+    damping: f64,
+) -> Result<ConstraintSet<S>, Error> {
+    check(model, contacts, damping)?;
+    let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
+    let mut set = ConstraintSet::new(model, &constraints).map_err(|error| match error {
+        condyle_dynamics::Error::Constraint { constraint, what } => {
+            Error::Contact { name: contacts[constraint].name.clone(), what }
+        }
+        other => Error::Contact { name: String::new(), what: other.to_string() },
+    })?;
+    set.proximal = Proximal { mu: damping, iterations: 1 };
+    Ok(set)
+}
+
+/// Refuses contacts that are named twice or are singular together, and damping that is no number of at least 0.
+fn check(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     if !(damping >= 0.0 && damping.is_finite()) {
         return Err(Error::Contact { name: "damping".to_owned(), what: format!("μ is {damping}, not at least 0") });
     }
@@ -68,32 +87,20 @@ pub(super) fn constraint_set(model: &Model, contacts: &[Contact], damping: f64) 
             return wrong(what);
         }
     }
-    let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
-    let mut set = ConstraintSet::new(model, &constraints).map_err(|error| match error {
-        condyle_dynamics::Error::Constraint { constraint, what } => {
-            Error::Contact { name: contacts[constraint].name.clone(), what }
-        }
-        other => Error::Contact { name: String::new(), what: other.to_string() },
-    })?;
-    set.proximal = Proximal { mu: damping, iterations: 1 };
-    Ok(set)
+    Ok(())
 }
 
-/// What contacts add to the offer of a knot's dynamics.
-pub(super) fn offer(offer: Offer, contacts: &[Contact]) -> Offer {
+/// The names of contacts, and the rows of each in λ.
+pub(super) fn rows_of(contacts: &[Contact]) -> Vec<(String, Range<usize>)> {
     let mut row = 0;
-    let rows = contacts.iter().map(|contact| {
-        let rows = match contact.constraint.kind {
-            ConstraintKind::Point => 3,
-            ConstraintKind::Rigid => 6,
-        };
-        row += rows;
-        (contact.name.clone(), row - rows..row)
+    let rows = contacts.iter().map(|Contact { name, constraint }| {
+        row += constraint.kind.rows();
+        (name.clone(), row - constraint.kind.rows()..row)
     });
-    Offer { contacts: rows.collect(), ..offer }
+    rows.collect()
 }
 
-/// For each row of all contacts the coordinates that move it.
+/// The coordinates that move each row of all contacts.
 pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
     let rows = contacts.iter().flat_map(|Contact { constraint, .. }| {
         let frames = [Some(constraint.frame), constraint.other].into_iter().flatten();

@@ -1,13 +1,11 @@
 //! Limits of a robot's state, control and forces: residuals that are held within bounds.
 
-use super::common::Variants;
-use super::integrated::ContinuousModel;
-use super::residual::{Part, Residual};
-use super::sight::seat;
-use super::terms::{Plan, Room, View};
-use super::watch::{Offer, Slopes};
+use super::capabilities::Capabilities;
+use super::per_knot::PerKnot;
+use super::residuals::layout::{KnotLayout, Plan};
+use super::residuals::residual::Residual;
+use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
 use crate::Error;
-use crate::lq::LqNode;
 use crate::multipliers::{Bounded, Multipliers, Visit, leave_a_value};
 use condyle_dynamics::Model;
 use serde::{Deserialize, Serialize};
@@ -45,14 +43,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limit {
-    /// How errors call it.
+    /// The name by which errors call it.
     pub name: String,
-    /// r.
+    /// The residual r.
     pub residual: Residual,
-    /// Least values; −∞ for none. Empty, as is `upper`, where r = 0.
+    /// The least values; −∞ for none. Empty, as is `upper`, where r = 0.
     #[serde(with = "condyle_spatial::finite::lower")]
     pub lower: Vec<f64>,
-    /// Greatest values; ∞ for none.
+    /// The greatest values; ∞ for none.
     #[serde(with = "condyle_spatial::finite::upper")]
     pub upper: Vec<f64>,
 }
@@ -68,9 +66,9 @@ impl Limit {
         Self::new(name, residual, vec![], vec![])
     }
 
-    /// As it is computed, with its bounds, or what does not fit.
-    fn plan(&mut self, model: &Model, offer: &Offer) -> Result<Plan, String> {
-        let plan = Plan::new(model, offer, &self.residual)?;
+    /// The plan of the residual, or what does not fit; sets bounds that are left out.
+    fn plan(&mut self, model: &Model, capabilities: &Capabilities) -> Result<Plan, String> {
+        let plan = Plan::new(model, capabilities, &self.residual)?;
         if self.lower.is_empty() && self.upper.is_empty() {
             (self.lower, self.upper) = (vec![0.0; plan.n], vec![0.0; plan.n]);
         }
@@ -85,155 +83,115 @@ impl Limit {
     }
 }
 
+impl Term for Limit {
+    fn residual(&self) -> &Residual {
+        &self.residual
+    }
+}
+
 /// The limits of a knot.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Set {
-    limits: Vec<Limit>,
-    plans: Vec<Plan>,
-    /// Those that look at kinematics.
-    looks: Vec<usize>,
-    room: Room,
+struct LimitSet {
+    terms: Terms<Limit>,
     /// The bounds of all, one after the other.
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
 
-impl Set {
-    /// Some limits for a robot whose dynamics offer some signals; of one knot of the horizon, or of all.
-    fn new(model: &Model, offer: &Offer, limits: Vec<Limit>, knot: Option<usize>) -> Result<Self, Error> {
+impl LimitSet {
+    /// The set of some limits, of one knot of the horizon or of all, for a robot whose dynamics have some capabilities.
+    fn new(model: &Model, capabilities: &Capabilities, limits: Vec<Limit>, knot: Option<usize>) -> Result<Self, Error> {
         let mut set = Self::default();
         for mut limit in limits {
             let name = limit.name.clone();
             let wrong = |what: String| Error::Limit { name, knot, what };
-            if set.limits.iter().any(|other| other.name == limit.name) {
+            if set.terms.all().iter().any(|other| other.name == limit.name) {
                 return Err(wrong("another limit has this name".to_owned()));
             }
-            let plan = limit.plan(model, offer).map_err(wrong)?;
-            set.room = set.room + Room::of(model.nv(), &limit.residual, &plan);
+            let plan = limit.plan(model, capabilities).map_err(wrong)?;
             set.lower.extend(&limit.lower);
             set.upper.extend(&limit.upper);
-            set.plans.push(plan);
-            set.limits.push(limit);
+            set.terms.push(limit, plan);
         }
-        set.looks = seat(model.nv(), set.limits.iter().map(|limit| &limit.residual).zip(&mut set.plans));
         Ok(set)
-    }
-
-    /// What its residuals take.
-    pub(super) fn room(&self) -> Room {
-        self.room
-    }
-
-    /// The limits that look at kinematics.
-    pub(super) fn looks(&self) -> impl Iterator<Item = (&Limit, &Plan)> {
-        self.looks.iter().map(|&k| (&self.limits[k], &self.plans[k]))
-    }
-
-    /// The limits, with the place of the first number of each.
-    fn each(&self) -> impl Iterator<Item = (usize, &Limit, &Plan)> {
-        let mut first = 0;
-        self.limits.iter().zip(&self.plans).map(move |(limit, plan)| {
-            first += plan.n;
-            (first - plan.n, limit, plan)
-        })
     }
 }
 
 /// The limits of all knots that an action serves, with their multipliers.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    sets: Variants<Set>,
-    none: Set,
+    sets: PerKnot<LimitSet>,
+    /// No limits, where they do not count.
+    none: Terms<Limit>,
     multipliers: Multipliers,
-    /// Whether they count: not at later stages of a step.
+    /// Whether limits count: not at later stages of a step.
     pub(super) active: bool,
-    /// The term of the augmented Lagrangian, which no Δt scales. Written by: `calc`.
+    /// The term of the augmented Lagrangian, which no Δt scales. Written by: `HorizonTerms::calc`.
     pub(super) term: f64,
 }
 
 impl Limits {
+    /// No limits.
     pub(super) fn none() -> Self {
-        let none = Set::default();
-        Self { sets: Variants::new(none.clone()), none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
+        let (sets, none) = (PerKnot::new(LimitSet::default()), Terms::default());
+        Self { sets, none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
     }
 
-    /// Sets those of knot t, or of all knots without limits of their own. Forgets multipliers.
+    /// Sets the limits of knot t, or of all knots without limits of their own. Forgets multipliers.
     pub(super) fn set(
         &mut self,
         model: &Model,
-        offer: &Offer,
+        capabilities: &Capabilities,
         t: Option<usize>,
         limits: Vec<Limit>,
     ) -> Result<(), Error> {
-        self.sets.set(t, Set::new(model, offer, limits, t)?);
-        let most = self.sets.all().iter().map(|set| set.lower.len()).max().unwrap_or(0);
+        self.sets.set(t, LimitSet::new(model, capabilities, limits, t)?);
+        let most = self.sets.all().iter().map(|set| set.terms.len()).max().unwrap_or(0);
         self.multipliers = Multipliers::new(most);
         Ok(())
     }
 
-    /// Knot t becomes knot t − 1.
+    /// Moves the horizon on: knot t becomes knot t − 1.
     pub(super) fn shift(&mut self) {
         self.sets.shift();
     }
 
-    /// What they take at any knot.
-    pub(super) fn most_room(&self) -> Room {
-        self.sets.all().iter().fold(Room::default(), |most, set| most.or(set.room))
+    /// The memory that the limits of any knot take.
+    pub(super) fn layout(&self) -> KnotLayout {
+        self.sets.all().iter().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
     }
 
-    /// Those that count at knot t.
-    pub(super) fn at(&self, t: usize) -> &Set {
-        if self.active { self.sets.at(t) } else { &self.none }
+    /// The limits that count at knot t.
+    pub(super) fn at(&self, t: usize) -> &Terms<Limit> {
+        if self.active { &self.sets.at(t).terms } else { &self.none }
     }
 
+    /// The limits that count at knot t, and what they are worth.
+    pub(super) fn objective(&mut self, t: usize) -> (&Terms<Limit>, LimitObjective<'_>) {
+        let Self { sets, none, multipliers, active, .. } = self;
+        let terms = if *active { &sets.at(t).terms } else { none };
+        (terms, LimitObjective { multipliers, t })
+    }
+
+    /// Shows the limits of knot t.
     pub(super) fn visit(&mut self, t: usize, visit: &mut Visit<'_>) {
-        let Set { lower, upper, .. } = self.sets.at(t);
-        visit(Bounded { count: lower.len(), lower, upper, multipliers: &mut self.multipliers });
-    }
-
-    /// The term at knot t.
-    pub(super) fn calc(&mut self, t: usize, view: &mut View<'_>) {
-        let Self { sets, multipliers, active: true, term, .. } = self else { return };
-        *term = 0.0;
-        for (first, limit, plan) in sets.at(t).each() {
-            view.residual(&limit.residual, plan);
-            *term += multipliers.value(t, first, &view.scratch.r[..plan.n], &limit.lower, &limit.upper);
-        }
-    }
-
-    /// The rows of Jacobians, for the gradient and the Hessian of the term.
-    pub(super) fn push_rows(&mut self, t: usize, view: &mut View<'_>, slopes: &dyn Slopes) {
-        let Self { sets, multipliers, active: true, .. } = self else { return };
-        multipliers.begin(t);
-        for (first, limit, plan) in sets.at(t).each().filter(|(_, limit, _)| limit.residual.part() != Part::Diagonal) {
-            worth(multipliers, t, first, limit, plan, view);
-            view.push_rows(&limit.residual, plan, slopes);
-        }
-    }
-
-    /// The parts of both that have no rows, to q, r, Q, R of the node.
-    pub(super) fn add_diagonals(&mut self, t: usize, view: &mut View<'_>, node: &mut LqNode) {
-        let Self { sets, multipliers, active: true, .. } = self else { return };
-        for (first, limit, plan) in sets.at(t).each().filter(|(_, limit, _)| limit.residual.part() == Part::Diagonal) {
-            worth(multipliers, t, first, limit, plan, view);
-            view.add_diagonal(&limit.residual, node);
-        }
+        let LimitSet { terms, lower, upper } = self.sets.at(t);
+        visit(Bounded { count: terms.len(), lower, upper, multipliers: &mut self.multipliers });
     }
 }
 
-/// The term of a model's limits as of the last `calc`.
-pub(super) fn limit_term<M: ContinuousModel>(model: &mut M) -> f64 {
-    model.limits().map_or(0.0, |limits| limits.term)
+/// The term of the augmented Lagrangian at knot t.
+pub(super) struct LimitObjective<'a> {
+    pub multipliers: &'a mut Multipliers,
+    t: usize,
 }
 
-/// Lets a model's limits count or not; says whether it has any.
-pub(super) fn activate_limits<M: ContinuousModel>(model: &mut M, active: bool) -> bool {
-    model.limits().map(|limits| limits.active = active).is_some()
-}
+impl Objective<Limit> for LimitObjective<'_> {
+    fn value(&self, limit: &Limit, plan: &Plan, r: &[f64]) -> f64 {
+        self.multipliers.value(self.t, plan.first, r, &limit.lower, &limit.upper)
+    }
 
-/// The residual of a limit and the derivatives of its term, in the scratch.
-fn worth(multipliers: &mut Multipliers, t: usize, first: usize, limit: &Limit, plan: &Plan, view: &mut View<'_>) {
-    view.residual(&limit.residual, plan);
-    let s = &mut *view.scratch;
-    multipliers.slopes(t, first, &s.r[..plan.n], [&limit.lower, &limit.upper], &mut s.d, &mut s.dd);
+    fn slopes(&mut self, limit: &Limit, plan: &Plan, r: &[f64], d: &mut [f64], dd: &mut [f64]) {
+        self.multipliers.slopes(self.t, plan.first, r, [&limit.lower, &limit.upper], d, dd);
+    }
 }

@@ -14,10 +14,11 @@
 //! no pivot, and the knot stays explicit.
 #![allow(non_snake_case)] // J, M, T, U, D
 
-use super::quadratic::Row;
-use super::watch::{Signal, Slopes};
 use crate::dense::{SLACK, copy_scaled, max_abs};
 use crate::implicit::{Implicit, Rows, block, mask};
+use crate::robot::capabilities::Output;
+use crate::robot::knot::Sensitivities;
+use crate::robot::residuals::rows::Row;
 use crate::vector::{Dense, Vector, at_level};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
@@ -25,38 +26,38 @@ const PREFERENCE: f64 = 1e-2;
 /// A pivot that is so much smaller than the row's largest entry was at first counts as zero.
 const REDUNDANT: f64 = 1e-7;
 
-/// How wide and how high the tableau of a knot is: a row for each contact's row and each coordinate, over
+/// The size of the tableau of a knot: a row for each contact's row and each coordinate, over
 /// (δa, δf, δv, δq).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tableau {
+pub(crate) struct Tableau {
     pub nv: usize,
     /// The number of rows of all contacts.
     pub rows: usize,
 }
 
 impl Tableau {
-    /// From one row to the next.
-    pub(super) fn stride(self) -> usize {
+    /// The distance from one row to the next.
+    pub(crate) fn stride(self) -> usize {
         3 * self.nv + self.rows + SLACK
     }
 
-    /// How many numbers it has.
-    pub(super) fn len(self) -> usize {
+    /// The number of its entries.
+    pub(crate) fn len(self) -> usize {
         (self.rows + self.nv) * self.stride()
     }
 }
 
 /// The elimination for one set of contacts, and its scratch.
 #[derive(Clone, Debug)]
-pub(super) struct Elimination {
+pub(crate) struct KktElimination {
     tableau: Tableau,
-    /// How many coordinates, the first ones, are not driven.
+    /// The number of coordinates, the first ones, that are not driven.
     passive: usize,
-    /// For each contact's row the coordinates that it prefers.
+    /// The coordinates that each contact's row prefers.
     preferred: Vec<Vec<usize>>,
     /// The column that each row was solved for.
     pivots: Vec<usize>,
-    /// For each column of δa and δf its unknown, if it is one, or else the row that was solved for it.
+    /// The place of each column of δa and δf: its unknown, if it is one, or else the row that was solved for it.
     place: Vec<Place>,
     /// Runs of columns that are unknowns: the first column, the first unknown, how many.
     runs: Vec<[usize; 3]>,
@@ -70,10 +71,10 @@ enum Place {
     Row(usize),
 }
 
-impl Elimination {
-    /// For contacts whose rows are moved by some coordinates each, of a robot whose first `passive` coordinates are not
-    /// driven.
-    pub(super) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
+impl KktElimination {
+    /// The elimination for contacts whose rows are moved by some coordinates each, of a robot whose first `passive`
+    /// coordinates are not driven.
+    pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
         let rows = moved_by.len();
         let driven = |k: &usize| *k >= passive;
         let alone = |r: usize, k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
@@ -93,19 +94,19 @@ impl Elimination {
     }
 
     /// The most coordinates that are not unknowns.
-    pub(super) fn most_dependent(&self) -> usize {
+    pub(crate) fn most_dependent(&self) -> usize {
         self.tableau.rows + self.passive
     }
 
     /// Writes U and D for steps of Δt; says whether there were pivots. Overwrites the tableau.
-    pub(super) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut Implicit) -> bool {
+    pub(crate) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut Implicit) -> bool {
         let mut done = false;
         at_level(Run { elimination: self, T: tableau, dt, implicit, done: &mut done });
         done
     }
 
-    /// How signals depend on (w, δv, δq), for a knot whose U and D are these.
-    pub(super) fn slopes<'a>(&'a self, implicit: &'a Implicit, dt: f64) -> Unknowns<'a> {
+    /// The sensitivities of outputs by (w, δv, δq), for a knot whose U and D are these.
+    pub(crate) fn sensitivities<'a>(&'a self, implicit: &'a Implicit, dt: f64) -> Unknowns<'a> {
         Unknowns { elimination: self, implicit, dt }
     }
 
@@ -140,7 +141,7 @@ impl Elimination {
 }
 
 struct Run<'a> {
-    elimination: &'a mut Elimination,
+    elimination: &'a mut KktElimination,
     T: &'a mut [f64],
     dt: f64,
     implicit: &'a mut Implicit,
@@ -251,7 +252,7 @@ impl Dense for Run<'_> {
 struct Gather<'a> {
     runs: &'a [[usize; 3]],
     nv: usize,
-    /// Where δv begins.
+    /// The column where δv begins.
     x: usize,
     m: usize,
 }
@@ -267,9 +268,9 @@ impl Gather<'_> {
     }
 }
 
-/// The slopes of a knot over (w, δv, δq); see [`Elimination::slopes`].
-pub(super) struct Unknowns<'a> {
-    elimination: &'a Elimination,
+/// The sensitivities of a knot by (w, δv, δq); see [`KktElimination::sensitivities`].
+pub(crate) struct Unknowns<'a> {
+    elimination: &'a KktElimination,
     implicit: &'a Implicit,
     dt: f64,
 }
@@ -286,18 +287,18 @@ impl Unknowns<'_> {
     }
 }
 
-impl Slopes for Unknowns<'_> {
-    fn add_row(&self, signal: Signal, row: usize, c: f64, g: &mut Row<'_>) {
-        let Elimination { tableau, passive, place, forces, .. } = self.elimination;
+impl Sensitivities for Unknowns<'_> {
+    fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>) {
+        let KktElimination { tableau, passive, place, forces, .. } = self.elimination;
         let per_step = c / self.dt; // δa = (y − δv) / Δt
-        match (signal, row) {
-            (Signal::Effort, row) if row < *passive => {}
-            (Signal::Effort, row) => self.add(&self.implicit.efforts, row - passive, c, g),
-            (Signal::Acceleration, row) => match place[row] {
+        match (output, row) {
+            (Output::Effort, row) if row < *passive => {}
+            (Output::Effort, row) => self.add(&self.implicit.efforts, row - passive, c, g),
+            (Output::Acceleration, row) => match place[row] {
                 Place::Unknown(k) => g.u[k] += per_step,
                 Place::Row(k) => self.add(&self.implicit.steps, k, per_step, g),
             },
-            (Signal::Force, row) => match place[tableau.nv + row] {
+            (Output::Force, row) => match place[tableau.nv + row] {
                 Place::Unknown(k) => g.u[k] += c,
                 Place::Row(k) => self.add(forces, k, c, g),
             },

@@ -1,9 +1,16 @@
-//! A robot's problem as data: what a file has of it.
+//! A problem of a robot as data, as a file holds it.
 
-use super::{
-    Actuation, Contact, Contacts, ContinuousModel, Cost, Free, FreeDynamics, ImpulseDynamics, Integrated, Integrator,
-    Inverse, Limit,
-};
+use super::actuation::Actuation;
+use super::contact::Contact;
+use super::continuous::ContinuousModel;
+use super::costs::Cost;
+use super::dynamics::contact::Contacts;
+use super::dynamics::free::{Free, FreeDynamics};
+use super::dynamics::impulse::ImpulseDynamics;
+use super::dynamics::inverse::Inverse;
+use super::dynamics::knots::HasRobot;
+use super::integrators::{Integrated, Integrator};
+use super::limits::Limit;
 use crate::action::ActionModel;
 use crate::{Error, Problem};
 use condyle_dynamics::Model;
@@ -41,11 +48,11 @@ pub struct RobotProblem {
     pub model: Model,
     /// The initial state (q, v).
     pub x0: Vec<f64>,
-    /// The knots that there are.
+    /// The kinds of knots.
     pub knots: Vec<Knot>,
-    /// For each knot of the horizon the index of one of them.
+    /// The index of one of them for each knot of the horizon.
     pub stages: Vec<usize>,
-    /// What comes after the last one: the end, or an impact.
+    /// The knot after the last one: the end, or an impact.
     pub terminal: Knot,
 }
 
@@ -53,20 +60,20 @@ pub struct RobotProblem {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Knot {
-    /// How the state goes on.
+    /// The rule by which the state goes on.
     pub dynamics: Dynamics,
-    /// Its costs.
+    /// The costs.
     pub costs: Vec<Cost>,
     /// Other costs in their place, by the number of a knot of the horizon.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub costs_at: BTreeMap<usize, Vec<Cost>>,
-    /// Its limits.
+    /// The limits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub limits: Vec<Limit>,
     /// Other limits in their place, by the number of a knot of the horizon.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub limits_at: BTreeMap<usize, Vec<Limit>>,
-    /// Bounds on its controls, if there are any.
+    /// Bounds on the controls, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bounds: Option<ControlBounds>,
 }
@@ -75,15 +82,15 @@ pub struct Knot {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControlBounds {
-    /// Least values.
+    /// The least values.
     #[serde(with = "condyle_spatial::finite::lower")]
     pub lower: Vec<f64>,
-    /// Greatest values.
+    /// The greatest values.
     #[serde(with = "condyle_spatial::finite::upper")]
     pub upper: Vec<f64>,
 }
 
-/// How the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
+/// The rule by which the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Dynamics {
@@ -92,28 +99,28 @@ pub enum Dynamics {
         /// S.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         actuation: Option<DMatrix<f64>>,
-        /// How it steps.
+        /// The integrator.
         integrator: Integrator,
         /// Δt (s).
         dt: f64,
     },
     /// [`ContactDynamics`](super::ContactDynamics).
     Contact {
-        /// What is held.
+        /// The contacts that hold.
         contacts: Vec<Contact>,
         /// μ (1/kg).
         damping: f64,
         /// S.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         actuation: Option<DMatrix<f64>>,
-        /// How it steps.
+        /// The integrator.
         integrator: Integrator,
         /// Δt (s).
         dt: f64,
     },
     /// [`ImpulseDynamics`].
     Impulse {
-        /// What sets in.
+        /// The contacts that set in.
         contacts: Vec<Contact>,
         /// ε, from 0 to 1.
         restitution: f64,
@@ -122,7 +129,7 @@ pub enum Dynamics {
     },
     /// [`InverseDynamics`](super::InverseDynamics).
     Inverse {
-        /// How it steps.
+        /// The integrator.
         integrator: Integrator,
         /// Δt (s).
         dt: f64,
@@ -146,22 +153,8 @@ impl RobotProblem {
     }
 }
 
-/// An action with its limits, and the costs and limits of single knots.
-macro_rules! complete {
-    ($knot:expr, $action:expr) => {{
-        let mut action = $action.with_limits($knot.limits.clone())?;
-        for (&t, costs) in &$knot.costs_at {
-            action.set_costs(t, costs.clone())?;
-        }
-        for (&t, limits) in &$knot.limits_at {
-            action.set_limits(t, limits.clone())?;
-        }
-        action
-    }};
-}
-
 impl Knot {
-    /// With these costs at all knots that it serves, and without limits and bounds.
+    /// A knot with these costs wherever it serves, without limits and bounds.
     pub fn new(dynamics: Dynamics, costs: Vec<Cost>) -> Self {
         let (costs_at, limits_at) = (BTreeMap::new(), BTreeMap::new());
         Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None }
@@ -180,26 +173,39 @@ impl Knot {
         match &self.dynamics {
             Dynamics::Free { actuation, integrator, dt } => {
                 let inner = Free::new(model.clone(), drives(actuation)?, costs)?;
-                self.bounded(complete!(self, Integrated::new(inner, *integrator, *dt)?))
+                self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Contact { contacts, damping, actuation, integrator, dt } => {
                 let inner = Contacts::new(model.clone(), drives(actuation)?, contacts, *damping, costs)?;
-                self.bounded(complete!(self, Integrated::new(inner, *integrator, *dt)?))
+                self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Inverse { integrator, dt } => {
                 let inner = Inverse::new(model.clone(), costs)?;
-                self.bounded(complete!(self, Integrated::new(inner, *integrator, *dt)?))
+                self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Impulse { contacts, restitution, damping } => {
                 let action = ImpulseDynamics::new(model.clone(), contacts, *restitution, *damping, costs)?;
                 self.check_bounds(0)?;
-                Ok(Box::new(complete!(self, action)))
+                Ok(Box::new(self.complete(action)?))
             }
             Dynamics::End => {
                 self.check_bounds(0)?;
-                Ok(Box::new(complete!(self, FreeDynamics::terminal(model, costs)?)))
+                Ok(Box::new(self.complete(FreeDynamics::terminal(model, costs)?)?))
             }
         }
+    }
+
+    /// Gives an action the limits, and the costs and limits of single knots.
+    fn complete<K: HasRobot>(&self, mut action: K) -> Result<K, Error> {
+        let terms = &mut action.robot_mut().terms;
+        terms.set_limits(None, self.limits.clone())?;
+        for (&t, costs) in &self.costs_at {
+            terms.set_costs(t, costs.clone())?;
+        }
+        for (&t, limits) in &self.limits_at {
+            terms.set_limits(Some(t), limits.clone())?;
+        }
+        Ok(action)
     }
 
     fn check_bounds(&self, nu: usize) -> Result<(), Error> {
@@ -211,7 +217,8 @@ impl Knot {
         Ok(())
     }
 
-    fn bounded<M: ContinuousModel>(&self, action: Integrated<M>) -> Result<Box<dyn ActionModel>, Error> {
+    fn bounded<M: ContinuousModel + HasRobot>(&self, action: Integrated<M>) -> Result<Box<dyn ActionModel>, Error> {
+        let action = self.complete(action)?;
         self.check_bounds(action.nu())?;
         Ok(match &self.bounds {
             Some(ControlBounds { lower, upper }) => Box::new(action.with_bounds(lower.clone(), upper.clone())),

@@ -8,18 +8,17 @@
 //!
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), section II.1.
 
-use super::euler::apply_block;
-use super::integrated::{ContinuousModel, Derivatives};
-use super::limits::{activate_limits, limit_term};
+use super::retraction::Retraction;
 use crate::lq::LqNode;
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted, activate_limits, limit_term};
 use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
 pub(super) struct RungeKutta {
-    /// Where the stages are in the step, and their weights.
+    /// The times of the stages in the step, and their weights.
     c: &'static [f64],
     b: &'static [f64],
-    /// y of a stage. Shape: nq + nv.
+    /// The state y of a stage. Shape: nq + nv.
     y: Vec<f64>,
     /// k of a stage, the step to the next one, and Σ b k. Shape: 2 nv.
     k: Vec<f64>,
@@ -37,7 +36,9 @@ pub(super) struct RungeKutta {
 }
 
 impl RungeKutta {
-    pub(super) fn new(stages: usize, nq: usize, nv: usize, nu: usize) -> Self {
+    /// A method of two, three or four stages.
+    pub(super) fn new<M: ContinuousModel>(stages: usize, model: &M) -> Self {
+        let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
         let (c, b): (&[f64], &[f64]) = match stages {
             2 => (&[0.0, 0.5], &[0.0, 1.0]),
             3 => (&[0.0, 1.0 / 3.0, 2.0 / 3.0], &[0.25, 0.0, 0.75]),
@@ -60,7 +61,7 @@ impl RungeKutta {
         }
     }
 
-    /// x ⊕ c Δt k, in `self.y`, with the step in `self.dx`.
+    /// Computes x ⊕ c Δt k, in `self.y`, with the step in `self.dx`.
     fn advance<M: ContinuousModel>(&mut self, model: &M, x: &[f64], step: f64) {
         let (nq, nv) = (model.nq(), model.nv());
         (0..2 * nv).for_each(|i| self.dx[i] = step * self.k[i]);
@@ -68,14 +69,12 @@ impl RungeKutta {
         (0..nv).for_each(|i| self.y[nq + i] = x[nq + i] + self.dx[nv + i]);
     }
 
-    /// The next state; returns the cost.
+    /// Writes the next state; returns the cost.
     pub(super) fn calc<M: ContinuousModel>(
         &mut self,
         model: &mut M,
+        KnotInput { t, x, u, .. }: KnotInput<'_>,
         dt: f64,
-        t: usize,
-        x: &[f64],
-        u: &[f64],
         next: &mut [f64],
     ) -> f64 {
         let (nq, nv, mut cost, mut term) = (model.nq(), model.nv(), 0.0, 0.0);
@@ -83,7 +82,8 @@ impl RungeKutta {
         self.k.fill(0.0);
         for i in 0..self.b.len() {
             self.advance(model, x, self.c[i] * dt);
-            let (a, rate) = model.calc(t, &self.y, u);
+            model.prepare(&[t], &self.y, u, Wanted::Motion);
+            let (a, rate) = model.calc(KnotInput { lane: 0, t, x: &self.y, u });
             cost += self.b[i] * rate;
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
@@ -99,15 +99,13 @@ impl RungeKutta {
         dt * cost + term
     }
 
-    /// Its derivatives, by the chain rule through the stages.
+    /// Writes the derivatives of a step, by the chain rule through the stages.
     pub(super) fn calc_diff<M: ContinuousModel>(
         &mut self,
         model: &mut M,
+        KnotInput { t, x, u, .. }: KnotInput<'_>,
         dt: f64,
-        t: usize,
-        x: &[f64],
-        u: &[f64],
-        [transport, exp]: [&mut DMatrix<f64>; 2],
+        step: &mut Retraction,
         node: &mut LqNode,
     ) {
         let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
@@ -122,12 +120,16 @@ impl RungeKutta {
         self.dk.fill(0.0);
         self.dsum.fill(0.0);
         for i in 0..self.b.len() {
-            let (step, weight) = (self.c[i] * dt, self.b[i] * dt);
-            self.advance(model, x, step);
+            let (time, weight) = (self.c[i] * dt, self.b[i] * dt);
+            self.advance(model, x, time);
             self.dy.copy_from(&self.dk);
-            self.dy *= step; // ∂(c Δt k)
-            chain(model, &self.dx[..nv], [transport, exp], &mut self.dy);
-            let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(t, &self.y, u, weight, &mut self.stage);
+            self.dy *= time; // ∂(c Δt k)
+            step.delta.copy_from_slice(&self.dx[..nv]);
+            step.differentiate(model);
+            step.chain(model.groups(), &mut self.dy);
+            model.prepare(&[t], &self.y, u, Wanted::Derivatives);
+            let input = KnotInput { lane: 0, t, x: &self.y, u };
+            let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, weight, &mut self.stage);
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
             for j in 0..n + nu {
@@ -148,7 +150,9 @@ impl RungeKutta {
             }
         }
         activate_limits(model, true);
-        chain(model, &self.sum[..nv], [transport, exp], &mut self.dsum);
+        step.delta.copy_from_slice(&self.sum[..nv]);
+        step.differentiate(model);
+        step.chain(model.groups(), &mut self.dsum);
         node.A.copy_from(&self.dsum.columns(0, n));
         node.B.copy_from(&self.dsum.columns(n, nu));
     }
@@ -181,24 +185,5 @@ impl RungeKutta {
         node.Q += H.view((0, 0), (n, n));
         node.S += H.view((0, n), (n, nu));
         node.R += H.view((n, n), (nu, nu));
-    }
-}
-
-/// ∂(x ⊕ dx)/∂(x, u) in place of ∂dx/∂(x, u).
-fn chain<M: ContinuousModel>(model: &M, dq: &[f64], [transport, exp]: [&mut DMatrix<f64>; 2], X: &mut DMatrix<f64>) {
-    let nv = dq.len();
-    if !model.groups().is_empty() {
-        model.integrate_jacobians(dq, transport, exp);
-        model.groups().iter().for_each(|group| apply_block(exp, group, X));
-    }
-    let mut from = 0;
-    for group in model.groups().iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
-        (from..group.start).for_each(|k| X[(k, k)] += 1.0);
-        from = group.end;
-        for c in group.clone() {
-            for r in group.clone() {
-                X[(r, c)] += transport[(r, c)];
-            }
-        }
     }
 }

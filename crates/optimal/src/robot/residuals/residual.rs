@@ -1,7 +1,7 @@
 //! Residuals: what a cost looks at.
 
-use super::cones::{FrictionCone, WrenchCone};
-use super::watch::{Offer, Signal};
+use super::cones::{FrictionCone, WrenchCone, pressure_rows};
+use crate::robot::capabilities::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -47,7 +47,7 @@ pub enum Residual {
     FramePlacement {
         /// The frame.
         frame: usize,
-        /// Its wanted pose in the world.
+        /// The frame's wanted pose in the world.
         target: Se3<f64>,
     },
     /// p − p_ref, 3 numbers, in the world.
@@ -61,7 +61,7 @@ pub enum Residual {
     FrameRotation {
         /// The frame.
         frame: usize,
-        /// Its wanted axes in the world.
+        /// The frame's wanted axes in the world.
         target: Mat3<f64>,
     },
     /// v − v_ref, 6 numbers, linear first.
@@ -70,7 +70,7 @@ pub enum Residual {
         frame: usize,
         /// The wanted velocity (m/s, rad/s).
         target: Motion<f64>,
-        /// In which both are expressed.
+        /// The frame in which both are expressed.
         reference: ReferenceFrame,
     },
     /// λ − λ_ref, the force or impulse of a contact along the axes of its rows: 3 or 6 numbers, linear first.
@@ -108,20 +108,20 @@ pub enum Residual {
     ImpulseCenterOfMass,
 }
 
-/// Where the Hessian of a residual has entries.
+/// The part of the Hessian of a residual that has entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    /// On the diagonal of Q or R, and in the blocks of groups.
+pub(crate) enum Part {
+    /// The diagonal of Q or R, and the blocks of groups.
     Diagonal,
-    /// Of positions with positions.
+    /// The block of positions with positions.
     Positions,
-    /// Anywhere.
+    /// All of it.
     All,
 }
 
 impl Residual {
-    /// Where its Hessian has entries.
-    pub(super) fn part(&self) -> Part {
+    /// The part of the Hessian that has entries.
+    pub(crate) fn part(&self) -> Part {
         match self {
             Self::State { .. } | Self::Control { .. } => Part::Diagonal,
             Self::CenterOfMass { .. }
@@ -132,42 +132,39 @@ impl Residual {
         }
     }
 
-    /// Which signal of the dynamics it looks at, beside x and u.
-    pub(super) fn signal(&self) -> Option<Signal> {
+    /// The output of the dynamics that it looks at, beside x and u.
+    pub(crate) fn output(&self) -> Option<Output> {
         match self {
-            Self::JointEffort { .. } => Some(Signal::Effort),
+            Self::JointEffort { .. } => Some(Output::Effort),
             Self::ControlGravity | Self::JointAcceleration { .. } | Self::ImpulseCenterOfMass => {
-                Some(Signal::Acceleration)
+                Some(Output::Acceleration)
             }
             Self::ContactForce { .. }
             | Self::FrictionCone { .. }
             | Self::WrenchCone { .. }
-            | Self::CenterOfPressure { .. } => Some(Signal::Force),
+            | Self::CenterOfPressure { .. } => Some(Output::Force),
             _ => None,
         }
     }
 
     /// Whether it looks at kinematics alone.
-    pub(super) fn is_seen(&self) -> bool {
+    pub(crate) fn is_kinematic(&self) -> bool {
         self.frame().is_some() || matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. })
     }
 
-    /// Whether another one looks at the same, with a target of its own.
-    pub(super) fn looks_like(&self, other: &Self) -> bool {
-        let reference = |residual: &Self| match residual {
-            Self::FrameVelocity { reference, .. } => Some(*reference),
-            _ => None,
-        };
+    /// Whether another residual looks at the same, with a target of its own.
+    pub(crate) fn differs_in_target(&self, other: &Self) -> bool {
         core::mem::discriminant(self) == core::mem::discriminant(other)
-            && (self.frame(), reference(self)) == (other.frame(), reference(other))
+            && (self.frame(), self.reference()) == (other.frame(), other.reference())
     }
 
-    /// Writes the numbers of its target, positions and twists first, to lane k.
-    pub(super) fn write_target<const N: usize>(&self, k: usize, to: &mut [[f64; N]; 12]) {
-        let mut write = |from: usize, numbers: &[f64]| (0..numbers.len()).for_each(|i| to[from + i][k] = numbers[i]);
+    /// The numbers of its target: a position, a twist or a wrench, then a rotation by columns; zeros where there is none.
+    pub(crate) fn target(&self) -> [f64; 12] {
+        let mut to = [0.0; 12];
+        let mut write = |from: usize, numbers: &[f64]| to[from..][..numbers.len()].copy_from_slice(numbers);
         match self {
             Self::CenterOfMass { target } | Self::FrameTranslation { target, .. } => write(0, &target.to_array()),
-            Self::CentroidalMomentum { target } => write(0, &target.to_array()),
+            Self::CentroidalMomentum { target } | Self::ContactForce { target, .. } => write(0, &target.to_array()),
             Self::FrameVelocity { target, .. } => write(0, &target.to_array()),
             Self::FramePlacement { target, .. } => {
                 write(0, &target.translation.to_array());
@@ -176,10 +173,11 @@ impl Residual {
             Self::FrameRotation { target, .. } => write(3, target.columns().map(Vec3::to_array).as_flattened()),
             _ => {}
         }
+        to
     }
 
     /// The frame that it looks at.
-    pub(super) fn frame(&self) -> Option<usize> {
+    pub(crate) fn frame(&self) -> Option<usize> {
         match self {
             Self::FramePlacement { frame, .. }
             | Self::FrameTranslation { frame, .. }
@@ -189,8 +187,16 @@ impl Residual {
         }
     }
 
+    /// The frame in which it is expressed, of those that leave a choice.
+    pub(crate) fn reference(&self) -> Option<ReferenceFrame> {
+        match self {
+            Self::FrameVelocity { reference, .. } => Some(*reference),
+            _ => None,
+        }
+    }
+
     /// The contact that it looks at.
-    pub(super) fn contact(&self) -> Option<&str> {
+    pub(crate) fn contact(&self) -> Option<&str> {
         match self {
             Self::ContactForce { contact, .. }
             | Self::FrictionCone { contact, .. }
@@ -200,80 +206,67 @@ impl Residual {
         }
     }
 
-    /// How many numbers it has, or what does not fit the robot and what its action offers.
-    pub(super) fn check(&self, model: &Model, offer: &Offer) -> Result<usize, String> {
-        let (nx, nv) = (model.nq() + model.nv(), model.nv());
-        let length = |name: &str, numbers: &[f64], expected: usize| match numbers.len() == expected {
-            true if numbers.iter().any(|x| !x.is_finite()) => {
-                let what = if numbers.iter().any(|x| x.is_nan()) { "a NaN" } else { "an infinite number" };
-                Err(format!("its {name} holds {what}"))
-            }
-            true => Ok(expected),
-            false => Err(format!("its {name} has {} numbers, expected {expected}", numbers.len())),
+    /// The number of its entries, or what does not fit the robot and the capabilities of its dynamics.
+    pub(crate) fn check(&self, model: &Model, capabilities: &Capabilities) -> Result<usize, String> {
+        let (nx, nv, nu) = (model.nq() + model.nv(), model.nv(), capabilities.nu);
+        let finite = |name: &str, numbers: &[f64]| match numbers.iter().all(|x| x.is_finite()) {
+            true => Ok(()),
+            false if numbers.iter().any(|x| x.is_nan()) => Err(format!("its {name} holds a NaN")),
+            false => Err(format!("its {name} holds an infinite number")),
+        };
+        let length = |numbers: &[f64], expected: usize| match numbers.len() == expected {
+            true => finite("reference", numbers),
+            false => Err(format!("its reference has {} numbers, expected {expected}", numbers.len())),
         };
         if let Some(frame) = self.frame().filter(|&frame| frame >= model.frames().len()) {
             return Err(format!("there is no frame {frame}; the robot has {}", model.frames().len()));
         }
-        let rows = match self.contact() {
-            Some(name) => offer.contact(name)?.len(),
-            None => 0,
-        };
+        let rows = self.contact().map_or(Ok(0), |name| capabilities.contact(name).map(|rows| rows.len()))?;
         let rigid = |what: &str| match rows {
             6 => Ok(()),
             _ => Err(format!("{what} needs a rigid contact, of 6 rows; this one has {rows}")),
         };
-        match self {
-            Self::State { reference } => length("reference", reference, nx).map(|_| 2 * nv),
-            Self::Control { reference } => length("reference", reference, offer.nu),
-            Self::JointEffort { reference } => length("reference", reference, nv),
-            Self::JointAcceleration { reference } => length("reference", reference, nv),
-            Self::ControlGravity => Ok(nv),
-            Self::CenterOfMass { target } => length("target", &target.to_array(), 3),
-            Self::CentroidalMomentum { target } => length("target", &target.to_array(), 6),
-            Self::FramePlacement { target, .. } => {
-                let R = target.rotation.columns().map(Vec3::to_array).concat();
-                length("target", &[&target.translation.to_array()[..], &R].concat(), 12).map(|_| 6)
+        finite("target", &self.target())?;
+        let n = match self {
+            Self::State { reference } => length(reference, nx).map(|()| 2 * nv)?,
+            Self::Control { reference } => length(reference, nu).map(|()| nu)?,
+            Self::JointEffort { reference } | Self::JointAcceleration { reference } => {
+                length(reference, nv).map(|()| nv)?
             }
-            Self::FrameTranslation { target, .. } => length("target", &target.to_array(), 3),
-            Self::FrameRotation { target, .. } => {
-                length("target", &target.columns().map(Vec3::to_array).concat(), 9).map(|_| 3)
-            }
-            Self::FrameVelocity { target, .. } => length("target", &target.to_array(), 6),
-            Self::ContactForce { target, .. } => length("target", &target.to_array(), 6).map(|_| rows),
-            Self::FrictionCone { cone, .. } => match cone.wrong() {
-                Some(what) => Err(what),
-                None => Ok(cone.facets + 1),
-            },
-            Self::WrenchCone { cone, .. } => {
+            Self::ControlGravity => nv,
+            Self::CenterOfMass { .. } | Self::FrameTranslation { .. } | Self::FrameRotation { .. } => 3,
+            Self::CentroidalMomentum { .. } | Self::FramePlacement { .. } | Self::FrameVelocity { .. } => 6,
+            Self::ContactForce { .. } => rows,
+            Self::FrictionCone { cone, .. } => cone.wrong().map_or(Ok(cone.facets + 1), Err)?,
+            Self::WrenchCone { cone: WrenchCone { friction, size }, .. } => {
                 rigid("a wrench cone")?;
-                length("size", &cone.size, 2)?;
-                match cone.friction.wrong() {
-                    Some(what) => Err(what),
-                    None => Ok(cone.friction.facets + 13),
-                }
+                finite("size", size)?;
+                friction.wrong().map_or(Ok(friction.facets + 13), Err)?
             }
             Self::CenterOfPressure { rotation, size, .. } => {
                 rigid("a centre of pressure")?;
-                length("size", size, 2)?;
-                length("rotation", &rotation.columns().map(Vec3::to_array).concat(), 9).map(|_| 4)
+                finite("size", size)?;
+                finite("rotation", rotation.columns().map(Vec3::to_array).as_flattened()).map(|()| 4)?
             }
-            Self::ImpulseCenterOfMass if !offer.impulse => Err("only an impact changes velocities at once".to_owned()),
-            Self::ImpulseCenterOfMass => Ok(3),
-        }
-        .and_then(|n| match self.signal() {
-            Some(Signal::Effort) if !offer.effort => Err("there is no effort at this knot".to_owned()),
-            Some(Signal::Acceleration) if !(offer.effort || offer.impulse) => {
+            Self::ImpulseCenterOfMass if !capabilities.impulse => {
+                return Err("only an impact changes velocities at once".to_owned());
+            }
+            Self::ImpulseCenterOfMass => 3,
+        };
+        match self.output() {
+            Some(Output::Effort) if !capabilities.effort => Err("there is no effort at this knot".to_owned()),
+            Some(Output::Acceleration) if !(capabilities.effort || capabilities.impulse) => {
                 Err("there is no acceleration at this knot".to_owned())
             }
-            Some(Signal::Acceleration) if offer.impulse && *self != Self::ImpulseCenterOfMass => {
+            Some(Output::Acceleration) if capabilities.impulse && *self != Self::ImpulseCenterOfMass => {
                 Err("an impact has no acceleration".to_owned())
             }
             _ => Ok(n),
-        })
+        }
     }
 
     /// W of a residual r = W f of a contact's force, row after row; its rows have as many numbers as the contact.
-    pub(super) fn force_rows(&self, rows: usize) -> Vec<f64> {
+    pub(crate) fn force_rows(&self, rows: usize) -> Vec<f64> {
         match self {
             Self::ContactForce { .. } => (0..rows * rows).map(|k| f64::from(u8::from(k % rows == k / rows))).collect(),
             Self::FrictionCone { cone, .. } => {
@@ -281,7 +274,7 @@ impl Residual {
                 cone.rows().iter().flat_map(pad).collect()
             }
             Self::WrenchCone { cone, .. } => cone.rows().concat(),
-            Self::CenterOfPressure { rotation, size, .. } => super::cones::pressure_rows(*rotation, *size).concat(),
+            Self::CenterOfPressure { rotation, size, .. } => pressure_rows(*rotation, *size).concat(),
             _ => Vec::new(),
         }
     }

@@ -1,5 +1,5 @@
-//! How residuals' gradients and Gauss–Newton Hessians come into a node: the rows of their Jacobians are collected, and
-//! each entry of Q, S and R is then written once, as the sum of their outer products.
+//! Rows of the Jacobians of residuals. They are collected, and gradients and Gauss–Newton Hessians of a node are then
+//! written once, each entry of Q, S and R as a sum of outer products.
 #![allow(non_snake_case)] // the names of the literature
 
 use crate::dense::{SLACK, tile_rows};
@@ -8,7 +8,7 @@ use crate::vector::{Dense, Vector, at_level};
 use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
-pub(super) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[f64], dd: &[f64]) {
+pub(crate) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[f64], dd: &[f64]) {
     let (n, implicit) = (node.ndx(), &mut node.implicit);
     for i in entries.clone() {
         node.q[i] += d[i];
@@ -23,7 +23,7 @@ pub(super) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[
 }
 
 /// r += d and R += diag(dd).
-pub(super) fn add_control_diagonal(node: &mut LqNode, d: &[f64], dd: &[f64]) {
+pub(crate) fn add_control_diagonal(node: &mut LqNode, d: &[f64], dd: &[f64]) {
     let (n, m, implicit) = (node.ndx(), node.nu(), &mut node.implicit);
     for i in 0..m {
         node.r[i] += d[i];
@@ -35,7 +35,7 @@ pub(super) fn add_control_diagonal(node: &mut LqNode, d: &[f64], dd: &[f64]) {
 }
 
 /// A row of a Jacobian with respect to (u, v, q), to be added to.
-pub(super) struct Row<'a> {
+pub(crate) struct Row<'a> {
     pub u: &'a mut [f64],
     pub v: &'a mut [f64],
     pub q: &'a mut [f64],
@@ -44,16 +44,16 @@ pub(super) struct Row<'a> {
 /// The rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In
 /// a knot of implicit form u stands for the unknowns that replace the controls.
 #[derive(Clone, Debug)]
-pub(super) struct Rows {
+pub(crate) struct Rows {
     nu: usize,
     nv: usize,
-    /// How far it is from one row to the next.
+    /// The distance from one row to the next.
     stride: usize,
-    /// Those of residuals that depend on more than q, and behind their end those of the others, from the last one on.
+    /// The rows of residuals that depend on more than q, and from the end of the memory backwards those of the others.
     rows: Vec<f64>,
     /// a′ and a″.
     slopes: Vec<[f64; 2]>,
-    /// How many there are of both kinds.
+    /// The number of rows of both kinds.
     whole: usize,
     positions: usize,
     /// The rows times √|a″|, and the same with the sign of a″.
@@ -62,8 +62,8 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Room for so many rows with respect to (u, v, q), and to q alone, of a robot with nv coordinates and nu controls.
-    pub(super) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
+    /// Memory for so many rows with respect to (u, v, q), and to q alone, of a robot with nv coordinates and nu controls.
+    pub(crate) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
         let (most, stride) = (whole + positions, nu + 2 * nv + SLACK);
         let rows = vec![0.0; most.max(1) * stride];
         let (left, right, slopes) = (rows.clone(), rows.clone(), vec![[0.0; 2]; most]);
@@ -71,12 +71,12 @@ impl Rows {
     }
 
     /// Forgets all rows.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         (self.whole, self.positions) = (0, 0);
     }
 
     /// A row of zeros, to be written, for the a′ and a″ that it is worth.
-    pub(super) fn push(&mut self, worth: [f64; 2]) -> Row<'_> {
+    pub(crate) fn push(&mut self, worth: [f64; 2]) -> Row<'_> {
         let k = self.whole;
         self.slopes[k] = worth;
         self.whole += 1;
@@ -88,7 +88,7 @@ impl Rows {
     }
 
     /// A row of a Jacobian with respect to q alone.
-    pub(super) fn push_positions(&mut self, row: &[f64], worth: [f64; 2]) {
+    pub(crate) fn push_positions(&mut self, row: &[f64], worth: [f64; 2]) {
         self.positions += 1;
         let k = self.slopes.len() - self.positions;
         self.slopes[k] = worth;
@@ -97,7 +97,7 @@ impl Rows {
 
     /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in implicit form, it writes q and the
     /// part of Q for q alone, and leaves the rows that depend on more to the sweep.
-    pub(super) fn write(&mut self, node: &mut LqNode) {
+    pub(crate) fn write(&mut self, node: &mut LqNode) {
         node.q.as_mut_slice().fill(0.0);
         node.r.as_mut_slice().fill(0.0);
         if node.implicit.active {

@@ -18,17 +18,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionCone {
-    /// R: the surface's axes along the contact's.
+    /// R, the surface's axes along the contact's.
     pub rotation: Mat3<f64>,
     /// μ.
     pub mu: f64,
-    /// How many sides the pyramid has; even.
+    /// The number of sides of the pyramid; even.
     pub facets: usize,
     /// Whether the pyramid lies inside of the cone, or around it.
     pub inner: bool,
-    /// Least normal force (N).
+    /// The least normal force (N).
     pub least: f64,
-    /// Greatest normal force (N).
+    /// The greatest normal force (N).
     #[serde(with = "condyle_spatial::finite::greatest")]
     pub greatest: f64,
 }
@@ -47,7 +47,7 @@ pub struct FrictionCone {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WrenchCone {
-    /// What the force must obey.
+    /// The cone of the force.
     pub friction: FrictionCone,
     /// The rectangle's sides along the surface's x and y (m).
     pub size: [f64; 2],
@@ -87,8 +87,8 @@ impl FrictionCone {
         (lower, upper)
     }
 
-    /// What makes no sense.
-    pub(super) fn wrong(&self) -> Option<String> {
+    /// A message for what makes no sense.
+    pub(crate) fn wrong(&self) -> Option<String> {
         let rotation = self.rotation.columns().map(Vec3::to_array).concat();
         if !(self.mu >= 0.0 && self.mu.is_finite()) {
             return Some(format!("its friction is {}, but it must be at least 0", self.mu));
@@ -101,7 +101,7 @@ impl FrictionCone {
 }
 
 /// The four rows that keep the centre of pressure within a rectangle: |τ_x| ≤ ½ size_y f_z, |τ_y| ≤ ½ size_x f_z.
-pub(super) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6]; 4] {
+pub(crate) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6]; 4] {
     let [x, y, z] = R.columns();
     [(width, x), (width, -x), (length, y), (length, -y)].map(|(side, axis)| {
         let ([a, b, c], [d, e, f]) = (z.scale(-0.5 * side).to_array(), axis.to_array());

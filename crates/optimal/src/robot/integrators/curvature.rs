@@ -10,16 +10,16 @@
 //! where ∂²θ has a block for each group of positions that is no vector space, and is zero elsewhere.
 #![allow(non_snake_case)] // E
 
-use super::integrated::{ContinuousModel, Derivatives};
+use super::retraction::Retraction;
 use crate::lq::Hessian;
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted};
 use crate::structure::LARGEST_BLOCK;
 use core::ops::Range;
-use nalgebra::DMatrix;
 
-/// Of a column of a matrix, the rows of a group; zeros after them.
+/// The rows of a group of a column of a matrix, zeros after them.
 type Rows = [f64; LARGEST_BLOCK];
 
-/// Room for the second derivatives of steps of one model.
+/// Scratch of the second derivatives of steps of one model.
 #[derive(Clone, Debug)]
 pub(super) struct Curvature {
     groups: Vec<Range<usize>>,
@@ -40,17 +40,14 @@ impl Curvature {
         Self { groups, mu: vec![0.0; nv], theta: Hessian::zeros(n, n), columns }
     }
 
-    /// ∂²ψ into `hessian`; says whether the model gives it. Overwrites dq, ∂(q ⊕ dq)/∂q and E.
+    /// Writes ∂²ψ to `hessian`; says whether the model gives it.
     pub(super) fn run<M: ContinuousModel>(
         &mut self,
         model: &mut M,
         dt: f64,
-        t: usize,
-        x: &[f64],
-        u: &[f64],
+        input: KnotInput<'_>,
         lambda: &[f64],
-        dq: &mut [f64],
-        [transport, exp]: [&mut DMatrix<f64>; 2],
+        step: &mut Retraction,
         hessian: &mut Hessian,
     ) -> bool {
         let Self { groups, mu, theta, columns } = self;
@@ -58,25 +55,23 @@ impl Curvature {
         let (lambda_q, lambda_v) = lambda.split_at(nv);
         mu.copy_from_slice(lambda_q);
         if !groups.is_empty() {
-            let v = &x[model.nq()..];
-            let a = model.calc(t, x, u).0;
-            for k in 0..nv {
-                dq[k] = v[k] * dt + a[k] * dt * dt;
-            }
-            if !model.integrate_hessian(dq, lambda_q, theta) {
+            model.prepare(&[input.t], input.x, input.u, Wanted::Motion);
+            let a = model.calc(input).0;
+            step.set_euler(&input.x[input.x.len() - nv..], a, dt);
+            if !model.integrate_hessian(&step.delta, lambda_q, theta) {
                 return false;
             }
-            model.integrate_jacobians(dq, transport, exp);
+            step.differentiate(model);
             for group in groups.iter() {
                 for k in group.clone() {
-                    mu[k] = group.clone().map(|r| exp[(r, k)] * lambda_q[r]).sum(); // Eᵀ λ_q
+                    mu[k] = group.clone().map(|r| step.E[(r, k)] * lambda_q[r]).sum(); // Eᵀ λ_q
                 }
             }
         }
         for k in 0..nv {
             mu[k] = dt * (lambda_v[k] + dt * mu[k]); // Δt (λ_v + Δt Eᵀ λ_q)
         }
-        let Some(first) = model.hessian(t, x, u, mu, hessian) else { return false };
+        let Some(first) = model.hessian(input, mu, hessian) else { return false };
         for group in groups.iter() {
             add_group(group, dt, &first, theta, columns, hessian);
         }

@@ -1,0 +1,375 @@
+//! Dynamics of one knot, or of several side by side in the lanes of a vector register, with what their residuals see.
+//!
+//! The coordinates of knots are packed so that each number has a lane for each knot; the passes of dynamics then run once
+//! for all of them. What they give is unpacked into the data of each knot, since the costs and the sweep look at one knot
+//! after the other.
+#![allow(non_snake_case)] // J, M
+
+use super::kkt_elimination::Tableau;
+use crate::Error;
+use crate::robot::contact::{Contact, constraint_set};
+use crate::robot::continuous::Wanted;
+use crate::robot::horizon_terms::HorizonTerms;
+use crate::robot::knot::{KnotData, WIDEST, unpack, unpack_matrix};
+use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
+use crate::robot::residuals::surplus::Surplus;
+use condyle_dynamics::level::{Level, level};
+use condyle_dynamics::{
+    ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
+    constrained_dynamics_equations, rnea, rnea_derivatives,
+};
+use condyle_spatial::block::{Block, Strided, gather_rows};
+use condyle_spatial::lanes::{Element, Fused, Lanes};
+use core::fmt::Debug;
+use nalgebra::DMatrix;
+
+/// Where accelerations come from.
+#[derive(Clone, Copy)]
+pub(crate) enum Law<'a> {
+    /// Nowhere: time stands still, or the state jumps.
+    None,
+    /// q̈ = M⁻¹ (τ − h).
+    Free,
+    /// M q̈ + h = τ + Jᵀλ, J q̈ + γ = 0, with the damping μ.
+    Contact(&'a [Contact], f64),
+    /// The controls: q̈ = u, and τ = M q̈ + h follows.
+    Inverse,
+}
+
+/// A law with the scratch that it takes.
+#[derive(Clone, Debug)]
+pub(crate) enum Pass<S> {
+    None,
+    Free,
+    /// The constraints, and J. Shape: rows × nv.
+    Contact(Box<ConstraintSet<S>>, DMatrix<S>),
+    Inverse,
+}
+
+/// A scalar of knots: one knot alone, or a knot in each lane.
+pub(crate) trait KnotScalar: Block<Number = f64> {
+    /// Scratch of residuals of kinematics, on the scalar that rounds as the passes on this one do.
+    type Residuals: Clone + Debug + Send;
+
+    /// Scratch for a robot with nv coordinates.
+    fn residuals(nv: usize) -> Self::Residuals;
+
+    /// Computes the residuals of kinematics of some knots at (q, v).
+    fn run_residuals(
+        scratch: &mut Self::Residuals,
+        model: &Model,
+        data: &mut Data<Self>,
+        x: [&[Self]; 2],
+        group: &mut KnotGroup<'_>,
+    );
+
+    /// Calls [`KnotBatch::run_equations`] where there are lanes.
+    fn run_equations(batch: &mut KnotBatch<Self>, model: &Model, to: &mut [KnotData]);
+}
+
+impl<const N: usize> KnotScalar for Lanes<f64, N>
+where
+    f64: Element<N>,
+{
+    type Residuals = ResidualKernel<Self>;
+
+    fn residuals(nv: usize) -> ResidualKernel<Self> {
+        ResidualKernel::new(nv)
+    }
+
+    fn run_residuals(
+        scratch: &mut ResidualKernel<Self>,
+        model: &Model,
+        data: &mut Data<Self>,
+        x: [&[Self]; 2],
+        group: &mut KnotGroup<'_>,
+    ) {
+        scratch.run(model, data, x, group);
+    }
+
+    fn run_equations(batch: &mut KnotBatch<Self>, model: &Model, to: &mut [KnotData]) {
+        batch.run_equations(model, to);
+    }
+}
+
+/// A single knot rounds as a lane does: its products are fused wherever there are lanes.
+impl KnotScalar for f64 {
+    type Residuals = (ResidualKernel<Fused>, ResidualKernel<Self>);
+
+    fn residuals(nv: usize) -> Self::Residuals {
+        (ResidualKernel::new(nv), ResidualKernel::new(nv))
+    }
+
+    fn run_residuals(
+        (fused, plain): &mut Self::Residuals,
+        model: &Model,
+        data: &mut Data<Self>,
+        x: [&[Self]; 2],
+        group: &mut KnotGroup<'_>,
+    ) {
+        if level() == Level::Baseline {
+            return plain.run(model, data, x, group);
+        }
+        data.placements(model); // those of limbs too are then body by body
+        fused.run(model, data.fused(), x.map(Fused::of), group);
+    }
+
+    fn run_equations(_: &mut KnotBatch<Self>, _: &Model, _: &mut [KnotData]) {
+        unreachable!("only knots in lanes are asked for equations");
+    }
+}
+
+/// The dynamics of as many knots as a scalar has lanes.
+#[derive(Debug)]
+pub(crate) struct KnotBatch<S: KnotScalar> {
+    pub data: Data<S>,
+    pub pass: Pass<S>,
+    surplus: Surplus<S>,
+    residuals: S::Residuals,
+    q: Vec<S>,
+    v: Vec<S>,
+    /// The output that the controls drive: τ, or q̈.
+    tau: Vec<S>,
+    a: Vec<S>,
+    /// Whether the last pass was at q.
+    visited: bool,
+}
+
+impl<S: KnotScalar> Clone for KnotBatch<S> {
+    #[inline(never)] // large
+    fn clone(&self) -> Self {
+        let Self { data, pass, surplus, residuals, q, v, tau, a, visited } = self;
+        let (data, pass, surplus, residuals) = (clone(data), clone(pass), clone(surplus), clone(residuals));
+        Self {
+            data,
+            pass,
+            surplus,
+            residuals,
+            q: q.clone(),
+            v: v.clone(),
+            tau: tau.clone(),
+            a: a.clone(),
+            visited: *visited,
+        }
+    }
+}
+
+#[inline(never)]
+fn clone<T: Clone>(of: &T) -> T {
+    of.clone()
+}
+
+impl<S: KnotScalar> KnotBatch<S> {
+    /// Scratch for a robot whose accelerations obey a law.
+    ///
+    /// # Errors
+    /// [`Error::Contact`] for contacts that do not fit.
+    #[inline(never)]
+    pub(crate) fn new(model: &Model, law: Law<'_>) -> Result<Self, Error> {
+        let (nv, zeros) = (model.nv(), |n| vec![S::zero(); n]);
+        let pass = match law {
+            Law::None => Pass::None,
+            Law::Free => Pass::Free,
+            Law::Contact(contacts, damping) => {
+                let set = Box::new(constraint_set(model, contacts, damping)?);
+                let J = DMatrix::from_element(set.rows(), nv, S::zero());
+                Pass::Contact(set, J)
+            }
+            Law::Inverse => Pass::Inverse,
+        };
+        let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), S::residuals(nv));
+        let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
+        Ok(Self { data, pass, surplus, residuals, q, v, tau, a, visited: false })
+    }
+
+    /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and what
+    /// the residuals see of those that look at the same as the first one.
+    pub(crate) fn run(
+        &mut self,
+        model: &Model,
+        knots: &[usize],
+        xs: &[f64],
+        terms: &HorizonTerms,
+        wanted: Wanted,
+        to: &mut [KnotData],
+    ) {
+        self.pack(model, xs, to);
+        pack(to.len(), |k| &to[k].tau, &mut self.tau);
+        match wanted {
+            Wanted::Equations => S::run_equations(self, model, to),
+            _ => self.run_pass(model, wanted == Wanted::Derivatives, terms.layout().forces, to),
+        }
+        self.run_residuals(model, knots, terms, wanted != Wanted::Motion, to);
+    }
+
+    /// Sets the states of some knots.
+    fn pack(&mut self, model: &Model, xs: &[f64], of: &[KnotData]) {
+        let (nq, nx) = (model.nq(), model.nq() + model.nv());
+        pack(of.len(), |k| &xs[k * nx..][..nq], &mut self.q);
+        pack(of.len(), |k| &xs[k * nx + nq..][..nx - nq], &mut self.v);
+        self.visited = false;
+    }
+
+    /// Accelerations and forces, and their derivatives; those of forces only if they are looked at.
+    fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
+        let Self { data, pass, q, v, tau, a, .. } = self;
+        match pass {
+            Pass::None => return,
+            Pass::Free if !derivatives => a.copy_from_slice(aba(model, data, q, v, tau, &[])),
+            Pass::Free => {
+                let d = aba_derivatives(model, data, q, v, tau, &[]);
+                a.copy_from_slice(d.a);
+                unpack_matrices([d.da_dq, d.da_dv, d.da_dtau], to, |to| &mut to.da);
+            }
+            Pass::Contact(set, _) if !derivatives => {
+                let d = constrained_dynamics(model, data, set, q, v, tau, &[]);
+                a.copy_from_slice(d.a);
+                unpack(d.lambda, to, |to| &mut to.lambda);
+            }
+            Pass::Contact(set, _) => {
+                let d = constrained_dynamics_derivatives(model, data, set, q, v, tau, &[]);
+                a.copy_from_slice(d.a);
+                unpack(d.lambda, to, |to| &mut to.lambda);
+                unpack_matrices([d.da_dq, d.da_dv, d.da_dtau], to, |to| &mut to.da);
+                if forces {
+                    unpack_matrices([d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau], to, |to| &mut to.dlambda);
+                }
+            }
+            Pass::Inverse => {
+                a.copy_from_slice(tau);
+                unpack(rnea(model, data, q, v, a, &[]), to, |to| &mut to.tau);
+                if derivatives {
+                    let d = rnea_derivatives(model, data, q, v, a, &[]);
+                    unpack_matrices([d.dtau_dq, d.dtau_dv, d.dtau_da], to, |to| &mut to.dtau);
+                }
+            }
+        }
+        unpack(a, to, |to| &mut to.a);
+        self.visited = true;
+    }
+
+    /// Accelerations and forces, and the equations that they satisfy: the tableau [J μ1 c_v c_q; M −Jᵀ r_v r_q].
+    fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
+        let Self { data, pass, q, v, tau, a, .. } = self;
+        let nv = model.nv();
+        match pass {
+            Pass::Contact(set, J) => {
+                let tableau = Tableau { nv, rows: J.nrows() };
+                let (Tableau { rows, .. }, mu, x) = (tableau, set.proximal.mu, nv + J.nrows());
+                let d = constrained_dynamics_equations(model, data, set, q, v, tau, &[]);
+                a.copy_from_slice(d.a);
+                unpack(d.lambda, to, |to| &mut to.lambda);
+                unpack_block(d.dgamma_dv, false, false, to, [0, x], tableau);
+                unpack_block(d.dgamma_dq, false, false, to, [0, x + nv], tableau);
+                unpack_dynamics([d.M, d.dtau_dv, d.dtau_dq], to, tableau);
+                set.jacobian(J);
+                unpack_block(J, false, false, to, [0, 0], tableau);
+                unpack_block(J, true, true, to, [rows, nv], tableau);
+                for equations in to.iter_mut().map(|to| &mut to.equations) {
+                    for r in 0..rows {
+                        let forces = &mut equations[r * tableau.stride() + nv..][..rows];
+                        forces.fill(0.0);
+                        forces[r] = mu;
+                    }
+                }
+            }
+            _ => {
+                a.copy_from_slice(aba(model, data, q, v, tau, &[]));
+                let d = rnea_derivatives(model, data, q, v, a, &[]);
+                unpack_dynamics([d.dtau_da, d.dtau_dv, d.dtau_dq], to, Tableau { nv, rows: 0 });
+            }
+        }
+        unpack(a, to, |to| &mut to.a);
+        self.visited = true;
+    }
+
+    /// Computes what the residuals see of a knot whose accelerations are known.
+    pub(crate) fn run_residuals_at(
+        &mut self,
+        model: &Model,
+        t: usize,
+        x: &[f64],
+        terms: &HorizonTerms,
+        slopes: bool,
+        to: &mut KnotData,
+    ) {
+        let to = core::slice::from_mut(to);
+        self.pack(model, x, to);
+        pack(1, |_| &to[0].a, &mut self.a);
+        self.run_residuals(model, &[t], terms, slopes, to);
+    }
+
+    /// Computes what the residuals see of those knots that look at the same as the first one.
+    fn run_residuals(
+        &mut self,
+        model: &Model,
+        knots: &[usize],
+        terms: &HorizonTerms,
+        slopes: bool,
+        to: &mut [KnotData],
+    ) {
+        let first = terms.at(knots[0]);
+        let mut each = [first; WIDEST];
+        for (k, to) in to.iter_mut().enumerate() {
+            to.residuals.reserve(model.nv(), terms.layouts());
+            let own = terms.at(knots[k]);
+            to.residuals.is_written = own.is_alike(first);
+            if to.residuals.is_written {
+                each[k] = own;
+            }
+        }
+        let Self { data, surplus, residuals, q, v, a, visited, .. } = self;
+        let requirements = first.layout().requirements;
+        let mut group = KnotGroup { terms: &each[..to.len()], data: to, slopes, visited: *visited };
+        if requirements.gravity {
+            surplus.run(model, data, [q, v, a], requirements.inertia, &mut group);
+            group.visited = true;
+        }
+        if requirements.placements || requirements.velocities {
+            S::run_residuals(residuals, model, data, [q, v], &mut group);
+        }
+    }
+}
+
+/// Writes numbers of some knots side by side.
+fn pack<'a, S: KnotScalar>(count: usize, of: impl Fn(usize) -> &'a [f64], to: &mut [S]) {
+    let rows: [&[f64]; WIDEST] = core::array::from_fn(|k| of(k.min(count - 1)));
+    gather_rows(&rows[..count], to);
+}
+
+/// Writes three matrices to the data of each knot.
+fn unpack_matrices<S: KnotScalar>(
+    from: [&DMatrix<S>; 3],
+    to: &mut [KnotData],
+    part: impl Fn(&mut KnotData) -> &mut [DMatrix<f64>; 3],
+) {
+    for (k, from) in from.into_iter().enumerate() {
+        unpack(from.as_slice(), to, |to| part(to)[k].as_mut_slice());
+    }
+}
+
+/// Writes a matrix, or its transpose, or minus it, to the equations of each knot: `at` is its first row and column there.
+fn unpack_block<S: KnotScalar>(
+    from: &DMatrix<S>,
+    transposed: bool,
+    negative: bool,
+    to: &mut [KnotData],
+    at: [usize; 2],
+    tableau: Tableau,
+) {
+    let ((rows, columns), stride) = (from.shape(), tableau.stride());
+    let (strides, shape) = match transposed {
+        false => ([1, rows], [rows, columns]),
+        true => ([rows, 1], [columns, rows]),
+    };
+    let from = Strided { vectors: from.as_slice(), strides, shape, negative };
+    unpack_matrix(&from, to, stride, |to| &mut to.equations[at[0] * stride + at[1]..]);
+}
+
+/// Writes M, ∂τ/∂v and ∂τ/∂q to the equations of each knot.
+fn unpack_dynamics<S: KnotScalar>([M, by_v, by_q]: [&DMatrix<S>; 3], to: &mut [KnotData], tableau: Tableau) {
+    let Tableau { nv, rows } = tableau;
+    unpack_block(M, true, false, to, [rows, 0], tableau); // M is symmetric
+    unpack_block(by_v, false, false, to, [rows, nv + rows], tableau);
+    unpack_block(by_q, false, false, to, [rows, 2 * nv + rows], tableau);
+}

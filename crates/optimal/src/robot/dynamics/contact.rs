@@ -1,0 +1,97 @@
+//! Dynamics of a robot in contact with the world.
+#![allow(non_snake_case)] // J
+
+use super::batch::{Law, Pass};
+use super::robot::RobotDynamics;
+use crate::Error;
+use crate::error::assert_length;
+use crate::robot::actuation::Actuation;
+use crate::robot::capabilities::Capabilities;
+use crate::robot::contact::{Contact, rows_of};
+use crate::robot::costs::Cost;
+use crate::robot::integrators::{Integrated, Integrator};
+use condyle_dynamics::{Model, constrained_dynamics, gravity};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Forward dynamics of a robot in contact, and costs: q̈ and λ of M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0.
+#[derive(Clone, Debug)]
+pub struct Contacts(pub(super) RobotDynamics);
+
+/// A knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
+///
+/// ```text
+/// [ M  Jᵀ ] [  q̈ ]   [ S u − h ]
+/// [ J  −μ ] [ −λ ] = [ −γ      ],   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
+/// ```
+///
+/// Any set of point and rigid contacts, also none. The damping μ makes J M⁻¹ Jᵀ + μ 1 regular where contacts are redundant.
+/// These are Crocoddyl's rules (`DifferentialActionModelContactFwdDynamics`).
+///
+/// ```
+/// use condyle_dynamics::{Constraint, robots};
+/// use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FrictionCone, Residual};
+/// use std::sync::Arc;
+/// let quadruped = Arc::new(robots::quadruped());
+/// let contacts = ["LF_foot", "RH_foot"].map(|foot| {
+///     let frame = quadruped.frame(foot).unwrap();
+///     Contact::new(foot, Constraint { kd: 50.0, ..Constraint::point(frame) })
+/// });
+/// let cone = FrictionCone::new(0.7);
+/// let (lower, upper) = cone.bounds();
+/// let grip = Residual::FrictionCone { contact: "LF_foot".into(), cone };
+/// let costs = vec![Cost::new("grip", 1e1, grip, Activation::Barrier { lower, upper })];
+/// let trot = ContactDynamics::running(quadruped, &contacts, 0.02, costs)?;
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+pub type ContactDynamics = Integrated<Contacts>;
+
+impl Contacts {
+    /// A robot with some drives, in contact, with the damping μ.
+    ///
+    /// # Errors
+    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular beside another one on the same
+    /// body without damping; [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for drives of another
+    /// robot, or a robot with joints that move no mass.
+    pub fn new(
+        model: Arc<Model>,
+        actuation: Actuation,
+        contacts: &[Contact],
+        damping: f64,
+        costs: Vec<Cost>,
+    ) -> Result<Self, Error> {
+        let nu = actuation.nu();
+        let capabilities = Capabilities { nu, effort: true, contacts: rows_of(contacts), ..Capabilities::default() };
+        RobotDynamics::new(model, actuation, capabilities, Law::Contact(contacts, damping), costs).map(Self)
+    }
+}
+
+impl ContactDynamics {
+    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler, without damping.
+    /// For other drives, integrators and damping see [`Contacts::new`] and [`Integrated::new`].
+    ///
+    /// # Errors
+    /// As [`Contacts::new`], and [`Error::TimeStep`] if Δt is not above 0.
+    pub fn running(model: Arc<Model>, contacts: &[Contact], dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
+        let actuation = Actuation::joints(&model);
+        let inner = Contacts::new(model, actuation, contacts, 0.0, costs)?;
+        Self::new(inner, Integrator::SemiImplicitEuler, dt)
+    }
+
+    /// The smallest controls and forces that hold the robot still at a state, (u, λ) = [S Jᵀ]⁺ g(q): u of them. Allocates.
+    ///
+    /// # Panics
+    /// If `x` has not nq + nv numbers.
+    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
+        let RobotDynamics { model, actuation, single, .. } = &mut self.inner_mut().0;
+        let (nq, nv) = (model.nq(), model.nv());
+        assert_length("x", x.len(), nq + nv);
+        let mut J = DMatrix::zeros(0, nv);
+        if let Pass::Contact(set, _) = &mut single.pass {
+            constrained_dynamics(model, &mut single.data, set, &x[..nq], &x[nq..], &vec![0.0; nv], &[]);
+            J = DMatrix::zeros(set.rows(), nv);
+            set.jacobian(&mut J);
+        }
+        actuation.hold(gravity(model, &mut single.data, &x[..nq]), &J)
+    }
+}

@@ -1,0 +1,84 @@
+//! Dynamics of a robot that touches nothing.
+
+use super::batch::Law;
+use super::robot::RobotDynamics;
+use crate::Error;
+use crate::error::assert_length;
+use crate::robot::actuation::Actuation;
+use crate::robot::capabilities::Capabilities;
+use crate::robot::costs::Cost;
+use crate::robot::integrators::{Integrated, Integrator};
+use condyle_dynamics::{Model, gravity};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
+#[derive(Clone, Debug)]
+pub struct Free(pub(super) RobotDynamics);
+
+/// A knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
+///
+/// ```text
+/// q̈ = aba(q, v, S u),   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
+/// ```
+///
+/// The state is x = (q, v). A terminal knot has no controls and no Δt: ℓ = Σ w a(r). These are Crocoddyl's rules.
+///
+/// ```
+/// use condyle_dynamics::robots;
+/// use condyle_optimal::ActionModel;
+/// use condyle_optimal::robot::{Actuation, FreeDynamics, Integrator};
+/// use std::sync::Arc;
+/// let quadruped = Arc::new(robots::quadruped());
+/// let mut fall = FreeDynamics::running(quadruped.clone(), 0.1, vec![])?;
+/// let (mut x, mut next) = (condyle_dynamics::neutral(&quadruped), vec![0.0; 37]);
+/// x.extend([0.0; 18]);
+/// fall.calc(0, &x, &[0.0; 12], &mut next);
+/// assert!((next[2] + 9.81 * 0.01).abs() < 1e-12); // −g Δt²
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+pub type FreeDynamics = Integrated<Free>;
+
+impl Free {
+    /// A robot with some drives.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for drives of another robot, or a robot with
+    /// joints that move no mass.
+    pub fn new(model: Arc<Model>, actuation: Actuation, costs: Vec<Cost>) -> Result<Self, Error> {
+        let capabilities = Capabilities { nu: actuation.nu(), effort: true, ..Capabilities::default() };
+        RobotDynamics::new(model, actuation, capabilities, Law::Free, costs).map(Self)
+    }
+}
+
+impl FreeDynamics {
+    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other
+    /// drives or integrators see [`Free::new`] and [`Integrated::new`].
+    ///
+    /// # Errors
+    /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0, [`Error::Actuation`] for
+    /// a robot with joints that move no mass.
+    pub fn running(model: Arc<Model>, dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
+        let actuation = Actuation::joints(&model);
+        Self::new(Free::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
+    }
+
+    /// The knot after the last one. Terms of the control must have an empty reference: there is none.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] for a term that does not fit.
+    pub fn terminal(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
+        let none = Actuation::none(&model);
+        Ok(Self::end(Free(RobotDynamics::new(model, none, Capabilities::default(), Law::None, costs)?)))
+    }
+
+    /// The efforts that hold the robot still at a state, u = S⁺ g(q): the smallest ones that come nearest to it. Allocates.
+    ///
+    /// # Panics
+    /// If `x` has not nq + nv numbers.
+    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
+        let RobotDynamics { model, actuation, single, .. } = &mut self.inner_mut().0;
+        assert_length("x", x.len(), model.nq() + model.nv());
+        actuation.hold(gravity(model, &mut single.data, &x[..model.nq()]), &DMatrix::zeros(0, model.nv()))
+    }
+}

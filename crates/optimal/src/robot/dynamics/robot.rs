@@ -1,0 +1,272 @@
+//! Dynamics of a robot: what its knots of all kinds share.
+
+use super::batch::{KnotBatch, Law, Pass};
+use super::kkt_elimination::{KktElimination, Tableau};
+use crate::Error;
+use crate::lq::{Hessian, LqNode};
+use crate::robot::actuation::Actuation;
+use crate::robot::capabilities::{Capabilities, Output};
+use crate::robot::contact::moved_by;
+use crate::robot::continuous::{Derivatives, KnotInput, Wanted};
+use crate::robot::costs::Cost;
+use crate::robot::horizon_terms::HorizonTerms;
+use crate::robot::knot::{KnotData, KnotState, Sensitivities, add_matrix_row};
+use crate::robot::residuals::rows::Row;
+use crate::robot::state::{GroupHessian, groups};
+use condyle_dynamics::level::{Level, level};
+use condyle_dynamics::{IntegrateArgument, Model, aba_hessian, integrate_jacobian};
+use condyle_spatial::Scalar;
+use condyle_spatial::block::Real;
+use core::ops::Range;
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+type Short = <f64 as Real>::Short;
+type Long = <f64 as Real>::Long;
+
+/// Fewer knots than this are computed one by one.
+const WORTHWHILE: usize = 3;
+
+/// A robot with its drives, the law of its accelerations, and the terms of its knots.
+#[derive(Clone, Debug)]
+pub(crate) struct RobotDynamics {
+    pub model: Arc<Model>,
+    pub actuation: Actuation,
+    pub terms: HorizonTerms,
+    /// The dynamics of one knot.
+    pub single: KnotBatch<f64>,
+    vectors: Option<Box<VectorBatches>>,
+    /// The knots of the group that was prepared, and what was computed of them.
+    pub data: Vec<KnotData>,
+    prepared: Wanted,
+    /// The output that the controls drive.
+    given: Output,
+    elimination: Option<KktElimination>,
+    /// The coordinates of each group of positions that is no vector space.
+    pub groups: Vec<Range<usize>>,
+    group_hessian: GroupHessian,
+    /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
+    da_du: Vec<f64>,
+}
+
+/// The dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for derivatives
+/// they are not: too rarely used to stay in the caches.
+#[derive(Clone, Debug)]
+struct VectorBatches {
+    short: KnotBatch<Short>,
+    long: Option<KnotBatch<Long>>,
+}
+
+impl RobotDynamics {
+    /// A robot with some drives whose accelerations obey a law.
+    ///
+    /// # Errors
+    /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot, [`Error::Cost`]
+    /// for a term that does not fit, [`Error::Actuation`] for a robot of which forward dynamics has no solution.
+    pub(crate) fn new(
+        model: Arc<Model>,
+        actuation: Actuation,
+        capabilities: Capabilities,
+        law: Law<'_>,
+        costs: Vec<Cost>,
+    ) -> Result<Self, Error> {
+        let (nv, single) = (model.nv(), KnotBatch::new(&model, law)?);
+        if actuation.nv() != nv {
+            let what = format!("it drives {} coordinates, the robot has {nv}", actuation.nv());
+            return Err(Error::Actuation { what });
+        }
+        let terms = HorizonTerms::new(model.clone(), capabilities.clone(), costs)?;
+        let singular = model.singular_joints();
+        if !singular.is_empty() && (capabilities.impulse || matches!(law, Law::Free | Law::Contact(..))) {
+            let why = "nothing with a mass moves with the joints";
+            return Err(Error::Actuation { what: format!("{why} {singular:?}: their accelerations are undefined") });
+        }
+        let (lanes, vectors) = match (law, level()) {
+            (Law::None, _) | (_, Level::Baseline) => (1, None),
+            (_, Level::Neon | Level::Avx2) => (Short::LANES, Some((KnotBatch::new(&model, law)?, None))),
+            (_, Level::Avx512) => {
+                (Long::LANES, Some((KnotBatch::new(&model, law)?, Some(KnotBatch::new(&model, law)?))))
+            }
+        };
+        let moved_by = match law {
+            Law::Free => Some(Vec::new()),
+            Law::Contact(contacts, _) => Some(moved_by(&model, contacts)),
+            _ => None,
+        };
+        // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
+        let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
+        let elimination = form.map(|(moved_by, passive)| KktElimination::new(nv, passive, &moved_by));
+        let given = if matches!(law, Law::Inverse) { Output::Acceleration } else { Output::Effort };
+        let mut data = KnotData::new(nv, &capabilities, given);
+        if elimination.is_some() {
+            data.equations.resize(Tableau { nv, rows: capabilities.rows() }.len(), 0.0);
+        }
+        let groups = groups(&model);
+        Ok(Self {
+            vectors: vectors.map(|(short, long)| Box::new(VectorBatches { short, long })),
+            data: vec![data; lanes],
+            prepared: Wanted::Motion,
+            group_hessian: GroupHessian::new(nv, &groups),
+            da_du: actuation.scratch(),
+            model,
+            actuation,
+            terms,
+            single,
+            given,
+            elimination,
+            groups,
+        })
+    }
+
+    /// As [`ContinuousModel::lanes`](crate::robot::ContinuousModel::lanes).
+    pub(crate) fn lanes(&self) -> usize {
+        self.data.len()
+    }
+
+    /// As [`ContinuousModel::prepare`](crate::robot::ContinuousModel::prepare): side by side where that is worthwhile.
+    pub(crate) fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
+        let Self { model, actuation, terms, single, vectors, data, .. } = self;
+        let (nu, nx, count) = (actuation.nu(), model.nq() + model.nv(), knots.len());
+        let data = &mut data[..count];
+        for (k, data) in data.iter_mut().enumerate() {
+            actuation.effort(&us[k * nu..][..nu], &mut data.tau); // τ = S u
+        }
+        match vectors.as_deref_mut().filter(|_| count >= WORTHWHILE || wanted == Wanted::Equations) {
+            Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || wanted != Wanted::Motion => {
+                long.run(model, knots, xs, terms, wanted, data);
+            }
+            Some(VectorBatches { short, .. }) => short.run(model, knots, xs, terms, wanted, data),
+            None => {
+                for (k, data) in data.chunks_exact_mut(1).enumerate() {
+                    single.run(model, &knots[k..=k], &xs[k * nx..][..nx], terms, wanted, data);
+                }
+            }
+        }
+        for (k, data) in data.iter_mut().enumerate().filter(|(_, data)| !data.residuals.is_written) {
+            let slopes = wanted != Wanted::Motion;
+            single.run_residuals_at(model, knots[k], &xs[k * nx..][..nx], terms, slopes, data);
+        }
+        self.prepared = wanted;
+    }
+
+    /// As [`ContinuousModel::calc`](crate::robot::ContinuousModel::calc).
+    pub(crate) fn calc(&mut self, KnotInput { lane, t, x, u }: KnotInput<'_>) -> (&[f64], f64) {
+        let data = &self.data[lane];
+        (&data.a, self.terms.calc(t, KnotState { x, u, data }))
+    }
+
+    /// As [`ContinuousModel::calc_diff`](crate::robot::ContinuousModel::calc_diff).
+    pub(crate) fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
+        let inverse = self.prepared == Wanted::Equations && self.write_inverse_dynamics_form(input, scale, node);
+        if self.prepared == Wanted::Equations && !inverse {
+            let Self { model, terms, single, data, .. } = self;
+            let data = &mut data[input.lane..=input.lane];
+            single.run(model, &[input.t], input.x, terms, Wanted::Derivatives, data);
+        }
+        let Self { terms, data, given, actuation, da_du, .. } = self;
+        let (KnotInput { lane, t, x, u }, given) = (input, *given);
+        let data = &data[lane];
+        let [da_dq, da_dv, da_dtau] = &data.da;
+        if !inverse {
+            let sensitivities = DynamicsSensitivities { given, data, actuation };
+            terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, scale, node);
+        }
+        Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
+    }
+
+    /// Writes a knot of Δt = `scale` seconds in inverse-dynamics form; says whether there is one.
+    fn write_inverse_dynamics_form(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> bool {
+        let Self { terms, data, elimination: Some(elimination), .. } = self else { return false };
+        let (KnotInput { lane, t, x, u }, form) = (input, &mut node.implicit);
+        if !elimination.run(&mut data[lane].equations, scale, form) {
+            return false;
+        }
+        form.active = true;
+        let lent = form.lend();
+        let state = KnotState { x, u, data: &data[lane] };
+        terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, node);
+        node.implicit.take_back(lent);
+        true
+    }
+
+    /// As [`ContinuousModel::inverse_dynamics_form`](crate::robot::ContinuousModel::inverse_dynamics_form).
+    pub(crate) fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
+        Some([self.elimination.as_ref()?.most_dependent(), self.terms.layout().rows[0]])
+    }
+
+    /// As [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
+    pub(crate) fn hessian(
+        &mut self,
+        KnotInput { x, u, .. }: KnotInput<'_>,
+        mu: &[f64],
+        hessian: &mut Hessian,
+    ) -> Option<Derivatives<'_>> {
+        let Self { model, actuation, single: KnotBatch { data, pass, .. }, data: knots, da_du, .. } = self;
+        let knot = &mut knots[0];
+        match pass {
+            Pass::Free => {
+                actuation.effort(u, &mut knot.tau);
+                let (nv, (q, v)) = (model.nv(), x.split_at(model.nq()));
+                let d = aba_hessian(model, data, q, v, &knot.tau, &[], mu);
+                for c in 0..nv {
+                    for r in 0..nv {
+                        hessian.xx[(r, c)] = d.dqdq[(r, c)];
+                        hessian.xx[(nv + r, c)] = d.dvdq[(r, c)];
+                        hessian.xx[(c, nv + r)] = d.dvdq[(r, c)];
+                        hessian.xx[(nv + r, nv + c)] = d.dvdv[(r, c)];
+                    }
+                    let column = &d.dtaudq.as_slice()[c * nv..][..nv];
+                    for k in 0..u.len() {
+                        hessian.xu[(c, k)] = actuation.along(k, column); // Sᵀ ∂²ψ/∂τ∂q
+                        hessian.xu[(nv + c, k)] = 0.0;
+                    }
+                }
+                hessian.uu.fill(0.0);
+                let (first, da_du) = (d.first, actuation.columns(d.first.da_dtau, da_du));
+                Some(Derivatives { a: first.a, da_dq: first.da_dq, da_dv: first.da_dv, da_du })
+            }
+            Pass::Inverse => {
+                knot.a.copy_from_slice(u);
+                for part in [&mut hessian.xx, &mut hessian.xu, &mut hessian.uu] {
+                    part.fill(0.0); // accelerations that are given do not curve
+                }
+                let [da_dq, da_dv, da_du] = &knot.da;
+                Some(Derivatives { a: &knot.a, da_dq, da_dv, da_du: da_du.as_slice() })
+            }
+            _ => None,
+        }
+    }
+
+    /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
+    pub(crate) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
+        integrate_jacobian(&self.model, dq, IntegrateArgument::Position, by_q);
+        integrate_jacobian(&self.model, dq, IntegrateArgument::Velocity, by_dq);
+    }
+
+    /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
+    pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
+        self.group_hessian.run(&self.model, &self.groups, dq, lambda, hessian);
+    }
+}
+
+/// How the outputs of a knot change, by the derivatives in its data.
+pub(crate) struct DynamicsSensitivities<'a> {
+    /// The output that is S u.
+    pub given: Output,
+    pub data: &'a KnotData,
+    pub actuation: &'a Actuation,
+}
+
+impl Sensitivities for DynamicsSensitivities<'_> {
+    fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>) {
+        let [by_q, by_v, by_given] = match output {
+            output if output == self.given => return self.actuation.add_row(row, c, g.u),
+            Output::Acceleration => &self.data.da,
+            Output::Effort => &self.data.dtau,
+            Output::Force => &self.data.dlambda,
+        };
+        add_matrix_row(by_q, row, c, g.q);
+        add_matrix_row(by_v, row, c, g.v);
+        self.actuation.add_product_row(by_given, row, c, g.u);
+    }
+}

@@ -1,0 +1,75 @@
+//! Semi-implicit Euler, as Crocoddyl's: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt; the limits' term as it is.
+#![allow(non_snake_case)] // A, B
+
+use super::retraction::Retraction;
+use crate::lq::LqNode;
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, limit_term};
+use crate::vector::{Dense, Vector, at_level};
+
+/// Writes the next state of a prepared one; returns the cost.
+pub(super) fn calc<M: ContinuousModel>(
+    model: &mut M,
+    input: KnotInput<'_>,
+    dt: f64,
+    step: &mut Retraction,
+    next: &mut [f64],
+) -> f64 {
+    let (q, v) = input.x.split_at(model.nq());
+    let (q_next, v_next) = next.split_at_mut(q.len());
+    let (a, cost) = model.calc(input);
+    for k in 0..v.len() {
+        v_next[k] = v[k] + a[k] * dt; // v⁺ = v + a Δt
+    }
+    step.set_euler(v, a, dt);
+    model.integrate(q, &step.delta, q_next);
+    dt * cost + limit_term(model)
+}
+
+/// Writes the derivatives of a step, with T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ for δ = v Δt + a Δt²:
+///
+/// A = [T + E ∂a/∂q Δt², E (Δt 1 + ∂a/∂v Δt²); ∂a/∂q Δt, 1 + ∂a/∂v Δt],   B = [E ∂a/∂u Δt²; ∂a/∂u Δt]
+///
+/// In inverse-dynamics form T and E are all of them.
+pub(super) fn calc_diff<M: ContinuousModel>(
+    model: &mut M,
+    input: KnotInput<'_>,
+    dt: f64,
+    step: &mut Retraction,
+    node: &mut LqNode,
+) {
+    let (nv, v) = (model.nv(), &input.x[model.nq()..]);
+    let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, dt, node);
+    step.set_euler(v, a, dt);
+    let inverse = node.implicit.active;
+    if !inverse {
+        let (by_q, by_v) = node.A.as_mut_slice().split_at_mut(2 * nv * nv);
+        let parts = [(da_dq.as_slice(), by_q), (da_dv.as_slice(), by_v), (da_du, node.B.as_mut_slice())];
+        at_level(Steps(parts, nv, dt));
+        (0..nv).for_each(|k| node.A[(k, nv + k)] += dt);
+    }
+    step.differentiate(model);
+    step.write_blocks(model.groups(), node.structure.set_euler(dt, model.groups()));
+    if !inverse {
+        step.chain(model.groups(), &mut node.A);
+        step.multiply(model.groups(), &mut node.B);
+    }
+}
+
+/// Derivatives of accelerations, nv numbers a column, become those of steps: [a Δt²; a Δt].
+struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
+
+impl<const N: usize> Dense for Steps<'_, N> {
+    #[inline(always)]
+    fn run<V: Vector, const NR: usize>(self) {
+        let Self(parts, nv, dt) = self;
+        for (from, to) in parts {
+            for (column, a) in to.chunks_exact_mut(2 * nv).zip(from.chunks_exact(nv)) {
+                let (position, velocity) = column.split_at_mut(nv);
+                for k in 0..nv {
+                    velocity[k] = a[k] * dt;
+                    position[k] = a[k] * dt * dt;
+                }
+            }
+        }
+    }
+}

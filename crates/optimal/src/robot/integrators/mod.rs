@@ -1,0 +1,246 @@
+//! Integrators: from accelerations to the next state, and knots of some duration.
+
+mod curvature;
+mod euler;
+mod retraction;
+mod runge_kutta;
+
+use super::continuous::{ContinuousModel, KnotInput, Wanted, limit_term};
+use crate::Error;
+use crate::action::ActionModel;
+use crate::error::assert_length;
+use crate::lq::{Hessian, LqNode};
+use crate::multipliers::Visit;
+use curvature::Curvature;
+use retraction::Retraction;
+use runge_kutta::RungeKutta;
+use serde::{Deserialize, Serialize};
+
+/// The rule by which a knot steps through its time.
+///
+/// The stages of the Runge–Kutta methods add velocities of different points as if positions were a vector space, as
+/// Crocoddyl's do; for a free-flyer they are therefore of first order in its rotation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Integrator {
+    /// v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): one evaluation; symplectic. Crocoddyl's `IntegratedActionModelEuler`.
+    SemiImplicitEuler,
+    /// The midpoint rule, 2 evaluations.
+    #[serde(rename = "runge_kutta_2")]
+    RungeKutta2,
+    /// Heun's rule of third order, 3 evaluations.
+    #[serde(rename = "runge_kutta_3")]
+    RungeKutta3,
+    /// The classical rule, 4 evaluations.
+    #[serde(rename = "runge_kutta_4")]
+    RungeKutta4,
+}
+
+/// A knot of Δt seconds of a [`ContinuousModel`], or the end, where time stands still and the cost is ℓ itself.
+#[derive(Clone, Debug)]
+pub struct Integrated<M> {
+    inner: M,
+    method: Method,
+    /// The least and the greatest controls.
+    bounds: Option<[Vec<f64>; 2]>,
+    retraction: Retraction,
+    curvature: Curvature,
+}
+
+#[derive(Clone, Debug)]
+enum Method {
+    /// The end of a horizon, where time stands still.
+    Still,
+    /// A semi-implicit Euler step of Δt.
+    Euler(f64),
+    /// A Runge–Kutta step of Δt.
+    RungeKutta(f64, Box<RungeKutta>),
+}
+
+impl<M: ContinuousModel> Integrated<M> {
+    /// A knot of Δt seconds.
+    ///
+    /// # Errors
+    /// [`Error::TimeStep`] if Δt is not above 0.
+    pub fn new(model: M, integrator: Integrator, dt: f64) -> Result<Self, Error> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::TimeStep { dt });
+        }
+        let runge_kutta = |stages| Method::RungeKutta(dt, Box::new(RungeKutta::new(stages, &model)));
+        let method = match integrator {
+            Integrator::SemiImplicitEuler => Method::Euler(dt),
+            Integrator::RungeKutta2 => runge_kutta(2),
+            Integrator::RungeKutta3 => runge_kutta(3),
+            Integrator::RungeKutta4 => runge_kutta(4),
+        };
+        Ok(Self::with(model, method))
+    }
+
+    /// The end of a horizon, for a model without controls.
+    ///
+    /// # Panics
+    /// If the model has controls.
+    pub fn end(model: M) -> Self {
+        assert!(model.nu() == 0, "model: a terminal one has no controls, found {}", model.nu());
+        Self::with(model, Method::Still)
+    }
+
+    fn with(inner: M, method: Method) -> Self {
+        let (retraction, curvature) = (Retraction::new(inner.nv()), Curvature::new(&inner));
+        Self { inner, method, bounds: None, retraction, curvature }
+    }
+
+    /// The same knot with bounds on the controls, infinite where there is none.
+    ///
+    /// # Panics
+    /// If there are not nu numbers of each.
+    #[must_use]
+    pub fn with_bounds(mut self, lower: Vec<f64>, upper: Vec<f64>) -> Self {
+        assert_length("lower", lower.len(), self.inner.nu());
+        assert_length("upper", upper.len(), self.inner.nu());
+        self.bounds = Some([lower, upper]);
+        self
+    }
+
+    /// The model that is integrated.
+    pub fn inner(&self) -> &M {
+        &self.inner
+    }
+
+    /// The model that is integrated, to change it.
+    pub fn inner_mut(&mut self) -> &mut M {
+        &mut self.inner
+    }
+
+    /// Prepares the states of a group, as many at a time as there are lanes, and calls a function for each of them with its
+    /// number in the group. Runge–Kutta methods prepare each stage.
+    fn each(
+        &mut self,
+        knots: &[usize],
+        xs: &[f64],
+        us: &[f64],
+        wanted: Wanted,
+        mut visit: impl FnMut(&mut Self, KnotInput<'_>, usize),
+    ) {
+        let (nx, nu, lanes) = (self.nx(), self.nu(), self.lanes());
+        assert_length("xs", xs.len(), knots.len() * nx);
+        assert_length("us", us.len(), knots.len() * nu);
+        for from in (0..knots.len()).step_by(lanes) {
+            let to = (from + lanes).min(knots.len());
+            if !matches!(self.method, Method::RungeKutta(..)) {
+                self.inner.prepare(&knots[from..to], &xs[from * nx..to * nx], &us[from * nu..to * nu], wanted);
+            }
+            for i in from..to {
+                let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
+                visit(self, KnotInput { lane: i - from, t: knots[i], x, u }, i);
+            }
+        }
+    }
+
+    /// Writes the next state of a prepared one; returns the cost.
+    fn step(&mut self, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
+        let Self { inner, method, retraction, .. } = self;
+        match method {
+            Method::Still => inner.calc(input).1 + limit_term(inner),
+            Method::Euler(dt) => euler::calc(inner, input, *dt, retraction, next),
+            Method::RungeKutta(dt, method) => method.calc(inner, input, *dt, next),
+        }
+    }
+
+    /// Writes the derivatives at a prepared state.
+    fn differentiate(&mut self, input: KnotInput<'_>, node: &mut LqNode) {
+        let Self { inner, method, retraction, .. } = self;
+        match method {
+            Method::Still => _ = inner.calc_diff(input, 1.0, node),
+            Method::Euler(dt) => euler::calc_diff(inner, input, *dt, retraction, node),
+            Method::RungeKutta(dt, method) => method.calc_diff(inner, input, *dt, retraction, node),
+        }
+    }
+}
+
+impl<M: ContinuousModel> ActionModel for Integrated<M> {
+    fn nx(&self) -> usize {
+        self.inner.nq() + self.inner.nv()
+    }
+
+    fn ndx(&self) -> usize {
+        2 * self.inner.nv()
+    }
+
+    fn nu(&self) -> usize {
+        self.inner.nu()
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
+    }
+
+    fn lanes(&self) -> usize {
+        if let Method::Euler(_) = self.method { self.inner.lanes() } else { 1 }
+    }
+
+    fn shift(&mut self) {
+        self.inner.shift();
+    }
+
+    fn implicit(&self) -> Option<[usize; 2]> {
+        if let Method::Euler(_) = self.method { self.inner.inverse_dynamics_form() } else { None }
+    }
+
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        let Self { inner, method, bounds, retraction, curvature } = self;
+        let (method, bounds, retraction, curvature) =
+            (method.clone(), bounds.clone(), retraction.clone(), curvature.clone());
+        Some(Box::new(Self { inner: inner.fork()?, method, bounds, retraction, curvature }))
+    }
+
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        let nx = self.nx();
+        assert_length("next", next.len(), knots.len() * nx);
+        assert_length("costs", costs.len(), knots.len());
+        self.each(knots, xs, us, Wanted::Motion, |knot, input, i| {
+            costs[i] = knot.step(input, &mut next[i * nx..][..nx]);
+        });
+    }
+
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        assert_length("nodes", nodes.len(), knots.len());
+        let inverse = self.implicit().is_some() && nodes.first().is_some_and(|node| node.implicit.wanted);
+        let wanted = if inverse { Wanted::Equations } else { Wanted::Derivatives };
+        self.each(knots, xs, us, wanted, |knot, input, i| knot.differentiate(input, &mut nodes[i]));
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let mut cost = 0.0;
+        self.each(&[t], x, u, Wanted::Motion, |knot, input, _| cost = knot.step(input, next));
+        cost
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.each(&[t], x, u, Wanted::Derivatives, |knot, input, _| knot.differentiate(input, node));
+    }
+
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        if let Some(limits) = self.inner.limits() {
+            limits.visit(t, visit);
+        }
+    }
+
+    /// By semi-implicit Euler: see `curvature.rs`.
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let Self { inner, method: Method::Euler(dt), retraction, curvature, .. } = self else { return false };
+        curvature.run(inner, *dt, KnotInput { lane: 0, t, x, u }, lambda, retraction, hessian)
+    }
+
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        let (nq, nv) = (self.inner.nq(), self.inner.nv());
+        self.inner.integrate(&x[..nq], &dx[..nv], &mut out[..nq]);
+        (0..nv).for_each(|k| out[nq + k] = x[nq + k] + dx[nv + k]);
+    }
+
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        let (nq, nv) = (self.inner.nq(), self.inner.nv());
+        self.inner.difference(&x0[..nq], &x1[..nq], &mut out[..nv]);
+        (0..nv).for_each(|k| out[nv + k] = x1[nq + k] - x0[nq + k]);
+    }
+}

@@ -1,0 +1,109 @@
+//! Retraction: a step δ of a configuration q, and the Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both are the identity
+//! but for a block for each group of positions that is no vector space.
+#![allow(non_snake_case)] // T, E
+
+use crate::robot::continuous::ContinuousModel;
+use crate::structure::{EulerBlock, LARGEST_BLOCK};
+use crate::vector::{Dense, Vector, at_level};
+use core::ops::Range;
+use nalgebra::DMatrix;
+
+/// A step of a configuration and its Jacobians.
+#[derive(Clone, Debug)]
+pub(super) struct Retraction {
+    /// δ. Shape: nv.
+    pub delta: Vec<f64>,
+    /// T. Shape: nv × nv, the groups' blocks. Written by: `differentiate`.
+    T: DMatrix<f64>,
+    /// E. Shape: nv × nv, the groups' blocks. Written by: `differentiate`.
+    pub E: DMatrix<f64>,
+}
+
+impl Retraction {
+    pub(super) fn new(nv: usize) -> Self {
+        let square = DMatrix::zeros(nv, nv);
+        Self { delta: vec![0.0; nv], T: square.clone(), E: square }
+    }
+
+    /// Sets the step of semi-implicit Euler, δ = v Δt + a Δt².
+    pub(super) fn set_euler(&mut self, v: &[f64], a: &[f64], dt: f64) {
+        for k in 0..v.len() {
+            self.delta[k] = v[k] * dt + a[k] * dt * dt;
+        }
+    }
+
+    /// Computes T and E.
+    pub(super) fn differentiate<M: ContinuousModel>(&mut self, model: &M) {
+        if !model.groups().is_empty() {
+            model.integrate_jacobians(&self.delta, &mut self.T, &mut self.E);
+        }
+    }
+
+    /// Writes T and E of the groups.
+    pub(super) fn write_blocks(&self, groups: &[Range<usize>], blocks: &mut [EulerBlock]) {
+        for (group, block) in groups.iter().zip(blocks) {
+            block.T.copy_from(&self.T.view((group.start, group.start), (group.len(), group.len())));
+            block.E.copy_from(&self.E.view((group.start, group.start), (group.len(), group.len())));
+        }
+    }
+
+    /// E X in place of X, whose first nv rows are those of δ.
+    pub(super) fn multiply(&self, groups: &[Range<usize>], X: &mut DMatrix<f64>) {
+        for group in groups {
+            let rows = X.nrows();
+            at_level(Multiply { E: &self.E, group, X: X.as_mut_slice(), rows });
+        }
+    }
+
+    /// ∂(x ⊕ (δ, δv)) in place of X = ∂(δ, δv), by the chain rule: E X + T for positions, X + 1 for velocities. The first
+    /// columns of X are derivatives by x.
+    pub(super) fn chain(&self, groups: &[Range<usize>], X: &mut DMatrix<f64>) {
+        self.multiply(groups, X);
+        let n = X.nrows();
+        let mut from = 0;
+        for group in groups {
+            (from..group.start).for_each(|k| X[(k, k)] += 1.0);
+            from = group.end;
+            for (r, c) in group.clone().flat_map(|c| group.clone().map(move |r| (r, c))) {
+                X[(r, c)] += self.T[(r, c)];
+            }
+        }
+        (from..n).for_each(|k| X[(k, k)] += 1.0);
+    }
+}
+
+/// The rows of a group times its block of E, in place.
+struct Multiply<'a> {
+    E: &'a DMatrix<f64>,
+    group: &'a Range<usize>,
+    X: &'a mut [f64],
+    rows: usize,
+}
+
+impl Dense for Multiply<'_> {
+    #[inline(always)]
+    fn run<V: Vector, const NR: usize>(self) {
+        let Self { E, group, X, rows } = self;
+        let (start, size) = (group.start, group.len());
+        let mut block = [[0.0; 8]; LARGEST_BLOCK]; // column by column, with zeros up to a whole register
+        for c in 0..size {
+            for r in 0..size {
+                block[c][r] = E[(start + r, start + c)];
+            }
+        }
+        for column in X.chunks_exact_mut(rows) {
+            let (mut sum, part) = ([0.0; 8], &mut column[start..start + size]);
+            for c in 0..size {
+                let x = part[c];
+                for r in 0..8 {
+                    sum[r] += block[c][r] * x;
+                }
+            }
+            for r in 0..LARGEST_BLOCK {
+                if r < size {
+                    part[r] = sum[r];
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! A knot as its residuals see it: its state, and what its dynamics give; and how vectors with a lane for each knot become
+//! the data of each.
+
+use super::capabilities::{Capabilities, Output};
+use super::residuals::layout::ResidualData;
+use super::residuals::rows::Row;
+use condyle_spatial::block::{Block, Strided, scatter_matrix, scatter_rows};
+use nalgebra::DMatrix;
+
+/// What the dynamics of a knot give, and what its residuals read.
+#[derive(Clone, Debug)]
+pub(crate) struct KnotData {
+    /// q̈, or v⁺ − v at an impact. Shape: nv.
+    pub a: Vec<f64>,
+    /// τ of all joints. Shape: nv.
+    pub tau: Vec<f64>,
+    /// λ. Shape: rows.
+    pub lambda: Vec<f64>,
+    /// The derivatives of q̈ by q, v and what the controls drive: τ, or q̈ itself. Shape: nv × nv.
+    pub da: [DMatrix<f64>; 3],
+    /// The derivatives of λ, written only if a residual looks at forces. Shape: rows × nv.
+    pub dlambda: [DMatrix<f64>; 3],
+    /// The derivatives of τ by q, v and q̈ where the controls drive q̈, else nothing. Shape: nv × nv.
+    pub dtau: [DMatrix<f64>; 3],
+    /// The equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
+    pub equations: Vec<f64>,
+    pub residuals: ResidualData,
+}
+
+impl KnotData {
+    /// Zeros, with the derivatives of q̈ that are constants if it is the `given` output.
+    pub(crate) fn new(nv: usize, capabilities: &Capabilities, given: Output) -> Self {
+        let rows = capabilities.rows();
+        let square = || DMatrix::zeros(nv, nv);
+        let wide = || DMatrix::zeros(rows, nv);
+        let (last, n) = match given {
+            Output::Acceleration => (DMatrix::identity(nv, nv), nv),
+            _ => (square(), 0),
+        };
+        Self {
+            a: vec![0.0; nv],
+            tau: vec![0.0; nv],
+            lambda: vec![0.0; rows],
+            da: [square(), square(), last],
+            dlambda: [wide(), wide(), wide()],
+            dtau: [(); 3].map(|()| DMatrix::zeros(n, n)),
+            equations: Vec::new(),
+            residuals: ResidualData::default(),
+        }
+    }
+}
+
+/// A knot as its residuals see it.
+#[derive(Clone, Copy)]
+pub(crate) struct KnotState<'a> {
+    pub x: &'a [f64],
+    pub u: &'a [f64],
+    pub data: &'a KnotData,
+}
+
+/// How the outputs of a knot change with x and u.
+pub(crate) trait Sensitivities {
+    /// g += c · ∂y_row/∂(u, v, q) for entry `row` of an output y.
+    fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>);
+}
+
+/// Adds a row of a matrix: g += c X[row, :], for as many columns as g has numbers.
+pub(crate) fn add_matrix_row(X: &DMatrix<f64>, row: usize, c: f64, g: &mut [f64]) {
+    for (g, column) in g.iter_mut().zip(X.as_slice().chunks_exact(X.nrows())) {
+        *g += c * column[row];
+    }
+}
+
+/// The most knots that a vector has lanes for.
+pub(crate) const WIDEST: usize = 8;
+
+/// The part of the data of each knot that is to be written.
+pub(crate) fn parts(of: &mut [KnotData], part: impl Fn(&mut KnotData) -> &mut [f64]) -> [&mut [f64]; WIDEST] {
+    let mut parts: [&mut [f64]; WIDEST] = Default::default();
+    for (to, of) in parts.iter_mut().zip(of) {
+        *to = part(of);
+    }
+    parts
+}
+
+/// Writes vectors, with a lane for each knot, to a part of the data of each knot.
+pub(crate) fn unpack<S: Block<Number = f64>>(
+    from: &[S],
+    to: &mut [KnotData],
+    part: impl Fn(&mut KnotData) -> &mut [f64],
+) {
+    let count = to.len();
+    scatter_rows(from, &mut parts(to, part)[..count]);
+}
+
+/// Writes a matrix of vectors to rows of `stride` numbers in a part of the data of each knot.
+pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
+    from: &Strided<'_, S>,
+    to: &mut [KnotData],
+    stride: usize,
+    part: impl Fn(&mut KnotData) -> &mut [f64],
+) {
+    let count = to.len();
+    scatter_matrix(from, &mut parts(to, part)[..count], stride);
+}

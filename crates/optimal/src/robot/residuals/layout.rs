@@ -1,0 +1,199 @@
+//! Layout of the residuals of a knot: how each is computed, what it looks at, and where its numbers stand.
+#![allow(non_snake_case)] // W
+
+use super::residual::{Part, Residual};
+use crate::robot::capabilities::{Capabilities, Output};
+use condyle_dynamics::Model;
+use core::ops::{Add, BitOr, Range};
+use nalgebra::DMatrix;
+
+/// A residual as it is computed.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    /// The number of its entries.
+    pub n: usize,
+    /// The number of entries of the terms before it.
+    pub first: usize,
+    /// The place of a residual of kinematics among those of its knot.
+    pub index: usize,
+    /// The rows of its contact in λ.
+    pub rows: Range<usize>,
+    /// Whether its knot has contacts.
+    pub in_contact: bool,
+    /// W of a residual W f, row after row.
+    pub W: Vec<f64>,
+}
+
+impl Plan {
+    /// The plan of a residual, or what does not fit the robot and the capabilities of its dynamics.
+    pub(crate) fn new(model: &Model, capabilities: &Capabilities, residual: &Residual) -> Result<Self, String> {
+        let n = residual.check(model, capabilities)?;
+        let rows = residual.contact().map_or(Ok(0..0), |name| capabilities.contact(name))?;
+        let (W, in_contact) = (residual.force_rows(rows.len()), !capabilities.contacts.is_empty());
+        Ok(Self { n, first: 0, index: 0, rows, in_contact, W })
+    }
+}
+
+/// The width of a row of the Jacobian of a residual of kinematics, which is one by q alone or by (v, q).
+pub(crate) fn row_width(nv: usize, residual: &Residual) -> usize {
+    if residual.part() == Part::Positions { nv } else { 2 * nv }
+}
+
+/// The memory that the residuals of a knot take, and the quantities that they look at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct KnotLayout {
+    /// The most entries of one residual.
+    pub longest: usize,
+    /// The most rows of Jacobians by (u, v, q), and by q alone.
+    pub rows: [usize; 2],
+    /// The number of residuals of kinematics.
+    pub kinematic: usize,
+    /// Whether a residual looks at forces.
+    pub forces: bool,
+    pub requirements: Requirements,
+}
+
+impl KnotLayout {
+    /// The layout of a single residual.
+    pub(crate) fn of(residual: &Residual, plan: &Plan) -> Self {
+        let rows = match residual.part() {
+            Part::All => [plan.n, 0],
+            Part::Positions => [0, plan.n],
+            Part::Diagonal => [0, 0],
+        };
+        let kinematic = usize::from(residual.is_kinematic());
+        let forces = residual.output() == Some(Output::Force);
+        let requirements = Requirements::of(residual, plan.in_contact);
+        Self { longest: plan.n, rows, kinematic, forces, requirements }
+    }
+
+    /// The layout that serves both of two knots.
+    pub(crate) fn or(self, other: Self) -> Self {
+        let most = |a: [usize; 2], b: [usize; 2]| [a[0].max(b[0]), a[1].max(b[1])];
+        let kinematic = self.kinematic.max(other.kinematic);
+        Self { rows: most(self.rows, other.rows), kinematic, ..self + other }
+    }
+}
+
+/// The layout of the residuals of both together.
+impl Add for KnotLayout {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        let sum = |a: [usize; 2], b: [usize; 2]| [a[0] + b[0], a[1] + b[1]];
+        Self {
+            longest: self.longest.max(other.longest),
+            rows: sum(self.rows, other.rows),
+            kinematic: self.kinematic + other.kinematic,
+            forces: self.forces | other.forces,
+            requirements: self.requirements | other.requirements,
+        }
+    }
+}
+
+/// The quantities of the whole robot that the residuals of a knot look at, so that each is computed once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Requirements {
+    pub placements: bool,
+    pub velocities: bool,
+    /// The Jacobian of the centre of mass.
+    pub com: bool,
+    pub momentum: bool,
+    /// g, the efforts that hold the robot still.
+    pub gravity: bool,
+    /// M q̈ + h, the efforts of joints and contacts.
+    pub inertia: bool,
+    /// The change of the velocity of the centre of mass at an impact.
+    pub impulse_com: bool,
+}
+
+impl Requirements {
+    fn of(residual: &Residual, in_contact: bool) -> Self {
+        let mut all = Self::default();
+        match residual {
+            Residual::ControlGravity => (all.gravity, all.inertia) = (true, in_contact),
+            Residual::CenterOfMass { .. } => (all.com, all.placements) = (true, true),
+            Residual::CentroidalMomentum { .. } => (all.momentum, all.velocities) = (true, true),
+            Residual::FrameVelocity { .. } => all.velocities = true,
+            Residual::ImpulseCenterOfMass => all.impulse_com = true,
+            _ => all.placements = residual.frame().is_some(),
+        }
+        all
+    }
+}
+
+impl BitOr for Requirements {
+    type Output = Self;
+    fn bitor(self, o: Self) -> Self {
+        Self {
+            placements: self.placements | o.placements,
+            velocities: self.velocities | o.velocities,
+            com: self.com | o.com,
+            momentum: self.momentum | o.momentum,
+            gravity: self.gravity | o.gravity,
+            inertia: self.inertia | o.inertia,
+            impulse_com: self.impulse_com | o.impulse_com,
+        }
+    }
+}
+
+/// The numbers of each residual of kinematics stand so far from those of the next one.
+pub(crate) const STRIDE: usize = 8;
+/// The rows of each have so many numbers per coordinate: six rows by v and q.
+pub(crate) const ROWS: usize = 12;
+
+/// The quantities that the residuals of a knot read; those that its terms do not require are not written.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ResidualData {
+    /// The residuals of kinematics: those of costs, and those of limits.
+    pub kinematic: [KinematicData; 2],
+    /// M q̈ + h − g at a knot with contacts, else −g. Shape: nv.
+    pub surplus: Vec<f64>,
+    /// The derivatives of the surplus by q, v, q̈; of −g that by q. Shape: nv × nv.
+    pub dsurplus: [DMatrix<f64>; 3],
+    /// J_c (v⁺ − v) at an impact: the change of the velocity of the centre of mass.
+    pub com_change: [f64; 3],
+    /// The derivatives of that by q, where v⁺ − v stays, and by v⁺ − v. Shape: 3 × nv.
+    pub dcom_change: [DMatrix<f64>; 2],
+    /// Whether it was written for the terms of the knot.
+    pub is_written: bool,
+}
+
+/// Residuals of kinematics, and the rows of their Jacobians, at the places that their plans name.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct KinematicData {
+    pub r: Vec<f64>,
+    pub rows: Vec<f64>,
+}
+
+impl ResidualData {
+    /// Makes room for the residuals of costs and of limits of a robot's knots.
+    pub(crate) fn reserve(&mut self, nv: usize, layouts: [KnotLayout; 2]) {
+        for (data, KnotLayout { kinematic, .. }) in self.kinematic.iter_mut().zip(layouts) {
+            if data.r.len() < kinematic * STRIDE {
+                data.r.resize(kinematic * STRIDE, 0.0);
+                data.rows.resize(kinematic * ROWS * nv, 0.0);
+            }
+        }
+        let requirements = layouts[0].requirements | layouts[1].requirements;
+        if requirements.gravity && self.surplus.is_empty() {
+            self.surplus.resize(nv, 0.0);
+            self.dsurplus.fill(DMatrix::zeros(nv, nv));
+        }
+        if requirements.impulse_com && self.dcom_change[0].is_empty() {
+            self.dcom_change.fill(DMatrix::zeros(3, nv));
+        }
+    }
+}
+
+impl KinematicData {
+    /// r of a residual.
+    pub(crate) fn residual(&self, plan: &Plan) -> &[f64] {
+        &self.r[plan.index * STRIDE..][..plan.n]
+    }
+
+    /// The rows of the Jacobian of a residual.
+    pub(crate) fn rows(&self, nv: usize, residual: &Residual, plan: &Plan) -> core::slice::ChunksExact<'_, f64> {
+        let width = row_width(nv, residual);
+        self.rows[plan.index * ROWS * nv..][..plan.n * width].chunks_exact(width)
+    }
+}

@@ -1,0 +1,10 @@
+//! Residuals: what costs and limits look at, and how it is computed.
+
+pub(super) mod cones;
+pub(super) mod kernel;
+pub(super) mod layout;
+pub(super) mod residual;
+pub(super) mod rows;
+pub(super) mod surplus;
+pub(super) mod terms;
+pub(super) mod view;

@@ -1,0 +1,165 @@
+//! Terms: residuals and what they are worth, costs or limits of a knot.
+
+use super::layout::{KnotLayout, Plan};
+use super::residual::{Part, Residual};
+use super::view::ResidualView;
+use crate::lq::LqNode;
+use crate::robot::knot::Sensitivities;
+
+/// A residual that is worth something.
+pub(crate) trait Term {
+    fn residual(&self) -> &Residual;
+
+    /// The weight; a term whose weight is 0 is not computed.
+    fn weight(&self) -> f64 {
+        1.0
+    }
+}
+
+/// What terms of a kind are worth, by their residuals.
+pub(crate) trait Objective<T> {
+    /// The worth of a term.
+    fn value(&self, term: &T, plan: &Plan, r: &[f64]) -> f64;
+
+    /// Writes its gradient and the diagonal of its Hessian by r.
+    fn slopes(&mut self, term: &T, plan: &Plan, r: &[f64], d: &mut [f64], dd: &mut [f64]);
+}
+
+/// The terms of one kind of a knot, as they are computed.
+#[derive(Clone, Debug)]
+pub(crate) struct Terms<T> {
+    all: Vec<T>,
+    plans: Vec<Plan>,
+    /// The terms that look at kinematics.
+    kinematic: Vec<usize>,
+    layout: KnotLayout,
+}
+
+impl<T> Default for Terms<T> {
+    fn default() -> Self {
+        Self { all: Vec::new(), plans: Vec::new(), kinematic: Vec::new(), layout: KnotLayout::default() }
+    }
+}
+
+impl<T: Term> Terms<T> {
+    /// Adds a term with the plan of its residual.
+    pub(crate) fn push(&mut self, term: T, mut plan: Plan) {
+        (plan.first, plan.index) = (self.len(), self.kinematic.len());
+        if term.residual().is_kinematic() {
+            self.kinematic.push(self.all.len());
+        }
+        self.layout = self.layout + KnotLayout::of(term.residual(), &plan);
+        self.all.push(term);
+        self.plans.push(plan);
+    }
+
+    /// Puts a term with the plan of its residual in the place of term k; says whether it takes the same memory.
+    pub(crate) fn replace(&mut self, k: usize, term: T, plan: Plan) -> bool {
+        let (old, before) = (&mut self.all[k], &mut self.plans[k]);
+        let same = KnotLayout::of(term.residual(), &plan) == KnotLayout::of(old.residual(), before);
+        if same {
+            (*old, *before) = (term, Plan { first: before.first, index: before.index, ..plan });
+        }
+        same
+    }
+
+    /// All terms.
+    pub(crate) fn all(&self) -> &[T] {
+        &self.all
+    }
+
+    /// All terms, to change what they are worth.
+    pub(crate) fn all_mut(&mut self) -> &mut [T] {
+        &mut self.all
+    }
+
+    /// The number of entries of all residuals.
+    pub(crate) fn len(&self) -> usize {
+        self.plans.last().map_or(0, |plan| plan.first + plan.n)
+    }
+
+    /// The terms that have a weight.
+    fn weighty(&self) -> impl Iterator<Item = (&T, &Plan)> {
+        self.all.iter().zip(&self.plans).filter(|(term, _)| term.weight() != 0.0)
+    }
+
+    /// Σ of what the terms are worth.
+    pub(crate) fn value(&self, view: &mut ResidualView<'_>, objective: &impl Objective<T>) -> f64 {
+        let mut sum = 0.0;
+        for (term, plan) in self.weighty() {
+            view.compute(term.residual(), plan);
+            sum += objective.value(term, plan, &view.scratch.r[..plan.n]);
+        }
+        sum
+    }
+
+    /// Adds to the gradient and the Hessian of what the terms are worth: first the rows of Jacobians to those that are
+    /// collected in the scratch, then (`diagonal`) what has no rows to q, r, Q, R of the node.
+    pub(crate) fn differentiate(
+        &self,
+        view: &mut ResidualView<'_>,
+        sensitivities: &dyn Sensitivities,
+        objective: &mut impl Objective<T>,
+        diagonal: bool,
+        node: &mut LqNode,
+    ) {
+        for (term, plan) in self.weighty() {
+            let residual = term.residual();
+            if (residual.part() == Part::Diagonal) != diagonal {
+                continue;
+            }
+            view.compute(residual, plan);
+            let s = &mut *view.scratch;
+            objective.slopes(term, plan, &s.r[..plan.n], &mut s.d[..plan.n], &mut s.dd[..plan.n]);
+            match diagonal {
+                false => view.push_rows(residual, plan, sensitivities),
+                true => view.add_diagonal(residual, node),
+            }
+        }
+    }
+}
+
+/// Terms of either kind, for those who compute kinematics.
+pub(crate) trait KinematicTerms {
+    /// The memory that the terms take, and what they look at.
+    fn layout(&self) -> KnotLayout;
+
+    /// The i-th residual of kinematics, with its weight and its place.
+    fn kinematic(&self, i: usize) -> Option<(&Residual, f64, &Plan)>;
+}
+
+impl<T: Term> KinematicTerms for Terms<T> {
+    fn layout(&self) -> KnotLayout {
+        self.layout
+    }
+
+    fn kinematic(&self, i: usize) -> Option<(&Residual, f64, &Plan)> {
+        let k = *self.kinematic.get(i)?;
+        Some((self.all[k].residual(), self.all[k].weight(), &self.plans[k]))
+    }
+}
+
+/// The terms of a knot: its costs and its limits.
+#[derive(Clone, Copy)]
+pub(crate) struct KnotTerms<'a>(pub [&'a dyn KinematicTerms; 2]);
+
+impl KnotTerms<'_> {
+    /// The layout of all terms.
+    pub(crate) fn layout(&self) -> KnotLayout {
+        self.0[0].layout() + self.0[1].layout()
+    }
+
+    /// Whether another knot looks at the same with its own targets.
+    pub(crate) fn is_alike(self, other: Self) -> bool {
+        let same = |k: usize| core::ptr::addr_eq(self.0[k], other.0[k]);
+        let alike = |a: &dyn KinematicTerms, b: &dyn KinematicTerms| {
+            a.layout().kinematic == b.layout().kinematic
+                && (0..a.layout().kinematic).all(|i| match (a.kinematic(i), b.kinematic(i)) {
+                    (Some((a, ..)), Some((b, ..))) => a.differs_in_target(b),
+                    _ => false,
+                })
+        };
+        let all_alike = || (0..2).all(|k| alike(self.0[k], other.0[k]));
+        (same(0) && same(1)) || (self.layout().requirements == other.layout().requirements && all_alike())
+    }
+}

@@ -1,0 +1,176 @@
+//! Values of residuals, and how their Jacobians come into a node; costs and limits say what they are worth.
+#![allow(non_snake_case)] // D
+
+use super::layout::{KinematicData, KnotLayout, Plan};
+use super::residual::{Part, Residual};
+use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
+use crate::lq::LqNode;
+use crate::robot::capabilities::Output;
+use crate::robot::knot::{KnotState, Sensitivities, add_matrix_row};
+use crate::robot::state::{groups, state_difference};
+use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian};
+use core::ops::Range;
+use nalgebra::DMatrix;
+
+/// Scratch of the residuals of a knot.
+#[derive(Clone, Debug)]
+pub(crate) struct Scratch {
+    /// The residual, its worth's gradient and the diagonal of its worth's Hessian.
+    pub r: Vec<f64>,
+    pub d: Vec<f64>,
+    pub dd: Vec<f64>,
+    /// The rows of all Jacobians.
+    pub rows: Rows,
+    /// The Jacobian of the difference of configurations. Shape: nv × nv.
+    D: DMatrix<f64>,
+    /// The coordinates of each group of positions that is no vector space.
+    groups: Vec<Range<usize>>,
+}
+
+impl Scratch {
+    /// Scratch for a robot with nu controls.
+    pub(crate) fn new(model: &Model, nu: usize, layout: KnotLayout) -> Self {
+        let (nv, numbers) = (model.nv(), || vec![0.0; layout.longest]);
+        let (rows, D) = (Rows::new(nv, nu, layout.rows), DMatrix::zeros(nv, nv));
+        Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model) }
+    }
+}
+
+/// The residuals of a knot: those of its costs, or those of its limits.
+pub(crate) struct ResidualView<'a> {
+    pub model: &'a Model,
+    pub state: KnotState<'a>,
+    pub kinematics: &'a KinematicData,
+    pub scratch: &'a mut Scratch,
+}
+
+impl ResidualView<'_> {
+    /// Computes r of a residual, in the scratch.
+    pub(crate) fn compute(&mut self, residual: &Residual, plan: &Plan) {
+        let Self { model, state: KnotState { x, u, data }, kinematics, scratch } = self;
+        let r = &mut scratch.r[..plan.n];
+        let minus = |r: &mut [f64], a: &[f64], b: &[f64]| (0..r.len()).for_each(|i| r[i] = a[i] - b[i]);
+        match residual {
+            Residual::State { reference } => state_difference(model, reference, x, r), // x ⊖ x_ref
+            Residual::Control { reference } => minus(r, u, reference),
+            Residual::ControlGravity => {
+                r.copy_from_slice(&data.residuals.surplus);
+                if !plan.in_contact {
+                    r.iter_mut().zip(&data.tau).for_each(|(r, tau)| *r += tau); // τ − g
+                }
+            }
+            Residual::JointEffort { reference } => minus(r, &data.tau, reference),
+            Residual::JointAcceleration { reference } => minus(r, &data.a, reference),
+            Residual::ImpulseCenterOfMass => r.copy_from_slice(&data.residuals.com_change),
+            Residual::ContactForce { target, .. } => minus(r, &data.lambda[plan.rows.clone()], &target.to_array()),
+            Residual::FrictionCone { .. } | Residual::WrenchCone { .. } | Residual::CenterOfPressure { .. } => {
+                let f = &data.lambda[plan.rows.clone()];
+                for (r, row) in r.iter_mut().zip(plan.W.chunks_exact(f.len())) {
+                    *r = row.iter().zip(f).map(|(w, f)| w * f).sum(); // W f
+                }
+            }
+            _ => r.copy_from_slice(kinematics.residual(plan)),
+        }
+    }
+
+    /// Pushes the rows of the Jacobian of a residual that was just computed, with its worth's slopes d and curvatures dd;
+    /// unless the Jacobian is the identity: then see [`add_diagonal`](Self::add_diagonal).
+    pub(crate) fn push_rows(&mut self, residual: &Residual, plan: &Plan, sensitivities: &dyn Sensitivities) {
+        let (s, nv) = (&mut *self.scratch, self.model.nv());
+        let worth = s.d.iter().zip(&s.dd).map(|(d, dd)| [*d, *dd]);
+        if residual.part() == Part::Positions {
+            for (row, worth) in self.kinematics.rows(nv, residual, plan).zip(worth) {
+                s.rows.push_positions(row, worth);
+            }
+            return;
+        }
+        let active = |worth: &[f64; 2]| *worth != [0.0, 0.0]; // not so a cone's row inside
+        if residual.is_kinematic() {
+            let rows = self.kinematics.rows(nv, residual, plan).zip(worth);
+            for (row, worth) in rows.filter(|(_, worth)| active(worth)) {
+                let g = s.rows.push(worth);
+                g.v.copy_from_slice(&row[..nv]);
+                g.q.copy_from_slice(&row[nv..]);
+            }
+            return;
+        }
+        for i in 0..plan.n {
+            if active(&[self.scratch.d[i], self.scratch.dd[i]]) {
+                self.push_row(residual, plan, i, sensitivities);
+            }
+        }
+    }
+
+    /// Pushes row i of ∂r/∂(u, v, q) of a residual that looks at outputs of the dynamics.
+    fn push_row(&mut self, residual: &Residual, plan: &Plan, i: usize, sensitivities: &dyn Sensitivities) {
+        let (Scratch { rows, d, dd, .. }, data) = (&mut *self.scratch, &self.state.data.residuals);
+        let (g, nv) = (&mut rows.push([d[i], dd[i]]), self.model.nv());
+        match residual {
+            Residual::ControlGravity => {
+                let [by_q, by_v, by_a] = &data.dsurplus;
+                add_matrix_row(by_q, i, 1.0, g.q);
+                if plan.in_contact {
+                    add_matrix_row(by_v, i, 1.0, g.v);
+                    (0..nv).for_each(|k| sensitivities.add_row(Output::Acceleration, k, by_a[(i, k)], g)); // M ∂q̈
+                } else {
+                    sensitivities.add_row(Output::Effort, i, 1.0, g);
+                }
+            }
+            Residual::ImpulseCenterOfMass => {
+                let [by_q, Jcom] = &data.dcom_change;
+                add_matrix_row(by_q, i, 1.0, g.q);
+                (0..nv).for_each(|k| sensitivities.add_row(Output::Acceleration, k, Jcom[(i, k)], g)); // J_c ∂(v⁺ − v)
+            }
+            Residual::JointEffort { .. } => sensitivities.add_row(Output::Effort, i, 1.0, g),
+            Residual::JointAcceleration { .. } => sensitivities.add_row(Output::Acceleration, i, 1.0, g),
+            _ => {
+                let rows = plan.rows.len();
+                for (k, w) in plan.W[i * rows..(i + 1) * rows].iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                    sensitivities.add_row(Output::Force, plan.rows.start + k, *w, g); // W ∂λ
+                }
+            }
+        }
+    }
+
+    /// Adds gradient and Hessian of a state's or a control's residual that was just computed.
+    pub(crate) fn add_diagonal(&mut self, residual: &Residual, node: &mut LqNode) {
+        match residual {
+            Residual::State { .. } => self.add_state(node),
+            _ => add_control_diagonal(node, &self.scratch.d, &self.scratch.dd),
+        }
+    }
+
+    /// Adds gradient and Hessian of a state's term: ∂r/∂x is the identity but for the groups' blocks of q.
+    fn add_state(&mut self, node: &mut LqNode) {
+        let Self { model, scratch: s, .. } = self;
+        let nv = model.nv();
+        let mut from = 0;
+        for group in s.groups.iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
+            add_state_diagonal(node, from..group.start, &s.d, &s.dd);
+            from = group.end;
+        }
+        if s.groups.is_empty() {
+            return;
+        }
+        difference_jacobian(model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
+        for group in &s.groups {
+            let (start, size) = (group.start, group.len());
+            let mut D = [[0.0; 6]; 6]; // row by row
+            for i in 0..size {
+                for a in 0..size {
+                    D[i][a] = s.D[(start + i, start + a)];
+                }
+            }
+            for i in 0..size {
+                let (d, dd) = (s.d[start + i], s.dd[start + i]);
+                for a in 0..size {
+                    node.q[start + a] += D[i][a] * d; // Dᵀ a′
+                    let column = &mut node.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
+                    for b in 0..size {
+                        column[b] += dd * (D[i][a] * D[i][b]); // Dᵀ a″ D
+                    }
+                }
+            }
+        }
+    }
+}
