@@ -5,13 +5,14 @@
 //! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
 //! matrix is inverted.
 
-use crate::data::{Data, Size, check, check_forces};
+use crate::data::{Data, Size, check_forces};
 use crate::dispatch::kernel;
 use crate::forward_dynamics::{Method, forward_dynamics};
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Single};
 use crate::limbs;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 
 /// In the world's frame.
@@ -206,10 +207,10 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
 pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) {
     data.check(model);
     model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("tau", tau.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("tau", tau.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
 }
 
 /// Body by body, for arguments that fit; leaves what depends on q behind.

@@ -15,9 +15,10 @@ use crate::inputs::State;
 use crate::limbs;
 use crate::ltdl::axpy;
 use crate::minv;
-use crate::model::{Coupled, Model};
 use crate::product;
 use crate::rnea_derivatives;
+use condyle_model::Model;
+use condyle_model::tree::Coupled;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -36,7 +37,7 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = DMatrix::from_element(size.nv, size.nv, S::zero());
-        let solve = articulated_solve::Workspace::new(&model.columns, size.nv);
+        let solve = articulated_solve::Workspace::new(model.columns(), size.nv);
         Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square, solve }
     }
 }
@@ -193,9 +194,9 @@ kernel! {
         let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
         // ∂q̈ = −M⁻¹ ∂τ
         if S::LANES > 1 {
-            minus_products(Minv, dtau, da, &model.coupled);
+            minus_products(Minv, dtau, da, model.coupled());
         } else {
-            dtau.into_iter().zip(da).for_each(|(dtau, da)| minus_product(Minv, dtau, da, &model.coupled));
+            dtau.into_iter().zip(da).for_each(|(dtau, da)| minus_product(Minv, dtau, da, model.coupled()));
         }
     }
 }
@@ -282,7 +283,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    if !product::minus_products(data.minv.matrix().as_slice(), dtau, da, &model.coupled) {
+    if !product::minus_products(data.minv.matrix().as_slice(), dtau, da, model.coupled()) {
         products(model, data);
     }
 }

@@ -13,10 +13,11 @@
 
 use crate::aba::check_arguments;
 use crate::aba_derivatives::{self, AbaDerivatives, minus_product};
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
-use crate::model::Model;
 use crate::{rnea_derivatives, rnea_hessian};
+use condyle_model::Model;
+use condyle_model::check;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -69,10 +70,10 @@ kernel! {
     fn run(model, data) {
         let Data { aba_derivatives, minv, rnea_hessian: phi, aba_hessian, .. } = data;
         let Workspace { transpose, product, dqdq, dvdq, dvdv, dtaudq, .. } = aba_hessian;
-        let (n, G) = (model.nv, phi.dadq.as_slice());
+        let (n, G) = (model.nv(), phi.dadq.as_slice());
         let product = product.as_mut_slice();
         transpose_to(aba_derivatives.da_dq.as_slice(), transpose, n);
-        minus_product(transpose, G, product, &model.coupled); // −(∂q̈/∂q)ᵀ G
+        minus_product(transpose, G, product, model.coupled()); // −(∂q̈/∂q)ᵀ G
         let (qq, vv) = (dqdq.as_mut_slice(), dvdv.as_mut_slice());
         let (phi_qq, phi_vv) = (phi.dqdq.as_slice(), phi.dvdv.as_slice());
         for j in 0..n {
@@ -83,11 +84,11 @@ kernel! {
         }
         transpose_to(aba_derivatives.da_dv.as_slice(), transpose, n);
         let (vq, phi_vq) = (dvdq.as_mut_slice(), phi.dvdq.as_slice());
-        minus_product(transpose, G, vq, &model.coupled); // −(∂q̈/∂v)ᵀ G
+        minus_product(transpose, G, vq, model.coupled()); // −(∂q̈/∂v)ᵀ G
         for k in 0..n * n {
             vq[k] -= phi_vq[k];
         }
-        minus_product(minv.matrix().as_slice(), G, dtaudq.as_mut_slice(), &model.coupled); // −M⁻¹ G
+        minus_product(minv.matrix().as_slice(), G, dtaudq.as_mut_slice(), model.coupled()); // −M⁻¹ G
     }
 }
 
@@ -136,7 +137,7 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     lambda: &[S],
 ) -> AbaHessian<'d, S, R> {
-    check("lambda", lambda.len(), model.nv);
+    check("lambda", lambda.len(), model.nv());
     check_arguments(model, data, q, v, tau, f_ext);
     aba_derivatives::in_turn(model, data, q, v, tau, f_ext);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);

@@ -5,12 +5,13 @@
 
 use crate::centroidal::{self, CentroidalMapRate, shift_rate};
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Layout, Pairs, Single};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -146,8 +147,8 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> AllTerms<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, data, q);
     velocities(model, data, v);
     run(model, data);

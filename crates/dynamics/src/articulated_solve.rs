@@ -6,7 +6,7 @@
 
 use crate::aba;
 use crate::kinematics::World;
-use crate::model::Column;
+use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 
 /// How many columns of B go together.

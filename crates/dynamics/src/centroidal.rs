@@ -7,12 +7,13 @@
 //! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Layout, Single};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
@@ -93,7 +94,7 @@ fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S
 /// Adds a column to the coordinate that it follows.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: Force<S>) {
-    let column = &model.columns[c];
+    let column = &model.columns()[c];
     let (f, at) = (f.scale(S::splat(column.ratio)).to_array(), 6 * column.coordinate);
     for (entry, &f) in matrix.as_mut_slice()[at..at + 6].iter_mut().zip(&f) {
         *entry += f;
@@ -204,7 +205,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
 ) -> CentroidalMap<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     positions(model, data, q);
     run_map(model, data);
     shift_map(model, &mut data.centroidal)
@@ -240,8 +241,8 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> CentroidalMapRate<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, data, q);
     velocities(model, data, v);
     run_map_rate(model, data);

@@ -14,11 +14,12 @@
 
 use crate::centroidal::{about, add};
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, accelerations, positions, velocities};
-use crate::layout::{Layout, Single};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -131,7 +132,7 @@ fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> Centroi
     }
     let of = [&d.drate_da, &d.dh_dq, &d.drate_dq, &d.drate_dv];
     for (to, from) in [&mut d.dcom_dq, &mut d.dvcom_dq, &mut d.dacom_dq, &mut d.dacom_dv].into_iter().zip(of) {
-        for j in 0..model.nv {
+        for j in 0..model.nv() {
             for i in 0..3 {
                 to[(i, j)] = from[(i, j)] * per_mass;
             }
@@ -205,9 +206,9 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
 ) -> CentroidalDerivatives<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
     positions(model, data, q);
     velocities(model, data, v);
     accelerations(model, data, a);

@@ -19,7 +19,8 @@ use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, Size};
 use crate::ltdl::{Ltdl, axpy};
-use crate::model::{Coupled, Model};
+use condyle_model::Model;
+use condyle_model::tree::Coupled;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 

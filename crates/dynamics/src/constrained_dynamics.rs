@@ -18,10 +18,10 @@ use crate::crba;
 use crate::data::{Data, Size};
 use crate::dispatch::Kernel;
 use crate::kinematics::{World, place};
-use crate::layout::{Pairs, Single};
 use crate::limbs;
 use crate::ltdl::Ltdl;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

@@ -20,9 +20,9 @@ use crate::constraint_set::ConstraintSet;
 use crate::data::Data;
 use crate::frames::Placements;
 use crate::kinematics::World;
-use crate::layout::{Layout, Single};
-use crate::model::Model;
 use crate::rnea_derivatives;
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
 use nalgebra::DMatrix;
 

@@ -3,9 +3,10 @@
 #![allow(unsafe_code)]
 
 use crate::constraint_set::ConstraintSet;
-use crate::data::{Data, check, check_forces};
+use crate::data::{Data, check_forces};
 use crate::dispatch::{Kernel, fused, is_f64, same, short, slice};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
 use condyle_spatial::lanes::Fused;
 use condyle_spatial::{Constant, Force, Scalar};
 
@@ -80,10 +81,10 @@ where
     data.check(model);
     constraints.check(model);
     model.check_regular();
-    check("q", x.q.len(), model.nq);
-    check("v", x.v.len(), model.nv);
-    check("tau", x.tau.len(), model.nv);
-    check_forces(x.f_ext.len(), model.nodes.len());
+    check("q", x.q.len(), model.nq());
+    check("v", x.v.len(), model.nv());
+    check("tau", x.tau.len(), model.nv());
+    check_forces(x.f_ext.len(), model.nodes().len());
 }
 
 /// Runs an algorithm, compiled for the level of its scalar.

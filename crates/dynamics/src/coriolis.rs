@@ -11,11 +11,12 @@
 //! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 numbers other than zero, given by the momentum
 //! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Pairs, Single};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;
 
@@ -171,8 +172,8 @@ pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> &'d DMatrix<S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, data, q);
     velocities(model, data, v);
     run(model, data);

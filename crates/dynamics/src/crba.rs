@@ -3,12 +3,13 @@
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2; in the world's frame, where a composite is
 //! a plain sum.
 
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Columns, Single};
 use crate::limbs;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Columns, Single};
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
 
@@ -91,7 +92,7 @@ kernel! {
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     if limbs::run(limbs::Task::Crba, model, data, q, &[], &[], &[]) {
         return &data.crba.M;
     }

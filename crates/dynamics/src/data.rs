@@ -1,12 +1,12 @@
 //! All that algorithms write: scratch and results.
 
 use crate::kinematics::{Moving, World};
-use crate::model::Model;
 use crate::{
     aba, aba_derivatives, aba_hessian, all_terms, centroidal, centroidal_derivatives, constrained_derivatives,
     constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, minv, regressor, rnea,
     rnea_derivatives, rnea_hessian, statics,
 };
+use condyle_model::Model;
 use condyle_spatial::Scalar;
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
@@ -70,15 +70,15 @@ impl<S: Scalar> Data<S> {
     /// Allocates everything for a model.
     pub fn new<R>(model: &Model<R>) -> Self {
         let size = Size {
-            bodies: model.nodes.len(),
-            columns: model.columns.len(),
-            depth: model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0),
-            levels: model.nodes.iter().map(|n| n.level + 1).max().unwrap_or(1),
-            nv: model.nv,
+            bodies: model.nodes().len(),
+            columns: model.columns().len(),
+            depth: model.columns().iter().map(|c| c.depth + 1).max().unwrap_or(0),
+            levels: model.nodes().iter().map(|n| n.level + 1).max().unwrap_or(1),
+            nv: model.nv(),
         };
         Self {
             size,
-            tree: model.tree,
+            tree: model.tree(),
             world: World::new(size),
             moving: Moving::new(size),
             rnea: rnea::Workspace::new(size),
@@ -111,20 +111,13 @@ impl<S> Data<S> {
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
         let made_for = (self.size.bodies, self.size.columns, self.size.nv);
-        let given = (model.nodes.len(), model.columns.len(), model.nv);
+        let given = (model.nodes().len(), model.columns().len(), model.nv());
         let other = if made_for == given { " in another tree" } else { "" };
         assert!(
-            self.tree == model.tree,
+            self.tree == model.tree(),
             "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}{other}"
         );
     }
-}
-
-/// Panics unless an argument has as many numbers as it must have.
-#[inline]
-#[track_caller]
-pub(crate) fn check(argument: &str, found: usize, expected: usize) {
-    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
 }
 
 /// Panics unless there is a force for each body, the world included, or none at all.

@@ -4,8 +4,8 @@ use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, forward_velocities};
-use crate::layout::{Layout, Single};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
@@ -48,7 +48,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     #[inline(always)]
     pub(crate) fn rotors(&self) -> S {
         let mut twice = S::zero();
-        for (&armature, &qd) in self.model.armature.iter().zip(&self.moving.qd) {
+        for (&armature, &qd) in self.model.armature().iter().zip(&self.moving.qd) {
             twice += armature.lift() * qd * qd;
         }
         twice

@@ -19,12 +19,13 @@ use crate::constrained_dynamics::inertia;
 use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::kinematics::{World, place};
-use crate::layout::{Layout, Pairs, Single};
 use crate::ltdl::axpy;
-use crate::model::Model;
 use crate::rnea_derivatives;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -119,8 +120,8 @@ where
     data.check(model);
     constraints.check(model);
     model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
 }
 
 struct Impact;

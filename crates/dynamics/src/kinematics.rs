@@ -1,13 +1,14 @@
 //! Where the bodies are and how they move: one pass from the root to the tips for all bodies. What can then be asked is
 //! in `frames.rs`.
 
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Placements, Velocities};
-use crate::joint::{Joint, Turns};
-use crate::layout::{Layout, Single};
 use crate::limbs;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::joint::{Joint, Turns};
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
 /// What depends on the position alone, in the world's frame.
@@ -184,7 +185,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
 ) -> Placements<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     positions(model, data, q);
     Placements { model, world: &data.world }
 }
@@ -212,8 +213,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> Velocities<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, data, q);
     velocities(model, data, v);
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
@@ -245,9 +246,9 @@ pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
 ) -> Accelerations<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
     positions(model, data, q);
     velocities(model, data, v);
     accelerations(model, data, a);

@@ -7,13 +7,15 @@
 
 use crate::aba;
 use crate::crba::crba;
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::Single;
 use crate::limbs;
 use crate::ltdl::Ltdl;
-use crate::model::{Column, Model};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::Single;
+use condyle_model::tree::Column;
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 
@@ -143,7 +145,7 @@ kernel! {
 kernel! {
     /// After `aba`.
     pub(crate) fn from_factors(model, data) {
-        sweep(&model.columns, &data.world, &data.aba, &mut data.minv);
+        sweep(model.columns(), &data.world, &data.aba, &mut data.minv);
     }
 }
 
@@ -174,7 +176,7 @@ kernel! {
 pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
     model.check_regular();
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     if data.minv.by_factor {
         if limbs::run(limbs::Task::Minv, model, data, q, &[], &[], &[]) {
             return &data.minv.Minv;

@@ -5,7 +5,7 @@
 //! `aba_derivatives::minus_product`.
 
 use crate::dispatch::{slice, slice_mut};
-use crate::model::Coupled;
+use condyle_model::tree::Coupled;
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real};
 use condyle_spatial::lanes::Kernel;

@@ -5,13 +5,14 @@
 //! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
 //! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
 
-use crate::data::{Data, Size, check, check_forces};
+use crate::data::{Data, Size, check_forces};
 use crate::dispatch::kernel;
-use crate::joint::{Joint, Turning, Turns};
 use crate::kinematics::Placed;
-use crate::layout::{Layout, Single};
 use crate::limbs;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::joint::{Joint, Turning, Turns};
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
 /// In the bodies' turned frames.
@@ -149,10 +150,10 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
     run(model, data, q, v, a, f_ext);
     &data.rnea.tau
 }
@@ -170,8 +171,8 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     let zero = core::mem::take(&mut data.rnea.zero);
     run(model, data, q, v, &zero, &[]);
     data.rnea.zero = zero;
@@ -195,7 +196,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     let zero = core::mem::take(&mut data.rnea.zero);
     run(model, data, q, &zero, &zero, &[]);
     data.rnea.zero = zero;

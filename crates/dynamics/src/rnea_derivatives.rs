@@ -21,14 +21,15 @@
 //! (Iᶜ, B, F of the joint of d).
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size, check, check_forces};
+use crate::data::{Data, Size, check_forces};
 use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::kinematics::{World, positions};
-use crate::layout::{Columns, Layout, Single};
 use crate::limbs;
-use crate::model::Model;
 use crate::side_by_side::{self, Rows};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -269,10 +270,10 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
 #[track_caller]
 fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
 }
 
 /// Body by body, so that what second derivatives are made of is left behind.
@@ -292,8 +293,7 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
 /// What `pass` has left in the limbs' lanes.
 pub(crate) fn view_of_limbs<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let mut view = view(model, &data.world, &data.rnea_derivatives);
-    view.state.limbs =
-        data.limbs.as_ref().zip(model.limbs.as_ref()).map(|(scratch, plan)| limbs::Seen::new(plan, scratch));
+    view.state.limbs = data.limbs.as_ref().zip(model.limbs()).map(|(scratch, plan)| limbs::Seen::new(plan, scratch));
     view
 }
 
@@ -338,8 +338,8 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> CoriolisDerivatives<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     let still = core::mem::take(&mut data.rnea_derivatives.still);
     positions(model, data, q);
     run(model, data, v, &still, &[], &[Vec3::zero()]);

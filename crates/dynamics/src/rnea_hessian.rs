@@ -30,12 +30,13 @@
 //! programming for rigid-body systems* (2021); the sums above are those of the first, contracted before they are expanded.
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size, check};
+use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::kinematics::World;
-use crate::layout::{Pairs, Single};
-use crate::model::Model;
 use crate::rnea_derivatives::{self, RneaDerivatives};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -209,7 +210,7 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     lambda: &[S],
 ) -> RneaHessian<'d, S, R> {
-    check("lambda", lambda.len(), model.nv);
+    check("lambda", lambda.len(), model.nv());
     rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
     run(model, data, lambda);
     let first = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives);
@@ -235,8 +236,8 @@ pub struct RneaSecondDerivatives<S> {
 impl<S: Scalar> RneaSecondDerivatives<S> {
     /// Memory for the tensors of a model.
     pub fn new<R>(model: &Model<R>) -> Self {
-        let zeros = || vec![DMatrix::from_element(model.nv, model.nv, S::zero()); model.nv];
-        let lambda = vec![S::zero(); model.nv];
+        let zeros = || vec![DMatrix::from_element(model.nv(), model.nv(), S::zero()); model.nv()];
+        let lambda = vec![S::zero(); model.nv()];
         Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
     }
 }
@@ -267,9 +268,9 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     out: &mut RneaSecondDerivatives<S>,
 ) {
-    check("out", out.lambda.len(), model.nv);
+    check("out", out.lambda.len(), model.nv());
     rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
-    for i in 0..model.nv {
+    for i in 0..model.nv() {
         out.lambda[i] = S::one();
         run(model, data, &out.lambda);
         out.lambda[i] = S::zero();

@@ -8,11 +8,12 @@
 //! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)
 //! ```
 
-use crate::data::{Data, Size, check, check_forces};
+use crate::data::{Data, Size, check_forces};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Pairs, Single};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -97,8 +98,8 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check_forces(f_ext.len(), model.nodes().len());
     positions(model, data, q);
     run(model, data, f_ext);
     &data.statics.tau
@@ -169,8 +170,8 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d DMatrix<S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check_forces(f_ext.len(), model.nodes().len());
     positions(model, data, q);
     run_derivative(model, data, f_ext);
     &data.statics.dtau_dq

@@ -1,12 +1,12 @@
 //! Steps in place of bodies, lanes in place of numbers.
 #![allow(unsafe_code)]
 
-use super::links::{Before, Link, Pair};
-use super::steps::{Parents, Source, Step};
 use super::{LANES, Plan};
-use crate::joint::Joint;
-use crate::layout::{Columns, Layout};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::joint::Joint;
+use condyle_model::layout::{Columns, Layout};
+use condyle_model::limbs::column_map::{Before, Link, Pair};
+use condyle_model::limbs::schedule::{Parents, Source, Step};
 use condyle_spatial::lanes::{Fused, Lanes};
 use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::{Act, Force, Inertia, Se3, Vec3};
@@ -198,7 +198,7 @@ impl<'a> Limbs<'a> {
     #[inline(always)]
     pub(super) fn new(plan: &'a Plan, model: &'a Model) -> Self {
         let Plan { steps, links, pairs, copies, before, finished, coordinates, .. } = plan;
-        let (armature, gravity) = (&model.armature, model.gravity);
+        let (armature, gravity) = (model.armature(), *model.gravity());
         Self { steps, links, pairs, copies, before, finished, coordinates, armature, gravity }
     }
 

@@ -2,14 +2,15 @@
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, Limbs, numbers};
-use super::steps::Source;
 use super::{LANES, Plan, inverse};
 use crate::data::{Data, Size};
 use crate::dispatch::{fused, is_f64, same, slice};
 use crate::kinematics::{Placed, World, place};
-use crate::layout::{Columns, Layout, Single};
-use crate::model::Model;
 use crate::{aba, crba, rnea, rnea_derivatives};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Layout, Single};
+use condyle_model::limbs::Sizes;
+use condyle_model::limbs::schedule::Source;
 use condyle_spatial::block::{Block, Real, lanes};
 use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::level::{Level, level};
@@ -42,8 +43,7 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// For a model with limbs, on a processor that can.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
-        let plan =
-            model.limbs.as_ref().filter(|_| TypeId::of::<S>() == TypeId::of::<f64>() && level() > Level::Baseline)?;
+        let plan = model.limbs().filter(|_| TypeId::of::<S>() == TypeId::of::<f64>() && level() > Level::Baseline)?;
         let (steps, nv) = (plan.steps.len(), plan.coordinates.len());
         let size = Size { bodies: steps, columns: nv + plan.copies.len(), depth: 0, levels: steps, nv };
         let zeros = vec![Four::zero(); nv];
@@ -52,13 +52,13 @@ impl Scratch {
             v: zeros.clone(),
             x: zeros,
             f_ext: vec![Force::zero(); steps],
-            padded: vec![Fused(0.0); model.nq.max(model.nv) + 1],
+            padded: vec![Fused(0.0); model.nq().max(model.nv()) + 1],
             world: World::new(size),
             rnea: rnea::Workspace::new(size),
             aba: aba::Workspace::new(size),
             IC: vec![Inertia::zero(); steps],
             bodies: rnea_derivatives::Bodies::new(size),
-            inverted: inverse::Scratch::new(model, inverse::Sizes::new(model), plan.links.len()),
+            inverted: inverse::Scratch::new(model, Sizes::new(model), plan.links.len()),
         }))
     }
 
@@ -202,7 +202,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
 /// The plan, where this model and `data` have limbs side by side, and the processor can.
 #[inline]
 pub(super) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
-    let (Some(plan), Some(scratch)) = (&model.limbs, &data.limbs) else { return None };
+    let (Some(plan), Some(scratch)) = (model.limbs(), &data.limbs) else { return None };
     (is_f64::<S, R>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
 }
 
@@ -245,11 +245,11 @@ pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Dat
     // SAFETY: poses and motions are made of vectors.
     let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
     for i in 1..oX.len() {
-        let ((step, lane), column) = (plan.place[i], model.nodes[i].column);
+        let ((step, lane), column) = (plan.place[i], model.nodes()[i].column);
         let pose = |k: usize| Fused(poses[(12 * step + k) * LANES + lane]);
         let axis = |k: usize| Vec3::new(pose(k), pose(k + 1), pose(k + 2));
         oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));
-        for k in 0..model.nodes[i].joint.nv() {
+        for k in 0..model.nodes()[i].joint.nv() {
             let slot = plan.steps[step].idx_v + k;
             let number = |r: usize| Fused(motions[(6 * slot + r) * LANES + lane]);
             S[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));

@@ -1,9 +1,9 @@
 //! The semi-implicit (symplectic) Euler method.
 
 use super::{Input, Status, acceleration};
-use crate::configuration::integrate;
 use crate::data::Data;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::integrate;
 use condyle_spatial::{Constant, Scalar};
 
 #[derive(Clone, Debug)]
@@ -16,7 +16,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        Self { effort: vec![S::zero(); model.nv], way: vec![S::zero(); model.nv] }
+        Self { effort: vec![S::zero(); model.nv()], way: vec![S::zero(); model.nv()] }
     }
 }
 

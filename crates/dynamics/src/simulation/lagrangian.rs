@@ -18,8 +18,8 @@
 //! ```
 
 use crate::kinematics::World;
-use crate::layout::Pairs;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
 /// In the world's frame; matrices by columns.
@@ -51,7 +51,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let (bodies, columns, nv) = (model.nodes.len(), model.columns.len(), model.nv);
+        let (bodies, columns, nv) = (model.nodes().len(), model.columns().len(), model.nv());
         Self {
             v: vec![Motion::zero(); bodies],
             IC: vec![Inertia::zero(); bodies],

@@ -1,7 +1,7 @@
 //! Files in files.
 
 use crate::error::Error;
-use crate::xml::{self, Element};
+use crate::io::xml::{self, Element};
 use std::path::{Path, PathBuf};
 
 /// How deep bodies may be nested once the included files are in their places.

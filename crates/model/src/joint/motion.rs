@@ -4,7 +4,7 @@ use condyle_spatial::{Motion, Scalar, Vec3};
 
 /// A joint's velocity S q̇ or acceleration S q̈ in the body's frame, in the form that costs least to compute with.
 #[derive(Clone, Copy)]
-pub(crate) enum JointMotion<S> {
+pub enum JointMotion<S> {
     /// About z.
     Turn(S),
     /// Along z.
@@ -29,7 +29,7 @@ impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
 /// How a body turns, and how its origin accelerates: what the equations of Newton and Euler need.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub(crate) struct Turning<S> {
+pub struct Turning<S> {
     /// ω.
     pub w: Vec3<S>,
     /// ω̇.
@@ -47,7 +47,7 @@ impl<S: Scalar> JointMotion<S> {
     /// Adds a joint that moves with this velocity and with the acceleration aJ to what the body would do without it:
     /// ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J.
     #[inline(always)]
-    pub(crate) fn added_to(self, aJ: Self, Turning { mut w, mut dw, mut a }: Turning<S>) -> Turning<S> {
+    pub fn added_to(self, aJ: Self, Turning { mut w, mut dw, mut a }: Turning<S>) -> Turning<S> {
         match (self, aJ) {
             (Self::Turn(x), Self::Turn(xx)) => {
                 dw = Vec3::new(w.y.mul_add(x, dw.x), (-w.x).mul_add(x, dw.y), dw.z + xx);

@@ -56,7 +56,7 @@ pub enum NotPhysical {
 /// π: mass, mass times centre of mass, and the inertia about the origin, as ten numbers.
 ///
 /// ```
-/// use condyle_dynamics::{Inertia, Sym3, Vec3, inertial_parameters};
+/// use condyle_model::{Inertia, Sym3, Vec3, inertial_parameters};
 /// let I = Inertia::from_com(2.0, Vec3::new(0.0, 0.0, 0.5), Sym3::diagonal(0.1));
 /// let pi = inertial_parameters::from_inertia(I);
 /// assert_eq!(pi, [2.0, 0.0, 0.0, 1.0, 0.6, 0.0, 0.6, 0.0, 0.0, 0.1]);
@@ -84,7 +84,7 @@ fn second_moments<S: Scalar>(J: Sym3<S>) -> Sym3<S> {
 /// (2018).
 ///
 /// ```
-/// use condyle_dynamics::{inertial_parameters::pseudo_inertia, robots};
+/// use condyle_model::{inertial_parameters::pseudo_inertia, robots};
 /// let arm = robots::arm7();
 /// assert!(pseudo_inertia(arm.bodies()[3].inertia).symmetric_eigenvalues().min() > 0.0);
 /// ```
@@ -135,7 +135,7 @@ fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
 /// [`NotPhysical`], with the first number that is not positive.
 ///
 /// ```
-/// use condyle_dynamics::{Inertia, Sym3, Vec3, inertial_parameters::check};
+/// use condyle_model::{Inertia, Sym3, Vec3, inertial_parameters::check};
 /// let mut J = Sym3::diagonal(0.1);
 /// assert!(check(Inertia::from_com(1.0, Vec3::zero(), J)).is_ok());
 /// J.zz = 0.3; // more than 0.1 + 0.1
@@ -150,11 +150,11 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
 /// α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). Source: Rucker and Wensing (2022).
 ///
 /// ```
-/// use condyle_dynamics::{inertial_parameters::{from_log_cholesky, log_cholesky}, robots};
+/// use condyle_model::{inertial_parameters::{from_log_cholesky, log_cholesky}, robots};
 /// let I = robots::arm7().bodies()[3].inertia;
 /// let theta = log_cholesky(I)?;
 /// assert!((from_log_cholesky(theta).mass - I.mass).abs() < 1e-14 * I.mass);
-/// # Ok::<(), condyle_dynamics::inertial_parameters::NotPhysical>(())
+/// # Ok::<(), condyle_model::inertial_parameters::NotPhysical>(())
 /// ```
 ///
 /// # Errors
@@ -195,7 +195,7 @@ pub fn from_log_cholesky<S: Scalar>(theta: [S; 10]) -> Inertia<S> {
 /// slope of the torques in θ.
 ///
 /// ```
-/// use condyle_dynamics::inertial_parameters::log_cholesky_jacobian;
+/// use condyle_model::inertial_parameters::log_cholesky_jacobian;
 /// let J = log_cholesky_jacobian([0.0; 10]);
 /// assert_eq!(J[(0, 0)], 2.0); // m = e²ᵅ
 /// ```

@@ -2,7 +2,7 @@
 
 use super::attributes::{Attributes, Compiler};
 use crate::error::Error;
-use crate::xml::Element;
+use crate::io::xml::Element;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use core::f64::consts::PI;
 use nalgebra::Matrix3;

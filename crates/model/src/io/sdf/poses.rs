@@ -2,8 +2,8 @@
 
 use super::WORLD_LINK;
 use crate::error::Error;
+use crate::io::xml::{self, Element};
 use crate::model::nearest;
-use crate::xml::{self, Element};
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3};
 use std::collections::HashMap;
 

@@ -6,7 +6,7 @@ use condyle_spatial::{Motion, Scalar, Se3, Vec3};
 
 impl Joint {
     /// The position that leaves the body at its joint's frame.
-    pub(crate) fn neutral(self, q: &mut [f64]) {
+    pub fn neutral(self, q: &mut [f64]) {
         q.fill(0.0);
         match self {
             Self::Continuous { .. } => q[0] = 1.0,
@@ -18,7 +18,7 @@ impl Joint {
     }
 
     /// Which of the joint's coordinates are a vector of length 1.
-    pub(crate) fn unit_part(self) -> Option<core::ops::Range<usize>> {
+    pub fn unit_part(self) -> Option<core::ops::Range<usize>> {
         match self {
             Self::Continuous { .. } => Some(0..2),
             Self::Planar => Some(2..4),
@@ -29,7 +29,7 @@ impl Joint {
     }
 
     /// A position drawn uniformly: lengths and angles between their limits, rotations over the whole group.
-    pub(crate) fn random(self, rng: &mut impl rand::Rng, lower: &[f64], upper: &[f64], q: &mut [f64]) {
+    pub fn random(self, rng: &mut impl rand::Rng, lower: &[f64], upper: &[f64], q: &mut [f64]) {
         use rand::RngExt;
         for ((q, &lower), &upper) in q.iter_mut().zip(lower).zip(upper) {
             *q = lower + (upper - lower) * rng.random::<f64>();
@@ -51,7 +51,7 @@ impl Joint {
     }
 
     /// q ⊕ v: the position after moving with v for one unit of time.
-    pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
+    pub fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
                 for k in 0..q.len() {
@@ -76,7 +76,7 @@ impl Joint {
     }
 
     /// q₁ ⊖ q₀: the v with q₀ ⊕ v = q₁.
-    pub(crate) fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
+    pub fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
                 for k in 0..q0.len() {
@@ -98,7 +98,7 @@ impl Joint {
     }
 
     /// Which Jacobian of the joint's group, at tangent vector v, as a map of twists; `None` where it is the identity.
-    pub(crate) fn jacobian<S: Scalar>(self, which: GroupJacobian, v: &[S]) -> Option<MotionMap<S>> {
+    pub fn jacobian<S: Scalar>(self, which: GroupJacobian, v: &[S]) -> Option<MotionMap<S>> {
         if !matches!(self, Self::Spherical | Self::Planar | Self::FreeFlyer) {
             return None;
         }
@@ -149,7 +149,7 @@ impl Joint {
 
 /// The Jacobians of a joint's group that integrating and taking differences need.
 #[derive(Clone, Copy)]
-pub(crate) enum GroupJacobian {
+pub enum GroupJacobian {
     /// ∂(q ⊕ v)/∂v.
     Exp,
     /// ∂(q₁ ⊖ q₀)/∂q₁ at q₁ ⊖ q₀ = v.

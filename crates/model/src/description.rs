@@ -3,7 +3,7 @@
 use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::model::{Body, Frame, Limits, Model};
-use crate::soundness::Warning;
+use crate::validate::Warning;
 use condyle_spatial::{Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -1,12 +1,11 @@
 //! What is odd about a model, though it loads: inertias that no body has, degrees of freedom along which M is singular.
 
-use crate::data::Data;
-use crate::kinematics::place;
-use crate::layout::{Layout, Single};
+use crate::configuration::random_configuration;
+use crate::joint::Joint;
+use crate::layout::{Columns, Layout, Pairs, Single};
 use crate::model::{Body, Model};
-use crate::{configuration::random_configuration, crba::crba};
-use condyle_spatial::{Act, ArticulatedInertia, Inertia};
-use nalgebra::Matrix3;
+use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3};
+use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
 use serde::{Deserialize, Serialize};
 
@@ -95,14 +94,11 @@ impl Model {
     pub(crate) fn find_singular(&mut self) {
         let mut always = vec![true; self.bodies.len()];
         let mut rng = StdRng::seed_from_u64(0);
-        let mut data = Data::new(self);
         for _ in 0..SAMPLES {
             let q = random_configuration(self, &mut rng);
-            let here = if self.has_mimic() {
-                self.singular_by_matrix(&mut data, &q)
-            } else {
-                self.singular_by_bodies(&mut data, &q)
-            };
+            let placed = Placed::at(self, &q);
+            let here =
+                if self.has_mimic() { self.singular_by_matrix(&placed) } else { self.singular_by_bodies(&placed) };
             always.iter_mut().zip(here).for_each(|(always, here)| *always &= here);
         }
         self.singular = (1..self.bodies.len()).filter(|&i| always[i]).collect();
@@ -112,15 +108,14 @@ impl Model {
     }
 
     /// The pivots D = Sᵀ Iᴬ S of the articulated bodies; a joint without one is passed over.
-    fn singular_by_bodies(&self, data: &mut Data<f64>, q: &[f64]) -> Vec<bool> {
+    fn singular_by_bodies(&self, Placed { oX, S }: &Placed) -> Vec<bool> {
         let l = Single::<f64, f64>::new(self);
-        place(&l, &mut data.world, q);
         let mut singular = vec![false; self.bodies.len()];
         let mut IA = vec![ArticulatedInertia::zero(); self.bodies.len()];
         for i in l.bodies().rev() {
-            let mut Ia = IA[i] + data.world.oX[i].act(l.inertia(i)).into();
+            let mut Ia = IA[i] + oX[i].act(l.inertia(i)).into();
             for k in (0..l.joint(i).nv()).rev() {
-                let S = data.world.S[l.slot(i) + k];
+                let S = S[l.slot(i) + k];
                 let U = Ia * S;
                 let D = S.dot(U) + l.armature(i, k);
                 let products = S.to_array().iter().zip(U.to_array()).map(|(s, u)| (s * u).abs()).sum::<f64>();
@@ -136,8 +131,8 @@ impl Model {
     }
 
     /// The pivots of M, of robots whose joints share coordinates.
-    fn singular_by_matrix(&self, data: &mut Data<f64>, q: &[f64]) -> Vec<bool> {
-        let mut M = crba(self, data, q).clone();
+    fn singular_by_matrix(&self, placed: &Placed) -> Vec<bool> {
+        let mut M = self.inertia_matrix(placed);
         let diagonal = M.diagonal();
         let mut singular = vec![false; self.nv];
         for k in (0..self.nv).rev() {
@@ -158,6 +153,52 @@ impl Model {
     }
 }
 
+/// The bodies and the columns of S in the world's frame, at one position.
+struct Placed {
+    /// oXi. Shape: bodies.
+    oX: Vec<Se3<f64>>,
+    /// Shape: columns.
+    S: Vec<Motion<f64>>,
+}
+
+impl Placed {
+    fn at(model: &Model, q: &[f64]) -> Self {
+        let l = Single::<f64, f64>::new(model);
+        let (mut oX, mut S) = (vec![Se3::identity(); model.bodies.len()], Vec::with_capacity(model.columns.len()));
+        for i in l.bodies() {
+            oX[i] = l.parent(&oX, i) * Joint::placement(&l, i, q); // oXi = oXλ λXi
+            S.extend((0..l.joint(i).nv()).map(|k| l.joint(i).column(&oX[i], k)));
+        }
+        Self { oX, S }
+    }
+}
+
+impl Model {
+    /// M, by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
+    fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
+        let l = Single::<f64, f64>::new(self);
+        let mut M = DMatrix::zeros(self.nv, self.nv);
+        let mut IC: Vec<_> = oX.iter().zip(&self.nodes).map(|(X, node)| X.act(node.inertia)).collect();
+        for i in l.bodies().rev() {
+            let support = l.support(i);
+            let before = support.len() - l.joint(i).nv();
+            for own in before..support.len() {
+                let F = IC[i] * l.at(S, support[own]); // F = Iᶜ S
+                for &e in &support[..own] {
+                    let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
+                    l.add_at(M.as_mut_slice(), support[own], e, x);
+                    l.add_at(M.as_mut_slice(), e, support[own], x);
+                }
+                l.add_at(M.as_mut_slice(), support[own], support[own], l.at(S, support[own]).dot(F));
+            }
+            let IC_i = IC[i];
+            l.push(&mut IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        }
+        l.add_armature(M.as_mut_slice());
+        M
+    }
+}
+
 impl<R> Model<R> {
     /// The bodies whose joints make M singular: nothing that they carry has inertia along them. Forward dynamics and
     /// M⁻¹ refuse such a robot; armature on these joints cures it.
@@ -166,9 +207,10 @@ impl<R> Model<R> {
     }
 
     /// Panics, with the joint's name, where M has no inverse.
+    #[doc(hidden)]
     #[inline]
     #[track_caller]
-    pub(crate) fn check_regular(&self) {
+    pub fn check_regular(&self) {
         if let Some(&i) = self.singular.first() {
             panic!("{}", Warning::Singular { joint: self.bodies[i].joint_name.clone() });
         }

@@ -8,7 +8,7 @@ use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 
 /// Four bodies as a pass sees them.
 #[derive(Clone, Debug)]
-pub(crate) struct Step {
+pub struct Step {
     /// The kind of their joints.
     pub joint: Joint,
     pub bodies: [usize; LANES],
@@ -27,7 +27,7 @@ pub(crate) struct Step {
 
 /// Where the parents of a step's bodies stand.
 #[derive(Clone, Debug)]
-pub(crate) enum Parents {
+pub enum Parents {
     /// In one step, each in its child's lane.
     Below(usize),
     /// Elsewhere: what comes from which step, and what goes there.
@@ -36,7 +36,7 @@ pub(crate) enum Parents {
 
 /// Where the four numbers of a position or a velocity come from: the one of the robot times `ratio`, plus `offset`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Source {
+pub struct Source {
     /// One past the robot's last in a lane without a joint.
     pub from: [usize; LANES],
     pub ratio: [f64; LANES],

@@ -1,8 +1,8 @@
 //! Robots of our own, embedded in the library: examples, tests and benches need no file.
 
+use crate::io::urdf::UrdfOptions;
 use crate::joint::Joint;
 use crate::model::Model;
-use crate::urdf::UrdfOptions;
 
 /// A seven-axis arm with a fixed base; its last frame is `tool`.
 pub const ARM7: &str = include_str!("../models/arm7.urdf");

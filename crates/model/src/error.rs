@@ -13,7 +13,7 @@ pub enum Error {
         what: String,
     },
     /// No folder has the file that a `package://` address names.
-    #[error("{address}: no such file in a package `{package}`; {}", crate::package::said(looked))]
+    #[error("{address}: no such file in a package `{package}`; {}", crate::io::packages::said(looked))]
     Package {
         /// As given.
         address: String,
@@ -104,7 +104,7 @@ pub enum Error {
         /// Path, or `<string>`.
         file: String,
         /// What is odd.
-        warning: crate::soundness::Warning,
+        warning: crate::validate::Warning,
     },
     /// Two bodies, joints or frames of one kind have the same name.
     #[error("two {kind}s are named `{name}`")]

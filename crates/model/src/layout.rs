@@ -19,7 +19,7 @@ use core::marker::PhantomData;
 use core::ops::{AddAssign, Range};
 
 /// How one pass sees model and state.
-pub(crate) trait Layout {
+pub trait Layout {
     /// The number that the pass computes with.
     type S: Scalar;
 
@@ -76,7 +76,7 @@ pub(crate) trait Layout {
 
 /// How a pass sees the columns before a joint, and the entries of matrices in coordinates, stored by columns, that it has
 /// with them.
-pub(crate) trait Columns: Layout {
+pub trait Columns: Layout {
     /// Names a column, in the list of a body's ancestors.
     type Column: Copy;
     /// Names a column of a body's own joint.
@@ -105,7 +105,7 @@ pub(crate) trait Columns: Layout {
 }
 
 /// How a pass sees any pair of columns.
-pub(crate) trait Pairs: Columns<Number = <Self as Layout>::S> {
+pub trait Pairs: Columns<Number = <Self as Layout>::S> {
     /// Sets the entry (row, column) of a matrix in coordinates after `clear`, or adds to it if several columns share it.
     /// Once for each pair of columns.
     fn put_at(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
@@ -114,13 +114,13 @@ pub(crate) trait Pairs: Columns<Number = <Self as Layout>::S> {
 }
 
 /// One body at a time: one state, or several knots of a horizon in the lanes of the scalar.
-pub(crate) struct Single<'m, S, R> {
+pub struct Single<'m, S, R> {
     model: &'m Model<R>,
     scalar: PhantomData<S>,
 }
 
 impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
-    pub(crate) fn new(model: &'m Model<R>) -> Self {
+    pub fn new(model: &'m Model<R>) -> Self {
         Self { model, scalar: PhantomData }
     }
 }

@@ -3,12 +3,12 @@
 mod mimics;
 mod poses;
 
+use super::xml::{self, Element};
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::{FrameKind, Model};
-use crate::soundness::Warning;
-use crate::xml::{self, Element};
+use crate::validate::Warning;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use mimics::Axes;
 use poses::{Poses, optional, three};
@@ -59,7 +59,7 @@ impl Model {
     /// Reads an SDF from a string; see [`from_sdf`](Self::from_sdf).
     ///
     /// ```
-    /// use condyle_dynamics::{Model, SdfOptions};
+    /// use condyle_model::{Model, SdfOptions};
     /// let sdf = r#"<sdf version="1.7"><model name="pendulum">
     ///   <link name="base"/>
     ///   <link name="rod"><inertial><pose>0 0 -1 0 0 0</pose><mass>2</mass></inertial></link>
@@ -72,7 +72,7 @@ impl Model {
     /// let error = Model::from_sdf_str(&sdf.replace(">rod<", ">bar<"), &SdfOptions::default()).unwrap_err();
     /// let expected = "<string>:5: joint `pivot`: no link, joint or frame is named `bar`; nearest is `base`";
     /// assert_eq!(error.to_string(), expected);
-    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// # Ok::<(), condyle_model::Error>(())
     /// ```
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::joint::Joint;
 use crate::limbs::Plan;
 use crate::model::{Body, Frame, FrameKind, Limits, Mimic, Model};
-use crate::soundness;
+use crate::validate;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use std::collections::HashSet;
 
@@ -44,7 +44,7 @@ struct Draft {
 /// Makes a [`Model`], body by body, parents first.
 ///
 /// ```
-/// use condyle_dynamics::{Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD};
+/// use condyle_model::{Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD};
 /// let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.08));
 /// let y = Vec3::new(0.0, 1.0, 0.0);
 /// let mut robot = ModelBuilder::new("double pendulum");
@@ -54,7 +54,7 @@ struct Draft {
 /// robot.frame("tip", lower, elbow);
 /// let model = robot.build()?;
 /// assert_eq!(model.nv(), 2);
-/// # Ok::<(), condyle_dynamics::Error>(())
+/// # Ok::<(), condyle_model::Error>(())
 /// ```
 pub struct ModelBuilder {
     name: String,
@@ -221,7 +221,7 @@ impl ModelBuilder {
         model.add_spaces();
         model.limbs = Plan::new(&model);
         for (body, &old) in model.bodies.iter().zip(&order).skip(1) {
-            soundness::of_body(body, self.drafts[old].between, &mut model.warnings);
+            validate::of_body(body, self.drafts[old].between, &mut model.warnings);
         }
         model.find_singular();
         Ok(model)

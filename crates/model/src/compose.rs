@@ -1,10 +1,10 @@
 //! Models from models: chains of joints, appended robots, locked joints.
 
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
-use crate::data::{Data, check};
+use crate::check;
 use crate::error::Error;
 use crate::joint::Joint;
-use crate::kinematics::forward_kinematics;
+use crate::layout::Single;
 use crate::model::{FrameKind, Model};
 use condyle_spatial::{Inertia, Se3, Vec3};
 
@@ -34,14 +34,15 @@ impl ModelBuilder {
     /// M is singular where q₁ = ±π/2. [`Joint::Spherical`] has no such place.
     ///
     /// ```
-    /// use condyle_dynamics::{Data, Inertia, ModelBuilder, Se3, Sym3, Vec3, WORLD, forward_kinematics};
+    /// use condyle_model::{ModelBuilder, WORLD};
+    /// use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
     /// let mut robot = ModelBuilder::new("ball");
     /// robot.spherical_zyx("ball", WORLD, Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(0.1)));
     /// let ball = robot.build()?;
-    /// let q = [0.0, 0.0, std::f64::consts::FRAC_PI_2]; // about x
-    /// let R = forward_kinematics(&ball, &mut Data::new(&ball), &q).body(ball.joint("ball")?).rotation;
-    /// assert!((R.y.z - 1.0).abs() < 1e-15); // y points up
-    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// assert_eq!(ball.nv(), 3);
+    /// let axes: Vec<_> = ball.bodies()[1..].iter().filter_map(|body| body.joint.axis()).collect();
+    /// assert_eq!(axes, [Vec3::new(0.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(1.0, 0.0, 0.0)]);
+    /// # Ok::<(), condyle_model::Error>(())
     /// ```
     pub fn spherical_zyx(&mut self, name: &str, parent: BodyId, placement: Se3<f64>, inertia: Inertia<f64>) -> BodyId {
         let about = |x, y, z| Joint::Revolute { axis: Vec3::new(x, y, z) };
@@ -53,7 +54,7 @@ impl ModelBuilder {
     /// Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before them.
     ///
     /// ```
-    /// use condyle_dynamics::{ModelBuilder, Se3, Vec3, WORLD, robots};
+    /// use condyle_model::{ModelBuilder, Se3, Vec3, WORLD, robots};
     /// let at = |y| Se3 { translation: Vec3::new(0.0, y, 0.5), ..Se3::identity() };
     /// let mut two = ModelBuilder::new("two arms");
     /// two.append(WORLD, at(0.4), &robots::arm7(), "left_");
@@ -61,7 +62,7 @@ impl ModelBuilder {
     /// let two = two.build()?;
     /// assert_eq!(two.nv(), 14);
     /// assert!(two.frame("right_tool").is_ok());
-    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// # Ok::<(), condyle_model::Error>(())
     /// ```
     pub fn append(&mut self, parent: BodyId, placement: Se3<f64>, model: &Model, prefix: &str) {
         self.append_locked(parent, placement, model, prefix, &[], &[]);
@@ -80,12 +81,12 @@ impl ModelBuilder {
         // where each body went: on which body of this builder, and at which placement there
         let mut place = vec![(parent, placement)];
         self.merge(parent, placement, model.bodies[0].inertia);
-        let mut data = Data::new(model);
+        let turned = |i: usize| Se3::new(model.nodes[i].reframing, Vec3::zero()); // bXz
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
             let (on, pXp) = place[body.parent];
             if locked.contains(&i) {
-                let placements = forward_kinematics(model, &mut data, q);
-                let pXb = pXp * placements.body(body.parent).inverse() * placements.body(i);
+                let l = Single::<f64, f64>::new(model);
+                let pXb = pXp * turned(body.parent) * Joint::placement(&l, i, q) * turned(i).inverse();
                 self.merge(on, pXb, body.inertia);
                 place.push((on, pXb));
                 continue;
@@ -134,13 +135,13 @@ impl Model {
     /// locked with it.
     ///
     /// ```
-    /// use condyle_dynamics::robots;
+    /// use condyle_model::robots;
     /// let arm = robots::arm7();
     /// let mut q = [0.0; 7];
     /// q[3] = 1.2;
     /// let stiff = arm.lock(&[arm.joint("joint4")?], &q)?;
     /// assert_eq!((stiff.nv(), stiff.total_mass()), (6, arm.total_mass()));
-    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// # Ok::<(), condyle_model::Error>(())
     /// ```
     ///
     /// # Errors

@@ -6,14 +6,13 @@
 //!
 //! What belongs to a column and changes from body to body on the way out (`inverse.rs`) has a place for each link.
 
-use super::inverse::Sizes;
 use super::{LANES, Plan};
 use crate::model::Model;
 use condyle_spatial::moves::Move;
 
 /// A column of each lane, among those from the root to a step's joints.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Link {
+pub struct Link {
     /// Where it stands in arrays by columns.
     pub slot: usize,
     /// Where its pairs with the step's own columns stand in `Plan::pairs`, one after the other.
@@ -23,7 +22,7 @@ pub(crate) struct Link {
 /// Where the entries of a pair of columns stand, one in each lane, in a matrix stored by columns. Lanes that have no such
 /// pair point to an entry that is set after all others, and there by the first lane.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pair {
+pub struct Pair {
     /// In the row of the step's own column.
     pub below: [u32; LANES],
     /// In the column of the step's own column.
@@ -35,7 +34,7 @@ pub(crate) struct Pair {
 
 /// From where a link gets what changes on the way out.
 #[derive(Clone, Debug)]
-pub(crate) enum Before {
+pub enum Before {
     /// From this link, in the same lanes; the step's own columns from themselves.
     Here(usize),
     /// From several links or lanes.
@@ -44,10 +43,38 @@ pub(crate) enum Before {
 
 /// Some columns of which each carries the next, and all columns from the root to the last of them.
 #[derive(Clone, Debug)]
-pub(crate) struct Block {
+pub struct Block {
     pub first: usize,
     pub many: usize,
     pub way: Vec<usize>,
+}
+
+/// How large the two matrices are that hold Z = L⁻¹ of the inertia matrix, row by row.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    pub rows: usize,
+    /// The length of a row that has the columns from the root on.
+    pub deep: usize,
+    /// The length of a row that has all columns, in whole vectors.
+    pub wide: usize,
+}
+
+impl Sizes {
+    /// For a robot's inertia matrix.
+    pub fn new<R>(model: &Model<R>) -> Self {
+        let deep = model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0);
+        Self { rows: model.nv, deep, wide: model.nv.next_multiple_of(2 * LANES) }
+    }
+
+    /// The place behind all rows: of what lanes without a body write.
+    pub fn deep_behind(self) -> usize {
+        self.rows * self.deep
+    }
+
+    /// The same of the other matrix.
+    pub fn wide_behind(self) -> usize {
+        self.rows * self.wide
+    }
 }
 
 /// How many rows a block has at most.

@@ -4,11 +4,11 @@
 //! `<visual>` and `<collision>` left out, so that whatever it refuses has a name and a line, and no mesh can be in the
 //! way.
 
+use super::packages;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::{FrameKind, Mimic, Model};
-use crate::package;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
 use roxmltree::{Document, Node};
 use std::collections::{HashMap, HashSet};
@@ -41,7 +41,7 @@ impl Model {
     /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Urdf`] (with file, line and element), and what
     /// [`ModelBuilder::build`] finds.
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
-        let path = package::locate(path.as_ref(), &options.packages)?;
+        let path = packages::locate(path.as_ref(), &options.packages)?;
         let file = path.display().to_string();
         let text =
             std::fs::read_to_string(&path).map_err(|e| Error::File { file: file.clone(), what: e.to_string() })?;
@@ -51,7 +51,7 @@ impl Model {
     /// Reads a URDF from a string; see [`from_urdf`](Self::from_urdf).
     ///
     /// ```
-    /// use condyle_dynamics::{Model, UrdfOptions};
+    /// use condyle_model::{Model, UrdfOptions};
     /// let urdf = r#"<robot name="pendulum">
     ///   <link name="base"/>
     ///   <link name="rod"><inertial><origin xyz="0 0 -1"/><mass value="2"/>
@@ -62,7 +62,7 @@ impl Model {
     /// assert_eq!((pendulum.nq(), pendulum.nv()), (2, 1)); // (cos, sin) and one speed
     /// let error = Model::from_urdf_str(&urdf.replace("rod\"/>", "bar\"/>"), &UrdfOptions::default()).unwrap_err();
     /// assert_eq!(error.to_string(), "<string>:5: joint `pivot`: no link is named `bar`; nearest is `base`");
-    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// # Ok::<(), condyle_model::Error>(())
     /// ```
     ///
     /// # Errors

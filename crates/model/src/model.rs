@@ -4,8 +4,9 @@ use crate::configuration::Space;
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::limbs::Plan;
-use crate::soundness::Warning;
-use condyle_spatial::{Act, Constant, Inertia, Mat3, Scalar, Se3, Vec3};
+use crate::tree::{Column, Coupled, Node};
+use crate::validate::Warning;
+use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::fmt;
@@ -89,53 +90,6 @@ pub struct Limits {
     pub effort: Vec<f64>,
 }
 
-/// A body as the algorithms see it: the axis of its joint turned to z, all that a pass needs side by side.
-#[derive(Clone, Debug)]
-pub(crate) struct Node<R> {
-    pub joint: Joint,
-    pub parent: usize,
-    pub idx_q: usize,
-    pub idx_v: usize,
-    pub mimic: Option<Mimic>,
-    /// The place of the joint's first column.
-    pub column: usize,
-    /// Where the columns from the root to this joint stand in `Model::support`, and how many they are.
-    pub support: usize,
-    pub depth: usize,
-    /// How many bodies are between it and the world, itself included.
-    pub level: usize,
-    /// Where in `Model::finished` the bodies stand of whose subtrees this is the last.
-    pub finished: (usize, usize),
-    /// X_T, between turned frames.
-    pub placement: Se3<R>,
-    /// In the turned frame.
-    pub inertia: Inertia<R>,
-    /// bRz: the turned frame in the body's.
-    pub reframing: Mat3<f64>,
-}
-
-/// A degree of freedom of a joint, and the coordinate that it follows.
-#[derive(Clone, Debug)]
-pub(crate) struct Column {
-    pub coordinate: usize,
-    pub ratio: f64,
-    /// The column before it on the way to the root.
-    pub parent: Option<usize>,
-    /// One past the last column of its subtree.
-    pub end: usize,
-    /// How many columns are between it and the root.
-    pub depth: usize,
-}
-
-/// The coordinates that the motion of one of them needs efforts of.
-#[derive(Clone, Debug)]
-pub(crate) struct Coupled {
-    /// Those before and after it in the tree, itself included.
-    pub rows: Vec<usize>,
-    /// How many coordinates in a row, from this one on, have the same ones.
-    pub alike: usize,
-}
-
 /// A robot: bodies, joints, frames, inertias, limits. Frozen, checked when built, shared between threads.
 ///
 /// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names (of
@@ -146,10 +100,10 @@ pub(crate) struct Coupled {
 /// checked as in [`ModelBuilder::build`](crate::ModelBuilder::build) when it is read.
 ///
 /// ```
-/// let arm = condyle_dynamics::robots::arm7();
+/// let arm = condyle_model::robots::arm7();
 /// assert_eq!((arm.nq(), arm.nv()), (7, 7));
 /// assert_eq!(arm.frames()[arm.frame("tool")?].body, 7);
-/// # Ok::<(), condyle_dynamics::Error>(())
+/// # Ok::<(), condyle_model::Error>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Model<R = f64> {
@@ -183,42 +137,52 @@ pub struct Model<R = f64> {
 
 impl<R> Model<R> {
     /// The robot's name.
+    #[inline]
     pub fn name(&self) -> &str {
         &self.name
     }
     /// How many numbers a position q has.
+    #[inline(always)]
     pub fn nq(&self) -> usize {
         self.nq
     }
     /// How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector.
+    #[inline(always)]
     pub fn nv(&self) -> usize {
         self.nv
     }
     /// All bodies; number 0 is the world.
+    #[inline(always)]
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
     /// All frames.
+    #[inline(always)]
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
     /// The limits.
+    #[inline]
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
     /// Viscous damping of each degree of freedom (N m s/rad, N s/m): stored, used by no algorithm unasked.
+    #[inline]
     pub fn damping(&self) -> &[f64] {
         &self.damping
     }
     /// Coulomb friction of each degree of freedom (N m, N): stored, used by no algorithm unasked.
+    #[inline]
     pub fn friction(&self) -> &[f64] {
         &self.friction
     }
     /// Inertia of the rotor as seen at each joint (kg m², kg), part of M in every algorithm.
+    #[inline(always)]
     pub fn armature(&self) -> &[R] {
         &self.armature
     }
     /// The acceleration of free fall, in the world's frame (m/s²).
+    #[inline(always)]
     pub fn gravity(&self) -> &Vec3<R> {
         &self.gravity
     }
@@ -263,6 +227,46 @@ impl<R> Model<R> {
     }
 }
 
+/// What the passes of algorithms are told.
+#[doc(hidden)]
+impl<R> Model<R> {
+    /// The bodies as passes see them.
+    #[inline(always)]
+    pub fn nodes(&self) -> &[Node<R>] {
+        &self.nodes
+    }
+    /// The degrees of freedom of all joints.
+    #[inline(always)]
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+    /// The columns from the root to a body's joint, its own last.
+    #[inline(always)]
+    pub fn support(&self, node: &Node<R>) -> &[usize] {
+        &self.support[node.support..node.support + node.depth]
+    }
+    /// How many pairs there are of a body and a column from the root to its joint.
+    #[inline(always)]
+    pub fn support_len(&self) -> usize {
+        self.support.len()
+    }
+    /// Of each coordinate, those that its motion needs efforts of.
+    #[inline(always)]
+    pub fn coupled(&self) -> &[Coupled] {
+        &self.coupled
+    }
+    /// How single calls compute several bodies at once, if they do.
+    #[inline(always)]
+    pub fn limbs(&self) -> Option<&Plan> {
+        self.limbs.as_ref()
+    }
+    /// A hash of the parents, joints and coordinates: tells trees apart.
+    #[inline(always)]
+    pub fn tree(&self) -> u64 {
+        self.tree
+    }
+}
+
 /// The most similar of some names (optimal string alignment distance).
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
     names.min_by_key(|n| strsim::osa_distance(n, name)).unwrap_or_default().to_owned()
@@ -275,7 +279,7 @@ impl Model {
     /// If `armature` has not nv numbers.
     #[must_use]
     pub fn with_armature(mut self, armature: &[f64]) -> Self {
-        crate::data::check("armature", armature.len(), self.nv);
+        crate::check("armature", armature.len(), self.nv);
         self.armature.copy_from_slice(armature);
         self.find_singular();
         self
@@ -287,18 +291,16 @@ impl Model {
     /// is a plain number: it follows if the new ones are.
     ///
     /// ```
-    /// use condyle_dynamics::{Data, Inertia, robots, rnea};
+    /// use condyle_model::robots;
+    /// use condyle_spatial::Inertia;
     /// use num_dual::Dual64;
-    /// // ∂τ/∂(mass of the last body): seed that one number
+    /// // ∂/∂(mass of the last body): seed that one number
     /// let arm = robots::arm7();
     /// let dual = arm.with_inertias(|body, I| Inertia::<Dual64> {
     ///     mass: Dual64::new(I.mass, if body == 7 { 1.0 } else { 0.0 }),
     ///     ..I.lift()
     /// });
-    /// let (q, o) = ([0.3; 7].map(Dual64::from), [Dual64::from(0.0); 7]);
-    /// let mut data = Data::new(&dual);
-    /// let tau = rnea(&dual, &mut data, &q, &o, &o, &[]);
-    /// assert!(tau[1].eps.abs() > 1.0); // the shoulder feels each kilogram
+    /// assert_eq!(dual.nv(), arm.nv()); // rnea(&dual, …) gives ∂τ/∂m with τ
     /// ```
     pub fn with_inertias<T: Scalar + Constant<T>>(
         &self,

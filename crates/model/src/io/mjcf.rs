@@ -5,12 +5,12 @@ mod equality;
 mod geometry;
 mod include;
 
+use super::xml::{self, Element};
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::{FrameKind, Model};
-use crate::soundness::Warning;
-use crate::xml::{self, Element};
+use crate::validate::Warning;
 use attributes::{Attributes, Compiler, Defaults, FromGeoms, MAIN, turn};
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use equality::Joints;
@@ -64,7 +64,7 @@ impl Model {
     /// Reads an MJCF from a string, which may not include files; see [`from_mjcf`](Self::from_mjcf).
     ///
     /// ```
-    /// use condyle_dynamics::{MjcfOptions, Model};
+    /// use condyle_model::{MjcfOptions, Model};
     /// let mjcf = r#"<mujoco model="pendulum"><worldbody>
     ///   <body name="rod">
     ///     <joint name="pivot" axis="0 1 0"/>
@@ -75,7 +75,7 @@ impl Model {
     /// assert_eq!((pendulum.nq(), pendulum.total_mass()), (1, 2.0));
     /// let error = Model::from_mjcf_str(&mjcf.replace("0 1 0", "0 y 0"), &MjcfOptions::default()).unwrap_err();
     /// assert_eq!(error.to_string(), "<string>:3: joint `pivot`: axis: `y` is no finite number");
-    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// # Ok::<(), condyle_model::Error>(())
     /// ```
     ///
     /// # Errors

@@ -10,7 +10,7 @@ const HALVINGS: i32 = 6;
 /// tanh x, to a few units of the last place of x: the continued fraction of x/64, then six times
 /// tanh 2y = 2 tanh y / (1 + tanh² y), which amplifies no relative error. ±1 without slope beyond ±20.
 #[inline(always)]
-pub(crate) fn tanh<S: Scalar>(x: S) -> S {
+pub fn tanh<S: Scalar>(x: S) -> S {
     let inside = x.abs().lt(S::splat(SATURATED));
     let y = S::select(inside, x, S::zero()) * S::splat(0.5f64.powi(HALVINGS));
     let t = y * y;
@@ -28,7 +28,7 @@ pub(crate) fn tanh<S: Scalar>(x: S) -> S {
 /// exp x, to about 1 + |x| units of the last place: the series of exp(x/64) − 1, then six times
 /// e²ʸ − 1 = (eʸ − 1)(2 + (eʸ − 1)). For |x| up to 64.
 #[inline(always)]
-pub(crate) fn exp<S: Scalar>(x: S) -> S {
+pub fn exp<S: Scalar>(x: S) -> S {
     let negative = x.lt(S::zero());
     let y = S::select(negative, -x, x) * S::splat(0.5f64.powi(HALVINGS));
     let mut sum = S::one();

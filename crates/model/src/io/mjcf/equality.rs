@@ -3,9 +3,9 @@
 use super::attributes::Attributes;
 use crate::builder::{BodyId, ModelBuilder};
 use crate::error::Error;
+use crate::io::xml::Element;
 use crate::model::Mimic;
-use crate::soundness::Warning;
-use crate::xml::Element;
+use crate::validate::Warning;
 use std::collections::{HashMap, HashSet};
 
 /// The body that a joint carries, and the joint's position in the file's pose (`ref`).

@@ -1,11 +1,59 @@
 //! What the algorithms see of a tree of bodies.
 
-use crate::model::{Body, Column, Coupled, Model, Node};
-use condyle_spatial::{Act, Se3, Vec3};
+use crate::joint::Joint;
+use crate::model::{Body, Mimic, Model};
+use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
+
+/// A body as the algorithms see it: the axis of its joint turned to z, all that a pass needs side by side.
+#[derive(Clone, Debug)]
+pub struct Node<R> {
+    pub joint: Joint,
+    pub parent: usize,
+    pub idx_q: usize,
+    pub idx_v: usize,
+    pub mimic: Option<Mimic>,
+    /// The place of the joint's first column.
+    pub column: usize,
+    /// Where the columns from the root to this joint stand in `Model::support`, and how many they are.
+    pub support: usize,
+    pub depth: usize,
+    /// How many bodies are between it and the world, itself included.
+    pub level: usize,
+    /// Where in `Model::finished` the bodies stand of whose subtrees this is the last.
+    pub finished: (usize, usize),
+    /// X_T, between turned frames.
+    pub placement: Se3<R>,
+    /// In the turned frame.
+    pub inertia: Inertia<R>,
+    /// bRz: the turned frame in the body's.
+    pub reframing: Mat3<f64>,
+}
+
+/// A degree of freedom of a joint, and the coordinate that it follows.
+#[derive(Clone, Debug)]
+pub struct Column {
+    pub coordinate: usize,
+    pub ratio: f64,
+    /// The column before it on the way to the root.
+    pub parent: Option<usize>,
+    /// One past the last column of its subtree.
+    pub end: usize,
+    /// How many columns are between it and the root.
+    pub depth: usize,
+}
+
+/// The coordinates that the motion of one of them needs efforts of.
+#[derive(Clone, Debug)]
+pub struct Coupled {
+    /// Those before and after it in the tree, itself included.
+    pub rows: Vec<usize>,
+    /// How many coordinates in a row, from this one on, have the same ones.
+    pub alike: usize,
+}
 
 impl Model {
     /// Derives from the bodies what the algorithms see: turned frames, columns, and each body's ancestors.
-    pub(crate) fn add_nodes(&mut self) {
+    pub fn add_nodes(&mut self) {
         let mut last_column: Vec<Option<usize>> = Vec::new(); // of each body or, failing one, of its ancestors
         for (i, body) in self.bodies.iter().enumerate() {
             let reframing = body.joint.reframing();
@@ -87,7 +135,7 @@ impl Model {
 
 impl Coupled {
     /// Of each coordinate, with these rows.
-    pub(crate) fn with(rows: Vec<Vec<usize>>) -> Vec<Self> {
+    pub fn with(rows: Vec<Vec<usize>>) -> Vec<Self> {
         let alike = |c: usize| rows[c..].iter().take_while(|other| **other == rows[c]).count();
         (0..rows.len()).map(|c| Self { rows: rows[c].clone(), alike: alike(c) }).collect()
     }

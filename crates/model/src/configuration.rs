@@ -1,6 +1,6 @@
 //! The space of positions: a product of vector spaces and groups, with q ⊕ v on the tangent vectors v.
 
-use crate::data::check;
+use crate::check;
 use crate::joint::{GroupJacobian, Joint};
 use crate::model::Model;
 use condyle_spatial::Scalar;
@@ -50,7 +50,7 @@ impl<R> Model<R> {
 /// The position in which every body is at its joint's frame: zeros, and rotations by nothing.
 ///
 /// ```
-/// use condyle_dynamics::{neutral, robots};
+/// use condyle_model::{neutral, robots};
 /// assert_eq!(neutral(&robots::quadruped())[..7], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
 /// ```
 pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
@@ -65,7 +65,7 @@ pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
 /// for rotations. The result depends on nothing but the model and the generator.
 ///
 /// ```
-/// use condyle_dynamics::{random_configuration, robots};
+/// use condyle_model::{random_configuration, robots};
 /// use rand::SeedableRng;
 /// let q = random_configuration(&robots::arm7(), &mut rand::rngs::StdRng::seed_from_u64(1));
 /// assert_eq!(q.len(), 7);
@@ -88,7 +88,7 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
 /// q: nq numbers; v: nv; out: nq. Allocates nothing.
 ///
 /// ```
-/// use condyle_dynamics::{difference, integrate, neutral, robots};
+/// use condyle_model::{difference, integrate, neutral, robots};
 /// let quadruped = robots::quadruped();
 /// let (q, v) = (neutral(&quadruped), vec![0.1; 18]);
 /// let (mut moved, mut back) = (vec![0.0; 19], vec![0.0; 18]);
@@ -128,7 +128,7 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
 /// q0, q1, out: nq numbers; tangent: scratch of nv numbers, left at t (q₁ ⊖ q₀). Allocates nothing.
 ///
 /// ```
-/// use condyle_dynamics::{interpolate, robots};
+/// use condyle_model::{interpolate, robots};
 /// let (mut q, mut tangent) = ([0.0; 7], [0.0; 7]);
 /// interpolate(&robots::arm7(), &[0.0; 7], &[1.0; 7], 0.25, &mut tangent, &mut q);
 /// assert_eq!(q, [0.25; 7]);
@@ -164,7 +164,7 @@ pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mu
 /// q: nq numbers. Allocates nothing.
 ///
 /// ```
-/// use condyle_dynamics::{neutral, normalize, robots};
+/// use condyle_model::{neutral, normalize, robots};
 /// let quadruped = robots::quadruped();
 /// let mut q = neutral(&quadruped);
 /// q[6] = 2.0;

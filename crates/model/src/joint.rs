@@ -7,12 +7,12 @@
 mod group;
 mod motion;
 
-use crate::dispatch::Kernel;
 use crate::layout::Layout;
 use crate::model::Mimic;
+use condyle_spatial::lanes::Kernel;
 use condyle_spatial::{Act, Force, Mat3, Motion, Quaternion, Scalar, Se3, Vec3};
-pub(crate) use group::GroupJacobian;
-pub(crate) use motion::{JointMotion, Turning};
+pub use group::GroupJacobian;
+pub use motion::{JointMotion, Turning};
 use serde::{Deserialize, Serialize};
 
 /// The kind of a joint, with what it needs to know.
@@ -57,7 +57,7 @@ const UNIT: f64 = 1e-15;
 /// Of each body's joint: see [`Joint::turns`]. What stands behind the last body has no meaning.
 #[derive(Clone, Debug)]
 #[repr(C)]
-pub(crate) struct Turns<S> {
+pub struct Turns<S> {
     /// Shape: bodies, in whole steps. Written by: `Joint::turns`.
     pub sin: Vec<S>,
     /// Shape: as sin. Written by: `Joint::turns`.
@@ -65,7 +65,7 @@ pub(crate) struct Turns<S> {
 }
 
 impl<S: Scalar> Turns<S> {
-    pub(crate) fn new(bodies: usize) -> Self {
+    pub fn new(bodies: usize) -> Self {
         let n = bodies.next_multiple_of(4);
         Self { sin: vec![S::zero(); n], cos: vec![S::zero(); n] }
     }
@@ -92,7 +92,7 @@ impl Joint {
     /// Which of the unit motions of the frame (linear x, y, z, angular x, y, z) it moves along: the columns of S. (A
     /// screw moves along z as well, by its pitch.)
     #[inline(always)]
-    pub(crate) fn axes(self) -> &'static [usize] {
+    pub fn axes(self) -> &'static [usize] {
         match self {
             Self::Revolute { .. } | Self::Continuous { .. } | Self::Helical { .. } => &[5],
             Self::Prismatic { .. } => &[2],
@@ -115,7 +115,7 @@ impl Joint {
     }
 
     /// The same joint about or along a unit vector, if its axis is neither zero nor infinite.
-    pub(crate) fn normalized(self) -> Option<Self> {
+    pub fn normalized(self) -> Option<Self> {
         let Some(axis) = self.axis() else { return Some(self) };
         let norm = axis.norm_squared().sqrt();
         let unit = (norm - 1.0).abs() < UNIT; // to the last bit the same when it was normalised before
@@ -131,7 +131,7 @@ impl Joint {
     /// The rotation bRz whose third column is the joint's axis: from the frame in which algorithms run to the body's.
     ///
     /// A permutation of axes, hence exact, for x, y and z; else the shortest rotation of z, or of −z, to the axis.
-    pub(crate) fn reframing(self) -> Mat3<f64> {
+    pub fn reframing(self) -> Mat3<f64> {
         let Some(a) = self.axis() else { return Mat3::identity() };
         let unit = |x, y, z| Vec3::new(x, y, z);
         if a == unit(0.0, 0.0, 1.0) {
@@ -159,7 +159,7 @@ impl Joint {
     ///
     /// The (cos, sin) of a leader tells its angle up to whole turns, and a whole multiple of it up to whole turns too;
     /// what else would follow jumps wherever the leader completes a turn.
-    pub(crate) fn following(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
+    pub fn following(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
         let turns = "a continuous joint's position is known up to whole turns only";
         match (leader, self) {
             (Self::Continuous { .. }, Self::Revolute { axis } | Self::Continuous { axis }) => {
@@ -181,7 +181,7 @@ impl Joint {
 
     /// The k-th number of the position of a joint that follows; q begins with its leader's.
     #[inline(always)]
-    pub(crate) fn follow<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
+    pub fn follow<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
         match self {
             Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // its offset is part of X_T
             _ => q[k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
@@ -189,7 +189,7 @@ impl Joint {
     }
 
     /// What of a follower's offset is part of its placement: the pose by which its frame, its axis turned to z, is moved.
-    pub(crate) fn offset(self, mimic: Mimic) -> Se3<f64> {
+    pub fn offset(self, mimic: Mimic) -> Se3<f64> {
         match self {
             Self::Continuous { .. } => turned(Se3::identity(), mimic.offset.sin(), mimic.offset.cos()),
             _ => Se3::identity(),
@@ -198,7 +198,7 @@ impl Joint {
 
     /// The sine and cosine of what each joint turns by about z (0 and 1 where it does not), all of them at once.
     #[inline(always)]
-    pub(crate) fn turns<L: Layout>(l: &L, q: &[L::S], Turns { sin, cos }: &mut Turns<L::S>) {
+    pub fn turns<L: Layout>(l: &L, q: &[L::S], Turns { sin, cos }: &mut Turns<L::S>) {
         for i in l.bodies() {
             if let Self::Revolute { .. } | Self::Helical { .. } = l.joint(i) {
                 sin[i] = l.position(q, i, 0);
@@ -216,7 +216,7 @@ impl Joint {
 
     /// λXi = X_T X_J(q), for joint i of a pass.
     #[inline(always)]
-    pub(crate) fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
+    pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
         let (sin, cos) = match l.joint(i) {
             Self::Revolute { .. } | Self::Helical { .. } => l.position(q, i, 0).sin_cos(),
             Self::Continuous { .. } => (l.position(q, i, 1), l.position(q, i, 0)),
@@ -228,7 +228,7 @@ impl Joint {
 
     /// The same, the sine and cosine being known.
     #[inline(always)]
-    pub(crate) fn turned_placement<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
+    pub fn turned_placement<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         let X_T = l.placement(i);
         match l.joint(i) {
             Self::Revolute { .. } | Self::Continuous { .. } => turned(X_T, sin, cos),
@@ -257,7 +257,7 @@ impl Joint {
 
     /// S v of joint i in the body's frame, for the velocity or acceleration coordinates v.
     #[inline(always)]
-    pub(crate) fn motion<L: Layout>(l: &L, i: usize, v: &[L::S]) -> JointMotion<L::S> {
+    pub fn motion<L: Layout>(l: &L, i: usize, v: &[L::S]) -> JointMotion<L::S> {
         match l.joint(i) {
             Self::Revolute { .. } | Self::Continuous { .. } => JointMotion::Turn(l.load(v, i, 0)),
             Self::Prismatic { .. } => JointMotion::Slide(l.load(v, i, 0)),
@@ -277,7 +277,7 @@ impl Joint {
 
     /// Sᵀ f of joint i, added to the coordinates τ.
     #[inline(always)]
-    pub(crate) fn project<L: Layout>(l: &L, i: usize, f: Force<L::S>, tau: &mut [L::S]) {
+    pub fn project<L: Layout>(l: &L, i: usize, f: Force<L::S>, tau: &mut [L::S]) {
         match l.joint(i) {
             Self::Revolute { .. } | Self::Continuous { .. } => l.add(tau, i, 0, f.angular.z),
             Self::Prismatic { .. } => l.add(tau, i, 0, f.linear.z),
@@ -295,7 +295,7 @@ impl Joint {
 
     /// Column k of S of a joint whose body is at oX, in the world's frame.
     #[inline(always)]
-    pub(crate) fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
+    pub fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
         let (R, p) = (oX.rotation, oX.translation);
         if let Self::Helical { pitch, .. } = self {
             return Motion::new(R.z.scale_add(S::splat(pitch), p.cross(R.z)), R.z);
