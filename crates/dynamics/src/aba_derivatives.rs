@@ -17,8 +17,8 @@ use crate::ltdl::axpy;
 use crate::minv;
 use crate::product;
 use crate::rnea_derivatives;
+use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Model;
-use condyle_model::tree::Coupled;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -42,17 +42,17 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// C = −A B, of square matrices, where column j of B has zeros but in the rows of `coupled[j]`.
+/// C = −A B, of square matrices, where column j of B has zeros but in the rows of `nonzero_rows[j]`.
 ///
 /// Four columns with the same rows, as those of one limb have, go together: as many entries of each as there are registers
 /// for stay there while their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored
 /// a quarter as often.
 #[inline(always)]
-pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Coupled]) {
-    let (n, mut j) = (coupled.len(), 0);
+pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
+    let (n, mut j) = (nonzero_rows.len(), 0);
     while j < n {
-        let Coupled { rows, alike } = &coupled[j];
-        let many = if *alike >= 4 { 4 } else { 1 };
+        let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
+        let many = if *same_pattern >= 4 { 4 } else { 1 };
         let (b, c) = (&B[j * n..(j + many) * n], &mut C[j * n..(j + many) * n]);
         match (many, size_of::<S>()) {
             (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n),
@@ -69,11 +69,11 @@ pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &
 
 /// Twice `minus_product` with one A that is symmetric, in lanes, where matrices are too large for the nearest cache.
 #[inline(always)]
-fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], coupled: &[Coupled]) {
-    let (n, mut j) = (coupled.len(), 0);
+fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+    let (n, mut j) = (nonzero_rows.len(), 0);
     while j < n {
-        let Coupled { rows, alike } = &coupled[j];
-        let many = (*alike).min(4);
+        let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
+        let many = (*same_pattern).min(4);
         let columns = j * n..(j + many) * n;
         let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
         let C = [&mut C0[columns.clone()], &mut C1[columns]];
@@ -194,9 +194,9 @@ kernel! {
         let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
         // ∂q̈ = −M⁻¹ ∂τ
         if S::LANES > 1 {
-            minus_products(Minv, dtau, da, model.coupled());
+            minus_products(Minv, dtau, da, model.nonzero_rows());
         } else {
-            dtau.into_iter().zip(da).for_each(|(dtau, da)| minus_product(Minv, dtau, da, model.coupled()));
+            dtau.into_iter().zip(da).for_each(|(dtau, da)| minus_product(Minv, dtau, da, model.nonzero_rows()));
         }
     }
 }
@@ -283,7 +283,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    if !product::minus_products(data.minv.matrix().as_slice(), dtau, da, model.coupled()) {
+    if !product::minus_products(data.minv.matrix().as_slice(), dtau, da, model.nonzero_rows()) {
         products(model, data);
     }
 }

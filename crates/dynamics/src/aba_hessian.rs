@@ -73,7 +73,7 @@ kernel! {
         let (n, G) = (model.nv(), phi.dadq.as_slice());
         let product = product.as_mut_slice();
         transpose_to(aba_derivatives.da_dq.as_slice(), transpose, n);
-        minus_product(transpose, G, product, model.coupled()); // −(∂q̈/∂q)ᵀ G
+        minus_product(transpose, G, product, model.nonzero_rows()); // −(∂q̈/∂q)ᵀ G
         let (qq, vv) = (dqdq.as_mut_slice(), dvdv.as_mut_slice());
         let (phi_qq, phi_vv) = (phi.dqdq.as_slice(), phi.dvdv.as_slice());
         for j in 0..n {
@@ -84,11 +84,11 @@ kernel! {
         }
         transpose_to(aba_derivatives.da_dv.as_slice(), transpose, n);
         let (vq, phi_vq) = (dvdq.as_mut_slice(), phi.dvdq.as_slice());
-        minus_product(transpose, G, vq, model.coupled()); // −(∂q̈/∂v)ᵀ G
+        minus_product(transpose, G, vq, model.nonzero_rows()); // −(∂q̈/∂v)ᵀ G
         for k in 0..n * n {
             vq[k] -= phi_vq[k];
         }
-        minus_product(minv.matrix().as_slice(), G, dtaudq.as_mut_slice(), model.coupled()); // −M⁻¹ G
+        minus_product(minv.matrix().as_slice(), G, dtaudq.as_mut_slice(), model.nonzero_rows()); // −M⁻¹ G
     }
 }
 

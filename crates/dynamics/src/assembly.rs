@@ -221,7 +221,7 @@ fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> 
 
 /// Whether each D of the body's joint is positive with nothing hanging on it; in its own frame, where S is constant.
 fn firm(body: &Body) -> bool {
-    let inertia = Se3::new(body.joint.reframing(), Vec3::zero()).act_inv(body.inertia);
+    let inertia = Se3::new(body.joint.axis_rotation(), Vec3::zero()).act_inv(body.inertia);
     let rotational = inertia.rotational;
     let least = FREE * (inertia.mass + rotational.xx + rotational.yy + rotational.zz);
     let mut Ia = ArticulatedInertia::from(inertia);

@@ -61,11 +61,11 @@ fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
     }
     for i in l.bodies().rev() {
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             F[c] = IC[i] * S[c]; // Iᶜ S
         }
         let IC_i = IC[i];
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
     }
 }
 
@@ -81,13 +81,13 @@ fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S
     for i in l.bodies().rev() {
         let dIC = BC[i].inertia_rate();
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             F[c] = IC[i] * S[c]; // Iᶜ S
             dF[c] = dIC * S[c] + IC[i] * m.dS[c]; // İᶜ S + Iᶜ Ṡ
         }
         let (IC_i, BC_i) = (IC[i], BC[i]);
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
-        l.push(BC, i, BC_i);
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(BC, i, BC_i);
     }
 }
 

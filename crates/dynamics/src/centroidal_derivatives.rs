@@ -91,7 +91,7 @@ fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d
     for i in l.bodies().rev() {
         let (v_parent, a_parent): (Motion<_>, Motion<_>) = (l.parent(&m.v, i), l.parent(&m.a, i));
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             let Psid = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
             let Psidd = a_parent.cross(S[c]) + v_parent.cross(Psid); // Ψ̈ = a_λ × S + v_λ × Ψ̇
             columns[c] = Column {
@@ -102,9 +102,9 @@ fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d
             };
         }
         let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
-        l.push(IC, i, IC_i);
-        l.push(BC, i, BC_i);
-        l.push(F, i, F_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
+        l.add_to_parent(F, i, F_i);
     }
 }
 

@@ -10,9 +10,9 @@ use crate::elimination::NONE;
 use crate::frames::ReferenceFrame;
 use crate::limbs::Held;
 use crate::ltdl::Ltdl;
+use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Error;
 use condyle_model::Model;
-use condyle_model::tree::Coupled;
 use condyle_spatial::{Scalar, Se3, Vec3};
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -140,7 +140,7 @@ pub struct ConstraintSet<S> {
     /// Of the tree that it was made for.
     tree: u64,
     /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
-    pub(crate) coupled: Vec<Coupled>,
+    pub(crate) nonzero_rows: Vec<NonzeroRows>,
     /// For each coordinate, the rows of J in which it may differ from zero.
     pub(crate) touching: Vec<Vec<usize>>,
     /// J on the places of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
@@ -213,7 +213,7 @@ impl<S: Scalar> ConstraintSet<S> {
             let placement = |frame: usize| model.frames()[frame].placement;
             let placements = [placement(constraint.frame), constraint.other.map_or(Se3::identity(), placement)];
             let turn =
-                |k: usize| Se3::new(model.nodes()[bodies[k]].reframing.transpose(), Vec3::zero()) * placements[k];
+                |k: usize| Se3::new(model.nodes()[bodies[k]].axis_rotation.transpose(), Vec3::zero()) * placements[k];
             let mut plan = Plan {
                 kind: constraint.kind,
                 reference: constraint.reference,
@@ -241,19 +241,19 @@ impl<S: Scalar> ConstraintSet<S> {
             let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
             touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
         };
-        let coupled = |k: usize| {
+        let nonzero_rows = |k: usize| {
             // what carries a frame moves the force on the other one
             let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
             let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
-            model.coupled()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
+            model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
         };
         let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
         Ok(Self {
             proximal: Proximal::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
             nv,
-            tree: model.tree(),
-            coupled: Coupled::with((0..nv).map(coupled).collect()),
+            tree: model.tree_hash(),
+            nonzero_rows: NonzeroRows::of_columns((0..nv).map(nonzero_rows).collect()),
             touching: (0..nv).map(touching).collect(),
             J: vec![o; entries],
             gamma: vec![o; rows],
@@ -324,6 +324,6 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Panics unless this was made for a model of the same tree.
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
-        assert!(self.tree == model.tree(), "constraints: made for another model than `{}`", model.name());
+        assert!(self.tree == model.tree_hash(), "constraints: made for another model than `{}`", model.name());
     }
 }

@@ -118,24 +118,24 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L:
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
         for k in 0..nv {
-            let s = l.slot(i) + k;
+            let s = l.column(i) + k;
             let column = own[k];
             let IS = IC[i] * S[s]; // Iᶜ S_d
             let BS = BC[i].apply_transpose(S[s]).scale(half); // Bᵀ S_d
             let F = IC[i] * dS[s] + BC[i].apply(S[s]).scale(half); // Iᶜ Ṡ_d + B S_d
             for &e in before {
                 let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
-                l.put_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS)); // C_de
-                l.put_at(C, e, column, S_e.dot(F)); // C_ed
+                l.set_entry(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS)); // C_de
+                l.set_entry(C, e, column, S_e.dot(F)); // C_ed
             }
             for &e in own {
                 let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
-                l.put_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS));
+                l.set_entry(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS));
             }
         }
         let (IC_i, BC_i) = (IC[i], BC[i]);
-        l.push(IC, i, IC_i);
-        l.push(BC, i, BC_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
     }
 }
 

@@ -50,19 +50,19 @@ pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
-        l.make_whole(IC, i);
+        l.sum_lanes_at(IC, i);
         for k in 0..nv {
-            let F = IC[i] * S[l.slot(i) + k]; // F = Iᶜ S
-            let (own, column) = (support.len() - nv + k, l.own(i, k));
+            let F = IC[i] * S[l.column(i) + k]; // F = Iᶜ S
+            let (own, column) = (support.len() - nv + k, l.own_column(i, k));
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
-                l.put_right(M, column, e, x);
-                l.put_below(M, column, e, x);
+                l.set_column(M, column, e, x);
+                l.set_row(M, column, e, x);
             }
-            l.put_below(M, column, support[own], l.at(S, support[own]).dot(F));
+            l.set_row(M, column, support[own], l.at(S, support[own]).dot(F));
         }
         let IC_i = IC[i];
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
     }
     l.add_armature(M);
 }

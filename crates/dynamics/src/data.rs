@@ -78,7 +78,7 @@ impl<S: Scalar> Data<S> {
         };
         Self {
             size,
-            tree: model.tree(),
+            tree: model.tree_hash(),
             world: World::new(size),
             moving: Moving::new(size),
             rnea: rnea::Workspace::new(size),
@@ -114,7 +114,7 @@ impl<S> Data<S> {
         let given = (model.nodes().len(), model.columns().len(), model.nv());
         let other = if made_for == given { " in another tree" } else { "" };
         assert!(
-            self.tree == model.tree(),
+            self.tree == model.tree_hash(),
             "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}{other}"
         );
     }

@@ -82,7 +82,7 @@ impl<S: Scalar> DivideConquer<S> {
             qdd: S::zero(),
         };
         Self {
-            tree: model.tree(),
+            tree: model.tree_hash(),
             bodies: vec![body; assembly.links.len()],
             dofs: vec![dof; model.columns().len()],
             handles: vec![TwoHandles::nothing(); assembly.pieces.len()],
@@ -111,7 +111,7 @@ impl<S: Scalar> DivideConquer<S> {
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);
         let other = if bodies == planned { " in another tree" } else { "" };
-        assert!(model.tree() == self.tree, "model: planned for {planned} bodies, found {bodies}{other}");
+        assert!(model.tree_hash() == self.tree, "model: planned for {planned} bodies, found {bodies}{other}");
         model.check_regular();
         check("q", q.len(), model.nq());
         check("v", v.len(), model.nv());
@@ -300,7 +300,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         let mut vJ = Motion::zero();
         for k in 0..l.joint(i).nv() {
             dofs[k].S = l.joint(i).column(&body.oX, k);
-            vJ = dofs[k].S.scale_add(l.load(self.qd, i, k), vJ); // v_J = S q̇
+            vJ = dofs[k].S.scale_add(l.joint_velocity(self.qd, i, k), vJ); // v_J = S q̇
         }
         body.v = v + vJ; // v_i = v_λ + v_J
         body.c = body.v.cross(vJ); // c_i = v_i × v_J

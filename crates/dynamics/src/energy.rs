@@ -105,15 +105,15 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
     for i in l.bodies().rev() {
         let v_parent: Motion<_> = l.parent(&m.v, i);
         for k in 0..l.joint(i).nv() {
-            let S = S[l.slot(i) + k];
-            l.add(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
-            l.add(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
+            let S = S[l.column(i) + k];
+            l.add_joint_effort(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
+            l.add_joint_effort(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
             let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com)); // ∂(m c)/∂q = m S_v + S_ω × m c
-            l.add(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
+            l.add_joint_effort(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
         }
         let (IC_i, h_i) = (IC[i], h[i]);
-        l.push(IC, i, IC_i);
-        l.push(h, i, h_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(h, i, h_i);
     }
     l.add_armature_torque(&m.qd, dT_dv);
 }

@@ -67,7 +67,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
         let mut i = body;
         while i > 0 {
             let parent = self.model.nodes()[i].parent;
-            (0..l.joint(i).nv()).for_each(|k| of(l.slot(i) + k, parent));
+            (0..l.joint(i).nv()).for_each(|k| of(l.column(i) + k, parent));
             i = parent;
         }
     }

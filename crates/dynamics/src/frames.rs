@@ -112,7 +112,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// If there is no such body.
     #[inline(always)]
     pub fn body(&self, body: usize) -> Se3<S> {
-        let zXb = Se3::new(self.model.nodes()[body].reframing.transpose(), Vec3::zero());
+        let zXb = Se3::new(self.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
         self.world.oX[body] * zXb.lift()
     }
 

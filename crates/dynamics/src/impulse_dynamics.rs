@@ -209,9 +209,9 @@ fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::
         let v_parent = l.parent(velocity, i);
         let mut v_i = v_parent;
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             Psid[c] = v_parent.cross(S[c]);
-            v_i = S[c].scale_add(l.load(w, i, k), v_i);
+            v_i = S[c].scale_add(l.joint_velocity(w, i, k), v_i);
         }
         velocity[i] = v_i;
     }

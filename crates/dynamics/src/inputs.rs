@@ -84,7 +84,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     /// oXb, in the body's public frame.
     fn pose(&self, b: usize) -> Se3<S> {
         if let Some(limbs) = self.limbs {
-            return limbs.pose(b) * Se3::new(self.model.nodes()[b].reframing.transpose(), Vec3::zero()).lift();
+            return limbs.pose(b) * Se3::new(self.model.nodes()[b].axis_rotation.transpose(), Vec3::zero()).lift();
         }
         Placements { model: self.model, world: self.world }.body(b)
     }

@@ -5,7 +5,7 @@
 //! `aba_derivatives::minus_product`.
 
 use crate::dispatch::{slice, slice_mut};
-use condyle_model::tree::Coupled;
+use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real};
 use condyle_spatial::lanes::Kernel;
@@ -20,18 +20,18 @@ const UNDER_WAY: usize = 8;
 
 /// X = −A B for two matrices B, if this is the way to take; whether it is.
 #[inline]
-pub(crate) fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], coupled: &[Coupled]) -> bool {
-    if TypeId::of::<S>() != TypeId::of::<f64>() || level() == Level::Baseline || coupled.len() < 4 {
+pub(crate) fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) -> bool {
+    if TypeId::of::<S>() != TypeId::of::<f64>() || level() == Level::Baseline || nonzero_rows.len() < 4 {
         return false;
     }
     let [X0, X1] = X;
     // SAFETY: S is f64.
     #[allow(unsafe_code)]
     let (A, B, X) = unsafe { (slice(A), [slice(B[0]), slice(B[1])], [slice_mut(X0), slice_mut(X1)]) };
-    if level() >= Level::Avx512 && coupled.len() >= 8 {
-        <f64 as Real>::Long::enter(Products::<<f64 as Real>::Long> { A, B, X, coupled, vector: PhantomData });
+    if level() >= Level::Avx512 && nonzero_rows.len() >= 8 {
+        <f64 as Real>::Long::enter(Products::<<f64 as Real>::Long> { A, B, X, nonzero_rows, vector: PhantomData });
     } else {
-        <f64 as Real>::Short::enter(Products::<<f64 as Real>::Short> { A, B, X, coupled, vector: PhantomData });
+        <f64 as Real>::Short::enter(Products::<<f64 as Real>::Short> { A, B, X, nonzero_rows, vector: PhantomData });
     }
     true
 }
@@ -40,14 +40,14 @@ struct Products<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],
     X: [&'a mut [f64]; 2],
-    coupled: &'a [Coupled],
+    nonzero_rows: &'a [NonzeroRows],
     vector: PhantomData<V>,
 }
 
 impl<V: Block<Number = f64>> Kernel for Products<'_, V> {
     #[inline(always)]
     fn run(mut self) {
-        let n = self.coupled.len();
+        let n = self.nonzero_rows.len();
         // how many vectors of a column stay in registers: for the fewest operations, the most
         let (mut best, mut least) = (1, usize::MAX);
         for many in 1..=3 {
@@ -72,27 +72,27 @@ impl<V: Block<Number = f64>> Products<'_, V> {
     #[inline(always)]
     fn all<const N: usize>(&mut self) {
         let mut j = 0;
-        while j < self.coupled.len() {
-            let Coupled { rows, alike } = &self.coupled[j];
-            // columns j, …, j + alike − 1 of the one matrix, then of the other
-            let (alike, mut k) = (*alike, 0);
-            while k < 2 * alike {
-                let at = |k: usize| (k / alike, j + k % alike);
-                match 2 * alike - k {
+        while j < self.nonzero_rows.len() {
+            let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
+            // columns j, …, j + same − 1 of the one matrix, then of the other
+            let (same, mut k) = (*same_pattern, 0);
+            while k < 2 * same {
+                let at = |k: usize| (k / same, j + k % same);
+                match 2 * same - k {
                     4.. => self.columns::<4, N>([at(k), at(k + 1), at(k + 2), at(k + 3)], rows),
                     2.. => self.columns::<2, N>([at(k), at(k + 1)], rows),
                     _ => self.columns::<1, N>([at(k)], rows),
                 }
-                k += if 2 * alike - k >= 4 { 4 } else { 2 };
+                k += if 2 * same - k >= 4 { 4 } else { 2 };
             }
-            j += alike;
+            j += same;
         }
     }
 
     /// Some columns of X: of which matrix, and which.
     #[inline(always)]
     fn columns<const M: usize, const N: usize>(&mut self, which: [(usize, usize); M], rows: &[usize]) {
-        let (n, wide) = (self.coupled.len(), N * V::LANES);
+        let (n, wide) = (self.nonzero_rows.len(), N * V::LANES);
         let mut b = [&self.B[0][..n]; M];
         for m in 0..M {
             b[m] = &self.B[which[m].0][which[m].1 * n..][..n];

@@ -1,9 +1,11 @@
 //! A model, body by body.
 
+use crate::body::{Body, Frame, FrameKind, Limits};
 use crate::error::Error;
-use crate::joint::Joint;
+use crate::joint::{Joint, Mimic};
 use crate::limbs::Plan;
-use crate::model::{Body, Frame, FrameKind, Limits, Mimic, Model};
+use crate::model::Model;
+use crate::tree::Tree;
 use crate::validate;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use std::collections::HashSet;
@@ -172,57 +174,50 @@ impl ModelBuilder {
         for (new, &old) in order.iter().enumerate() {
             number[old] = new;
         }
-        let mut model = Model {
-            name: self.name,
-            bodies: Vec::with_capacity(order.len()),
-            frames: self.frames,
-            nq: 0,
-            nv: 0,
-            limits: Limits::default(),
-            damping: Vec::new(),
-            friction: Vec::new(),
-            armature: Vec::new(),
-            gravity: self.gravity,
-            nodes: Vec::with_capacity(order.len()),
-            columns: Vec::new(),
-            support: Vec::new(),
-            finished: Vec::new(),
-            coupled: Vec::new(),
-            spaces: Vec::new(),
-            limbs: None,
-            warnings: Vec::new(),
-            singular: Vec::new(),
-            tree: 0,
-        };
-        for frame in &mut model.frames {
+        for frame in &mut self.frames {
             frame.body = number[frame.body];
         }
         // coordinates: of the joints that have their own, in order; then of those that follow one
+        let mut coordinates = Coordinates::default();
+        let mut bodies: Vec<Body> = Vec::with_capacity(order.len());
         for (i, &old) in order.iter().enumerate() {
             let Draft { body, options, mimic, .. } = &self.drafts[old];
             let mut body = body.clone();
             body.parent = number[body.parent];
-            (body.idx_q, body.idx_v) = (model.nq, model.nv);
+            (body.idx_q, body.idx_v) = (coordinates.nq, coordinates.nv);
             if i > 0 && mimic.is_none() {
-                model.add_coordinates(body.joint, options);
+                coordinates.add(body.joint, options);
             }
-            model.bodies.push(body);
+            bodies.push(body);
         }
         for (i, &old) in order.iter().enumerate() {
             if let Draft { mimic: Some((leader, mimic)), options, .. } = &self.drafts[old] {
-                let (leader, mimic) = (&model.bodies[number[*leader]], *mimic);
+                let (leader, mimic) = (&bodies[number[*leader]], *mimic);
                 let (idx_q, idx_v) = (leader.idx_q, leader.idx_v);
-                model.armature[idx_v] += mimic.ratio * mimic.ratio * options.armature; // v_joint = ratio v
-                let body = &mut model.bodies[i];
-                (body.idx_q, body.idx_v, body.mimic) = (idx_q, idx_v, Some(mimic));
+                coordinates.armature[idx_v] += mimic.ratio * mimic.ratio * options.armature; // v_joint = ratio v
+                (bodies[i].idx_q, bodies[i].idx_v, bodies[i].mimic) = (idx_q, idx_v, Some(mimic));
             }
         }
-        model.add_nodes();
-        model.add_spaces();
-        model.limbs = Plan::new(&model);
-        for (body, &old) in model.bodies.iter().zip(&order).skip(1) {
-            validate::of_body(body, self.drafts[old].between, &mut model.warnings);
+        let mut warnings = Vec::new();
+        for (body, &old) in bodies.iter().zip(&order).skip(1) {
+            validate::check_inertia(body, self.drafts[old].between, &mut warnings);
         }
+        let Coordinates { nq, nv, limits, damping, friction, armature } = coordinates;
+        let tree = Tree::new(&bodies, nq, nv);
+        let mut model = Model {
+            name: self.name,
+            bodies,
+            frames: self.frames,
+            limits,
+            damping,
+            friction,
+            armature,
+            gravity: self.gravity,
+            limbs: Plan::new(&tree),
+            tree,
+            warnings,
+            singular: Vec::new(),
+        };
         model.find_singular();
         Ok(model)
     }
@@ -253,15 +248,7 @@ impl ModelBuilder {
             if !joints.insert(body.joint_name.clone()) {
                 return Err(Error::Duplicate { kind: "joint", name: body.joint_name.clone() });
             }
-            body.joint = body
-                .joint
-                .normalized()
-                .ok_or_else(|| wrong(format!("axis {:?} is no direction", body.joint.axis())))?;
-            if let Joint::Helical { pitch, .. } = body.joint
-                && !pitch.is_finite()
-            {
-                return Err(wrong(format!("pitch {pitch} is not finite")));
-            }
+            body.joint = body.joint.normalized().map_err(wrong)?;
             let I = body.inertia;
             let finite = I.mass_com.norm_squared()
                 + [
@@ -302,7 +289,7 @@ impl ModelBuilder {
                 if mimics[leader] || leader == 0 {
                     return Err(wrong("mimics a joint without a coordinate of its own".to_owned()));
                 }
-                body.joint.following(kinds[leader], mimic).map_err(wrong)?;
+                body.joint.as_follower(kinds[leader], mimic).map_err(wrong)?;
             }
         }
         for frame in &self.frames {
@@ -333,9 +320,20 @@ fn is_rotation(R: Mat3<f64>) -> bool {
     off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
 }
 
-impl Model {
-    /// Gives a joint its coordinates, with their limits and losses.
-    fn add_coordinates(&mut self, joint: Joint, options: &JointOptions) {
+/// What a model has a number of for each coordinate.
+#[derive(Default)]
+struct Coordinates {
+    nq: usize,
+    nv: usize,
+    limits: Limits,
+    damping: Vec<f64>,
+    friction: Vec<f64>,
+    armature: Vec<f64>,
+}
+
+impl Coordinates {
+    /// Adds those of a joint, with their limits and losses.
+    fn add(&mut self, joint: Joint, options: &JointOptions) {
         let (lower, upper) = match options.position {
             Some(limits) if joint.nq() == 1 => limits,
             _ => (f64::NEG_INFINITY, f64::INFINITY),

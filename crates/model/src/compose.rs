@@ -1,11 +1,12 @@
 //! Models from models: chains of joints, appended robots, locked joints.
 
+use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::check;
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::layout::Single;
-use crate::model::{FrameKind, Model};
+use crate::model::Model;
 use condyle_spatial::{Inertia, Se3, Vec3};
 
 impl ModelBuilder {
@@ -81,7 +82,7 @@ impl ModelBuilder {
         // where each body went: on which body of this builder, and at which placement there
         let mut place = vec![(parent, placement)];
         self.merge(parent, placement, model.bodies[0].inertia);
-        let turned = |i: usize| Se3::new(model.nodes[i].reframing, Vec3::zero()); // bXz
+        let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero()); // bXz
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
             let (on, pXp) = place[body.parent];
             if locked.contains(&i) {
@@ -109,7 +110,7 @@ impl ModelBuilder {
             if let Some(mimic) = body.mimic
                 && !locked.contains(&i)
             {
-                let leads = |b: &crate::model::Body| b.mimic.is_none() && b.idx_v == body.idx_v;
+                let leads = |b: &crate::body::Body| b.mimic.is_none() && b.idx_v == body.idx_v;
                 let leader = 1 + model.bodies[1..].iter().position(leads).expect("a mimic joint follows a joint");
                 self.mimic(place[i].0, place[leader].0, mimic);
             }
@@ -150,7 +151,7 @@ impl Model {
     /// # Panics
     /// If `q` has not nq numbers, or a body does not exist or is the world.
     pub fn lock(&self, bodies: &[usize], q: &[f64]) -> Result<Self, Error> {
-        check("q", q.len(), self.nq);
+        check("q", q.len(), self.tree.nq);
         for &i in bodies {
             assert!((1..self.bodies.len()).contains(&i), "bodies: there is no joint {i}");
         }

@@ -1,51 +1,14 @@
 //! The space of positions: a product of vector spaces and groups, with q ⊕ v on the tangent vectors v.
 
 use crate::check;
-use crate::joint::{GroupJacobian, Joint};
+use crate::joint::GroupJacobian;
 use crate::model::Model;
+use crate::tree::Space;
 use condyle_spatial::Scalar;
-use core::ops::Range;
 use nalgebra::DMatrix;
 
 /// Where a random position lies in a coordinate that has no limits: within this of zero (rad, m).
 const UNLIMITED: f64 = 3.0;
-
-/// Coordinates of one joint, or of several joints side by side whose coordinates are vectors.
-#[derive(Clone, Debug)]
-pub(crate) struct Space {
-    /// One of them.
-    pub joint: Joint,
-    pub q: Range<usize>,
-    pub v: Range<usize>,
-}
-
-impl<R> Model<R> {
-    /// All coordinates, in as few spaces as they make.
-    pub(crate) fn add_spaces(&mut self) {
-        let is_vector = |joint: Joint| joint.nq() == joint.nv();
-        let mut spaces: Vec<Space> = Vec::new();
-        for (joint, q, v) in self.coordinates() {
-            match spaces.last_mut() {
-                Some(last)
-                    if is_vector(last.joint) && is_vector(joint) && (last.q.end, last.v.end) == (q.start, v.start) =>
-                {
-                    (last.q.end, last.v.end) = (q.end, v.end);
-                }
-                _ => spaces.push(Space { joint, q, v }),
-            }
-        }
-        self.spaces = spaces;
-    }
-
-    /// Each joint that has coordinates of its own, with where they stand in q and in v.
-    fn coordinates(&self) -> impl Iterator<Item = (Joint, Range<usize>, Range<usize>)> + '_ {
-        self.nodes
-            .iter()
-            .skip(1)
-            .filter(|n| n.mimic.is_none())
-            .map(|n| (n.joint, n.idx_q..n.idx_q + n.joint.nq(), n.idx_v..n.idx_v + n.joint.nv()))
-    }
-}
 
 /// The position in which every body is at its joint's frame: zeros, and rotations by nothing.
 ///
@@ -54,8 +17,8 @@ impl<R> Model<R> {
 /// assert_eq!(neutral(&robots::quadruped())[..7], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
 /// ```
 pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
-    let mut q = vec![0.0; model.nq];
-    for (joint, iq, _) in model.coordinates() {
+    let mut q = vec![0.0; model.nq()];
+    for (joint, iq, _) in model.tree.coordinates() {
         joint.neutral(&mut q[iq]);
     }
     q
@@ -71,8 +34,8 @@ pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
 /// assert_eq!(q.len(), 7);
 /// ```
 pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Vec<f64> {
-    let mut q = vec![0.0; model.nq];
-    for (joint, iq, _) in model.coordinates() {
+    let mut q = vec![0.0; model.nq()];
+    for (joint, iq, _) in model.tree.coordinates() {
         let bound = |limits: &[f64], otherwise: f64| -> Vec<f64> {
             limits.iter().map(|&x| if x.abs() < 1e6 { x } else { otherwise }).collect()
         };
@@ -100,10 +63,10 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
 /// # Panics
 /// If an argument has the wrong length.
 pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]) {
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("out", out.len(), model.nq);
-    for space in &model.spaces {
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("out", out.len(), model.nq());
+    for space in &model.tree.spaces {
         space.joint.integrate(&q[space.q.clone()], &v[space.v.clone()], &mut out[space.q.clone()]);
     }
 }
@@ -115,10 +78,10 @@ pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]
 /// # Panics
 /// If an argument has the wrong length.
 pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut [S]) {
-    check("q0", q0.len(), model.nq);
-    check("q1", q1.len(), model.nq);
-    check("out", out.len(), model.nv);
-    for space in &model.spaces {
+    check("q0", q0.len(), model.nq());
+    check("q1", q1.len(), model.nq());
+    check("out", out.len(), model.nv());
+    for space in &model.tree.spaces {
         space.joint.difference(&q0[space.q.clone()], &q1[space.q.clone()], &mut out[space.v.clone()]);
     }
 }
@@ -175,8 +138,8 @@ pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mu
 /// # Panics
 /// If `q` has not nq numbers.
 pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
-    check("q", q.len(), model.nq);
-    for (joint, iq, _) in model.coordinates() {
+    check("q", q.len(), model.nq());
+    for (joint, iq, _) in model.tree.coordinates() {
         if let Some(unit) = joint.unit_part() {
             let unit = &mut q[iq][unit];
             let mut sum = S::zero();
@@ -199,9 +162,9 @@ pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
 /// # Panics
 /// If `v` has not nv numbers or `X` has not nv rows.
 pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
-    check("v", v.len(), model.nv);
-    assert!(X.nrows() == model.nv, "X: expected {} rows, found {}", model.nv, X.nrows());
-    for (joint, _, iv) in model.coordinates() {
+    check("v", v.len(), model.nv());
+    assert!(X.nrows() == model.nv(), "X: expected {} rows, found {}", model.nv(), X.nrows());
+    for (joint, _, iv) in model.tree.coordinates() {
         let mut back = [S::zero(); 6];
         for (back, &v) in back.iter_mut().zip(&v[iv.clone()]) {
             *back = -v; // (Ad exp(v)⁻¹)⁻¹ = Ad exp(−v)⁻¹
@@ -274,10 +237,10 @@ fn block_diagonal<S: Scalar, R>(
     sign: S,
     J: &mut DMatrix<S>,
 ) {
-    check(name, v.len(), model.nv);
-    assert!(J.shape() == (model.nv, model.nv), "J: expected {0} × {0}, found {1:?}", model.nv, J.shape());
+    check(name, v.len(), model.nv());
+    assert!(J.shape() == (model.nv(), model.nv()), "J: expected {0} × {0}, found {1:?}", model.nv(), J.shape());
     J.as_mut_slice().fill(S::zero());
-    for Space { joint, v: iv, .. } in model.spaces.iter().cloned() {
+    for Space { joint, v: iv, .. } in model.tree.spaces.iter().cloned() {
         let mut signed = [S::zero(); 6];
         for (signed, &v) in signed.iter_mut().zip(&v[iv.clone()]) {
             *signed = v * sign;

@@ -1,9 +1,9 @@
 //! A model in files: what a user may edit. All else follows from it, and is made and checked when a file is read.
 
+use crate::body::{Body, Frame, Limits};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
-use crate::error::Error;
-use crate::model::{Body, Frame, Limits, Model};
-use crate::validate::Warning;
+use crate::error::{Error, Warning};
+use crate::model::Model;
 use condyle_spatial::{Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -66,7 +66,7 @@ impl Description {
                 return Err(Error::Body { body: body.name.clone(), what });
             }
         }
-        self.check_coordinates(model.nq, model.nv)?;
+        self.check_coordinates(model.tree.nq, model.tree.nv)?;
         let Self { limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
         model.warnings = warnings;

@@ -1,4 +1,6 @@
-//! What can be wrong with a robot model.
+//! What can be wrong with a robot model, and what is odd about it.
+
+use serde::{Deserialize, Serialize};
 
 /// What is wrong with a robot's description, or with a name that was looked up in it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -13,7 +15,7 @@ pub enum Error {
         what: String,
     },
     /// No folder has the file that a `package://` address names.
-    #[error("{address}: no such file in a package `{package}`; {}", crate::io::packages::said(looked))]
+    #[error("{address}: no such file in a package `{package}`; {}", where_looked(looked))]
     Package {
         /// As given.
         address: String,
@@ -104,7 +106,7 @@ pub enum Error {
         /// Path, or `<string>`.
         file: String,
         /// What is odd.
-        warning: crate::validate::Warning,
+        warning: Warning,
     },
     /// Two bodies, joints or frames of one kind have the same name.
     #[error("two {kind}s are named `{name}`")]
@@ -130,4 +132,62 @@ pub enum Error {
         /// The most similar name there is.
         nearest: String,
     },
+}
+
+/// What is odd about a model. Loaders collect these, or refuse the model when they are strict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A body that moves has neither mass nor inertia.
+    #[error("body `{body}` moves and has no mass")]
+    Massless {
+        /// The body.
+        body: String,
+    },
+    /// A body's rotational inertia about its centre of mass has a negative principal moment.
+    #[error("body `{body}`: a principal moment of inertia is {moment:e} kg m²")]
+    Negative {
+        /// The body.
+        body: String,
+        /// The least moment (kg m²).
+        moment: f64,
+    },
+    /// One principal moment is larger than the sum of the others: no distribution of mass has such an inertia.
+    #[error(
+        "body `{body}`: principal moments {} > {} + {} kg m² break the triangle inequality",
+        moments[2], moments[0], moments[1]
+    )]
+    Triangle {
+        /// The body.
+        body: String,
+        /// The principal moments (kg m²), least first.
+        moments: [f64; 3],
+    },
+    /// Nothing resists a joint: M is singular, and forward dynamics has no answer.
+    #[error("joint `{joint}` moves nothing that has inertia along it: the inertia matrix is singular")]
+    Singular {
+        /// The joint.
+        joint: String,
+    },
+    /// A loader left something out that a tree of bodies cannot have, or assumed something.
+    #[error("{element}: {what}")]
+    LeftOut {
+        /// For example ``joint `loop` ``.
+        element: String,
+        /// What was left out, and why.
+        what: String,
+    },
+}
+
+/// What [`Error::Package`] says of where it looked.
+fn where_looked(looked: &[String]) -> String {
+    if looked.is_empty() {
+        return "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)".to_owned();
+    }
+    format!("looked for {}", looked.join(", "))
+}
+
+/// The most similar of some names (optimal string alignment distance).
+pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
+    names.min_by_key(|n| strsim::osa_distance(n, name)).unwrap_or_default().to_owned()
 }

@@ -5,14 +5,13 @@
 //! when the model is built, so that inside, S is the same for all of them.
 
 mod group;
+pub mod kinematics;
 mod motion;
 
-use crate::layout::Layout;
-use crate::model::Mimic;
 use condyle_spatial::lanes::Kernel;
-use condyle_spatial::{Act, Force, Mat3, Motion, Quaternion, Scalar, Se3, Vec3};
+use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 pub use group::GroupJacobian;
-pub use motion::{JointMotion, Turning};
+pub use motion::{ClassicalMotion, JointMotion};
 use serde::{Deserialize, Serialize};
 
 /// The kind of a joint, with what it needs to know.
@@ -51,27 +50,39 @@ pub enum Joint {
     FreeFlyer,
 }
 
+/// How a joint follows another one: its position is ratio · q + offset, q being the leader's position.
+///
+/// Both have one degree of freedom, and the leader follows nobody. A continuous leader has q = [cos θ, sin θ]: ratio is
+/// then a whole number, and what follows turns, by ratio · θ + offset. A continuous follower of a leader with one number
+/// turns by ratio · q + offset.
+///
+/// The follower's armature counts, as ratio² · armature of the leader's coordinate. Its limits, damping and friction do
+/// not: as in Pinocchio, those of a coordinate are its leader's alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Mimic {
+    pub ratio: f64,
+    pub offset: f64,
+}
+
 /// How far from 1 rounding takes the length of a vector that was divided by it.
 const UNIT: f64 = 1e-15;
 
-/// Of each body's joint: see [`Joint::turns`]. What stands behind the last body has no meaning.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub struct Turns<S> {
-    /// Shape: bodies, in whole steps. Written by: `Joint::turns`.
-    pub sin: Vec<S>,
-    /// Shape: as sin. Written by: `Joint::turns`.
-    pub cos: Vec<S>,
-}
-
-impl<S: Scalar> Turns<S> {
-    pub fn new(bodies: usize) -> Self {
-        let n = bodies.next_multiple_of(4);
-        Self { sin: vec![S::zero(); n], cos: vec![S::zero(); n] }
-    }
-}
-
 impl Joint {
+    /// The kind's name.
+    pub(crate) fn kind(self) -> &'static str {
+        match self {
+            Self::Revolute { .. } => "revolute",
+            Self::Continuous { .. } => "continuous",
+            Self::Prismatic { .. } => "prismatic",
+            Self::Helical { .. } => "helical",
+            Self::Spherical => "spherical",
+            Self::Planar => "planar",
+            Self::Translation => "translation",
+            Self::FreeFlyer => "free-flyer",
+        }
+    }
+
     /// How many numbers the position has.
     pub fn nq(self) -> usize {
         match self {
@@ -114,24 +125,28 @@ impl Joint {
         }
     }
 
-    /// The same joint about or along a unit vector, if its axis is neither zero nor infinite.
-    pub fn normalized(self) -> Option<Self> {
-        let Some(axis) = self.axis() else { return Some(self) };
+    /// The same joint about or along a unit vector, or what is wrong with its axis or pitch.
+    pub(crate) fn normalized(self) -> Result<Self, String> {
+        let Some(axis) = self.axis() else { return Ok(self) };
         let norm = axis.norm_squared().sqrt();
+        if !norm.is_normal() {
+            return Err(format!("axis {:?} is no direction", self.axis()));
+        }
         let unit = (norm - 1.0).abs() < UNIT; // to the last bit the same when it was normalised before
         let axis = if unit { axis } else { axis.scale(1.0 / norm) };
-        (norm.is_normal() && norm.is_finite()).then_some(match self {
-            Self::Continuous { .. } => Self::Continuous { axis },
-            Self::Prismatic { .. } => Self::Prismatic { axis },
-            Self::Helical { pitch, .. } => Self::Helical { axis, pitch },
-            _ => Self::Revolute { axis },
-        })
+        match self {
+            Self::Helical { pitch, .. } if !pitch.is_finite() => Err(format!("pitch {pitch} is not finite")),
+            Self::Helical { pitch, .. } => Ok(Self::Helical { axis, pitch }),
+            Self::Continuous { .. } => Ok(Self::Continuous { axis }),
+            Self::Prismatic { .. } => Ok(Self::Prismatic { axis }),
+            _ => Ok(Self::Revolute { axis }),
+        }
     }
 
     /// The rotation bRz whose third column is the joint's axis: from the frame in which algorithms run to the body's.
     ///
     /// A permutation of axes, hence exact, for x, y and z; else the shortest rotation of z, or of −z, to the axis.
-    pub fn reframing(self) -> Mat3<f64> {
+    pub fn axis_rotation(self) -> Mat3<f64> {
         let Some(a) = self.axis() else { return Mat3::identity() };
         let unit = |x, y, z| Vec3::new(x, y, z);
         if a == unit(0.0, 0.0, 1.0) {
@@ -159,7 +174,7 @@ impl Joint {
     ///
     /// The (cos, sin) of a leader tells its angle up to whole turns, and a whole multiple of it up to whole turns too;
     /// what else would follow jumps wherever the leader completes a turn.
-    pub fn following(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
+    pub(crate) fn as_follower(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
         let turns = "a continuous joint's position is known up to whole turns only";
         match (leader, self) {
             (Self::Continuous { .. }, Self::Revolute { axis } | Self::Continuous { axis }) => {
@@ -181,7 +196,7 @@ impl Joint {
 
     /// The k-th number of the position of a joint that follows; q begins with its leader's.
     #[inline(always)]
-    pub fn follow<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
+    pub fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
         match self {
             Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // its offset is part of X_T
             _ => q[k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
@@ -189,107 +204,10 @@ impl Joint {
     }
 
     /// What of a follower's offset is part of its placement: the pose by which its frame, its axis turned to z, is moved.
-    pub fn offset(self, mimic: Mimic) -> Se3<f64> {
+    pub(crate) fn mimic_offset(self, mimic: Mimic) -> Se3<f64> {
         match self {
             Self::Continuous { .. } => turned(Se3::identity(), mimic.offset.sin(), mimic.offset.cos()),
             _ => Se3::identity(),
-        }
-    }
-
-    /// The sine and cosine of what each joint turns by about z (0 and 1 where it does not), all of them at once.
-    #[inline(always)]
-    pub fn turns<L: Layout>(l: &L, q: &[L::S], Turns { sin, cos }: &mut Turns<L::S>) {
-        for i in l.bodies() {
-            if let Self::Revolute { .. } | Self::Helical { .. } = l.joint(i) {
-                sin[i] = l.position(q, i, 0);
-            }
-        }
-        L::S::sin_cos_of_all(sin, cos);
-        for i in l.bodies() {
-            match l.joint(i) {
-                Self::Continuous { .. } => (cos[i], sin[i]) = (l.position(q, i, 0), l.position(q, i, 1)),
-                Self::Planar => (cos[i], sin[i]) = (l.position(q, i, 2), l.position(q, i, 3)),
-                _ => {}
-            }
-        }
-    }
-
-    /// λXi = X_T X_J(q), for joint i of a pass.
-    #[inline(always)]
-    pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
-        let (sin, cos) = match l.joint(i) {
-            Self::Revolute { .. } | Self::Helical { .. } => l.position(q, i, 0).sin_cos(),
-            Self::Continuous { .. } => (l.position(q, i, 1), l.position(q, i, 0)),
-            Self::Planar => (l.position(q, i, 3), l.position(q, i, 2)),
-            _ => (L::S::zero(), L::S::one()),
-        };
-        Self::turned_placement(l, i, q, sin, cos)
-    }
-
-    /// The same, the sine and cosine being known.
-    #[inline(always)]
-    pub fn turned_placement<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
-        let X_T = l.placement(i);
-        match l.joint(i) {
-            Self::Revolute { .. } | Self::Continuous { .. } => turned(X_T, sin, cos),
-            Self::Prismatic { .. } => {
-                let d = l.position(q, i, 0);
-                Se3::new(X_T.rotation, X_T.rotation.z.scale_add(d, X_T.translation))
-            }
-            Self::Helical { pitch, .. } => {
-                let X = turned(X_T, sin, cos);
-                let d = l.position(q, i, 0) * L::S::splat(pitch);
-                Se3::new(X.rotation, X.rotation.z.scale_add(d, X_T.translation))
-            }
-            Self::Spherical => {
-                let R = quaternion(l, i, q, 0).to_rotation();
-                Se3::new(X_T.rotation * R, X_T.translation)
-            }
-            Self::Planar => {
-                let p = Vec3::new(l.position(q, i, 0), l.position(q, i, 1), L::S::zero());
-                let X = turned(X_T, sin, cos);
-                Se3::new(X.rotation, X_T.act(p))
-            }
-            Self::Translation => Se3::new(X_T.rotation, X_T.act(point(l, i, q))),
-            Self::FreeFlyer => X_T * Se3::new(quaternion(l, i, q, 3).to_rotation(), point(l, i, q)),
-        }
-    }
-
-    /// S v of joint i in the body's frame, for the velocity or acceleration coordinates v.
-    #[inline(always)]
-    pub fn motion<L: Layout>(l: &L, i: usize, v: &[L::S]) -> JointMotion<L::S> {
-        match l.joint(i) {
-            Self::Revolute { .. } | Self::Continuous { .. } => JointMotion::Turn(l.load(v, i, 0)),
-            Self::Prismatic { .. } => JointMotion::Slide(l.load(v, i, 0)),
-            Self::Helical { pitch, .. } => {
-                let (o, x) = (L::S::zero(), l.load(v, i, 0));
-                JointMotion::Any(Motion::new(Vec3::new(o, o, x * L::S::splat(pitch)), Vec3::new(o, o, x)))
-            }
-            joint => {
-                let mut m = [L::S::zero(); 6];
-                for (k, &axis) in joint.axes().iter().enumerate() {
-                    m[axis] = l.load(v, i, k);
-                }
-                JointMotion::Any(m.into())
-            }
-        }
-    }
-
-    /// Sᵀ f of joint i, added to the coordinates τ.
-    #[inline(always)]
-    pub fn project<L: Layout>(l: &L, i: usize, f: Force<L::S>, tau: &mut [L::S]) {
-        match l.joint(i) {
-            Self::Revolute { .. } | Self::Continuous { .. } => l.add(tau, i, 0, f.angular.z),
-            Self::Prismatic { .. } => l.add(tau, i, 0, f.linear.z),
-            Self::Helical { pitch, .. } => {
-                l.add(tau, i, 0, f.linear.z.mul_add(L::S::splat(pitch), f.angular.z));
-            }
-            joint => {
-                let f = f.to_array();
-                for (k, &axis) in joint.axes().iter().enumerate() {
-                    l.add(tau, i, k, f[axis]);
-                }
-            }
         }
     }
 
@@ -350,14 +268,4 @@ fn turned<S: Scalar>(X_T: Se3<S>, sin: S, cos: S) -> Se3<S> {
     let Mat3 { x, y, z } = X_T.rotation;
     let rotation = Mat3 { x: x.scale_add(cos, y.scale(sin)), y: y.scale_add(cos, x.scale(-sin)), z };
     Se3::new(rotation, X_T.translation)
-}
-
-#[inline(always)]
-fn quaternion<L: Layout>(l: &L, i: usize, q: &[L::S], at: usize) -> Quaternion<L::S> {
-    Quaternion::new(l.position(q, i, at), l.position(q, i, at + 1), l.position(q, i, at + 2), l.position(q, i, at + 3))
-}
-
-#[inline(always)]
-fn point<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Vec3<L::S> {
-    Vec3::new(l.position(q, i, 0), l.position(q, i, 1), l.position(q, i, 2))
 }

@@ -14,6 +14,7 @@
 //! (`layout`), the tree of its turned frames and columns (`tree`), the schedule of its limbs (`limbs`).
 #![allow(non_snake_case)]
 
+mod body;
 mod builder;
 mod compose;
 mod configuration;
@@ -34,19 +35,20 @@ pub mod robots;
 #[doc(hidden)]
 pub mod tree;
 mod validate;
+mod variants;
 
+pub use body::{Body, Frame, FrameKind, Limits};
 pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 pub use configuration::{
     DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
     interpolate, neutral, normalize, random_configuration, transport,
 };
-pub use error::Error;
+pub use error::{Error, Warning};
 pub use io::mjcf::MjcfOptions;
 pub use io::sdf::SdfOptions;
 pub use io::urdf::UrdfOptions;
-pub use joint::Joint;
-pub use model::{Body, Frame, FrameKind, Limits, Mimic, Model};
-pub use validate::Warning;
+pub use joint::{Joint, Mimic};
+pub use model::Model;
 
 /// Panics unless an argument has as many numbers as it must have.
 #[doc(hidden)]

@@ -12,8 +12,8 @@ pub mod column_map;
 pub mod schedule;
 
 use crate::joint::Joint;
-use crate::model::Model;
 use crate::tree::Node;
+use crate::tree::Tree;
 pub use column_map::Sizes;
 use condyle_spatial::moves::Move;
 
@@ -50,21 +50,22 @@ pub struct Plan {
     pub copies: Vec<Vec<(usize, Move)>>,
     /// Of each link, the one before it on the way out.
     pub before: Vec<column_map::Before>,
+    pub sizes: Sizes,
     /// All columns, those after one another together.
     pub blocks: Vec<column_map::Block>,
 }
 
 impl Plan {
     /// The plan for a robot, if it has limbs enough.
-    pub fn new(model: &Model) -> Option<Self> {
+    pub(crate) fn new(tree: &Tree<f64>) -> Option<Self> {
         let turns_with = |n: &Node<f64>| n.mimic.is_some() && matches!(n.joint, Joint::Continuous { .. });
-        if model.nodes.iter().any(turns_with) {
+        if tree.nodes.iter().any(turns_with) {
             return None; // its position is no multiple of its leader's
         }
-        let mut plan = Self::schedule(&model.nodes)?;
-        plan.leaders = vec![0; model.nv];
-        plan.add_steps(model);
-        plan.add_links(model);
+        let mut plan = Self::schedule(&tree.nodes)?;
+        plan.leaders = vec![0; tree.nv];
+        plan.add_steps(tree);
+        plan.add_links(tree);
         Some(plan)
     }
 
@@ -101,6 +102,7 @@ impl Plan {
             pairs: Vec::new(),
             copies: Vec::new(),
             before: Vec::new(),
+            sizes: Sizes::default(),
             blocks: Vec::new(),
         };
         let mut ready = children[0].clone();
@@ -155,24 +157,4 @@ impl Plan {
 fn side_by_side(a: Joint, b: Joint) -> bool {
     let pitch = |joint| if let Joint::Helical { pitch, .. } = joint { pitch } else { 0.0 };
     core::mem::discriminant(&a) == core::mem::discriminant(&b) && pitch(a) == pitch(b)
-}
-
-impl Model {
-    /// The same robot, with its limbs side by side in single calls or one body after the other.
-    ///
-    /// Where it has limbs enough (four legs, two legs and two arms, fingers), `rnea`, `aba`, `crba`, `minv`, the derivatives
-    /// of the first two and `constrained_dynamics` compute four bodies of one state at a time if the processor has AVX2 or
-    /// NEON, two to three times as fast. A `Batch` never does, since its lanes hold states. The two ways add up in
-    /// different orders, so their results differ in the last digits; without limbs a single call gives the bits of a batch.
-    ///
-    /// ```
-    /// let quadruped = condyle_model::robots::quadruped();
-    /// let in_turn = quadruped.clone().with_limbs(false); // rnea(&in_turn, …) is rnea(&quadruped, …) but for rounding
-    /// assert_eq!(in_turn.nv(), quadruped.nv());
-    /// ```
-    #[must_use]
-    pub fn with_limbs(mut self, side_by_side: bool) -> Self {
-        self.limbs = if side_by_side { Plan::new(&self) } else { None };
-        self
-    }
 }

@@ -1,58 +1,14 @@
 //! What is odd about a model, though it loads: inertias that no body has, degrees of freedom along which M is singular.
 
+use crate::body::Body;
 use crate::configuration::random_configuration;
+use crate::error::Warning;
 use crate::joint::Joint;
 use crate::layout::{Columns, Layout, Pairs, Single};
-use crate::model::{Body, Model};
+use crate::model::Model;
 use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3};
 use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
-use serde::{Deserialize, Serialize};
-
-/// What is odd about a model. Loaders collect these, or refuse the model when they are strict.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
-#[non_exhaustive]
-pub enum Warning {
-    /// A body that moves has neither mass nor inertia.
-    #[error("body `{body}` moves and has no mass")]
-    Massless {
-        /// The body.
-        body: String,
-    },
-    /// A body's rotational inertia about its centre of mass has a negative principal moment.
-    #[error("body `{body}`: a principal moment of inertia is {moment:e} kg m²")]
-    Negative {
-        /// The body.
-        body: String,
-        /// The least moment (kg m²).
-        moment: f64,
-    },
-    /// One principal moment is larger than the sum of the others: no distribution of mass has such an inertia.
-    #[error(
-        "body `{body}`: principal moments {} > {} + {} kg m² break the triangle inequality",
-        moments[2], moments[0], moments[1]
-    )]
-    Triangle {
-        /// The body.
-        body: String,
-        /// The principal moments (kg m²), least first.
-        moments: [f64; 3],
-    },
-    /// Nothing resists a joint: M is singular, and forward dynamics has no answer.
-    #[error("joint `{joint}` moves nothing that has inertia along it: the inertia matrix is singular")]
-    Singular {
-        /// The joint.
-        joint: String,
-    },
-    /// A loader left something out that a tree of bodies cannot have, or assumed something.
-    #[error("{element}: {what}")]
-    LeftOut {
-        /// For example ``joint `loop` ``.
-        element: String,
-        /// What was left out, and why.
-        what: String,
-    },
-}
 
 /// Rounding in a body's moments of inertia, as files have them: six digits.
 const MOMENT_ROUNDING: f64 = 1e-6;
@@ -61,8 +17,8 @@ const PIVOT_ROUNDING: f64 = 1e-13;
 /// Positions at which M is looked at. A joint is called singular if it is so at all of them.
 const SAMPLES: usize = 3;
 
-/// What is odd about a body on its own. The bodies between the joints of a chain have no mass on purpose.
-pub(crate) fn of_body(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
+/// Says what is odd about a body's inertia. The bodies between the joints of a chain have no mass on purpose.
+pub(crate) fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     let (I, name) = (body.inertia, || body.name.clone());
     if I == Inertia::zero() {
         if !between {
@@ -115,7 +71,7 @@ impl Model {
         for i in l.bodies().rev() {
             let mut Ia = IA[i] + oX[i].act(l.inertia(i)).into();
             for k in (0..l.joint(i).nv()).rev() {
-                let S = S[l.slot(i) + k];
+                let S = S[l.column(i) + k];
                 let U = Ia * S;
                 let D = S.dot(U) + l.armature(i, k);
                 let products = S.to_array().iter().zip(U.to_array()).map(|(s, u)| (s * u).abs()).sum::<f64>();
@@ -125,7 +81,7 @@ impl Model {
                     Ia = Ia.minus_outer(U, 1.0 / D);
                 }
             }
-            l.push(&mut IA, i, Ia);
+            l.add_to_parent(&mut IA, i, Ia);
         }
         singular
     }
@@ -134,8 +90,8 @@ impl Model {
     fn singular_by_matrix(&self, placed: &Placed) -> Vec<bool> {
         let mut M = self.inertia_matrix(placed);
         let diagonal = M.diagonal();
-        let mut singular = vec![false; self.nv];
-        for k in (0..self.nv).rev() {
+        let mut singular = vec![false; self.tree.nv];
+        for k in (0..self.tree.nv).rev() {
             let D = M[(k, k)];
             if D <= PIVOT_ROUNDING * diagonal[k] {
                 singular[k] = true;
@@ -164,7 +120,7 @@ struct Placed {
 impl Placed {
     fn at(model: &Model, q: &[f64]) -> Self {
         let l = Single::<f64, f64>::new(model);
-        let (mut oX, mut S) = (vec![Se3::identity(); model.bodies.len()], Vec::with_capacity(model.columns.len()));
+        let (mut oX, mut S) = (vec![Se3::identity(); model.bodies.len()], Vec::with_capacity(model.tree.columns.len()));
         for i in l.bodies() {
             oX[i] = l.parent(&oX, i) * Joint::placement(&l, i, q); // oXi = oXλ λXi
             S.extend((0..l.joint(i).nv()).map(|k| l.joint(i).column(&oX[i], k)));
@@ -177,8 +133,8 @@ impl Model {
     /// M, by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
     fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
         let l = Single::<f64, f64>::new(self);
-        let mut M = DMatrix::zeros(self.nv, self.nv);
-        let mut IC: Vec<_> = oX.iter().zip(&self.nodes).map(|(X, node)| X.act(node.inertia)).collect();
+        let mut M = DMatrix::zeros(self.tree.nv, self.tree.nv);
+        let mut IC: Vec<_> = oX.iter().zip(&self.tree.nodes).map(|(X, node)| X.act(node.inertia)).collect();
         for i in l.bodies().rev() {
             let support = l.support(i);
             let before = support.len() - l.joint(i).nv();
@@ -186,13 +142,13 @@ impl Model {
                 let F = IC[i] * l.at(S, support[own]); // F = Iᶜ S
                 for &e in &support[..own] {
                     let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
-                    l.add_at(M.as_mut_slice(), support[own], e, x);
-                    l.add_at(M.as_mut_slice(), e, support[own], x);
+                    l.add_entry(M.as_mut_slice(), support[own], e, x);
+                    l.add_entry(M.as_mut_slice(), e, support[own], x);
                 }
-                l.add_at(M.as_mut_slice(), support[own], support[own], l.at(S, support[own]).dot(F));
+                l.add_entry(M.as_mut_slice(), support[own], support[own], l.at(S, support[own]).dot(F));
             }
             let IC_i = IC[i];
-            l.push(&mut IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+            l.add_to_parent(&mut IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
         }
         l.add_armature(M.as_mut_slice());
         M

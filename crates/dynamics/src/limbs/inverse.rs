@@ -18,7 +18,6 @@ mod vectors {
     use crate::kinematics::World;
     use crate::limbs::lanes::{Four, Limbs};
     use crate::limbs::{LANES, Plan};
-    use condyle_model::Model;
     use condyle_model::layout::Layout;
     use condyle_model::limbs::column_map::{Block as Rows, Sizes};
     use condyle_spatial::block::Block;
@@ -42,12 +41,13 @@ mod vectors {
     }
 
     impl Scratch {
-        pub(in crate::limbs) fn new<R>(model: &Model<R>, sizes: Sizes, links: usize) -> Self {
+        pub(in crate::limbs) fn new(nv: usize, plan: &Plan) -> Self {
+            let sizes = plan.sizes;
             let mut Zt = vec![0.0; sizes.wide_behind() + 1];
-            (0..model.nv()).for_each(|k| Zt[k * (sizes.wide + 1)] = 1.0);
+            (0..nv).for_each(|k| Zt[k * (sizes.wide + 1)] = 1.0);
             Self {
                 sizes,
-                T: vec![Motion::zero(); links],
+                T: vec![Motion::zero(); plan.links.len()],
                 ZD: vec![0.0; sizes.deep_behind() + 1],
                 Zt,
                 rows: vec![0.0; sizes.wide_behind()],
@@ -89,7 +89,7 @@ mod vectors {
                 let (first, end) = l.steps[i].links;
                 let nv = l.joint(i).nv();
                 for k in 0..nv {
-                    let (s, own) = (l.slot(i) + k, end - nv + k);
+                    let (s, own) = (l.column(i) + k, end - nv + k);
                     let (S, U) = (w.S[s], -aba.U[s].scale(aba.D_inv[s]));
                     for link in first..own {
                         let felt = if k == 0 { l.before(T, link) } else { T[link] };

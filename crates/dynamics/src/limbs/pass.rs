@@ -9,7 +9,6 @@ use crate::kinematics::{Placed, World, place};
 use crate::{aba, crba, rnea, rnea_derivatives};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
-use condyle_model::limbs::Sizes;
 use condyle_model::limbs::schedule::Source;
 use condyle_spatial::block::{Block, Real, lanes};
 use condyle_spatial::lanes::{Fused, Kernel};
@@ -58,7 +57,7 @@ impl Scratch {
             aba: aba::Workspace::new(size),
             IC: vec![Inertia::zero(); steps],
             bodies: rnea_derivatives::Bodies::new(size),
-            inverted: inverse::Scratch::new(model, Sizes::new(model), plan.links.len()),
+            inverted: inverse::Scratch::new(model.nv(), plan),
         }))
     }
 
@@ -165,14 +164,14 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
         let l = Limbs::new(plan, model);
         if let Task::Rnea = task {
             data.world.placed = Placed::Nowhere;
-            rnea::pass(&l, &mut world.turns, rnea, q, v, x, f_ext);
+            rnea::pass(&l, &mut world.sin_cos, rnea, q, v, x, f_ext);
             scatter(plan, &rnea.tau, &mut data.rnea.tau);
             Single::<Fused, f64>::new(model).add_armature_torque(arguments.x, &mut data.rnea.tau);
             return;
         }
         place(&l, world, q);
         data.world.placed = Placed::Limbs;
-        l.share(&mut world.S);
+        l.broadcast(&mut world.S);
         if let Task::Crba = task {
             crba::pass(&l, world, IC, data.crba.M.as_mut_slice());
         }
@@ -184,7 +183,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
             scatter(plan, &aba.qdd, &mut data.aba.qdd);
         }
         if let Task::Minv | Task::AbaDerivatives = task {
-            l.share(&mut aba.D_inv);
+            l.broadcast(&mut aba.D_inv);
             inverted.inverse::<V>(&l, world, aba, &plan.blocks, data.minv.Minv.as_mut_slice());
         }
         if let Task::RneaDerivatives | Task::AbaDerivatives = task {

@@ -6,11 +6,11 @@ mod geometry;
 mod include;
 
 use super::xml::{self, Element};
+use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
-use crate::error::Error;
+use crate::error::{Error, Warning};
 use crate::joint::Joint;
-use crate::model::{FrameKind, Model};
-use crate::validate::Warning;
+use crate::model::Model;
 use attributes::{Attributes, Compiler, Defaults, FromGeoms, MAIN, turn};
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use equality::Joints;
@@ -319,7 +319,7 @@ impl<'a> Reader<'a> {
             "ball" => (Joint::Spherical, self.compiler.angle),
             _ => return Err(wrong(format!("type: `{kind}` is none of hinge, slide, ball and free"))),
         };
-        let joint = joint.normalized().ok_or_else(|| wrong(format!("axis {axis:?} is no direction")))?;
+        let joint = joint.normalized().map_err(|_| wrong(format!("axis {axis:?} is no direction")))?;
         let anchor = a.vector("pos")?.filter(|_| kind != "slide").unwrap_or(Vec3::zero());
         let at_zero = a.number("ref")?.unwrap_or(0.0) * unit;
         let lXj = match joint {

@@ -44,14 +44,6 @@ fn find(address: &str, folders: &[PathBuf]) -> Result<PathBuf, Error> {
     Err(Error::Package { address: format!("{SCHEME}{address}"), package: package.to_owned(), looked })
 }
 
-/// What [`Error::Package`] says of where it looked.
-pub(crate) fn said(looked: &[String]) -> String {
-    if looked.is_empty() {
-        return "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)".to_owned();
-    }
-    format!("looked for {}", looked.join(", "))
-}
-
 #[cfg(test)]
 mod tests {
     use super::folders;

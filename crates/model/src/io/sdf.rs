@@ -4,11 +4,11 @@ mod mimics;
 mod poses;
 
 use super::xml::{self, Element};
+use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
-use crate::error::Error;
+use crate::error::{Error, Warning};
 use crate::joint::Joint;
-use crate::model::{FrameKind, Model};
-use crate::validate::Warning;
+use crate::model::Model;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use mimics::Axes;
 use poses::{Poses, optional, three};
@@ -292,7 +292,7 @@ impl<'a> Reader<'a> {
         let (mut body, mut at) = (parent, bXj);
         let count = joints.len();
         for (k, (joint, axis)) in joints.into_iter().enumerate() {
-            let joint = joint.normalized().ok_or_else(|| element.wrong(format!("{axis}: xyz is no direction")))?;
+            let joint = joint.normalized().map_err(|_| element.wrong(format!("{axis}: xyz is no direction")))?;
             let options = element.child(axis).map_or(Ok(JointOptions::default()), |a| limits(element, a, joint))?;
             let last = k + 1 == count;
             let (link, called, inertia) = if last {

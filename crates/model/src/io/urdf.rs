@@ -5,10 +5,11 @@
 //! way.
 
 use super::packages;
+use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
-use crate::joint::Joint;
-use crate::model::{FrameKind, Mimic, Model};
+use crate::joint::{Joint, Mimic};
+use crate::model::Model;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
 use roxmltree::{Document, Node};
 use std::collections::{HashMap, HashSet};
@@ -184,7 +185,7 @@ impl<'a> Reader<'a> {
         for &joint in &joints {
             for link in [&joint.content.parent.link, &joint.content.child.link] {
                 if !self.links.contains_key(link) {
-                    let near = crate::model::nearest(link, order.iter().map(String::as_str));
+                    let near = crate::error::nearest(link, order.iter().map(String::as_str));
                     return Err(self.wrong_joint(joint, format!("no link is named `{link}`; nearest is `{near}`")));
                 }
             }
@@ -312,12 +313,8 @@ impl Reader<'_> {
             urdf_rs::JointType::Planar => Joint::Planar,
             urdf_rs::JointType::Floating => Joint::FreeFlyer,
         };
-        match kind.normalized() {
-            Some(kind) => Ok(Some(kind)),
-            None => {
-                Err(self.wrong_joint(joint, format!("its axis ({} {} {}) is no direction", axis.x, axis.y, axis.z)))
-            }
-        }
+        let direction = |_| format!("its axis ({} {} {}) is no direction", axis.x, axis.y, axis.z);
+        kind.normalized().map(Some).map_err(|what| self.wrong_joint(joint, direction(what)))
     }
 
     fn options(&self, joint: &Element<urdf_rs::Joint>) -> Result<JointOptions, Error> {

@@ -6,11 +6,11 @@ use condyle_spatial::{Motion, Scalar, Vec3};
 #[derive(Clone, Copy)]
 pub enum JointMotion<S> {
     /// About z.
-    Turn(S),
+    Revolute(S),
     /// Along z.
-    Slide(S),
+    Prismatic(S),
     /// Along several axes.
-    Any(Motion<S>),
+    General(Motion<S>),
 }
 
 impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
@@ -18,9 +18,9 @@ impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
     #[inline(always)]
     fn add(mut self, vJ: JointMotion<S>) -> Self {
         match vJ {
-            JointMotion::Turn(x) => self.angular.z += x,
-            JointMotion::Slide(x) => self.linear.z += x,
-            JointMotion::Any(m) => self += m,
+            JointMotion::Revolute(x) => self.angular.z += x,
+            JointMotion::Prismatic(x) => self.linear.z += x,
+            JointMotion::General(m) => self += m,
         }
         self
     }
@@ -29,7 +29,7 @@ impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
 /// How a body turns, and how its origin accelerates: what the equations of Newton and Euler need.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct Turning<S> {
+pub struct ClassicalMotion<S> {
     /// ω.
     pub w: Vec3<S>,
     /// ω̇.
@@ -47,13 +47,17 @@ impl<S: Scalar> JointMotion<S> {
     /// Adds a joint that moves with this velocity and with the acceleration aJ to what the body would do without it:
     /// ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J.
     #[inline(always)]
-    pub fn added_to(self, aJ: Self, Turning { mut w, mut dw, mut a }: Turning<S>) -> Turning<S> {
+    pub fn added_to(
+        self,
+        aJ: Self,
+        ClassicalMotion { mut w, mut dw, mut a }: ClassicalMotion<S>,
+    ) -> ClassicalMotion<S> {
         match (self, aJ) {
-            (Self::Turn(x), Self::Turn(xx)) => {
+            (Self::Revolute(x), Self::Revolute(xx)) => {
                 dw = Vec3::new(w.y.mul_add(x, dw.x), (-w.x).mul_add(x, dw.y), dw.z + xx);
                 w.z += x;
             }
-            (Self::Slide(x), Self::Slide(xx)) => {
+            (Self::Prismatic(x), Self::Prismatic(xx)) => {
                 let twice = x + x;
                 a = Vec3::new(w.y.mul_add(twice, a.x), (-w.x).mul_add(twice, a.y), a.z + xx);
             }
@@ -64,6 +68,6 @@ impl<S: Scalar> JointMotion<S> {
                 w += vJ.angular;
             }
         }
-        Turning { w, dw, a }
+        ClassicalMotion { w, dw, a }
     }
 }

@@ -7,7 +7,7 @@
 //! What belongs to a column and changes from body to body on the way out (`inverse.rs`) has a place for each link.
 
 use super::{LANES, Plan};
-use crate::model::Model;
+use crate::tree::Tree;
 use condyle_spatial::moves::Move;
 
 /// A column of each lane, among those from the root to a step's joints.
@@ -50,7 +50,7 @@ pub struct Block {
 }
 
 /// How large the two matrices are that hold Z = L⁻¹ of the inertia matrix, row by row.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Sizes {
     pub rows: usize,
     /// The length of a row that has the columns from the root on.
@@ -61,9 +61,9 @@ pub struct Sizes {
 
 impl Sizes {
     /// For a robot's inertia matrix.
-    pub fn new<R>(model: &Model<R>) -> Self {
-        let deep = model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0);
-        Self { rows: model.nv, deep, wide: model.nv.next_multiple_of(2 * LANES) }
+    fn new(tree: &Tree<f64>) -> Self {
+        let deep = tree.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0);
+        Self { rows: tree.nv, deep, wide: tree.nv.next_multiple_of(2 * LANES) }
     }
 
     /// The place behind all rows: of what lanes without a body write.
@@ -81,8 +81,8 @@ impl Sizes {
 const ROWS: usize = 4;
 
 /// The blocks of all columns.
-fn blocks(model: &Model) -> Vec<Block> {
-    let columns = &model.columns;
+fn blocks(tree: &Tree<f64>) -> Vec<Block> {
+    let columns = &tree.columns;
     let mut blocks: Vec<Block> = Vec::new();
     for c in 0..columns.len() {
         let mut way: Vec<usize> = std::iter::successors(Some(c), |&c| columns[c].parent).collect();
@@ -105,17 +105,18 @@ type Draft = (usize, [Option<usize>; LANES]);
 
 impl Plan {
     /// Fills in the links of all steps.
-    pub(super) fn add_links(&mut self, model: &Model) {
+    pub(super) fn add_links(&mut self, tree: &Tree<f64>) {
         let mut drafts: Vec<Vec<Draft>> = vec![Vec::new()];
         let first = self.bodies.get(1).map_or(0, |bodies| bodies[0]); // whose last column is set last, in the first lane
-        let last = model.nodes[first].idx_v + model.nodes[first].joint.nv().saturating_sub(1);
-        let unused = (last * (model.nv + 1)) as u32;
-        let sizes = Sizes::new(model);
-        self.blocks = blocks(model);
+        let last = tree.nodes[first].idx_v + tree.nodes[first].joint.nv().saturating_sub(1);
+        let unused = (last * (tree.nv + 1)) as u32;
+        let sizes = Sizes::new(tree);
+        self.sizes = sizes;
+        self.blocks = blocks(tree);
         for s in 1..self.steps.len() {
-            let mut draft = self.before(model, &drafts, s);
+            let mut draft = self.before(tree, &drafts, s);
             let (bodies, joint, slot) = (self.bodies[s], self.steps[s].joint, self.steps[s].idx_v);
-            let coordinate = |k: usize| bodies.map(|i| (i > 0).then(|| model.nodes[i].idx_v + k));
+            let coordinate = |k: usize| bodies.map(|i| (i > 0).then(|| tree.nodes[i].idx_v + k));
             draft.extend((0..joint.nv()).map(|k| (slot + k, coordinate(k))));
             let first = self.links.len();
             for &(slot, others) in &draft {
@@ -129,10 +130,9 @@ impl Plan {
                     let mut pair = Pair { below: [unused; LANES], right: [unused; LANES], deep, wide };
                     for lane in 0..LANES {
                         if let (Some(d), Some(e)) = (own[lane], others[lane]) {
-                            (pair.below[lane], pair.right[lane]) =
-                                ((d + model.nv * e) as u32, (e + model.nv * d) as u32);
-                            if !model.has_mimic() {
-                                pair.deep[lane] = (d * sizes.deep + model.columns[e].depth) as u32;
+                            (pair.below[lane], pair.right[lane]) = ((d + tree.nv * e) as u32, (e + tree.nv * d) as u32);
+                            if !tree.has_mimic() {
+                                pair.deep[lane] = (d * sizes.deep + tree.columns[e].depth) as u32;
                                 pair.wide[lane] = (e * sizes.wide + d) as u32;
                             }
                         }
@@ -143,17 +143,17 @@ impl Plan {
             let last = self.links.len();
             self.before.extend((self.before.len()..last).map(Before::Here)); // the step's own
             self.steps[s].links = (first, last);
-            let hangs_here = |&i: &usize| i > 0 && self.place[model.nodes[i].parent].0 == s;
+            let hangs_here = |&i: &usize| i > 0 && self.place[tree.nodes[i].parent].0 == s;
             self.steps[s].tip = !self.bodies.iter().flatten().any(hangs_here);
             drafts.push(draft);
         }
     }
 
     /// The columns before those of step s, with copies of what stands elsewhere.
-    fn before(&mut self, model: &Model, drafts: &[Vec<Draft>], s: usize) -> Vec<Draft> {
+    fn before(&mut self, tree: &Tree<f64>, drafts: &[Vec<Draft>], s: usize) -> Vec<Draft> {
         let mut ways: Vec<Vec<Item>> = vec![Vec::new(); LANES];
         for lane in (0..LANES).filter(|&lane| self.bodies[s][lane] > 0) {
-            let (step, its) = self.place[model.nodes[self.bodies[s][lane]].parent];
+            let (step, its) = self.place[tree.nodes[self.bodies[s][lane]].parent];
             let its = if self.in_all_lanes(step) { lane } else { its };
             let columns = drafts[step].iter().enumerate();
             let link = self.steps[step].links.0;

@@ -2,7 +2,7 @@
 
 use super::{LANES, Plan};
 use crate::joint::Joint;
-use crate::model::Model;
+use crate::tree::Tree;
 use condyle_spatial::moves::Move;
 use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 
@@ -14,7 +14,7 @@ pub struct Step {
     pub bodies: [usize; LANES],
     pub placement: Se3<[f64; LANES]>,
     pub inertia: Inertia<[f64; LANES]>,
-    pub reframing: Mat3<[f64; LANES]>,
+    pub axis_rotation: Mat3<[f64; LANES]>,
     /// Where the positions and the velocities of their joints begin among those in lanes.
     pub idx_q: usize,
     pub idx_v: usize,
@@ -45,22 +45,22 @@ pub struct Source {
 
 impl Plan {
     /// Fills in the constants of all steps.
-    pub(super) fn add_steps(&mut self, model: &Model) {
+    pub(super) fn add_steps(&mut self, tree: &Tree<f64>) {
         for s in 0..self.bodies.len() {
             let bodies = self.bodies[s];
             let some = bodies.into_iter().find(|&i| i > 0).unwrap_or(0);
-            let joint = model.nodes[some].joint;
+            let joint = tree.nodes[some].joint;
             let (idx_q, idx_v) = (self.positions.len(), self.coordinates.len());
             if s > 0 {
-                self.add_sources(model, s, joint);
+                self.add_sources(tree, s, joint);
             }
             // what a body in all lanes weighs, the first lane carries
             let carried = |lane: usize| match bodies[lane] {
                 0 => Inertia::zero(),
                 _ if self.in_all_lanes(s) && lane > 0 => Inertia::zero(),
-                i => model.nodes[i].inertia,
+                i => tree.nodes[i].inertia,
             };
-            let placement = bodies.map(|i| model.nodes[i].placement);
+            let placement = bodies.map(|i| tree.nodes[i].placement);
             self.steps.push(Step {
                 joint,
                 bodies,
@@ -69,10 +69,10 @@ impl Plan {
                     translation: vector(placement.map(|X| X.translation)),
                 },
                 inertia: inertia([0, 1, 2, 3].map(carried)),
-                reframing: rotation(bodies.map(|i| model.nodes[i].reframing)),
+                axis_rotation: rotation(bodies.map(|i| tree.nodes[i].axis_rotation)),
                 idx_q,
                 idx_v,
-                parents: self.parents(model, s),
+                parents: self.parents(tree, s),
                 links: (0, 0),
                 tip: false,
             });
@@ -80,20 +80,20 @@ impl Plan {
     }
 
     /// Of all positions and degrees of freedom of step s.
-    fn add_sources(&mut self, model: &Model, s: usize, joint: Joint) {
+    fn add_sources(&mut self, tree: &Tree<f64>, s: usize, joint: Joint) {
         let bodies = self.bodies[s];
         let mut neutral = vec![0.0; joint.nq()];
         joint.neutral(&mut neutral); // where there is no joint
-        let follows = bodies.map(|i| model.nodes[i].mimic);
+        let follows = bodies.map(|i| tree.nodes[i].mimic);
         let ratio = follows.map(|m| m.map_or(1.0, |m| m.ratio));
         for (k, neutral) in neutral.into_iter().enumerate() {
-            let from = bodies.map(|i| if i > 0 { model.nodes[i].idx_q + k } else { model.nq });
+            let from = bodies.map(|i| if i > 0 { tree.nodes[i].idx_q + k } else { tree.nq });
             let mut offset = follows.map(|m| m.map_or(0.0, |m| m.offset));
             (0..LANES).filter(|&lane| bodies[lane] == 0).for_each(|lane| offset[lane] = neutral);
             self.positions.push(Source { from, ratio, offset });
         }
         for k in 0..joint.nv() {
-            let from = bodies.map(|i| if i > 0 { model.nodes[i].idx_v + k } else { model.nv });
+            let from = bodies.map(|i| if i > 0 { tree.nodes[i].idx_v + k } else { tree.nv });
             for lane in 0..if self.in_all_lanes(s) { 1 } else { LANES } {
                 let (to, here) = (from[lane], LANES * self.coordinates.len() + lane);
                 match follows[lane] {
@@ -107,12 +107,12 @@ impl Plan {
     }
 
     /// Where the parents of step s stand.
-    fn parents(&self, model: &Model, s: usize) -> Parents {
+    fn parents(&self, tree: &Tree<f64>, s: usize) -> Parents {
         // of each lane with a body: its parent's step and lane
         let at: Vec<(usize, (usize, usize))> = (0..LANES)
             .filter(|&lane| self.bodies[s][lane] > 0)
             .map(|lane| {
-                let (step, its) = self.place[model.nodes[self.bodies[s][lane]].parent];
+                let (step, its) = self.place[tree.nodes[self.bodies[s][lane]].parent];
                 (lane, (step, if self.in_all_lanes(step) { lane } else { its }))
             })
             .collect();

@@ -1,8 +1,7 @@
 //! What an MJCF element says, with the defaults of its class, in SI units.
 
-use crate::error::Error;
+use crate::error::{Error, nearest};
 use crate::io::xml::{self, Element};
-use crate::model::nearest;
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 use std::collections::HashMap;
 

@@ -2,10 +2,9 @@
 
 use super::attributes::Attributes;
 use crate::builder::{BodyId, ModelBuilder};
-use crate::error::Error;
+use crate::error::{Error, Warning};
 use crate::io::xml::Element;
-use crate::model::Mimic;
-use crate::validate::Warning;
+use crate::joint::Mimic;
 use std::collections::{HashMap, HashSet};
 
 /// The body that a joint carries, and the joint's position in the file's pose (`ref`).

@@ -2,10 +2,9 @@
 
 use super::poses::optional;
 use crate::builder::{BodyId, ModelBuilder};
-use crate::error::Error;
+use crate::error::{Error, Warning};
 use crate::io::xml::Element;
-use crate::model::Mimic;
-use crate::validate::Warning;
+use crate::joint::Mimic;
 use std::collections::HashMap;
 
 /// What moves about or along each axis, by the joint's name and the axis's tag, and who follows.

@@ -1,9 +1,8 @@
 //! Where links, joints and frames of an SDF are, and in which frames axes are given.
 
 use super::WORLD_LINK;
-use crate::error::Error;
+use crate::error::{Error, nearest};
 use crate::io::xml::{self, Element};
-use crate::model::nearest;
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3};
 use std::collections::HashMap;
 
