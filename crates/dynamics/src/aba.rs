@@ -10,8 +10,8 @@ use crate::dispatch::kernel;
 use crate::forward_dynamics::{Method, forward_dynamics};
 use crate::kinematics::{World, positions};
 use crate::limbs;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 

@@ -12,12 +12,13 @@
 //! second-order differential dynamic programming for rigid-body systems* (2021).
 
 use crate::aba::check_arguments;
-use crate::aba_derivatives::{self, AbaDerivatives, minus_product};
+use crate::aba_derivatives::{self, AbaDerivatives};
 use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::{rnea_derivatives, rnea_hessian};
+use condyle_linalg::check;
+use condyle_linalg::tree_product::minus_product;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 

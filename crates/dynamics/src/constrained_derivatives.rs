@@ -13,13 +13,14 @@
 //! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
 //! programming for multi-phase rigid contact dynamics* (2018).
 
-use crate::aba_derivatives::{minus_product, subtract_column};
 use crate::constrained_equations;
 use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, Size};
-use crate::ltdl::{Ltdl, axpy};
+use condyle_linalg::Ltdl;
+use condyle_linalg::axpy::axpy;
 use condyle_linalg::sparsity::NonzeroRows;
+use condyle_linalg::tree_product::{minus_product, subtract_column};
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;

@@ -19,7 +19,7 @@ use crate::data::{Data, Size};
 use crate::dispatch::Kernel;
 use crate::kinematics::{World, place};
 use crate::limbs;
-use crate::ltdl::Ltdl;
+use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};

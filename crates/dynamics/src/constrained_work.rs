@@ -5,8 +5,8 @@
 use crate::constraint_set::ConstraintSet;
 use crate::data::{Data, check_forces};
 use crate::dispatch::{Kernel, fused, is_f64, same, short, slice};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_spatial::lanes::Fused;
 use condyle_spatial::{Constant, Force, Scalar};
 

@@ -14,8 +14,8 @@
 use crate::data::{Data, Size};
 use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, positions, velocities};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;

@@ -1,14 +1,14 @@
 //! Forward dynamics by the method that is fastest for the model.
 
 use crate::aba::aba;
-use crate::cholesky::Cholesky;
 use crate::crba::crba;
 use crate::data::{Data, check_forces};
 use crate::dispatch::kernel;
-use crate::ltdl::Ltdl;
 use crate::rnea::rnea;
+use condyle_linalg::Cholesky;
+use condyle_linalg::Ltdl;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_spatial::{Constant, Force, Scalar};
 
 /// A way to compute forward dynamics. All give the same numbers, up to rounding.

@@ -11,8 +11,8 @@
 use crate::data::{Data, Size, check_forces};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
