@@ -7,17 +7,19 @@
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
 
-use crate::aba::{check_arguments, one_by_one};
+use crate::aba::{self, check_arguments, one_by_one};
 use crate::articulated_solve::{self, minus_solve};
-use crate::data::{Data, Size};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::inputs::State;
+use crate::kinematics::World;
 use crate::limbs;
 use crate::ltdl::axpy;
 use crate::minv;
 use crate::model::{Coupled, Model};
 use crate::product;
 use crate::rnea_derivatives;
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -35,9 +37,9 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
-        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        let square = zero_matrix(size.nv, size.nv);
         let solve = articulated_solve::Workspace::new(&model.columns, size.nv);
-        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square, solve }
+        Self { a: filled(S::zero(), size.nv), da_dq: square.clone(), da_dv: square, solve }
     }
 }
 
@@ -186,26 +188,21 @@ pub struct AbaDerivatives<'d, S, R = f64> {
 }
 
 kernel! {
-    /// After `rnea_derivatives` and `minv`.
-    fn products(model, data) {
-        let (Minv, d, out) = (data.minv.matrix().as_slice(), &data.rnea_derivatives, &mut data.aba_derivatives);
-        let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
-        let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-        // ∂q̈ = −M⁻¹ ∂τ
+    /// ∂q̈ = −M⁻¹ ∂τ by products.
+    fn products<S>(Minv: &[S], dtau: [&[S]; 2], da: [&mut [S]; 2], coupled: &[Coupled]) {
         if S::LANES > 1 {
-            minus_products(Minv, dtau, da, &model.coupled);
+            minus_products(Minv, dtau, da, coupled);
         } else {
-            dtau.into_iter().zip(da).for_each(|(dtau, da)| minus_product(Minv, dtau, da, &model.coupled));
+            dtau.into_iter().zip(da).for_each(|(dtau, da)| minus_product(Minv, dtau, da, coupled));
         }
     }
 }
 
 kernel! {
-    /// After `aba` and `rnea_derivatives`.
-    fn solves(_model, data) {
-        let (d, Workspace { da_dq, da_dv, solve, .. }) = (&data.rnea_derivatives, &mut data.aba_derivatives);
-        let B = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
-        minus_solve(&data.world, &data.aba, solve, B, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);
+    /// ∂q̈ = −M⁻¹ ∂τ by the factors of the articulated bodies.
+    fn solves<S>(world: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>, dtau: [&[S]; 2]) {
+        let Workspace { da_dq, da_dv, solve, .. } = d;
+        minus_solve(world, f, solve, dtau, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);
     }
 }
 
@@ -244,11 +241,10 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
         data.rnea_derivatives.qd.copy_from_slice(v);
         data.rnea_derivatives.qdd.copy_from_slice(&data.aba.qdd);
         multiply(model, data);
-        let state = rnea_derivatives::view_of_limbs(model, data).state;
-        return data.aba_derivatives.view(data.minv.matrix(), state);
+    } else {
+        in_turn(model, data, q, v, tau, f_ext);
     }
-    in_turn(model, data, q, v, tau, f_ext);
-    let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
+    let state = rnea_derivatives::view(model, data).state;
     data.aba_derivatives.view(data.minv.matrix(), state)
 }
 
@@ -261,17 +257,19 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) {
+    one_by_one(model, data, q, v, tau, f_ext);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
-    a_kept.copy_from_slice(one_by_one(model, data, q, v, tau, f_ext));
-    rnea_derivatives::run(model, data, v, &a_kept, f_ext, &[]);
+    a_kept.copy_from_slice(&data.aba.qdd);
+    rnea_derivatives::run(model, &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext, &[]);
     data.aba_derivatives.a = a_kept;
     if data.minv.by_factor() {
-        minv::from_derivatives(model, data);
+        minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
     } else {
-        minv::from_factors(model, data); // those of `aba`
+        minv::from_factors(&model.columns, &data.world, &data.aba, &mut data.minv); // those of `aba`
     }
     if data.aba_derivatives.solve.pays() {
-        solves(model, data);
+        let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];
+        solves(&data.world, &data.aba, &mut data.aba_derivatives, dtau);
     } else {
         multiply(model, data);
     }
@@ -282,8 +280,11 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    if !product::minus_products(data.minv.matrix().as_slice(), dtau, da, &model.coupled) {
-        products(model, data);
+    let Minv = data.minv.matrix().as_slice();
+    if S::LANES > 1 || !product::minus_products(Minv, dtau, da, &model.coupled) {
+        let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+        let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
+        products(Minv, dtau, [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()], &model.coupled);
     }
 }
 

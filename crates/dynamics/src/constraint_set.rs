@@ -320,6 +320,7 @@ impl<S: Scalar> ConstraintSet<S> {
     }
 
     /// Panics unless this was made for a model of the same tree.
+    #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
         assert!(self.tree == model.tree, "constraints: made for another model than `{}`", model.name);

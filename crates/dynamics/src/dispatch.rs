@@ -1,118 +1,89 @@
-//! Where an algorithm is compiled for the vector instructions that this processor has.
+//! The gate to vector instructions: where passes are compiled, for which scalars, and with what.
 //!
-//! `kernel!` wraps the body of an algorithm, which is generic and inlined throughout, and lets the scalar choose the
-//! function in which it is compiled ([`Kernel`]):
+//! `kernel!` wraps a pass, whose body is generic and inlined throughout, into a function that is called:
 //!
-//! - a scalar that is made of vector instructions brings its level along;
-//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same
-//!   64 bits under another name: model, arguments and `Data` are looked at as if they were made of it;
-//! - all other scalars run as they are.
+//! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
+//!   instructions that the scalar is made of; whoever uses the library calls that code;
+//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same 64 bits
+//!   under another name;
+//! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
 #![allow(unsafe_code)]
 
-use crate::data::Data;
-use condyle_spatial::lanes::Fused;
-pub(crate) use condyle_spatial::lanes::{Kernel, short};
-use condyle_spatial::{Constant, Scalar};
+use condyle_spatial::block::Real;
+pub(crate) use condyle_spatial::lanes::{Fused, Kernel};
+pub(crate) use condyle_spatial::level::{Level, level};
 use core::any::TypeId;
+use core::mem::ManuallyDrop;
 
-/// Whether a kernel computes on `f64` throughout, so that it may do so under another name.
+/// Four numbers at once, with AVX2 or NEON.
+pub(crate) type Short = <f64 as Real>::Short;
+/// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
+pub(crate) type Long = <f64 as Real>::Long;
+
+/// Whether two types are the same one.
 #[inline(always)]
-pub(crate) fn is_f64<S: Scalar, R: Constant<S>>() -> bool {
-    TypeId::of::<(S, R)>() == TypeId::of::<(f64, f64)>()
+pub(crate) fn is<A: 'static, B: 'static>() -> bool {
+    TypeId::of::<A>() == TypeId::of::<B>()
 }
 
-/// An argument under another name of its numbers.
+/// An argument under another name of its type.
 ///
 /// # Safety
-/// `A` and `B` are the same type but for `f64` in place of [`Fused`], or the same type.
+/// `A` and `B` are the same type, or the same but for `f64` in place of [`Fused`]: a transparent wrapper. Workspaces and the
+/// structs of spatial algebra are `repr(C)`, hence laid out alike; nalgebra's matrices are transparent and `repr(C)` structs
+/// over a `Vec`. Of `Vec` it is taken for granted that its three words stand in the same order whatever it holds;
+/// `tests::one_layout` looks.
 #[inline(always)]
-pub(crate) unsafe fn slice<A, B>(a: &[A]) -> &[B] {
+pub(crate) unsafe fn renamed<A, B>(a: A) -> B {
     assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
-    // SAFETY: the elements are equal in size, alignment and validity: `Fused` is a transparent wrapper, and the structs of
-    // spatial algebra that it may be in are `repr(C)`.
-    unsafe { core::slice::from_raw_parts(a.as_ptr().cast(), a.len()) }
+    // SAFETY: by the caller; `a` is not dropped, so there is one of it.
+    unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
-/// What is to be written, under another name of its numbers.
-///
-/// # Safety
-/// As for `slice`.
-#[inline(always)]
-pub(crate) unsafe fn slice_mut<A, B>(a: &mut [A]) -> &mut [B] {
-    assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
-    // SAFETY: as for `slice`.
-    unsafe { core::slice::from_raw_parts_mut(a.as_mut_ptr().cast(), a.len()) }
-}
-
-/// The same thing under another name.
-///
-/// # Safety
-/// `A` and `B` are the same type.
-#[inline(always)]
-pub(crate) unsafe fn same<A, B>(a: &A) -> &B {
-    assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
-    // SAFETY: by the caller.
-    unsafe { &*core::ptr::from_ref(a).cast() }
-}
-
-/// Scratch whose numbers are looked at as [`Fused`].
-///
-/// # Safety
-/// `S` is `f64`.
-#[inline(always)]
-pub(crate) unsafe fn fused<S>(data: &mut Data<S>) -> &mut Data<Fused> {
-    assert!(size_of::<Data<S>>() == size_of::<Data<Fused>>());
-    // SAFETY: `Fused` is a transparent wrapper of `f64`; `Data`, the workspaces in it and the structs of spatial algebra are
-    // `repr(C)`, hence laid out alike; nalgebra's matrices are transparent and `repr(C)` structs over a `Vec`. Of `Vec` it is
-    // taken for granted that its three words stand in the same order whatever it holds; `tests::one_layout` looks.
-    unsafe { &mut *core::ptr::from_mut(data).cast() }
-}
-
-impl Data<f64> {
-    /// The same scratch, for one who computes as algorithms on `f64` do.
-    #[doc(hidden)]
-    pub fn fused(&mut self) -> &mut Data<Fused> {
-        // SAFETY: S is f64.
-        unsafe { fused(self) }
-    }
-}
-
-/// A function that runs its body, generic over the scalar `S` and the model's constants `R`, compiled for the right level.
-///
-/// The body may return nothing: what it computes is in the data.
+/// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
+/// the head of `dispatch.rs`. It returns nothing: what it computes is in its arguments.
 macro_rules! kernel {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident($model:ident, $data:ident $(, $arg:ident: $type:ty)* $(,)?) $body:block) => {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident<$S:ident $(, $R:ident)?>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$doc])*
-        #[inline(always)]
+        #[inline]
         #[allow(unsafe_code, clippy::too_many_arguments)]
-        $vis fn $name<S: Scalar, R: Constant<S>>($model: &Model<R>, $data: &mut Data<S> $(, $arg: $type)*) {
-            #[inline(always)]
-            fn body<S: Scalar, R: Constant<S>>($model: &Model<R>, $data: &mut Data<S> $(, $arg: $type)*) $body
+        $vis fn $name<$S: Scalar $(, $R: Constant<$S>)?>($($arg: $type),*) {
+            use $crate::dispatch::{Fused, Kernel, Level, Long, Short, is, level};
 
-            #[allow(unused_imports)] // by kernels without slices
-            use $crate::dispatch::{Kernel, fused, is_f64, same, short, slice};
-
-            struct Work<M, D, T>(M, D, T);
-            impl<S: Scalar, R: Constant<S>> Kernel for Work<&Model<R>, &mut Data<S>, ($($type,)*)> {
+            struct Work<T, Scalars>(T, core::marker::PhantomData<Scalars>);
+            impl<$S: Scalar $(, $R: Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
                 #[inline(always)]
                 fn run(self) {
-                    let Work(model, data, ($($arg,)*)) = self;
-                    body(model, data $(, $arg)*);
-                }
-                #[inline(always)]
-                fn run_fused(self) {
-                    if !is_f64::<S, R>() {
-                        return self.run();
-                    }
-                    let Work(model, data, ($($arg,)*)) = self;
-                    // SAFETY: S and R are f64, and by contract the processor has the level.
-                    unsafe {
-                        let model: &Model<f64> = same(model);
-                        short(Work(model, fused(data), ($(slice($arg),)*)));
-                    }
+                    let Work(($($arg,)*), _) = self;
+                    $body
                 }
             }
-            S::enter(Work($model, $data, ($($arg,)*)));
+
+            if !$S::COMPILED {
+                return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), core::marker::PhantomData));
+            }
+            $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
+            let (f64, fused) = (is::<$S, f64>(), is::<$S, f64>() && level() > Level::Baseline);
+            $crate::dispatch::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
+            $crate::dispatch::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
+            $crate::dispatch::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
+            $crate::dispatch::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
+        }
+    };
+    // the function compiled for one scalar, if it is the one
+    (@call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)) => {
+        let chosen = $chosen;
+        {
+            type $S = $scalar;
+            $(type $R = f64;)?
+            #[inline(never)]
+            fn compiled($($arg: $type),*) {
+                $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), core::marker::PhantomData));
+            }
+            if chosen {
+                // SAFETY: R is f64, and S is this scalar, or f64 in place of `Fused`.
+                return unsafe { compiled($($crate::dispatch::renamed($arg)),*) };
+            }
         }
     };
 }

@@ -33,7 +33,6 @@ mod configuration;
 mod constrained_derivatives;
 mod constrained_dynamics;
 mod constrained_equations;
-mod constrained_work;
 mod constraint;
 mod constraint_motion;
 mod constraint_set;
@@ -81,6 +80,7 @@ mod statics;
 mod ties;
 mod two_handles;
 mod urdf;
+mod workspace;
 mod xml;
 
 pub use aba::aba;

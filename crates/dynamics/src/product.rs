@@ -4,13 +4,12 @@
 //! where they still fit, and so are had twice. Each entry is the same sum in the same order as in
 //! `aba_derivatives::minus_product`.
 
-use crate::dispatch::{slice, slice_mut};
+use crate::dispatch::{Long, Short, is, renamed};
 use crate::model::Coupled;
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real};
+use condyle_spatial::block::Block;
 use condyle_spatial::lanes::Kernel;
 use condyle_spatial::level::{Level, level};
-use core::any::TypeId;
 use core::marker::PhantomData;
 
 /// How many columns of B go together.
@@ -21,19 +20,22 @@ const UNDER_WAY: usize = 8;
 /// X = −A B for two matrices B, if this is the way to take; whether it is.
 #[inline]
 pub(crate) fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], coupled: &[Coupled]) -> bool {
-    if TypeId::of::<S>() != TypeId::of::<f64>() || level() == Level::Baseline || coupled.len() < 4 {
+    if !is::<S, f64>() || level() == Level::Baseline || coupled.len() < 4 {
         return false;
     }
-    let [X0, X1] = X;
     // SAFETY: S is f64.
     #[allow(unsafe_code)]
-    let (A, B, X) = unsafe { (slice(A), [slice(B[0]), slice(B[1])], [slice_mut(X0), slice_mut(X1)]) };
-    if level() >= Level::Avx512 && coupled.len() >= 8 {
-        <f64 as Real>::Long::enter(Products::<<f64 as Real>::Long> { A, B, X, coupled, vector: PhantomData });
-    } else {
-        <f64 as Real>::Short::enter(Products::<<f64 as Real>::Short> { A, B, X, coupled, vector: PhantomData });
-    }
+    let (A, B, X): (&[f64], [&[f64]; 2], [&mut [f64]; 2]) = unsafe { (renamed(A), renamed(B), renamed(X)) };
+    multiply(A, B, X, coupled);
     true
+}
+
+fn multiply(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], coupled: &[Coupled]) {
+    if level() >= Level::Avx512 && coupled.len() >= 8 {
+        Long::enter(Products::<Long> { A, B, X, coupled, vector: PhantomData });
+    } else {
+        Short::enter(Products::<Short> { A, B, X, coupled, vector: PhantomData });
+    }
 }
 
 struct Products<'a, V> {
@@ -61,10 +63,6 @@ impl<V: Block<Number = f64>> Kernel for Products<'_, V> {
             2 => self.all::<2>(),
             _ => self.all::<3>(),
         }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
     }
 }
 

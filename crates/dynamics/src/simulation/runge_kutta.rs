@@ -14,6 +14,7 @@ use crate::configuration::integrate;
 use crate::data::Data;
 use crate::joint::GroupJacobian;
 use crate::model::Model;
+use crate::workspace::filled;
 use condyle_spatial::{Constant, Scalar};
 
 #[derive(Clone, Debug)]
@@ -33,7 +34,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = vec![S::zero(); model.nv];
+        let zero = filled(S::zero(), model.nv);
         Self {
             effort: zero.clone(),
             xi: zero.clone(),

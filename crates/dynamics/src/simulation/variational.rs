@@ -30,6 +30,7 @@ use crate::layout::Single;
 use crate::ltdl::Ltdl;
 use crate::model::Model;
 use crate::passive::{passive_torque, passive_torque_derivative};
+use crate::workspace::filled;
 use condyle_spatial::{Constant, Scalar};
 
 /// Shape, where none is given: nv. Written by: `step`, where nothing else is said.
@@ -63,7 +64,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = vec![S::zero(); model.nv];
+        let zero = filled(S::zero(), model.nv);
         Self {
             p: zero.clone(),
             w: zero.clone(),
@@ -76,7 +77,7 @@ impl<S: Scalar> Workspace<S> {
             carried: zero.clone(),
             pushed: zero.clone(),
             residual: zero,
-            slope: vec![S::zero(); model.nv * model.nv],
+            slope: filled(S::zero(), model.nv * model.nv),
             lagrangian: lagrangian::Workspace::new(model),
             M: Ltdl::new(model),
         }
