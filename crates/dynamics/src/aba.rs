@@ -5,14 +5,15 @@
 //! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
 //! matrix is inverted.
 
-use crate::data::{Data, check, check_forces};
+use crate::data::{Data, check_forces};
 use crate::dispatch::kernel;
 use crate::forward_dynamics::{Method, by_factor};
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Single};
 use crate::limbs;
-use crate::model::Model;
 use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 
 /// In the world's frame.
@@ -66,7 +67,7 @@ fn eliminate<L: Layout>(
     mut Ia: ArticulatedInertia<L::S>,
 ) -> ArticulatedInertia<L::S> {
     for k in (0..l.joint(i).nv()).rev() {
-        let c = l.slot(i) + k;
+        let c = l.column(i) + k;
         U[c] = Ia * S[c]; // U = Iᴬ S
         D_inv[c] = (S[c].dot(U[c]) + l.armature(i, k)).recip(); // D = Sᵀ U
         Ia = Ia.minus_outer(U[c], D_inv[c]); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
@@ -79,10 +80,10 @@ fn eliminate<L: Layout>(
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;
     for i in l.bodies() {
-        IA[l.level(i)] = ArticulatedInertia::from(w.oX[i].act(l.inertia(i)));
-        for &j in l.finished(i) {
-            let Ia = eliminate(l, &w.S, U, D_inv, j, l.whole(j, IA[l.level(j)]));
-            l.lift(IA, j, Ia); // Iᴬ_λ += Iᵃ
+        IA[l.stack_index(i)] = ArticulatedInertia::from(w.oX[i].act(l.inertia(i)));
+        for &j in l.closed_by(i) {
+            let Ia = eliminate(l, &w.S, U, D_inv, j, l.sum_lanes(j, IA[l.stack_index(j)]));
+            l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
         }
     }
 }
@@ -116,28 +117,28 @@ pub(crate) fn inward<L: Layout>(
     for i in l.bodies() {
         let mut vJ = Motion::zero();
         for k in 0..l.joint(i).nv() {
-            vJ = S[l.slot(i) + k].scale_add(l.load(qd, i, k), vJ); // v_J = S q̇
+            vJ = S[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
         }
-        let vi = l.above(v, i) + vJ; // v_i = v_λ + v_J
+        let vi = l.parent_on_stack(v, i) + vJ; // v_i = v_λ + v_J
         let I = oX[i].act(l.inertia(i));
         let mut pi = vi.cross(I * vi); // p_i = v_i ×* I_i v_i
         if let Some(external) = l.force(f_ext, i) {
             pi -= oX[i].act(external);
         }
-        let here = l.level(i);
+        let here = l.stack_index(i);
         (v[here], IA[here], pA[here]) = (vi, ArticulatedInertia::from(I), pi);
         c[i] = vi.cross(vJ); // c_i = v_i × v_J
-        for &j in l.finished(i) {
-            let here = l.level(j);
-            let Ia = eliminate(l, S, U, D_inv, j, l.whole(j, IA[here]));
-            let mut pa = l.whole(j, pA[here]);
+        for &j in l.closed_by(i) {
+            let here = l.stack_index(j);
+            let Ia = eliminate(l, S, U, D_inv, j, l.sum_lanes(j, IA[here]));
+            let mut pa = l.sum_lanes(j, pA[here]);
             for k in (0..l.joint(j).nv()).rev() {
-                let s = l.slot(j) + k;
-                u[s] = l.load(tau, j, k) - S[s].dot(pa); // u = τ − Sᵀ pᴬ
+                let s = l.column(j) + k;
+                u[s] = l.joint_velocity(tau, j, k) - S[s].dot(pa); // u = τ − Sᵀ pᴬ
                 pa = U[s].scale_add(D_inv[s] * u[s], pa);
             }
-            l.lift(IA, j, Ia); // Iᴬ_λ += Iᵃ
-            l.lift(pA, j, pa + Ia * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
+            l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
+            l.add_to_parent_on_stack(pA, j, pa + Ia * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
         }
     }
 }
@@ -149,14 +150,14 @@ pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
     a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
     qdd.fill(L::S::zero());
     for i in l.bodies() {
-        let mut ai = l.above(a, i) + c[i]; // a' = a_λ + c
+        let mut ai = l.parent_on_stack(a, i) + c[i]; // a' = a_λ + c
         for k in 0..l.joint(i).nv() {
-            let s = l.slot(i) + k;
+            let s = l.column(i) + k;
             let x = D_inv[s] * (u[s] - ai.dot(U[s])); // q̈ = D⁻¹ (u − Uᵀ a')
-            l.add(qdd, i, k, x);
+            l.add_joint_effort(qdd, i, k, x);
             ai = S[s].scale_add(x, ai); // a = a' + S q̈
         }
-        a[l.level(i)] = ai;
+        a[l.stack_index(i)] = ai;
     }
 }
 
@@ -215,10 +216,10 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
 pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) {
     data.check(model);
     model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("tau", tau.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("tau", tau.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
 }
 
 /// Body by body, for arguments that fit; leaves what depends on q behind.

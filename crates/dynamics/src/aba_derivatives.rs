@@ -16,10 +16,11 @@ use crate::kinematics::World;
 use crate::limbs;
 use crate::ltdl::axpy;
 use crate::minv;
-use crate::model::{Coupled, Model};
 use crate::product;
 use crate::rnea_derivatives;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -38,22 +39,22 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = zero_matrix(size.nv, size.nv);
-        let solve = articulated_solve::Workspace::new(&model.columns, size.nv);
+        let solve = articulated_solve::Workspace::new(model.columns(), size.nv);
         Self { a: filled(S::zero(), size.nv), da_dq: square.clone(), da_dv: square, solve }
     }
 }
 
-/// C = −A B, of square matrices, where column j of B has zeros but in the rows of `coupled[j]`.
+/// C = −A B, of square matrices, where column j of B has zeros but in the rows of `nonzero_rows[j]`.
 ///
 /// Four columns with the same rows, as those of one limb have, go together: as many entries of each as there are registers
 /// for stay there while their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored
 /// a quarter as often.
 #[inline(always)]
-pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &[Coupled]) {
-    let (n, mut j) = (coupled.len(), 0);
+pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
+    let (n, mut j) = (nonzero_rows.len(), 0);
     while j < n {
-        let Coupled { rows, alike } = &coupled[j];
-        let many = if *alike >= 4 { 4 } else { 1 };
+        let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
+        let many = if *same_pattern >= 4 { 4 } else { 1 };
         let (b, c) = (&B[j * n..(j + many) * n], &mut C[j * n..(j + many) * n]);
         match (many, size_of::<S>()) {
             (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n),
@@ -70,11 +71,11 @@ pub(crate) fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], coupled: &
 
 /// Twice `minus_product` with one A that is symmetric, in lanes, where matrices are too large for the nearest cache.
 #[inline(always)]
-fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], coupled: &[Coupled]) {
-    let (n, mut j) = (coupled.len(), 0);
+fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+    let (n, mut j) = (nonzero_rows.len(), 0);
     while j < n {
-        let Coupled { rows, alike } = &coupled[j];
-        let many = (*alike).min(4);
+        let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
+        let many = (*same_pattern).min(4);
         let columns = j * n..(j + many) * n;
         let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
         let C = [&mut C0[columns.clone()], &mut C1[columns]];
@@ -189,7 +190,7 @@ pub struct AbaDerivatives<'d, S, R = f64> {
 
 kernel! {
     /// ∂q̈ = −M⁻¹ ∂τ by products.
-    fn products<S>(Minv: &[S], dtau: [&[S]; 2], da: [&mut [S]; 2], coupled: &[Coupled]) {
+    fn products<S>(Minv: &[S], dtau: [&[S]; 2], da: [&mut [S]; 2], coupled: &[NonzeroRows]) {
         if S::LANES > 1 {
             minus_products(Minv, dtau, da, coupled);
         } else {
@@ -265,7 +266,7 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
     if data.minv.by_factor() {
         minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
     } else {
-        minv::from_factors(&model.columns, &data.world, &data.aba, &mut data.minv); // those of `aba`
+        minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // those of `aba`
     }
     if data.aba_derivatives.solve.pays() {
         let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];
@@ -281,10 +282,10 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
     let Minv = data.minv.matrix().as_slice();
-    if S::LANES > 1 || !product::minus_products(Minv, dtau, da, &model.coupled) {
+    if S::LANES > 1 || !product::minus_products(Minv, dtau, da, model.nonzero_rows()) {
         let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
         let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
-        products(Minv, dtau, [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()], &model.coupled);
+        products(Minv, dtau, [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()], model.nonzero_rows());
     }
 }
 

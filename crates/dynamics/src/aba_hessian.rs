@@ -13,11 +13,13 @@
 
 use crate::aba::check_arguments;
 use crate::aba_derivatives::{self, AbaDerivatives, minus_product};
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
-use crate::model::{Coupled, Model};
 use crate::workspace::{Size, filled, zero_matrix};
 use crate::{rnea_derivatives, rnea_hessian};
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_model::Model;
+use condyle_model::check;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -68,7 +70,7 @@ impl<S: Scalar> Workspace<S> {
 kernel! {
     /// After `aba_derivatives` and the Hessian of φ.
     fn run<S>(
-        coupled: &[Coupled],
+        coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,
         Minv: &DMatrix<S>,
         phi: &rnea_hessian::Workspace<S>,
@@ -142,7 +144,7 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     lambda: &[S],
 ) -> AbaHessian<'d, S, R> {
-    check("lambda", lambda.len(), model.nv);
+    check("lambda", lambda.len(), model.nv());
     check_arguments(model, data, q, v, tau, f_ext);
     aba_derivatives::in_turn(model, data, q, v, tau, f_ext);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);
@@ -153,7 +155,7 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     rnea_hessian::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &mu);
     data.aba_hessian.mu = mu;
     let (first, Minv) = (&data.aba_derivatives, data.minv.matrix());
-    run(&model.coupled, first, Minv, &data.rnea_hessian, &mut data.aba_hessian);
+    run(model.nonzero_rows(), first, Minv, &data.rnea_hessian, &mut data.aba_hessian);
     let state = rnea_derivatives::view(model, data).state;
     let first = data.aba_derivatives.view(data.minv.matrix(), state);
     let Workspace { dqdq, dvdq, dvdv, dtaudq, .. } = &data.aba_hessian;

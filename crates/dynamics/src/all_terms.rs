@@ -5,13 +5,14 @@
 
 use crate::centroidal::{self, CentroidalMapRate, shift_rate};
 use crate::coriolis::Coriolis;
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Layout, Pairs, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -58,7 +59,7 @@ fn pass<L: Pairs>(
     for i in l.bodies() {
         let mut a_i = l.parent(a, i);
         for k in 0..l.joint(i).nv() {
-            a_i = dS[l.slot(i) + k].scale_add(l.load(qd, i, k), a_i); // a_i = a_λ + Ṡ q̇
+            a_i = dS[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), a_i); // a_i = a_λ + Ṡ q̇
         }
         let I = oX[i].act(l.inertia(i));
         a[i] = a_i;
@@ -75,22 +76,22 @@ fn pass<L: Pairs>(
         let support = l.support(i);
         let nv = l.joint(i).nv();
         for k in 0..nv {
-            let (c, own) = (l.slot(i) + k, support.len() - nv + k);
+            let (c, own) = (l.column(i) + k, support.len() - nv + k);
             let F_c = IC[i] * S[c]; // Iᶜ S
             F[c] = F_c;
             dF[c] = dIC * S[c] + IC[i] * dS[c]; // İᶜ S + Iᶜ Ṡ
-            l.add(h, i, k, S[c].dot(f[i])); // h = Sᵀ f
+            l.add_joint_effort(h, i, k, S[c].dot(f[i])); // h = Sᵀ f
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F_c); // M_ej = S_eᵀ Iᶜ S_j for every ancestor e
-                l.put_at(M, e, support[own], x);
-                l.put_at(M, support[own], e, x);
+                l.set_entry(M, e, support[own], x);
+                l.set_entry(M, support[own], e, x);
             }
-            l.put_at(M, support[own], support[own], S[c].dot(F_c));
+            l.set_entry(M, support[own], support[own], S[c].dot(F_c));
         }
         let (IC_i, BC_i, f_i) = (IC[i], BC[i], f[i]);
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
-        l.push(BC, i, BC_i);
-        l.push(f, i, f_i); // f_λ += f_i
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(BC, i, BC_i);
+        l.add_to_parent(f, i, f_i); // f_λ += f_i
     }
     l.add_armature(M);
 }
@@ -154,8 +155,8 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> AllTerms<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, &mut data.world, q);
     velocities(model, &data.world, &mut data.moving, v);
     run(model, &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);

@@ -6,8 +6,8 @@
 
 use crate::aba;
 use crate::kinematics::World;
-use crate::model::Column;
 use crate::workspace::filled;
+use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 
 /// How many columns of B go together.

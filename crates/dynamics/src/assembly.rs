@@ -8,7 +8,7 @@
 //! thus has ⌈log₂ n⌉ levels of joins, and any tree O(log n). No cut is made below a body that without its load would not
 //! resist its own joint (one without mass, say): the piece above the cut could not be solved on its own.
 
-use crate::model::{Body, Model};
+use condyle_model::{Body, Model};
 use condyle_spatial::{Act, ArticulatedInertia, Se3, Vec3};
 
 /// A joint whose inertia is a smaller part of its body's mass (kg) and rotational inertia (kg m²) counts as without any.
@@ -91,19 +91,19 @@ pub(crate) struct Assembly {
 impl Assembly {
     /// Runs have at most `grain` bodies, or more where no cut can be made.
     pub(crate) fn new<R>(model: &Model<R>, grain: usize) -> Self {
-        let bodies = model.bodies.len();
+        let bodies = model.bodies().len();
         let mut children = vec![Vec::new(); bodies];
         let mut weight = vec![1; bodies];
         for i in (1..bodies).rev() {
-            let parent = model.bodies[i].parent;
+            let parent = model.bodies()[i].parent;
             children[parent].push(i);
             weight[parent] += weight[i];
         }
         for children in &mut children {
             children.sort_by_key(|&i| (usize::MAX - weight[i], i)); // the heaviest first
         }
-        let nv = model.bodies.iter().map(|b| b.joint.nv()).collect();
-        let firm = model.bodies.iter().map(firm).collect();
+        let nv = model.bodies().iter().map(|b| b.joint.nv()).collect();
+        let firm = model.bodies().iter().map(firm).collect();
         let mut plan = Planner { children, weight, nv, firm, grain, pieces: Vec::new(), links: Vec::new() };
         if bodies > 1 {
             let roots = plan.children[0].clone();
@@ -221,7 +221,7 @@ fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> 
 
 /// Whether each D of the body's joint is positive with nothing hanging on it; in its own frame, where S is constant.
 fn firm(body: &Body) -> bool {
-    let inertia = Se3::new(body.joint.reframing(), Vec3::zero()).act_inv(body.inertia);
+    let inertia = Se3::new(body.joint.axis_rotation(), Vec3::zero()).act_inv(body.inertia);
     let rotational = inertia.rotational;
     let least = FREE * (inertia.mass + rotational.xx + rotational.yy + rotational.zz);
     let mut Ia = ArticulatedInertia::from(inertia);

@@ -9,8 +9,8 @@
 
 mod pass;
 
-use crate::data::check;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
 use condyle_spatial::Force;
 use condyle_spatial::block::Real;
 use condyle_spatial::level::{Level, level};
@@ -70,7 +70,7 @@ impl<T: Real> Batch<T> {
                 Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
                 Level::Avx512 => InLanes::Long(Group::new(model, states, threads)),
             },
-            vectors: vec![T::zero(); states * model.nv],
+            vectors: vec![T::zero(); states * model.nv()],
         }
     }
 
@@ -93,23 +93,23 @@ impl<T: Real> Batch<T> {
             InLanes::Short(g) => g.check(model),
             InLanes::Long(g) => g.check(model),
         }
-        let states = from.q.len() / model.nq.max(1);
+        let states = from.q.len() / model.nq().max(1);
         assert!(
-            states * model.nq == from.q.len() && states <= self.states,
+            states * model.nq() == from.q.len() && states <= self.states,
             "q: expected {} numbers for each of at most {} states, found {}",
-            model.nq,
+            model.nq(),
             self.states,
             from.q.len()
         );
         for (name, found) in names.into_iter().zip([from.v.len(), from.x.len()]).filter(|(name, _)| !name.is_empty()) {
-            check(name, found, states * model.nv);
+            check(name, found, states * model.nv());
         }
-        let (found, forces) = (from.f_ext.len(), states * model.nodes.len());
+        let (found, forces) = (from.f_ext.len(), states * model.nodes().len());
         assert!(
             found == 0 || found == forces,
             "f_ext: expected no force or {forces} (one for each body of each state), found {found}"
         );
-        let vectors = &mut self.vectors[..if has_vectors { states * model.nv } else { 0 }];
+        let vectors = &mut self.vectors[..if has_vectors { states * model.nv() } else { 0 }];
         if states > 0 {
             match &mut self.lanes {
                 InLanes::Single(g) => g.run(pass, model, states, from, vectors),
@@ -121,7 +121,7 @@ impl<T: Real> Batch<T> {
     }
 
     fn vectors(&self, model: &Model, states: usize) -> &[T] {
-        &self.vectors[..states * model.nv]
+        &self.vectors[..states * model.nv()]
     }
 
     fn matrices(&self, kind: usize, states: usize) -> Matrices<'_, T> {

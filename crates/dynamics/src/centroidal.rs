@@ -7,13 +7,14 @@
 //! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Layout, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
@@ -61,11 +62,11 @@ fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
     }
     for i in l.bodies().rev() {
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             F[c] = IC[i] * S[c]; // Iᶜ S
         }
         let IC_i = IC[i];
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
     }
 }
 
@@ -81,20 +82,20 @@ fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S
     for i in l.bodies().rev() {
         let dIC = BC[i].inertia_rate();
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             F[c] = IC[i] * S[c]; // Iᶜ S
             dF[c] = dIC * S[c] + IC[i] * m.dS[c]; // İᶜ S + Iᶜ Ṡ
         }
         let (IC_i, BC_i) = (IC[i], BC[i]);
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
-        l.push(BC, i, BC_i);
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(BC, i, BC_i);
     }
 }
 
 /// Adds a column to the coordinate that it follows.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: Force<S>) {
-    let column = &model.columns[c];
+    let column = &model.columns()[c];
     let (f, at) = (f.scale(S::splat(column.ratio)).to_array(), 6 * column.coordinate);
     for (entry, &f) in matrix.as_mut_slice()[at..at + 6].iter_mut().zip(&f) {
         *entry += f;
@@ -206,7 +207,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
 ) -> CentroidalMap<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     positions(model, &mut data.world, q);
     run_map(model, &data.world, &mut data.centroidal);
     shift_map(model, &mut data.centroidal)
@@ -243,8 +244,8 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> CentroidalMapRate<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, &mut data.world, q);
     velocities(model, &data.world, &mut data.moving, v);
     run_map_rate(model, &data.world, &data.moving, &mut data.centroidal);

@@ -14,12 +14,13 @@
 
 use crate::centroidal::{about, add};
 use crate::coriolis::Coriolis;
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, accelerations, positions, velocities};
-use crate::layout::{Layout, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -91,7 +92,7 @@ fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d
     for i in l.bodies().rev() {
         let (v_parent, a_parent): (Motion<_>, Motion<_>) = (l.parent(&m.v, i), l.parent(&m.a, i));
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             let Psid = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
             let Psidd = a_parent.cross(S[c]) + v_parent.cross(Psid); // Ψ̈ = a_λ × S + v_λ × Ψ̇
             columns[c] = Column {
@@ -102,9 +103,9 @@ fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d
             };
         }
         let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
-        l.push(IC, i, IC_i);
-        l.push(BC, i, BC_i);
-        l.push(F, i, F_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
+        l.add_to_parent(F, i, F_i);
     }
 }
 
@@ -132,7 +133,7 @@ fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> Centroi
     }
     let of = [&d.drate_da, &d.dh_dq, &d.drate_dq, &d.drate_dv];
     for (to, from) in [&mut d.dcom_dq, &mut d.dvcom_dq, &mut d.dacom_dq, &mut d.dacom_dv].into_iter().zip(of) {
-        for j in 0..model.nv {
+        for j in 0..model.nv() {
             for i in 0..3 {
                 to[(i, j)] = from[(i, j)] * per_mass;
             }
@@ -207,9 +208,9 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
 ) -> CentroidalDerivatives<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
     positions(model, &mut data.world, q);
     velocities(model, &data.world, &mut data.moving, v);
     accelerations(model, &data.world, &mut data.moving, a);

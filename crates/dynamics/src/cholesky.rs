@@ -2,8 +2,8 @@
 //!
 //! Source: Golub and Van Loan, *Matrix Computations* (4th edition), algorithm 4.2.1, column by column.
 
-use crate::data::check;
 use crate::ltdl::{axpy, dot};
+use condyle_model::check;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 

@@ -10,7 +10,7 @@
 //! Jacobian is part of [`centroidal_map`](crate::centroidal_map).
 
 use crate::frames::{Accelerations, Placements, Velocities};
-use crate::layout::{Layout, Single};
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Scalar, Vec3};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {

@@ -20,8 +20,9 @@ use crate::constraint_set::ConstraintSet;
 use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::ltdl::{Ltdl, axpy};
-use crate::model::{Coupled, Model};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -114,18 +115,18 @@ struct Equations<'e, S> {
     inertia: &'e DMatrix<S>,
     r: &'e DMatrix<S>,
     c: &'e DMatrix<S>,
-    coupled: &'e [Coupled],
+    nonzero_rows: &'e [NonzeroRows],
     touching: &'e [Vec<usize>],
 }
 
 impl<S: Scalar> Equations<'_, S> {
     #[inline(always)]
     fn solve(self, da: &mut DMatrix<S>, dlambda: &mut DMatrix<S>) {
-        minus_product(self.P.as_slice(), self.r.as_slice(), da.as_mut_slice(), self.coupled); // −P r − J̄ c
+        minus_product(self.P.as_slice(), self.r.as_slice(), da.as_mut_slice(), self.nonzero_rows); // −P r − J̄ c
         subtract_product(self.Jbar, self.c, da, self.touching);
         dlambda.as_mut_slice().fill(S::zero());
         subtract_product(self.inertia, self.c, dlambda, self.touching);
-        subtract_product(self.dlambda_dtau, self.r, dlambda, self.coupled); // J̄ᵀ r − Λ c
+        subtract_product(self.dlambda_dtau, self.r, dlambda, self.nonzero_rows); // J̄ᵀ r − Λ c
     }
 }
 
@@ -133,17 +134,17 @@ impl<S: Scalar> ConstraintSet<S> {
     /// The derivatives of acceleration and forces with respect to q, for r and `dgamma_dq`.
     #[inline(always)]
     fn respond_to_q(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        let Self { Jbar, dlambda_dtau, delassus, coupled, touching, dgamma_dq, dlambda_dq, .. } = self;
+        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, dgamma_dq, dlambda_dq, .. } = self;
         let (c, inertia) = (dgamma_dq, &delassus.inverse);
-        Equations { P, Jbar, dlambda_dtau, inertia, r, c, coupled, touching }.solve(da, dlambda_dq);
+        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching }.solve(da, dlambda_dq);
     }
 
     /// The same with respect to v, for r and `dgamma_dv`.
     #[inline(always)]
     fn respond_to_v(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        let Self { Jbar, dlambda_dtau, delassus, coupled, touching, dgamma_dv, dlambda_dv, .. } = self;
+        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, dgamma_dv, dlambda_dv, .. } = self;
         let (c, inertia) = (dgamma_dv, &delassus.inverse);
-        Equations { P, Jbar, dlambda_dtau, inertia, r, c, coupled, touching }.solve(da, dlambda_dv);
+        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching }.solve(da, dlambda_dv);
     }
 }
 

@@ -14,14 +14,15 @@
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::crba;
-use crate::data::{Data, check, check_forces};
+use crate::data::{Data, check_forces};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Pairs, Single};
 use crate::limbs;
 use crate::ltdl::Ltdl;
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -71,7 +72,7 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
     for i in l.bodies() {
         let mut vJ = Motion::zero();
         for k in 0..l.joint(i).nv() {
-            vJ = w.S[l.slot(i) + k].scale_add(l.load(qd, i, k), vJ); // v_J = S q̇
+            vJ = w.S[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
         }
         v[i] = l.parent(v, i) + vJ; // v_i = v_λ + v_J
         a[i] = l.parent(a, i) + v[i].cross(vJ); // a_i = a_λ + v_i × v_J
@@ -84,10 +85,10 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
     effort.fill(L::S::zero());
     for i in l.bodies().rev() {
         for k in 0..l.joint(i).nv() {
-            l.add(effort, i, k, w.S[l.slot(i) + k].dot(F[i])); // h = Sᵀ F
+            l.add_joint_effort(effort, i, k, w.S[l.column(i) + k].dot(F[i])); // h = Sᵀ F
         }
         let F_i = F[i];
-        l.push(F, i, F_i); // F_λ += F_i
+        l.add_to_parent(F, i, F_i); // F_λ += F_i
     }
     crba::carry(l, w, IC, M.as_mut_slice());
 }
@@ -241,10 +242,10 @@ impl<S: Scalar> Inputs<'_, S> {
         data.check(model);
         constraints.check(model);
         model.check_regular();
-        check("q", self.q.len(), model.nq);
-        check("v", self.v.len(), model.nv);
-        check("tau", self.tau.len(), model.nv);
-        check_forces(self.f_ext.len(), model.nodes.len());
+        check("q", self.q.len(), model.nq());
+        check("v", self.v.len(), model.nv());
+        check("tau", self.tau.len(), model.nv());
+        check_forces(self.f_ext.len(), model.nodes().len());
     }
 }
 

@@ -20,8 +20,8 @@ use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::frames::Placements;
 use crate::kinematics::World;
-use crate::model::Model;
 use crate::rnea_derivatives;
+use condyle_model::Model;
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
 use nalgebra::DMatrix;
 

@@ -1,8 +1,8 @@
 //! What constraints are: frames that touch the world, and frames of two bodies that are held together.
 
-use crate::error::Error;
 use crate::frames::ReferenceFrame;
-use crate::model::Model;
+use condyle_model::Error;
+use condyle_model::Model;
 use condyle_spatial::{Constant, Motion, Scalar, Se3};
 use serde::{Deserialize, Serialize};
 
@@ -121,14 +121,14 @@ impl Constraint {
     /// The bodies of both frames, unless something is wrong with this constraint or with it beside the ones before.
     pub(crate) fn bodies<R>(&self, model: &Model<R>, before: &[Self]) -> Result<[usize; 2], Error> {
         let wrong = |what| Err(Error::Constraint { constraint: before.len(), what });
-        let frames = model.frames.len();
+        let frames = model.frames().len();
         if let Some(frame) = [Some(self.frame), self.other].into_iter().flatten().find(|&f| f >= frames) {
             return wrong(format!("there is no frame {frame}: the model has {frames}"));
         }
-        let frame = &model.frames[self.frame];
-        let bodies = [frame.body, self.other.map_or(0, |other| model.frames[other].body)];
+        let frame = &model.frames()[self.frame];
+        let bodies = [frame.body, self.other.map_or(0, |other| model.frames()[other].body)];
         if bodies[0] == bodies[1] {
-            let other = self.other.map_or("world", |other| &model.frames[other].name);
+            let other = self.other.map_or("world", |other| &model.frames()[other].name);
             return wrong(format!("frames `{}` and `{other}` do not move relative to each other", frame.name));
         }
         if self.reference == ReferenceFrame::World {

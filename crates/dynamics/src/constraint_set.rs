@@ -7,11 +7,12 @@
 use crate::constraint::{Constraint, ConstraintKind, Target};
 use crate::delassus::Delassus;
 use crate::elimination::NONE;
-use crate::error::Error;
 use crate::frames::ReferenceFrame;
 use crate::limbs::Held;
 use crate::ltdl::Ltdl;
-use crate::model::{Coupled, Model};
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_model::Error;
+use condyle_model::Model;
 use condyle_spatial::{Scalar, Se3, Vec3};
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -139,7 +140,7 @@ pub struct ConstraintSet<S> {
     /// Of the tree that it was made for.
     tree: u64,
     /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
-    pub(crate) coupled: Vec<Coupled>,
+    pub(crate) nonzero_rows: Vec<NonzeroRows>,
     /// For each coordinate, the rows of J in which it may differ from zero.
     pub(crate) touching: Vec<Vec<usize>>,
     /// J on the places of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
@@ -174,11 +175,11 @@ impl<S: Scalar> ConstraintSet<S> {
     pub fn new<R>(model: &Model<R>, constraints: &[Constraint]) -> Result<Self, Error> {
         let factor = Ltdl::<S>::new(model);
         let tree = factor.tree();
-        let mut place = vec![0; model.nv];
+        let mut place = vec![0; model.nv()];
         for (k, &coordinate) in tree.order.iter().enumerate() {
             place[coordinate] = k;
         }
-        let support = |body: usize| &model.support[model.nodes[body].support..][..model.nodes[body].depth];
+        let support = |body: usize| model.support(&model.nodes()[body]);
         let mut plans: Vec<Plan> = Vec::new();
         let (mut row, mut start) = (0, 0);
         for (i, constraint) in constraints.iter().enumerate() {
@@ -186,7 +187,7 @@ impl<S: Scalar> ConstraintSet<S> {
             let ways = bodies.map(|body| {
                 let mut way = BTreeSet::new(); // with all places before, to the root
                 for &c in support(body) {
-                    let mut k = place[model.columns[c].coordinate];
+                    let mut k = place[model.columns()[c].coordinate];
                     while k != NONE && way.insert(k) {
                         k = tree.parent[k];
                     }
@@ -199,7 +200,7 @@ impl<S: Scalar> ConstraintSet<S> {
             let second = (shared + 1..places.len()).find(|&j| branch(&places[j]) != branch(&places[j - 1]));
             let columns: BTreeSet<usize> = bodies.iter().flat_map(|&body| support(body)).copied().collect();
             let touch = |column: usize| {
-                let c = &model.columns[column];
+                let c = &model.columns()[column];
                 Touch {
                     column,
                     at: places.binary_search(&place[c.coordinate]).expect("its place is on the way"),
@@ -209,9 +210,10 @@ impl<S: Scalar> ConstraintSet<S> {
                     second: support(bodies[1]).contains(&column),
                 }
             };
-            let placement = |frame: usize| model.frames[frame].placement;
+            let placement = |frame: usize| model.frames()[frame].placement;
             let placements = [placement(constraint.frame), constraint.other.map_or(Se3::identity(), placement)];
-            let turn = |k: usize| Se3::new(model.nodes[bodies[k]].reframing.transpose(), Vec3::zero()) * placements[k];
+            let turn =
+                |k: usize| Se3::new(model.nodes()[bodies[k]].axis_rotation.transpose(), Vec3::zero()) * placements[k];
             let mut plan = Plan {
                 kind: constraint.kind,
                 reference: constraint.reference,
@@ -234,24 +236,24 @@ impl<S: Scalar> ConstraintSet<S> {
             start += plan.rows() * plan.places.len();
             plans.push(plan);
         }
-        let (rows, entries, nv) = (row, start, model.nv);
+        let (rows, entries, nv) = (row, start, model.nv());
         let touching = |k: usize| {
             let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
             touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
         };
-        let coupled = |k: usize| {
+        let nonzero_rows = |k: usize| {
             // what carries a frame moves the force on the other one
             let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
             let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
-            model.coupled[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
+            model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
         };
         let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
         Ok(Self {
             proximal: Proximal::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
             nv,
-            tree: model.tree,
-            coupled: Coupled::with((0..nv).map(coupled).collect()),
+            tree: model.tree_hash(),
+            nonzero_rows: NonzeroRows::of_columns((0..nv).map(nonzero_rows).collect()),
             touching: (0..nv).map(touching).collect(),
             J: vec![o; entries],
             gamma: vec![o; rows],
@@ -323,6 +325,6 @@ impl<S: Scalar> ConstraintSet<S> {
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
-        assert!(self.tree == model.tree, "constraints: made for another model than `{}`", model.name);
+        assert!(self.tree == model.tree_hash(), "constraints: made for another model than `{}`", model.name());
     }
 }

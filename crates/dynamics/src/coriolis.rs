@@ -11,12 +11,13 @@
 //! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 numbers other than zero, given by the momentum
 //! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, positions, velocities};
-use crate::layout::{Pairs, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;
 
@@ -118,24 +119,24 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L:
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
         for k in 0..nv {
-            let s = l.slot(i) + k;
+            let s = l.column(i) + k;
             let column = own[k];
             let IS = IC[i] * S[s]; // Iᶜ S_d
             let BS = BC[i].apply_transpose(S[s]).scale(half); // Bᵀ S_d
             let F = IC[i] * dS[s] + BC[i].apply(S[s]).scale(half); // Iᶜ Ṡ_d + B S_d
             for &e in before {
                 let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
-                l.put_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS)); // C_de
-                l.put_at(C, e, column, S_e.dot(F)); // C_ed
+                l.set_entry(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS)); // C_de
+                l.set_entry(C, e, column, S_e.dot(F)); // C_ed
             }
             for &e in own {
                 let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
-                l.put_at(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS));
+                l.set_entry(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS));
             }
         }
         let (IC_i, BC_i) = (IC[i], BC[i]);
-        l.push(IC, i, IC_i);
-        l.push(BC, i, BC_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
     }
 }
 
@@ -173,8 +174,8 @@ pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> &'d DMatrix<S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, &mut data.world, q);
     velocities(model, &data.world, &mut data.moving, v);
     run(model, &data.world, &data.moving, &mut data.coriolis);

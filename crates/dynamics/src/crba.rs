@@ -3,13 +3,14 @@
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2; in the world's frame, where a composite is
 //! a plain sum.
 
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Columns, Single};
 use crate::limbs;
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Columns, Single};
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
 
@@ -50,19 +51,19 @@ pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [
     for i in l.bodies().rev() {
         let support = l.support(i);
         let nv = l.joint(i).nv();
-        l.make_whole(IC, i);
+        l.sum_lanes_at(IC, i);
         for k in 0..nv {
-            let F = IC[i] * S[l.slot(i) + k]; // F = Iᶜ S
-            let (own, column) = (support.len() - nv + k, l.own(i, k));
+            let F = IC[i] * S[l.column(i) + k]; // F = Iᶜ S
+            let (own, column) = (support.len() - nv + k, l.own_column(i, k));
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
-                l.put_right(M, column, e, x);
-                l.put_below(M, column, e, x);
+                l.set_column(M, column, e, x);
+                l.set_row(M, column, e, x);
             }
-            l.put_below(M, column, support[own], l.at(S, support[own]).dot(F));
+            l.set_row(M, column, support[own], l.at(S, support[own]).dot(F));
         }
         let IC_i = IC[i];
-        l.push(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
     }
     l.add_armature(M);
 }
@@ -93,7 +94,7 @@ kernel! {
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     if limbs::run(limbs::Task::Crba, model, data, q, &[], &[], &[]) {
         return &data.crba.M;
     }

@@ -3,13 +3,13 @@
 
 use crate::dispatch::{Long, Short, is, renamed};
 use crate::kinematics::{Moving, World};
-use crate::model::Model;
 use crate::workspace::Size;
 use crate::{
     aba, aba_derivatives, aba_hessian, all_terms, centroidal, centroidal_derivatives, constrained_derivatives,
     constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, minv, regressor, rnea,
     rnea_derivatives, rnea_hessian, statics,
 };
+use condyle_model::Model;
 use condyle_spatial::Scalar;
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
@@ -76,7 +76,7 @@ impl<S: Scalar> Data<S> {
         let size = Size::new(model);
         Self {
             size,
-            tree: model.tree,
+            tree: model.tree_hash(),
             world: World::new(size),
             moving: Moving::new(size),
             rnea: rnea::Workspace::new(size),
@@ -178,20 +178,13 @@ impl<S> Data<S> {
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
         let made_for = (self.size.bodies, self.size.columns, self.size.nv);
-        let given = (model.nodes.len(), model.columns.len(), model.nv);
+        let given = (model.nodes().len(), model.columns().len(), model.nv());
         let other = if made_for == given { " in another tree" } else { "" };
         assert!(
-            self.tree == model.tree,
+            self.tree == model.tree_hash(),
             "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}{other}"
         );
     }
-}
-
-/// Panics unless an argument has as many numbers as it must have.
-#[inline]
-#[track_caller]
-pub(crate) fn check(argument: &str, found: usize, expected: usize) {
-    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
 }
 
 /// Panics unless there is a force for each body, the world included, or none at all.

@@ -8,13 +8,14 @@
 //! number of degrees of freedom. Joints that share a coordinate are set free, and tied again afterwards (`ties.rs`).
 
 use crate::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
-use crate::data::{check, check_forces};
-use crate::joint::Joint;
-use crate::layout::{Layout, Single};
-use crate::model::Model;
+use crate::data::check_forces;
 use crate::parts::{Body, Dof, Part};
 use crate::ties::Ties;
 use crate::two_handles::TwoHandles;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::joint::Joint;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Motion, Scalar, Se3, Vec3};
 
 /// Forward dynamics by divide and conquer: the plan for one model, and its scratch.
@@ -81,13 +82,13 @@ impl<S: Scalar> DivideConquer<S> {
             qdd: S::zero(),
         };
         Self {
-            tree: model.tree,
+            tree: model.tree_hash(),
             bodies: vec![body; assembly.links.len()],
-            dofs: vec![dof; model.columns.len()],
+            dofs: vec![dof; model.columns().len()],
             handles: vec![TwoHandles::nothing(); assembly.pieces.len()],
             ties: Ties::new(model, &assembly.links),
-            zero: vec![S::zero(); model.nv],
-            qdd: vec![S::zero(); model.nv],
+            zero: vec![S::zero(); model.nv()],
+            qdd: vec![S::zero(); model.nv()],
             assembly,
         }
     }
@@ -108,18 +109,18 @@ impl<S: Scalar> DivideConquer<S> {
     /// If an argument has the wrong length, `model` is not of the tree of the one that was planned for, or M is singular
     /// ([`Model::singular_joints`]).
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
-        let (bodies, planned) = (model.nodes.len(), self.bodies.len() + 1);
+        let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);
         let other = if bodies == planned { " in another tree" } else { "" };
-        assert!(model.tree == self.tree, "model: planned for {planned} bodies, found {bodies}{other}");
+        assert!(model.tree_hash() == self.tree, "model: planned for {planned} bodies, found {bodies}{other}");
         model.check_regular();
-        check("q", q.len(), model.nq);
-        check("v", v.len(), model.nv);
-        check("tau", tau.len(), model.nv);
+        check("q", q.len(), model.nq());
+        check("v", v.len(), model.nv());
+        check("tau", tau.len(), model.nv());
         check_forces(f_ext.len(), bodies);
         let l = Single::<S, R>::new(model);
         let mut dofs = self.dofs.iter_mut();
         for link in &self.assembly.links {
-            let node = &model.nodes[link.body];
+            let node = &model.nodes()[link.body];
             for (k, dof) in dofs.by_ref().take(node.joint.nv()).enumerate() {
                 let leads = node.mimic.is_none(); // efforts and armature of a shared coordinate act at its leader
                 dof.tau = if leads { tau[node.idx_v + k] } else { S::zero() };
@@ -139,7 +140,7 @@ impl<S: Scalar> DivideConquer<S> {
         }
         let mut dofs = dofs.iter();
         for link in &assembly.links {
-            let node = &model.nodes[link.body];
+            let node = &model.nodes()[link.body];
             for (k, dof) in dofs.by_ref().take(node.joint.nv()).enumerate() {
                 if node.mimic.is_none() {
                     qdd[node.idx_v + k] = dof.qdd;
@@ -299,7 +300,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         let mut vJ = Motion::zero();
         for k in 0..l.joint(i).nv() {
             dofs[k].S = l.joint(i).column(&body.oX, k);
-            vJ = dofs[k].S.scale_add(l.load(self.qd, i, k), vJ); // v_J = S q̇
+            vJ = dofs[k].S.scale_add(l.joint_velocity(self.qd, i, k), vJ); // v_J = S q̇
         }
         body.v = v + vJ; // v_i = v_λ + v_J
         body.c = body.v.cross(vJ); // c_i = v_i × v_J

@@ -4,7 +4,7 @@
 //! branches; the coordinates are then eliminated in the order of least coupling, and the rows follow the elimination tree
 //! of that order (Liu, *The role of elimination trees in sparse factorization*, 1990).
 
-use crate::model::Column;
+use condyle_model::tree::Column;
 use std::collections::BTreeSet;
 
 /// Stands for the parent of a root.

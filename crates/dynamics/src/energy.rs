@@ -4,9 +4,9 @@ use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, forward_velocities};
-use crate::layout::{Layout, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
@@ -49,7 +49,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     #[inline(always)]
     pub(crate) fn rotors(&self) -> S {
         let mut twice = S::zero();
-        for (&armature, &qd) in self.model.armature.iter().zip(&self.moving.qd) {
+        for (&armature, &qd) in self.model.armature().iter().zip(&self.moving.qd) {
             twice += armature.lift() * qd * qd;
         }
         twice
@@ -106,15 +106,15 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
     for i in l.bodies().rev() {
         let v_parent: Motion<_> = l.parent(&m.v, i);
         for k in 0..l.joint(i).nv() {
-            let S = S[l.slot(i) + k];
-            l.add(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
-            l.add(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
+            let S = S[l.column(i) + k];
+            l.add_joint_effort(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
+            l.add_joint_effort(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
             let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com)); // ∂(m c)/∂q = m S_v + S_ω × m c
-            l.add(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
+            l.add_joint_effort(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
         }
         let (IC_i, h_i) = (IC[i], h[i]);
-        l.push(IC, i, IC_i);
-        l.push(h, i, h_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(h, i, h_i);
     }
     l.add_armature_torque(&m.qd, dT_dv);
 }

@@ -3,12 +3,13 @@
 use crate::aba::aba;
 use crate::cholesky::Cholesky;
 use crate::crba::crba;
-use crate::data::{Data, check, check_forces};
+use crate::data::{Data, check_forces};
 use crate::dispatch::kernel;
 use crate::ltdl::Ltdl;
-use crate::model::Model;
 use crate::rnea::rnea;
 use crate::workspace::filled;
+use condyle_model::Model;
+use condyle_model::check;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -40,9 +41,9 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(model: &Model<R>) -> Self {
         Self {
             sparse: Ltdl::new(model),
-            dense: Cholesky::new(model.nv),
-            qdd: filled(S::zero(), model.nv),
-            zero: filled(S::zero(), model.nv),
+            dense: Cholesky::new(model.nv()),
+            qdd: filled(S::zero(), model.nv()),
+            zero: filled(S::zero(), model.nv()),
         }
     }
 }
@@ -122,10 +123,10 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
 ) -> &'d [S] {
     data.check(model);
     model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("tau", tau.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("tau", tau.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
     match method.unwrap_or(Method::fastest(model)) {
         Method::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
         method => {

@@ -15,7 +15,7 @@
 //! derivative costs O(depth + nv); nothing allocates.
 
 use crate::frames::{Accelerations, ReferenceFrame, Velocities, add, clear};
-use crate::layout::{Layout, Single};
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Motion, Scalar, Se3};
 use nalgebra::DMatrix;
 
@@ -45,12 +45,12 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// If there is no such frame, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     pub fn frame_velocity_derivative(&self, frame: usize, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
-        self.velocity_derivative(self.model.frames[frame].body, self.frame(frame), reference, dv_dq);
+        self.velocity_derivative(self.model.frames()[frame].body, self.frame(frame), reference, dv_dq);
     }
 
     #[inline(always)]
     fn velocity_derivative(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
-        clear("dv_dq", dv_dq, self.model.nv);
+        clear("dv_dq", dv_dq, self.model.nv());
         let (oXr, v) = (reference.pose(oXf), self.moving.v[body]);
         self.each_column(body, |c, parent| {
             let S_c = self.world.S[c];
@@ -66,8 +66,8 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
         let l = Single::<S, R>::new(self.model);
         let mut i = body;
         while i > 0 {
-            let parent = self.model.nodes[i].parent;
-            (0..l.joint(i).nv()).for_each(|k| of(l.slot(i) + k, parent));
+            let parent = self.model.nodes()[i].parent;
+            (0..l.joint(i).nv()).for_each(|k| of(l.column(i) + k, parent));
             i = parent;
         }
     }
@@ -109,7 +109,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DMatrix<S>,
         da_dv: &mut DMatrix<S>,
     ) {
-        self.acceleration_derivatives(self.model.frames[frame].body, self.frame(frame), reference, da_dq, da_dv);
+        self.acceleration_derivatives(self.model.frames()[frame].body, self.frame(frame), reference, da_dq, da_dv);
     }
 
     fn acceleration_derivatives(
@@ -120,8 +120,8 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DMatrix<S>,
         da_dv: &mut DMatrix<S>,
     ) {
-        clear("da_dq", da_dq, self.model.nv);
-        clear("da_dv", da_dv, self.model.nv);
+        clear("da_dq", da_dq, self.model.nv());
+        clear("da_dv", da_dv, self.model.nv());
         self.each_column(body, |c, parent| {
             let d = self.column(body, oXf, reference, c, parent);
             add(self.model, da_dq, c, d.a_q);
@@ -155,9 +155,9 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DMatrix<S>,
         da_dv: &mut DMatrix<S>,
     ) {
-        clear("da_dq", da_dq, self.model.nv);
-        clear("da_dv", da_dv, self.model.nv);
-        let (body, oXf) = (self.model.frames[frame].body, self.frame(frame));
+        clear("da_dq", da_dq, self.model.nv());
+        clear("da_dv", da_dv, self.model.nv());
+        let (body, oXf) = (self.model.frames()[frame].body, self.frame(frame));
         let v = self.frame_velocity(frame, reference);
         let turning = |d: Motion<S>| d.angular.cross(v.linear) + v.angular.cross(d.linear); // δω × v + ω × δv
         self.each_column(body, |c, parent| {

@@ -10,8 +10,8 @@
 //! (acceleration). Each question about one body or frame costs O(1), a Jacobian O(depth + nv); nothing allocates.
 
 use crate::kinematics::{Moving, World};
-use crate::layout::{Columns, Single};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Single};
 use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3};
 use core::ops::Deref;
 use nalgebra::DMatrix;
@@ -91,7 +91,7 @@ impl<'d, S, R> Deref for Accelerations<'d, S, R> {
 /// Adds a column of a Jacobian to the coordinate that it follows.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, s: Motion<S>) {
-    let column = &model.columns[c];
+    let column = &model.columns()[c];
     let s = s.scale(S::splat(column.ratio)).to_array();
     for (row, &s) in s.iter().enumerate() {
         J[(row, column.coordinate)] += s;
@@ -112,7 +112,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// If there is no such body.
     #[inline(always)]
     pub fn body(&self, body: usize) -> Se3<S> {
-        let zXb = Se3::new(self.model.nodes[body].reframing.transpose(), Vec3::zero());
+        let zXb = Se3::new(self.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
         self.world.oX[body] * zXb.lift()
     }
 
@@ -122,7 +122,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// If there is no such frame.
     #[inline(always)]
     pub fn frame(&self, frame: usize) -> Se3<S> {
-        let frame = &self.model.frames[frame];
+        let frame = &self.model.frames()[frame];
         self.body(frame.body) * frame.placement.lift()
     }
 
@@ -140,12 +140,12 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// If there is no such frame, or `J` is not 6 × nv.
     #[inline(always)]
     pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        self.jacobian(self.model.frames[frame].body, self.frame(frame), reference, J);
+        self.jacobian(self.model.frames()[frame].body, self.frame(frame), reference, J);
     }
 
     #[inline(always)]
     fn jacobian(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        clear("J", J, self.model.nv);
+        clear("J", J, self.model.nv());
         let oXr = reference.pose(oXf);
         for &c in Single::<S, R>::new(self.model).support(body) {
             add(self.model, J, c, oXr.act_inv(self.world.S[c])); // J = oXr⁻¹ S
@@ -170,7 +170,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// If there is no such frame.
     #[inline(always)]
     pub fn frame_velocity(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
-        reference.pose(self.frame(frame)).act_inv(self.moving.v[self.model.frames[frame].body])
+        reference.pose(self.frame(frame)).act_inv(self.moving.v[self.model.frames()[frame].body])
     }
 
     /// The rate dJ/dt of a body's Jacobian, 6 × nv, as for [`frame_jacobian_rate`](Self::frame_jacobian_rate). dJ is
@@ -204,12 +204,12 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or `dJ` is not 6 × nv.
     pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
-        self.jacobian_rate(self.model.frames[frame].body, self.frame(frame), reference, dJ);
+        self.jacobian_rate(self.model.frames()[frame].body, self.frame(frame), reference, dJ);
     }
 
     #[inline(always)]
     fn jacobian_rate(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
-        clear("dJ", dJ, self.model.nv);
+        clear("dJ", dJ, self.model.nv());
         let (oXr, v_r) = (reference.pose(oXf), reference.velocity(oXf, self.moving.v[body]));
         for &c in Single::<S, R>::new(self.model).support(body) {
             let s = self.moving.dS[c] - v_r.cross(self.world.S[c]);
@@ -240,7 +240,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// # Panics
     /// If there is no such frame.
     pub fn frame_acceleration(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
-        reference.pose(self.frame(frame)).act_inv(self.moving.a[self.model.frames[frame].body])
+        reference.pose(self.frame(frame)).act_inv(self.moving.a[self.model.frames()[frame].body])
     }
 
     /// The classical acceleration of a body's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its

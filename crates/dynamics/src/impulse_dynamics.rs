@@ -20,14 +20,15 @@ use crate::constrained_dynamics::{factorize, inertia, solve};
 use crate::constrained_equations::{load, turn};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Layout, Single};
 use crate::ltdl::axpy;
-use crate::model::Model;
 use crate::rnea_derivatives;
 use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -121,8 +122,8 @@ where
     data.check(model);
     constraints.check(model);
     model.check_regular();
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
 }
 
 /// The whole algorithm, for arguments that fit.
@@ -195,9 +196,9 @@ fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::
         let v_parent = l.parent(velocity, i);
         let mut v_i = v_parent;
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             Psid[c] = v_parent.cross(S[c]);
-            v_i = S[c].scale_add(l.load(w, i, k), v_i);
+            v_i = S[c].scale_add(l.joint_velocity(w, i, k), v_i);
         }
         velocity[i] = v_i;
     }

@@ -12,13 +12,13 @@
 //! Of forward dynamics, M q̈ + h = τ gives ∂q̈/∂· = −M⁻¹ B.
 
 use crate::aba_derivatives::AbaDerivatives;
-use crate::elementary::tanh;
 use crate::frames::Placements;
 use crate::kinematics::World;
 use crate::limbs::Seen;
-use crate::model::Model;
 use crate::regressor::{PARAMETERS, effort};
 use crate::rnea_derivatives::{RneaDerivatives, Workspace};
+use condyle_model::Model;
+use condyle_model::elementary::tanh;
 use condyle_spatial::{Act, Constant, Inertia, Motion, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
@@ -58,7 +58,7 @@ impl Input {
             Self::Force(_) => 6,
             Self::Inertia(_) => PARAMETERS,
             Self::Gravity => 3,
-            Self::Armature | Self::Damping | Self::Friction { .. } => model.nv,
+            Self::Armature | Self::Damping | Self::Friction { .. } => model.nv(),
         }
     }
 }
@@ -77,7 +77,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     /// oXb, in the body's public frame.
     fn pose(&self, b: usize) -> Se3<S> {
         if let Some(limbs) = self.limbs {
-            return limbs.pose(b) * Se3::new(self.model.nodes[b].reframing.transpose(), Vec3::zero()).lift();
+            return limbs.pose(b) * Se3::new(self.model.nodes()[b].axis_rotation.transpose(), Vec3::zero()).lift();
         }
         Placements { model: self.model, world: self.world }.body(b)
     }
@@ -87,7 +87,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         if let Some(limbs) = self.limbs {
             return limbs.column(i, k);
         }
-        self.world.S[self.model.nodes[i].column + k]
+        self.world.S[self.model.nodes()[i].column + k]
     }
 
     /// Velocity, and acceleration with gravity as the world's.
@@ -108,7 +108,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 
     /// The columns of body b's joint and of all before it: of which body, and the how manieth.
     fn columns(&self, b: usize) -> impl Iterator<Item = (usize, usize)> {
-        let nodes = &self.model.nodes;
+        let nodes = &self.model.nodes();
         let way = std::iter::successors(Some(b), |&i| Some(nodes[i].parent)).take_while(|&i| i > 0);
         way.flat_map(|i| (0..nodes[i].joint.nv()).map(move |k| (i, k)))
     }
@@ -120,7 +120,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
             Input::Force(b) => {
                 let oXb = self.pose(b);
                 for (i, k) in self.columns(b) {
-                    let column = &model.columns[model.nodes[i].column + k];
+                    let column = &model.columns()[model.nodes()[i].column + k];
                     let S_b = oXb.act_inv(self.column(i, k)).scale(S::splat(-column.ratio)).to_array(); // −J_bᵀ
                     (0..6).for_each(|k| give(column.coordinate, k, S_b[k]));
                 }
@@ -130,32 +130,32 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
                 let (oXb, (v, a)) = (self.pose(b), self.moving(b));
                 let (v_b, a_b) = (oXb.act_inv(v), oXb.act_inv(a));
                 for (i, k) in self.columns(b) {
-                    let column = &model.columns[model.nodes[i].column + k];
+                    let column = &model.columns()[model.nodes()[i].column + k];
                     let y = effort(oXb.act_inv(self.column(i, k)).scale(S::splat(column.ratio)), v_b, a_b);
                     (0..PARAMETERS).for_each(|k| give(column.coordinate, k, y[k]));
                 }
             }
             Input::Gravity => {
-                for i in 1..model.nodes.len() {
-                    for k in 0..model.nodes[i].joint.nv() {
-                        let column = &model.columns[model.nodes[i].column + k];
+                for i in 1..model.nodes().len() {
+                    for k in 0..model.nodes()[i].joint.nv() {
+                        let column = &model.columns()[model.nodes()[i].column + k];
                         let weight = (self.carried(i) * self.column(i, k)).linear.scale(S::splat(-column.ratio));
                         (weight.to_array().into_iter().enumerate()).for_each(|(k, x)| give(column.coordinate, k, x));
                     }
                 }
             }
-            Input::Armature => (0..model.nv).for_each(|k| give(k, k, pass.qdd[k])),
-            Input::Damping => (0..model.nv).for_each(|k| give(k, k, pass.qd[k])),
+            Input::Armature => (0..model.nv()).for_each(|k| give(k, k, pass.qdd[k])),
+            Input::Damping => (0..model.nv()).for_each(|k| give(k, k, pass.qd[k])),
             Input::Friction { smoothing } => {
                 assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");
-                (0..model.nv).for_each(|k| give(k, k, tanh(pass.qd[k] * S::splat(1.0 / smoothing))));
+                (0..model.nv()).for_each(|k| give(k, k, tanh(pass.qd[k] * S::splat(1.0 / smoothing))));
             }
         }
     }
 
     /// Fills a derivative with zeros, if it has the right shape.
     fn clear(&self, name: &str, out: &mut DMatrix<S>, input: Input) {
-        let shape = (self.model.nv, input.len(self.model));
+        let shape = (self.model.nv(), input.len(self.model));
         assert!(out.shape() == shape, "{name}: expected {} × {}, found {:?}", shape.0, shape.1, out.shape());
         out.fill(S::zero());
     }

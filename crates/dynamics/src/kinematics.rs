@@ -1,14 +1,16 @@
 //! Where the bodies are and how they move: one pass from the root to the tips for all bodies. What can then be asked is
 //! in `frames.rs`.
 
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Placements, Velocities};
-use crate::joint::{Joint, Turns};
-use crate::layout::{Layout, Single};
 use crate::limbs;
-use crate::model::Model;
 use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::joint::Joint;
+use condyle_model::joint::kinematics::JointSinCos;
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
 /// What depends on the position alone, in the world's frame.
@@ -16,7 +18,7 @@ use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 #[repr(C)]
 pub(crate) struct World<S> {
     /// Written by: `place`, and by `rnea`.
-    pub turns: Turns<S>,
+    pub sin_cos: JointSinCos<S>,
     /// oXi: the body's turned frame in the world. Shape: bodies. Written by: `place`.
     pub oX: Vec<Se3<S>>,
     /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
@@ -39,7 +41,7 @@ pub(crate) enum Placed {
 impl<S: Scalar> World<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            turns: Turns::new(size.bodies),
+            sin_cos: JointSinCos::new(size.bodies),
             oX: filled(Se3::identity(), size.bodies),
             S: filled(Motion::zero(), size.columns),
             placed: Placed::Nowhere,
@@ -49,14 +51,14 @@ impl<S: Scalar> World<S> {
 
 /// oXi = oXλ λXi, and the columns of S, for all bodies.
 #[inline(always)]
-pub(crate) fn place<L: Layout>(l: &L, World { turns, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
+pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
     *placed = Placed::Bodies;
-    Joint::turns(l, q, turns);
+    Joint::sin_cos(l, q, sin_cos);
     for i in l.bodies() {
-        oX[i] = l.parent(oX, i) * Joint::turned_placement(l, i, q, turns.sin[i], turns.cos[i]); // oXi = oXλ λXi
+        oX[i] = l.parent(oX, i) * Joint::placement_with(l, i, q, sin_cos.sin[i], sin_cos.cos[i]); // oXi = oXλ λXi
         let joint = l.joint(i);
         for k in 0..joint.nv() {
-            S[l.slot(i) + k] = joint.column(&oX[i], k); // oXi S, in the world
+            S[l.column(i) + k] = joint.column(&oX[i], k); // oXi S, in the world
         }
     }
 }
@@ -94,11 +96,11 @@ fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>
     for i in l.bodies() {
         let mut v_i = l.parent(v, i);
         for k in 0..l.joint(i).nv() {
-            v_i = S[l.slot(i) + k].scale_add(l.load(qd, i, k), v_i); // v_i = v_λ + S q̇
+            v_i = S[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), v_i); // v_i = v_λ + S q̇
         }
         v[i] = v_i;
         for k in 0..l.joint(i).nv() {
-            dS[l.slot(i) + k] = v_i.cross(S[l.slot(i) + k]); // Ṡ = v_i × S: S is fixed in the body
+            dS[l.column(i) + k] = v_i.cross(S[l.column(i) + k]); // Ṡ = v_i × S: S is fixed in the body
         }
     }
 }
@@ -110,8 +112,8 @@ fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L:
     for i in l.bodies() {
         let mut a_i = l.parent(a, i);
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
-            a_i = S[c].scale_add(l.load(qdd, i, k), dS[c].scale_add(l.load(qd, i, k), a_i)); // a_i = a_λ + S q̈ + Ṡ q̇
+            let c = l.column(i) + k;
+            a_i = S[c].scale_add(l.joint_velocity(qdd, i, k), dS[c].scale_add(l.joint_velocity(qd, i, k), a_i)); // a_i = a_λ + S q̈ + Ṡ q̇
         }
         a[i] = a_i;
     }
@@ -185,7 +187,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
 ) -> Placements<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     positions(model, &mut data.world, q);
     Placements { model, world: &data.world }
 }
@@ -213,8 +215,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> Velocities<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     positions(model, &mut data.world, q);
     velocities(model, &data.world, &mut data.moving, v);
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
@@ -246,9 +248,9 @@ pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
 ) -> Accelerations<'d, S, R> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
     positions(model, &mut data.world, q);
     velocities(model, &data.world, &mut data.moving, v);
     accelerations(model, &data.world, &mut data.moving, a);

@@ -7,9 +7,9 @@
 //! Where joints share a coordinate (mimic), the tree is that of `elimination.rs`: right everywhere, and without fill-in
 //! where the joints' own tree is.
 
-use crate::data::check;
 use crate::elimination::{NONE, Tree};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
@@ -136,8 +136,8 @@ pub struct Ltdl<S> {
 impl<S: Scalar> Ltdl<S> {
     /// Finds the zeros of a model's M and allocates the factor.
     pub fn new<R>(model: &Model<R>) -> Self {
-        let tree = Tree::new(&model.columns, model.nv, step::<S>());
-        Self { rows: vec![S::zero(); tree.first[model.nv]], D_inv: vec![S::zero(); model.nv], tree }
+        let tree = Tree::new(model.columns(), model.nv(), step::<S>());
+        Self { rows: vec![S::zero(); tree.first[model.nv()]], D_inv: vec![S::zero(); model.nv()], tree }
     }
 
     /// The order and the tree of the places.

@@ -7,13 +7,15 @@
 
 use crate::aba;
 use crate::crba::crba;
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
 use crate::limbs;
 use crate::ltdl::Ltdl;
-use crate::model::{Column, Model};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::tree::Column;
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 
@@ -155,7 +157,7 @@ kernel! {
 pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
     model.check_regular();
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     if data.minv.by_factor {
         if limbs::run(limbs::Task::Minv, model, data, q, &[], &[], &[]) {
             return &data.minv.Minv;
@@ -166,6 +168,6 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     }
     positions(model, &mut data.world, q);
     aba::factors(model, &data.world, &mut data.aba);
-    from_factors(&model.columns, &data.world, &data.aba, &mut data.minv);
+    from_factors(model.columns(), &data.world, &data.aba, &mut data.minv);
     &data.minv.Minv
 }

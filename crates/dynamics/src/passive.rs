@@ -11,9 +11,9 @@
 //! and to 1e-6 from 7.25 ε, and at rest a joint creeps (a load below f moves it with less than ε artanh(load/f))
 //! instead of sticking. An explicit integrator needs steps shorter than 2 ε m/f, m the inertia that the joint feels.
 
-use crate::data::check;
-use crate::elementary::tanh;
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::elementary::tanh;
 use condyle_spatial::Scalar;
 
 /// τ = −d v − f tanh(v/ε): the efforts of damping and smoothed friction, in O(n).
@@ -38,9 +38,9 @@ use condyle_spatial::Scalar;
 /// If an argument has the wrong length, or `smoothing` is not positive.
 pub fn passive_torque<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, tau: &mut [S]) {
     check_arguments(model, v, smoothing, "tau", tau.len());
-    for k in 0..model.nv {
-        let friction = tanh(v[k] * S::splat(1.0 / smoothing)) * S::splat(model.friction[k]);
-        tau[k] = v[k].mul_add(S::splat(-model.damping[k]), -friction); // −d v − f tanh(v/ε)
+    for k in 0..model.nv() {
+        let friction = tanh(v[k] * S::splat(1.0 / smoothing)) * S::splat(model.friction()[k]);
+        tau[k] = v[k].mul_add(S::splat(-model.damping()[k]), -friction); // −d v − f tanh(v/ε)
     }
 }
 
@@ -60,16 +60,16 @@ pub fn passive_torque<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, t
 /// If an argument has the wrong length, or `smoothing` is not positive.
 pub fn passive_torque_derivative<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, dtau_dv: &mut [S]) {
     check_arguments(model, v, smoothing, "dtau_dv", dtau_dv.len());
-    for k in 0..model.nv {
+    for k in 0..model.nv() {
         let t = tanh(v[k] * S::splat(1.0 / smoothing));
-        let slope = (S::one() - t * t) * S::splat(model.friction[k] / smoothing);
-        dtau_dv[k] = -S::splat(model.damping[k]) - slope; // −d − f/ε (1 − tanh²)
+        let slope = (S::one() - t * t) * S::splat(model.friction()[k] / smoothing);
+        dtau_dv[k] = -S::splat(model.damping()[k]) - slope; // −d − f/ε (1 − tanh²)
     }
 }
 
 #[track_caller]
 fn check_arguments<S, R>(model: &Model<R>, v: &[S], smoothing: f64, name: &str, out: usize) {
-    check("v", v.len(), model.nv);
-    check(name, out, model.nv);
+    check("v", v.len(), model.nv());
+    check(name, out, model.nv());
     assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");
 }

@@ -5,7 +5,7 @@
 //! `aba_derivatives::minus_product`.
 
 use crate::dispatch::{Long, Short, is, renamed};
-use crate::model::Coupled;
+use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::Scalar;
 use condyle_spatial::block::Block;
 use condyle_spatial::lanes::Kernel;
@@ -19,7 +19,7 @@ const UNDER_WAY: usize = 8;
 
 /// X = −A B for two matrices B, if this is the way to take; whether it is.
 #[inline]
-pub(crate) fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], coupled: &[Coupled]) -> bool {
+pub(crate) fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], coupled: &[NonzeroRows]) -> bool {
     if !is::<S, f64>() || level() == Level::Baseline || coupled.len() < 4 {
         return false;
     }
@@ -30,11 +30,11 @@ pub(crate) fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2],
     true
 }
 
-fn multiply(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], coupled: &[Coupled]) {
+fn multiply(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], coupled: &[NonzeroRows]) {
     if level() >= Level::Avx512 && coupled.len() >= 8 {
-        Long::enter(Products::<Long> { A, B, X, coupled, vector: PhantomData });
+        Long::enter(Products::<Long> { A, B, X, nonzero_rows: coupled, vector: PhantomData });
     } else {
-        Short::enter(Products::<Short> { A, B, X, coupled, vector: PhantomData });
+        Short::enter(Products::<Short> { A, B, X, nonzero_rows: coupled, vector: PhantomData });
     }
 }
 
@@ -42,14 +42,14 @@ struct Products<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],
     X: [&'a mut [f64]; 2],
-    coupled: &'a [Coupled],
+    nonzero_rows: &'a [NonzeroRows],
     vector: PhantomData<V>,
 }
 
 impl<V: Block<Number = f64>> Kernel for Products<'_, V> {
     #[inline(always)]
     fn run(mut self) {
-        let n = self.coupled.len();
+        let n = self.nonzero_rows.len();
         // how many vectors of a column stay in registers: for the fewest operations, the most
         let (mut best, mut least) = (1, usize::MAX);
         for many in 1..=3 {
@@ -70,27 +70,27 @@ impl<V: Block<Number = f64>> Products<'_, V> {
     #[inline(always)]
     fn all<const N: usize>(&mut self) {
         let mut j = 0;
-        while j < self.coupled.len() {
-            let Coupled { rows, alike } = &self.coupled[j];
-            // columns j, …, j + alike − 1 of the one matrix, then of the other
-            let (alike, mut k) = (*alike, 0);
-            while k < 2 * alike {
-                let at = |k: usize| (k / alike, j + k % alike);
-                match 2 * alike - k {
+        while j < self.nonzero_rows.len() {
+            let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
+            // columns j, …, j + same − 1 of the one matrix, then of the other
+            let (same, mut k) = (*same_pattern, 0);
+            while k < 2 * same {
+                let at = |k: usize| (k / same, j + k % same);
+                match 2 * same - k {
                     4.. => self.columns::<4, N>([at(k), at(k + 1), at(k + 2), at(k + 3)], rows),
                     2.. => self.columns::<2, N>([at(k), at(k + 1)], rows),
                     _ => self.columns::<1, N>([at(k)], rows),
                 }
-                k += if 2 * alike - k >= 4 { 4 } else { 2 };
+                k += if 2 * same - k >= 4 { 4 } else { 2 };
             }
-            j += alike;
+            j += same;
         }
     }
 
     /// Some columns of X: of which matrix, and which.
     #[inline(always)]
     fn columns<const M: usize, const N: usize>(&mut self, which: [(usize, usize); M], rows: &[usize]) {
-        let (n, wide) = (self.coupled.len(), N * V::LANES);
+        let (n, wide) = (self.nonzero_rows.len(), N * V::LANES);
         let mut b = [&self.B[0][..n]; M];
         for m in 0..M {
             b[m] = &self.B[which[m].0][which[m].1 * n..][..n];

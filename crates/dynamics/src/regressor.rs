@@ -14,9 +14,9 @@
 use crate::data::Data;
 use crate::frames::Placements;
 use crate::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
-use crate::layout::{Columns, Layout, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Motion, Scalar};
 use nalgebra::DMatrix;
 
@@ -114,10 +114,10 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
         let a_i = Motion { linear: data.moving.a[i].linear + minus_g, ..data.moving.a[i] };
         let (v_b, a_b) = (oXb.act_inv(data.moving.v[i]), oXb.act_inv(a_i));
         for &c in l.support(i) {
-            let column = &model.columns[c];
+            let column = &model.columns()[c];
             let S_b = oXb.act_inv(data.world.S[c]).scale(S::splat(column.ratio));
             for (k, y) in effort(S_b, v_b, a_b).into_iter().enumerate() {
-                Y[column.coordinate + model.nv * (PARAMETERS * (i - 1) + k)] += y; // τ_S = (y(S, a) − y(v × S, v)) · π_i
+                Y[column.coordinate + model.nv() * (PARAMETERS * (i - 1) + k)] += y; // τ_S = (y(S, a) − y(v × S, v)) · π_i
             }
         }
     }
@@ -148,7 +148,7 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> &'d [S] {
     forward_velocities(model, data, q, v);
-    for i in 1..model.nodes.len() {
+    for i in 1..model.nodes().len() {
         let v_b = Placements { model, world: &data.world }.body(i).act_inv(data.moving.v[i]);
         of_body(&mut data.regressor.kinetic, i).copy_from_slice(&pairing(v_b.scale(S::splat(0.5)), v_b)); // ½ y(v, v)
     }
@@ -179,7 +179,7 @@ pub fn potential_energy_regressor<'d, S: Scalar, R: Constant<S>>(
 ) -> &'d [S] {
     forward_kinematics(model, data, q);
     let minus_g = Single::<S, R>::new(model).minus_gravity();
-    for i in 1..model.nodes.len() {
+    for i in 1..model.nodes().len() {
         let oXb = Placements { model, world: &data.world }.body(i);
         let first = oXb.rotation.transpose_mul(minus_g);
         let o = S::zero();

@@ -5,14 +5,16 @@
 //! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
 //! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
 
-use crate::data::{Data, check, check_forces};
+use crate::data::{Data, check_forces};
 use crate::dispatch::kernel;
-use crate::joint::{Joint, Turning, Turns};
 use crate::kinematics::{Placed, World};
-use crate::layout::{Layout, Single};
 use crate::limbs;
-use crate::model::Model;
 use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::joint::kinematics::JointSinCos;
+use condyle_model::joint::{ClassicalMotion, Joint};
+use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
 /// In the bodies' turned frames.
@@ -21,8 +23,8 @@ use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 pub(crate) struct Workspace<S> {
     /// λXi. Shape: levels. Written by: `pass`.
     X: Vec<Se3<S>>,
-    /// Turning, and acceleration of the origin, with gravity as the world's. Shape: levels. Written by: `pass`.
-    motion: Vec<Turning<S>>,
+    /// How the body turns and its origin accelerates, with gravity as the world's. Shape: levels. Written by: `pass`.
+    motion: Vec<ClassicalMotion<S>>,
     /// K; the world's stays 0. Shape: levels. Written by: `pass`.
     K: Vec<Mat3<S>>,
     /// Force through the joint. Shape: levels. Written by: `pass`.
@@ -35,7 +37,7 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let still = Turning { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() };
+        let still = ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() };
         Self {
             X: filled(Se3::identity(), size.levels),
             motion: filled(still, size.levels),
@@ -70,7 +72,7 @@ fn centripetal<S: Scalar>(w: Vec3<S>, dw: Vec3<S>) -> Mat3<S> {
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
-    turns: &mut Turns<L::S>,
+    sin_cos: &mut JointSinCos<L::S>,
     d: &mut Workspace<L::S>,
     q: &[L::S],
     qd: &[L::S],
@@ -78,17 +80,17 @@ pub(crate) fn pass<L: Layout>(
     f_ext: &[Force<L::S>],
 ) {
     let Workspace { X, motion, K, f, tau, .. } = d;
-    Joint::turns(l, q, turns);
+    Joint::sin_cos(l, q, sin_cos);
     motion[0].a = l.minus_gravity();
     tau.fill(L::S::zero());
     for i in l.bodies() {
         let vJ = Joint::motion(l, i, qd); // v_J = S q̇
         let aJ = Joint::motion(l, i, qdd); // S q̈
         let Inertia { mass, mass_com, rotational } = l.inertia(i);
-        let Xi = Joint::turned_placement(l, i, q, turns.sin[i], turns.cos[i]); // λXi = X_T X_J
-        let (parent, R) = (l.above(motion, i), Xi.rotation);
-        let a = l.above(K, i).mul_add(Xi.translation, parent.a); // a_λ + K_λ p
-        let m = Turning { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
+        let Xi = Joint::placement_with(l, i, q, sin_cos.sin[i], sin_cos.cos[i]); // λXi = X_T X_J
+        let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
+        let a = l.parent_on_stack(K, i).mul_add(Xi.translation, parent.a); // a_λ + K_λ p
+        let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
         let m = vJ.added_to(aJ, m);
         let Ki = centripetal(m.w, m.dw);
         // Newton: f = m a + K h.  Euler: n = I ω̇ + ω × I ω + h × a
@@ -97,13 +99,13 @@ pub(crate) fn pass<L: Layout>(
         if let Some(external) = l.force(f_ext, i) {
             fi -= external;
         }
-        let here = l.level(i);
+        let here = l.stack_index(i);
         (X[here], motion[here], K[here], f[here]) = (Xi, m, Ki, fi);
-        for &j in l.finished(i) {
-            let here = l.level(j);
-            let fj = l.whole(j, f[here]);
+        for &j in l.closed_by(i) {
+            let here = l.stack_index(j);
+            let fj = l.sum_lanes(j, f[here]);
             Joint::project(l, j, fj, tau); // τ_j = Sᵀ f_j
-            l.lift(f, j, X[here].act(fj)); // f_λ += λXj f_j
+            l.add_to_parent_on_stack(f, j, X[here].act(fj)); // f_λ += λXj f_j
         }
     }
     l.add_armature_torque(qdd, tau);
@@ -121,7 +123,7 @@ kernel! {
         f_ext: &[Force<S>],
     ) {
         world.placed = Placed::Nowhere;
-        pass(&Single::new(model), &mut world.turns, d, q, v, a, f_ext);
+        pass(&Single::new(model), &mut world.sin_cos, d, q, v, a, f_ext);
     }
 }
 
@@ -157,10 +159,10 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
     run(model, data, q, v, a, f_ext);
     &data.rnea.tau
 }
@@ -178,8 +180,8 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     let zero = core::mem::take(&mut data.rnea.zero);
     run(model, data, q, v, &zero, &[]);
     data.rnea.zero = zero;
@@ -203,7 +205,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
+    check("q", q.len(), model.nq());
     let zero = core::mem::take(&mut data.rnea.zero);
     run(model, data, q, &zero, &zero, &[]);
     data.rnea.zero = zero;

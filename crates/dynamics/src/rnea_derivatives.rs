@@ -21,15 +21,16 @@
 //! (Iᶜ, B, F of the joint of d).
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, check, check_forces};
+use crate::data::{Data, check_forces};
 use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::kinematics::{Placed, World, positions};
-use crate::layout::{Columns, Layout, Single};
 use crate::limbs;
-use crate::model::Model;
 use crate::side_by_side::{self, Rows};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -133,14 +134,14 @@ pub(crate) fn pass<L: Columns>(
         let (v_parent, a_parent) = (l.parent(v, i), l.parent(a, i));
         let (mut vJ, mut aJ) = (Motion::zero(), Motion::zero());
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
-            vJ = S[c].scale_add(l.load(qd, i, k), vJ); // v_J = S q̇
-            aJ = S[c].scale_add(l.load(qdd, i, k), aJ); // S q̈
+            let c = l.column(i) + k;
+            vJ = S[c].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
+            aJ = S[c].scale_add(l.joint_velocity(qdd, i, k), aJ); // S q̈
         }
         v[i] = v_parent + vJ; // v_i = v_λ + v_J
         a[i] = a_parent + aJ + v[i].cross(vJ); // a_i = a_λ + S q̈ + v_i × v_J
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             Psid[c] = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
             Psidd[c] = a_parent.cross(S[c]) + v_parent.cross(Psid[c]); // Ψ̈ = a_λ × S + v_λ × Ψ̇
             PsidSd[c] = Psid[c] + v[i].cross(S[c]); // Ψ̇ + Ṡ
@@ -152,9 +153,9 @@ pub(crate) fn pass<L: Columns>(
             F[i] -= oX[i].act(external);
         }
     }
-    l.share(Psid);
-    l.share(Psidd);
-    l.share(PsidSd);
+    l.broadcast(Psid);
+    l.broadcast(Psidd);
+    l.broadcast(PsidSd);
     l.clear(dq);
     l.clear(dv);
     l.clear(da);
@@ -162,11 +163,11 @@ pub(crate) fn pass<L: Columns>(
         let support = l.support(i);
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
-        l.make_whole(IC, i);
-        l.make_whole(BC, i);
-        l.make_whole(F, i);
+        l.sum_lanes_at(IC, i);
+        l.sum_lanes_at(BC, i);
+        l.sum_lanes_at(F, i);
         for k in 0..nv {
-            let (s, column) = (l.slot(i) + k, l.own(i, k));
+            let (s, column) = (l.column(i) + k, l.own_column(i, k));
             let IS = IC[i] * S[s]; // Iᶜ S_d
             let BS = BC[i].apply_transpose(S[s]); // 2Bᵀ S_d
             let by_q = IC[i] * Psidd[s] + BC[i].apply(Psid[s]) + S[s].cross(F[i]); // Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F
@@ -180,24 +181,24 @@ pub(crate) fn pass<L: Columns>(
                 let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)); // ∂τ_d/∂q̇_e
                 let (dq_ed, dv_ed) = (S_e.dot(by_q), S_e.dot(by_v)); // ∂τ_e/∂q_d, ∂τ_e/∂q̇_d
                 let M_de = S_e.dot(IS);
-                l.put_below(dq, column, e, dq_de); // all stores after all products, which may stay in registers
-                l.put_below(dv, column, e, dv_de);
-                l.put_right(dq, column, e, dq_ed);
-                l.put_right(dv, column, e, dv_ed);
-                l.put_below(da, column, e, M_de);
-                l.put_right(da, column, e, M_de);
+                l.set_row(dq, column, e, dq_de); // all stores after all products, which may stay in registers
+                l.set_row(dv, column, e, dv_de);
+                l.set_column(dq, column, e, dq_ed);
+                l.set_column(dv, column, e, dv_ed);
+                l.set_row(da, column, e, M_de);
+                l.set_column(da, column, e, M_de);
             }
             for &e in own {
                 let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
-                l.put_below(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
-                l.put_below(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
-                l.put_below(da, column, e, S_e.dot(IS));
+                l.set_row(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
+                l.set_row(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
+                l.set_row(da, column, e, S_e.dot(IS));
             }
         }
         let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
-        l.push(IC, i, IC_i);
-        l.push(BC, i, BC_i);
-        l.push(F, i, F_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
+        l.add_to_parent(F, i, F_i);
     }
     l.add_armature(da);
 }
@@ -278,10 +279,10 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
 #[track_caller]
 fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
-    check("a", a.len(), model.nv);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
 }
 
 /// Body by body, so that what second derivatives are made of is left behind.
@@ -302,7 +303,7 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
     let in_limbs = data.world.placed == Placed::Limbs;
-    let limbs = data.limbs.as_ref().zip(model.limbs.as_ref()).filter(|_| in_limbs);
+    let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
     let limbs = limbs.map(|(scratch, plan)| limbs::Seen::new(plan, scratch));
     let state = State { model, world: &data.world, pass: d, limbs };
     RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
@@ -339,8 +340,8 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> CoriolisDerivatives<'d, S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check("v", v.len(), model.nv);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
     let still = core::mem::take(&mut data.rnea_derivatives.still);
     positions(model, &mut data.world, q);
     run(model, &data.world, &mut data.rnea_derivatives, v, &still, &[], &[Vec3::zero()]);

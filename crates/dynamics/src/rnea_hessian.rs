@@ -30,13 +30,14 @@
 //! programming for rigid-body systems* (2021); the sums above are those of the first, contracted before they are expanded.
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, check};
+use crate::data::Data;
 use crate::dispatch::kernel;
 use crate::kinematics::World;
-use crate::layout::{Pairs, Single};
-use crate::model::Model;
 use crate::rnea_derivatives::{self, RneaDerivatives};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -93,9 +94,9 @@ fn pass<L: Pairs>(
         let w_parent = l.parent(w, i);
         let mut w_i = w_parent;
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
+            let c = l.column(i) + k;
             W[c] = w_parent.cross(S[c]); // W = w_λ × S
-            w_i = S[c].scale_add(l.load(lambda, i, k), w_i); // w_i = w_λ + S λ
+            w_i = S[c].scale_add(l.joint_velocity(lambda, i, k), w_i); // w_i = w_λ + S λ
         }
         w[i] = w_i;
         let I = oX[i].act(l.inertia(i));
@@ -114,7 +115,7 @@ fn pass<L: Pairs>(
         let (before, own) = support.split_at(support.len() - nv);
         let (P, D) = (PD[i].momentum, PD[i].inertia_rate());
         for k in 0..nv {
-            let s = l.slot(i) + k;
+            let s = l.column(i) + k;
             let column = own[k];
             let SP = S[s].cross(P);
             let DS = D * S[s];
@@ -129,29 +130,29 @@ fn pass<L: Pairs>(
                 let (S_e, W_e, Y_e) = (l.at(S, e), l.at(W, e), l.at(Y, e));
                 let (Psid_e, Psidd_e) = (l.at(Psid, e), l.at(Psidd, e));
                 let x = W_e.dot(A1) + Psidd_e.dot(A2) + Psid_e.dot(A3); // ∂²φ/∂q_d∂q_e
-                l.add_at(qq, column, e, x);
-                l.add_at(qq, e, column, x);
-                l.add_at(vq, e, column, Y_e.dot(A2) + S_e.dot(A3)); // ∂²φ/∂q̇_e∂q_d
-                l.add_at(vq, column, e, W_e.dot(B1) + Psid_e.dot(B2)); // ∂²φ/∂q̇_d∂q_e
+                l.add_entry(qq, column, e, x);
+                l.add_entry(qq, e, column, x);
+                l.add_entry(vq, e, column, Y_e.dot(A2) + S_e.dot(A3)); // ∂²φ/∂q̇_e∂q_d
+                l.add_entry(vq, column, e, W_e.dot(B1) + Psid_e.dot(B2)); // ∂²φ/∂q̇_d∂q_e
                 let x = S_e.dot(B2); // ∂²φ/∂q̇_d∂q̇_e
-                l.add_at(vv, column, e, x);
-                l.add_at(vv, e, column, x);
-                l.add_at(aq, e, column, S_e.dot(A2)); // ∂²φ/∂q̈_e∂q_d
-                l.add_at(aq, column, e, W_e.dot(C)); // ∂²φ/∂q̈_d∂q_e
+                l.add_entry(vv, column, e, x);
+                l.add_entry(vv, e, column, x);
+                l.add_entry(aq, e, column, S_e.dot(A2)); // ∂²φ/∂q̈_e∂q_d
+                l.add_entry(aq, column, e, W_e.dot(C)); // ∂²φ/∂q̈_d∂q_e
             }
             for &e in own {
                 let (W_e, Psid_e) = (l.at(W, e), l.at(Psid, e));
                 let x = (W_e.dot(A1) + l.at(Psidd, e).dot(A2) + Psid_e.dot(A3)) * half;
-                l.add_at(qq, column, e, x);
-                l.add_at(qq, e, column, x);
-                l.add_at(vq, column, e, W_e.dot(B1) + Psid_e.dot(B2));
-                l.add_at(vv, column, e, -l.at(S, e).dot(DS));
-                l.add_at(aq, column, e, W_e.dot(C));
+                l.add_entry(qq, column, e, x);
+                l.add_entry(qq, e, column, x);
+                l.add_entry(vq, column, e, W_e.dot(B1) + Psid_e.dot(B2));
+                l.add_entry(vv, column, e, -l.at(S, e).dot(DS));
+                l.add_entry(aq, column, e, W_e.dot(C));
             }
         }
         let (PD_i, Q_i) = (PD[i], Q[i]);
-        l.push(PD, i, PD_i);
-        l.push(Q, i, Q_i);
+        l.add_to_parent(PD, i, PD_i);
+        l.add_to_parent(Q, i, Q_i);
     }
 }
 
@@ -216,7 +217,7 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     lambda: &[S],
 ) -> RneaHessian<'d, S, R> {
-    check("lambda", lambda.len(), model.nv);
+    check("lambda", lambda.len(), model.nv());
     rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
     run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
     let first = rnea_derivatives::view(model, data);
@@ -242,8 +243,8 @@ pub struct RneaSecondDerivatives<S> {
 impl<S: Scalar> RneaSecondDerivatives<S> {
     /// Memory for the tensors of a model.
     pub fn new<R>(model: &Model<R>) -> Self {
-        let zeros = || vec![zero_matrix(model.nv, model.nv); model.nv];
-        let lambda = filled(S::zero(), model.nv);
+        let zeros = || vec![zero_matrix(model.nv(), model.nv()); model.nv()];
+        let lambda = filled(S::zero(), model.nv());
         Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
     }
 }
@@ -274,9 +275,9 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     out: &mut RneaSecondDerivatives<S>,
 ) {
-    check("out", out.lambda.len(), model.nv);
+    check("out", out.lambda.len(), model.nv());
     rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
-    for i in 0..model.nv {
+    for i in 0..model.nv() {
         out.lambda[i] = S::one();
         run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &out.lambda);
         out.lambda[i] = S::zero();

@@ -5,8 +5,8 @@
 //! matrix are had at once. They are had with the same operations as one, so the bits are the same.
 
 use crate::kinematics::World;
-use crate::model::Model;
 use crate::rnea_derivatives::{Bodies, Workspace};
+use condyle_model::Model;
 use condyle_spatial::lanes::Fused;
 use condyle_spatial::{Force, Scalar, Vec3};
 use core::any::{Any, TypeId};
@@ -51,7 +51,7 @@ impl<S: Scalar> Rows<S> {
 #[inline(always)]
 pub(crate) fn pays<S: Scalar, R>(model: &Model<R>) -> bool {
     let single = TypeId::of::<S>() == TypeId::of::<Fused>();
-    single && !model.has_mimic() && model.support.len() > LONG * model.columns.len()
+    single && !model.has_mimic() && model.support_len() > LONG * model.columns().len()
 }
 
 /// All pairs of columns of different joints, from what `Rows` has kept.
@@ -73,11 +73,11 @@ mod vectors {
 
     #[inline(always)]
     pub(super) fn pairs<R>(model: &Model<R>, w: &World<Fused>, d: &mut Workspace<Fused>) {
-        let n = model.nv;
+        let n = model.nv();
         let (Bodies { rows, Psid, Psidd, PsidSd, .. }, [dq, dv, da]) = d.parts();
-        for node in &model.nodes[1..] {
+        for node in &model.nodes()[1..] {
             let nv = node.joint.nv();
-            let (first, end) = (node.column + nv, model.columns[node.column].end);
+            let (first, end) = (node.column + nv, model.columns()[node.column].end);
             for e in node.column..node.column + nv {
                 let (S_e, Psid_e, Psidd_e, PsidSd_e) = (all(w.S[e]), all(Psid[e]), all(Psidd[e]), all(PsidSd[e]));
                 for c in first / SIDE..end.div_ceil(SIDE) {

@@ -8,12 +8,13 @@
 //! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)
 //! ```
 
-use crate::data::{Data, check, check_forces};
+use crate::data::{Data, check_forces};
 use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::layout::{Pairs, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::check;
+use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -58,10 +59,10 @@ fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
     tau.fill(L::S::zero());
     for i in l.bodies().rev() {
         for k in 0..l.joint(i).nv() {
-            l.add(tau, i, k, -S[l.slot(i) + k].dot(F[i])); // τ = −Sᵀ F
+            l.add_joint_effort(tau, i, k, -S[l.column(i) + k].dot(F[i])); // τ = −Sᵀ F
         }
         let F_i = F[i];
-        l.push(F, i, F_i); // F_λ += F_i
+        l.add_to_parent(F, i, F_i); // F_λ += F_i
     }
 }
 
@@ -99,8 +100,8 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check_forces(f_ext.len(), model.nodes().len());
     positions(model, &mut data.world, q);
     run(model, &data.world, &mut data.statics, f_ext);
     &data.statics.tau
@@ -125,21 +126,21 @@ fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Worksp
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
         for k in 0..nv {
-            let (S_d, column) = (S[l.slot(i) + k], own[k]);
+            let (S_d, column) = (S[l.column(i) + k], own[k]);
             let weight = (IC[i] * S_d).linear.cross(a_0.linear); // S_dᵀ Iᶜ (a₀ × S_e) = S_e · [0; (Iᶜ S_d)_linear × a₀]
             let by_q = IC[i] * a_0.cross(S_d) + S_d.cross(F[i]); // Iᶜ Ψ̈_d + S_d ×* F
             for &e in before {
                 let S_e = l.at(S, e);
-                l.put_at(dq, column, e, S_e.angular.dot(weight)); // ∂τ_d/∂q_e
-                l.put_at(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
+                l.set_entry(dq, column, e, S_e.angular.dot(weight)); // ∂τ_d/∂q_e
+                l.set_entry(dq, e, column, S_e.dot(by_q)); // ∂τ_e/∂q_d
             }
             for &e in own {
-                l.put_at(dq, column, e, l.at(S, e).angular.dot(weight));
+                l.set_entry(dq, column, e, l.at(S, e).angular.dot(weight));
             }
         }
         let (IC_i, F_i) = (IC[i], F[i]);
-        l.push(IC, i, IC_i);
-        l.push(F, i, F_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(F, i, F_i);
     }
 }
 
@@ -172,8 +173,8 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d DMatrix<S> {
     data.check(model);
-    check("q", q.len(), model.nq);
-    check_forces(f_ext.len(), model.nodes.len());
+    check("q", q.len(), model.nq());
+    check_forces(f_ext.len(), model.nodes().len());
     positions(model, &mut data.world, q);
     run_derivative(model, &data.world, &mut data.statics, f_ext);
     &data.statics.dtau_dq

@@ -18,12 +18,12 @@
 
 use crate::assembly::Link;
 use crate::cholesky::Cholesky;
-use crate::configuration::random_configuration;
 use crate::crba::crba;
 use crate::data::Data;
 use crate::ltdl::{axpy, dot};
-use crate::model::Model;
 use crate::parts::Dof;
+use condyle_model::Model;
+use condyle_model::random_configuration;
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, rngs::StdRng};
@@ -68,12 +68,12 @@ pub(crate) struct Ties<S> {
 impl<S: Scalar> Ties<S> {
     /// Those of a model, whose degrees of freedom are in the order of `links`.
     pub(crate) fn new<R: Constant<S>>(model: &Model<R>, links: &[Link]) -> Self {
-        let mut joints = vec![0; model.nv];
-        model.columns.iter().for_each(|column| joints[column.coordinate] += 1);
-        let shared: Vec<usize> = (0..model.nv).filter(|&k| joints[k] > 1).collect();
+        let mut joints = vec![0; model.nv()];
+        model.columns().iter().for_each(|column| joints[column.coordinate] += 1);
+        let shared: Vec<usize> = (0..model.nv()).filter(|&k| joints[k] > 1).collect();
         let (mut members, mut dofs) = (Vec::new(), 0);
         for &Link { body, .. } in links {
-            let node = &model.nodes[body];
+            let node = &model.nodes()[body];
             if let Ok(shared) = shared.binary_search(&node.idx_v) {
                 members.push(Member { body, dof: dofs, shared });
             }
@@ -119,7 +119,7 @@ impl<S: Scalar> Ties<S> {
     /// Reads the ratios.
     pub(crate) fn prepare<R>(&mut self, model: &Model<R>) {
         for (z, member) in self.members.iter().enumerate() {
-            let ratio = model.nodes[member.body].mimic.map_or(1.0, |mimic| mimic.ratio);
+            let ratio = model.nodes()[member.body].mimic.map_or(1.0, |mimic| mimic.ratio);
             self.G[(z, member.shared)] = S::splat(ratio);
         }
     }

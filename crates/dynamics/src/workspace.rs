@@ -2,7 +2,7 @@
 //!
 //! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer.
 
-use crate::model::Model;
+use condyle_model::Model;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
@@ -25,11 +25,11 @@ impl Size {
     /// The sizes for a model.
     pub(crate) fn new<R>(model: &Model<R>) -> Self {
         Self {
-            bodies: model.nodes.len(),
-            columns: model.columns.len(),
-            depth: model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0),
-            levels: model.nodes.iter().map(|n| n.level + 1).max().unwrap_or(1),
-            nv: model.nv,
+            bodies: model.nodes().len(),
+            columns: model.columns().len(),
+            depth: model.columns().iter().map(|c| c.depth + 1).max().unwrap_or(0),
+            levels: model.nodes().iter().map(|n| n.level + 1).max().unwrap_or(1),
+            nv: model.nv(),
         }
     }
 }

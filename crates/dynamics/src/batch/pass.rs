@@ -6,10 +6,10 @@ use crate::aba_derivatives::aba_derivatives;
 use crate::crba::crba;
 use crate::data::Data;
 use crate::minv::minv;
-use crate::model::Model;
 use crate::rnea::{gravity, nonlinear_effects, rnea};
 use crate::rnea_derivatives::rnea_derivatives;
 use crate::workspace::{filled, zero_matrix};
+use condyle_model::Model;
 use condyle_spatial::Force;
 use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter};
 use core::mem::swap;
@@ -45,17 +45,17 @@ impl<S: Block> Worker<S> {
     fn new(model: &Model) -> Self {
         Self {
             data: Data::new(model),
-            q: filled(S::zero(), model.nq),
-            v: filled(S::zero(), model.nv),
-            x: filled(S::zero(), model.nv),
-            f_ext: Vec::with_capacity(model.nodes.len()),
+            q: filled(S::zero(), model.nq()),
+            v: filled(S::zero(), model.nv()),
+            x: filled(S::zero(), model.nv()),
+            f_ext: Vec::with_capacity(model.nodes().len()),
         }
     }
 }
 
 impl<S: Block> Group<S> {
     pub(super) fn new(model: &Model, states: usize, threads: usize) -> Self {
-        let square = || zero_matrix(model.nv, model.nv);
+        let square = || zero_matrix(model.nv(), model.nv());
         let matrices = |_| core::array::from_fn(|_| square());
         Self {
             workers: (0..threads).map(|_| Worker::new(model)).collect(),

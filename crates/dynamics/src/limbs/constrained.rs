@@ -28,7 +28,7 @@ use crate::constraint_set::{ConstraintSet, Plan as Constraint};
 use crate::data::Data;
 use crate::dispatch::{Long, Short, renamed};
 use crate::kinematics::{Placed, place};
-use crate::model::Model;
+use condyle_model::Model;
 use condyle_spatial::block::Block;
 use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::level::{Level, level};

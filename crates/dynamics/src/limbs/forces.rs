@@ -9,7 +9,7 @@ use crate::constraint::ConstraintKind;
 use crate::constraint_motion::Ends;
 use crate::constraint_set::Plan as Constraint;
 use crate::kinematics::World;
-use crate::model::Model;
+use condyle_model::Model;
 use condyle_spatial::block::Block;
 use condyle_spatial::lanes::Fused;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
@@ -36,7 +36,7 @@ impl<'a> Left<'a> {
         let [oX, S, U, v, c] = unsafe { [numbers(&w.oX), numbers(&w.S), numbers(&d.U), numbers(&d.v), numbers(&d.c)] };
         // SAFETY: these are vectors.
         let [D_inv, u] = unsafe { [numbers(&d.D_inv), numbers(&d.u)] };
-        Self { plan, oX, S, U, D_inv, u, v, c, world: (-model.gravity).to_array() }
+        Self { plan, oX, S, U, D_inv, u, v, c, world: (-*model.gravity()).to_array() }
     }
 
     /// ₀X of a body.

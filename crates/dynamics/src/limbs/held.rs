@@ -3,7 +3,7 @@
 use super::LANES;
 use crate::constraint_set::Plan;
 use crate::dispatch::is;
-use crate::model::Model;
+use condyle_model::Model;
 
 /// So many rows of constraints stand side by side: in one vector, or in two.
 pub(super) const WIDE: usize = 2 * LANES;
@@ -65,17 +65,17 @@ pub(crate) struct Held {
 impl Held {
     /// For a robot with limbs on which no joint follows another.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>, plans: &[Plan]) -> Option<Box<Self>> {
-        if model.limbs.is_none() || model.has_mimic() || !is::<S, f64>() {
+        if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() {
             return None;
         }
-        let alone = model.nodes.iter().skip(1).filter(|node| node.parent == 0).count() == 1;
-        let (root, nv) = if alone { (1, model.nodes[1].joint.nv()) } else { (0, 0) };
+        let alone = model.nodes().iter().skip(1).filter(|node| node.parent == 0).count() == 1;
+        let (root, nv) = if alone { (1, model.nodes()[1].joint.nv()) } else { (0, 0) };
         let (mut rows, mut start): (Vec<Rows>, usize) = (Vec::new(), 0);
         for plan in plans {
-            let parent = |&i: &usize| Some(model.nodes[i].parent);
+            let parent = |&i: &usize| Some(model.nodes()[i].parent);
             let way = |i| std::iter::successors(Some(i), parent).take_while(|&i| i > root).collect::<Vec<_>>();
             let link = |&body: &usize| {
-                let node = &model.nodes[body];
+                let node = &model.nodes()[body];
                 let first = plan.touches.iter().find(|touch| touch.column == node.column);
                 Link { body, nv: node.joint.nv(), at: first.expect("it is on the way").at }
             };

@@ -11,46 +11,15 @@
 //!
 //! takes one product for each pair of columns and each column that carries both, and none of these waits for another.
 
-use super::LANES;
-use crate::model::Model;
 pub(super) use vectors::Scratch;
 
-/// Of the two matrices that hold Z.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sizes {
-    rows: usize,
-    /// The length of a row that has the columns from the root on.
-    pub deep: usize,
-    /// The length of a row that has all columns, in whole vectors.
-    pub wide: usize,
-}
-
-impl Sizes {
-    pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let deep = model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0);
-        Self { rows: model.nv, deep, wide: model.nv.next_multiple_of(2 * LANES) }
-    }
-
-    /// The place behind all rows: of what lanes without a body write.
-    pub(super) fn deep_behind(self) -> usize {
-        self.rows * self.deep
-    }
-
-    /// The same of the other matrix.
-    pub(super) fn wide_behind(self) -> usize {
-        self.rows * self.wide
-    }
-}
-
 mod vectors {
-    use super::Sizes;
     use crate::aba;
     use crate::kinematics::World;
-    use crate::layout::Layout;
     use crate::limbs::lanes::{Four, Limbs};
-    use crate::limbs::links::Block as Rows;
     use crate::limbs::{LANES, Plan};
-    use crate::model::Model;
+    use condyle_model::layout::Layout;
+    use condyle_model::limbs::column_map::{Block as Rows, Sizes};
     use condyle_spatial::block::Block;
     use condyle_spatial::lanes::Fused;
     use condyle_spatial::{Motion, Scalar};
@@ -72,12 +41,13 @@ mod vectors {
     }
 
     impl Scratch {
-        pub(in crate::limbs) fn new<R>(model: &Model<R>, sizes: Sizes, links: usize) -> Self {
+        pub(in crate::limbs) fn new(nv: usize, plan: &Plan) -> Self {
+            let sizes = plan.sizes;
             let mut Zt = vec![0.0; sizes.wide_behind() + 1];
-            (0..model.nv).for_each(|k| Zt[k * (sizes.wide + 1)] = 1.0);
+            (0..nv).for_each(|k| Zt[k * (sizes.wide + 1)] = 1.0);
             Self {
                 sizes,
-                T: vec![Motion::zero(); links],
+                T: vec![Motion::zero(); plan.links.len()],
                 ZD: vec![0.0; sizes.deep_behind() + 1],
                 Zt,
                 rows: vec![0.0; sizes.wide_behind()],
@@ -119,7 +89,7 @@ mod vectors {
                 let (first, end) = l.steps[i].links;
                 let nv = l.joint(i).nv();
                 for k in 0..nv {
-                    let (s, own) = (l.slot(i) + k, end - nv + k);
+                    let (s, own) = (l.column(i) + k, end - nv + k);
                     let (S, U) = (w.S[s], -aba.U[s].scale(aba.D_inv[s]));
                     for link in first..own {
                         let felt = if k == 0 { l.before(T, link) } else { T[link] };

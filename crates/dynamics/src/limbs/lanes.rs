@@ -1,12 +1,12 @@
 //! Steps in place of bodies, lanes in place of numbers.
 #![allow(unsafe_code)]
 
-use super::links::{Before, Link, Pair};
-use super::steps::{Parents, Source, Step};
 use super::{LANES, Plan};
-use crate::joint::Joint;
-use crate::layout::{Columns, Layout};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::joint::Joint;
+use condyle_model::layout::{Columns, Layout};
+use condyle_model::limbs::column_map::{Before, Link, Pair};
+use condyle_model::limbs::schedule::{Parents, Source, Step};
 use condyle_spatial::lanes::{Fused, Lanes};
 use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::{Act, Force, Inertia, Se3, Vec3};
@@ -122,7 +122,7 @@ impl Layout for Limbs<'_> {
     #[inline(always)]
     fn force(&self, f_ext: &[Force<Four>], i: usize) -> Option<Force<Four>> {
         let &f = f_ext.get(i)?; // not by `map`, which would not be inlined
-        Some(Se3::new(self.steps[i].reframing.lift(), Vec3::zero()).act_inv(f))
+        Some(Se3::new(self.steps[i].axis_rotation.lift(), Vec3::zero()).act_inv(f))
     }
 
     #[inline(always)]
@@ -133,7 +133,7 @@ impl Layout for Limbs<'_> {
         }
     }
     #[inline(always)]
-    fn push<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+    fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
         match &self.steps[i].parents {
             Parents::Below(step) => onto[*step] += x,
             Parents::Apart { to, .. } => {
@@ -144,24 +144,24 @@ impl Layout for Limbs<'_> {
         }
     }
     #[inline(always)]
-    fn level(&self, i: usize) -> usize {
+    fn stack_index(&self, i: usize) -> usize {
         i
     }
     /// All of them, when the pass has gone down to the last.
     #[inline(always)]
-    fn finished(&self, i: usize) -> &[usize] {
+    fn closed_by(&self, i: usize) -> &[usize] {
         if i + 1 == self.steps.len() { self.finished } else { &[] }
     }
     #[inline(always)]
-    fn above<T: Copy>(&self, of: &[T], i: usize) -> T {
+    fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T {
         self.parent(of, i)
     }
     #[inline(always)]
-    fn lift<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
-        self.push(onto, i, x);
+    fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        self.add_to_parent(onto, i, x);
     }
     #[inline(always)]
-    fn whole<T: Copy>(&self, i: usize, mut x: T) -> T {
+    fn sum_lanes<T: Copy>(&self, i: usize, mut x: T) -> T {
         let [first, others @ ..] = &self.steps[i].bodies;
         if others.iter().all(|other| other == first) {
             // SAFETY: passes keep structs of vectors.
@@ -178,15 +178,15 @@ impl Layout for Limbs<'_> {
         q[self.steps[i].idx_q + k]
     }
     #[inline(always)]
-    fn load(&self, x: &[Four], i: usize, k: usize) -> Four {
+    fn joint_velocity(&self, x: &[Four], i: usize, k: usize) -> Four {
         x[self.steps[i].idx_v + k]
     }
     #[inline(always)]
-    fn add(&self, x: &mut [Four], i: usize, k: usize, value: Four) {
+    fn add_joint_effort(&self, x: &mut [Four], i: usize, k: usize, value: Four) {
         x[self.steps[i].idx_v + k] += value;
     }
     #[inline(always)]
-    fn slot(&self, i: usize) -> usize {
+    fn column(&self, i: usize) -> usize {
         self.steps[i].idx_v
     }
     /// That is done where the lanes' efforts are put together.
@@ -198,7 +198,7 @@ impl<'a> Limbs<'a> {
     #[inline(always)]
     pub(super) fn new(plan: &'a Plan, model: &'a Model) -> Self {
         let Plan { steps, links, pairs, copies, before, finished, coordinates, .. } = plan;
-        let (armature, gravity) = (&model.armature, model.gravity);
+        let (armature, gravity) = (model.armature(), *model.gravity());
         Self { steps, links, pairs, copies, before, finished, coordinates, armature, gravity }
     }
 
@@ -234,7 +234,7 @@ impl<'a> Limbs<'a> {
 impl Columns for Limbs<'_> {
     type Column = Link;
     /// The how manieth of its joint.
-    type Own = usize;
+    type OwnColumn = usize;
     type Number = Fused;
 
     #[inline(always)]
@@ -243,7 +243,7 @@ impl Columns for Limbs<'_> {
         &self.links[first..end]
     }
     #[inline(always)]
-    fn own(&self, _: usize, k: usize) -> usize {
+    fn own_column(&self, _: usize, k: usize) -> usize {
         k
     }
     #[inline(always)]
@@ -251,7 +251,7 @@ impl Columns for Limbs<'_> {
         of[column.slot]
     }
     #[inline(always)]
-    fn share<T: Copy>(&self, of: &mut [T]) {
+    fn broadcast<T: Copy>(&self, of: &mut [T]) {
         for (k, from) in self.copies.iter().enumerate() {
             of[self.coordinates.len() + k] = gathered(of, from);
         }
@@ -261,11 +261,11 @@ impl Columns for Limbs<'_> {
         assert!(matrix.len() == self.armature.len() * self.armature.len());
     }
     #[inline(always)]
-    fn put_below(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
+    fn set_row(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
         Self::put(matrix, &self.pair(e, k).below, value);
     }
     #[inline(always)]
-    fn put_right(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
+    fn set_column(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
         Self::put(matrix, &self.pair(e, k).right, value);
     }
     #[inline(always)]

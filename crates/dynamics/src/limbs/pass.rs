@@ -2,15 +2,15 @@
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, Limbs, numbers};
-use super::steps::Source;
 use super::{LANES, Plan, inverse};
 use crate::data::Data;
 use crate::dispatch::{Long, Short, is, renamed};
 use crate::kinematics::{Placed, World, place};
-use crate::layout::{Columns, Layout, Single};
-use crate::model::Model;
 use crate::workspace::{Size, filled};
 use crate::{aba, crba, rnea, rnea_derivatives};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Layout, Single};
+use condyle_model::limbs::schedule::Source;
 use condyle_spatial::block::{Block, lanes};
 use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::level::{Level, level};
@@ -40,7 +40,7 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// For a model with limbs, on a processor that can.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
-        let plan = model.limbs.as_ref().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
+        let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
         let (steps, nv) = (plan.steps.len(), plan.coordinates.len());
         let size = Size { bodies: steps, columns: nv + plan.copies.len(), depth: 0, levels: steps, nv };
         let zeros = filled(Four::zero(), nv);
@@ -49,13 +49,13 @@ impl Scratch {
             v: zeros.clone(),
             x: zeros,
             f_ext: filled(Force::zero(), steps),
-            padded: vec![Fused(0.0); model.nq.max(model.nv) + 1],
+            padded: vec![Fused(0.0); model.nq().max(model.nv()) + 1],
             world: World::new(size),
             rnea: rnea::Workspace::new(size),
             aba: aba::Workspace::new(size),
             IC: filled(Inertia::zero(), steps),
             bodies: rnea_derivatives::Bodies::new(size),
-            inverted: inverse::Scratch::new(model, inverse::Sizes::new(model), plan.links.len()),
+            inverted: inverse::Scratch::new(model.nv(), plan),
         }))
     }
 
@@ -173,7 +173,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
         let l = Limbs::new(plan, model);
         if let Task::Rnea = task {
             data.world.placed = Placed::Nowhere;
-            rnea::pass(&l, &mut world.turns, rnea, q, v, x, f_ext);
+            rnea::pass(&l, &mut world.sin_cos, rnea, q, v, x, f_ext);
             let tau = Fused::of_mut(&mut data.rnea.tau);
             scatter(plan, &rnea.tau, tau);
             Single::<Fused, f64>::new(model).add_armature_torque(arguments.x, tau);
@@ -181,7 +181,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
         }
         place(&l, world, q);
         data.world.placed = Placed::Limbs;
-        l.share(&mut world.S);
+        l.broadcast(&mut world.S);
         if let Task::Crba = task {
             crba::pass(&l, world, IC, Fused::of_mut(data.crba.M.as_mut_slice()));
         }
@@ -193,7 +193,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
             scatter(plan, &aba.qdd, Fused::of_mut(&mut data.aba.qdd));
         }
         if let Task::Minv | Task::AbaDerivatives = task {
-            l.share(&mut aba.D_inv);
+            l.broadcast(&mut aba.D_inv);
             let Minv = Fused::of_mut(data.minv.Minv.as_mut_slice());
             inverted.inverse::<V>(&l, world, aba, &plan.blocks, Minv);
         }
@@ -208,7 +208,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
 /// The plan, where this model and `data` have limbs side by side, and the processor can.
 #[inline]
 pub(super) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
-    let (Some(plan), Some(scratch)) = (&model.limbs, &data.limbs) else { return None };
+    let (Some(plan), Some(scratch)) = (&model.limbs(), &data.limbs) else { return None };
     (is::<(S, R), (f64, f64)>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
 }
 
@@ -249,11 +249,11 @@ pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Dat
     // SAFETY: poses and motions are made of vectors.
     let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
     for i in 1..oX.len() {
-        let ((step, lane), column) = (plan.place[i], model.nodes[i].column);
+        let ((step, lane), column) = (plan.place[i], model.nodes()[i].column);
         let pose = |k: usize| S::splat(poses[(12 * step + k) * LANES + lane]);
         let axis = |k: usize| Vec3::new(pose(k), pose(k + 1), pose(k + 2));
         oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));
-        for k in 0..model.nodes[i].joint.nv() {
+        for k in 0..model.nodes()[i].joint.nv() {
             let slot = plan.steps[step].idx_v + k;
             let number = |r: usize| S::splat(motions[(6 * slot + r) * LANES + lane]);
             columns[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));
