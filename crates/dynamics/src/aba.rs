@@ -5,14 +5,15 @@
 //! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
 //! matrix is inverted.
 
-use crate::data::{Data, Size, check_forces};
-use crate::dispatch::kernel;
-use crate::forward_dynamics::{Method, forward_dynamics};
+use crate::data::{Data, check_forces};
+use crate::forward_dynamics::{Method, by_factor};
 use crate::kinematics::{World, positions};
 use crate::limbs;
+use crate::workspace::{Size, filled};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 
 /// In the world's frame.
@@ -42,15 +43,15 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            IA: vec![ArticulatedInertia::zero(); size.levels],
-            U: vec![Force::zero(); size.columns],
-            D_inv: vec![S::zero(); size.columns],
-            v: vec![Motion::zero(); size.levels],
-            a: vec![Motion::zero(); size.levels],
-            c: vec![Motion::zero(); size.bodies],
-            pA: vec![Force::zero(); size.levels],
-            u: vec![S::zero(); size.columns],
-            qdd: vec![S::zero(); size.nv],
+            IA: filled(ArticulatedInertia::zero(), size.levels),
+            U: filled(Force::zero(), size.columns),
+            D_inv: filled(S::zero(), size.columns),
+            v: filled(Motion::zero(), size.levels),
+            a: filled(Motion::zero(), size.levels),
+            c: filled(Motion::zero(), size.bodies),
+            pA: filled(Force::zero(), size.levels),
+            u: filled(S::zero(), size.columns),
+            qdd: filled(S::zero(), size.nv),
         }
     }
 }
@@ -161,8 +162,16 @@ pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
 }
 
 kernel! {
-    fn run(model, data, v: &[S], tau: &[S], f_ext: &[Force<S>]) {
-        pass(&Single::new(model), &data.world, &mut data.aba, v, tau, f_ext);
+    /// Body by body, for bodies that are placed.
+    fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, v: &[S], tau: &[S], f_ext: &[Force<S>]) {
+        pass(&Single::new(model), world, d, v, tau, f_ext);
+    }
+}
+
+kernel! {
+    /// The factors alone, for bodies that are placed.
+    pub(crate) fn factors<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        factorize(&Single::new(model), world, d);
     }
 }
 
@@ -195,10 +204,10 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     check_arguments(model, data, q, v, tau, f_ext);
-    if limbs::run(limbs::Task::Aba, model, data, q, v, tau, f_ext) {
-        return &data.aba.qdd;
+    if !limbs::run(limbs::Task::Aba, model, data, q, v, tau, f_ext) {
+        one_by_one(model, data, q, v, tau, f_ext);
     }
-    one_by_one(model, data, q, v, tau, f_ext)
+    &data.aba.qdd
 }
 
 /// Panics unless the arguments of forward dynamics fit.
@@ -214,18 +223,19 @@ pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v
 }
 
 /// Body by body, for arguments that fit; leaves what depends on q behind.
-pub(crate) fn one_by_one<'d, S: Scalar, R: Constant<S>>(
+pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
-    data: &'d mut Data<S>,
+    data: &mut Data<S>,
     q: &[S],
     v: &[S],
     tau: &[S],
     f_ext: &[Force<S>],
-) -> &'d [S] {
+) {
     if model.has_mimic() {
-        return forward_dynamics(model, data, q, v, tau, f_ext, Some(Method::Sparse));
+        by_factor(model, data, q, v, tau, f_ext, Method::Sparse);
+        data.aba.qdd.copy_from_slice(&data.forward_dynamics.qdd);
+        return;
     }
-    positions(model, data, q);
-    run(model, data, v, tau, f_ext);
-    &data.aba.qdd
+    positions(model, &mut data.world, q);
+    run(model, &data.world, &mut data.aba, v, tau, f_ext);
 }

@@ -7,16 +7,18 @@
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
 
-use crate::aba::{check_arguments, one_by_one};
+use crate::aba::{self, check_arguments, one_by_one};
 use crate::articulated_solve::{self, minus_solve};
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::inputs::State;
+use crate::kinematics::World;
 use crate::limbs;
 use crate::minv;
 use crate::rnea_derivatives;
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::tree_product::minus_products;
 use condyle_model::Model;
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -34,9 +36,9 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
-        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        let square = zero_matrix(size.nv, size.nv);
         let solve = articulated_solve::Workspace::new(model.columns(), size.nv);
-        Self { a: vec![S::zero(); size.nv], da_dq: square.clone(), da_dv: square, solve }
+        Self { a: filled(S::zero(), size.nv), da_dq: square.clone(), da_dv: square, solve }
     }
 }
 
@@ -55,11 +57,10 @@ pub struct AbaDerivatives<'d, S, R = f64> {
 }
 
 kernel! {
-    /// After `aba` and `rnea_derivatives`.
-    fn solves(_model, data) {
-        let (d, Workspace { da_dq, da_dv, solve, .. }) = (&data.rnea_derivatives, &mut data.aba_derivatives);
-        let B = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
-        minus_solve(&data.world, &data.aba, solve, B, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);
+    /// ∂q̈ = −M⁻¹ ∂τ by the factors of the articulated bodies.
+    fn solves<S>(world: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>, dtau: [&[S]; 2]) {
+        let Workspace { da_dq, da_dv, solve, .. } = d;
+        minus_solve(world, f, solve, dtau, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);
     }
 }
 
@@ -98,11 +99,10 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
         data.rnea_derivatives.qd.copy_from_slice(v);
         data.rnea_derivatives.qdd.copy_from_slice(&data.aba.qdd);
         multiply(model, data);
-        let state = rnea_derivatives::view_of_limbs(model, data).state;
-        return data.aba_derivatives.view(data.minv.matrix(), state);
+    } else {
+        in_turn(model, data, q, v, tau, f_ext);
     }
-    in_turn(model, data, q, v, tau, f_ext);
-    let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
+    let state = rnea_derivatives::view(model, data).state;
     data.aba_derivatives.view(data.minv.matrix(), state)
 }
 
@@ -115,17 +115,19 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) {
+    one_by_one(model, data, q, v, tau, f_ext);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
-    a_kept.copy_from_slice(one_by_one(model, data, q, v, tau, f_ext));
-    rnea_derivatives::run(model, data, v, &a_kept, f_ext, &[]);
+    a_kept.copy_from_slice(&data.aba.qdd);
+    rnea_derivatives::run(model, &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext, &[]);
     data.aba_derivatives.a = a_kept;
     if data.minv.by_factor() {
-        minv::from_derivatives(model, data);
+        minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
     } else {
-        minv::from_factors(model, data); // those of `aba`
+        minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // those of `aba`
     }
     if data.aba_derivatives.solve.pays() {
-        solves(model, data);
+        let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];
+        solves(&data.world, &data.aba, &mut data.aba_derivatives, dtau);
     } else {
         multiply(model, data);
     }
@@ -136,7 +138,8 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    minus_products(data.minv.matrix().as_slice(), dtau, da, model.nonzero_rows());
+    let Minv = data.minv.matrix().as_slice();
+    minus_products(Minv, dtau, da, model.nonzero_rows());
 }
 
 impl<S> Workspace<S> {

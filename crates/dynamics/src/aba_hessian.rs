@@ -13,12 +13,14 @@
 
 use crate::aba::check_arguments;
 use crate::aba_derivatives::{self, AbaDerivatives};
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
+use crate::workspace::{Size, filled, zero_matrix};
 use crate::{rnea_derivatives, rnea_hessian};
 use condyle_linalg::check;
+use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::minus_product;
 use condyle_model::Model;
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -53,11 +55,11 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let square = || DMatrix::from_element(size.nv, size.nv, S::zero());
+        let square = || zero_matrix(size.nv, size.nv);
         Self {
-            mu: vec![S::zero(); size.nv],
-            transpose: vec![S::zero(); size.nv * size.nv],
-            product: vec![S::zero(); size.nv * size.nv],
+            mu: filled(S::zero(), size.nv),
+            transpose: filled(S::zero(), size.nv * size.nv),
+            product: filled(S::zero(), size.nv * size.nv),
             dqdq: square(),
             dvdq: square(),
             dvdv: square(),
@@ -68,13 +70,18 @@ impl<S: Scalar> Workspace<S> {
 
 kernel! {
     /// After `aba_derivatives` and the Hessian of φ.
-    fn run(model, data) {
-        let Data { aba_derivatives, minv, rnea_hessian: phi, aba_hessian, .. } = data;
-        let Workspace { transpose, product, dqdq, dvdq, dvdv, dtaudq, .. } = aba_hessian;
-        let (n, G) = (model.nv(), phi.dadq.as_slice());
+    fn run<S>(
+        nonzero_rows: &[NonzeroRows],
+        first: &aba_derivatives::Workspace<S>,
+        Minv: &DMatrix<S>,
+        phi: &rnea_hessian::Workspace<S>,
+        d: &mut Workspace<S>,
+    ) {
+        let Workspace { transpose, product, dqdq, dvdq, dvdv, dtaudq, .. } = d;
+        let (n, G) = (nonzero_rows.len(), phi.dadq.as_slice());
         let product = product.as_mut_slice();
-        transpose_to(aba_derivatives.da_dq.as_slice(), transpose, n);
-        minus_product(transpose, G, product, model.nonzero_rows()); // −(∂q̈/∂q)ᵀ G
+        transpose_to(first.da_dq.as_slice(), transpose, n);
+        minus_product(transpose, G, product, nonzero_rows); // −(∂q̈/∂q)ᵀ G
         let (qq, vv) = (dqdq.as_mut_slice(), dvdv.as_mut_slice());
         let (phi_qq, phi_vv) = (phi.dqdq.as_slice(), phi.dvdv.as_slice());
         for j in 0..n {
@@ -83,13 +90,13 @@ kernel! {
                 vv[i + n * j] = -phi_vv[i + n * j];
             }
         }
-        transpose_to(aba_derivatives.da_dv.as_slice(), transpose, n);
+        transpose_to(first.da_dv.as_slice(), transpose, n);
         let (vq, phi_vq) = (dvdq.as_mut_slice(), phi.dvdq.as_slice());
-        minus_product(transpose, G, vq, model.nonzero_rows()); // −(∂q̈/∂v)ᵀ G
+        minus_product(transpose, G, vq, nonzero_rows); // −(∂q̈/∂v)ᵀ G
         for k in 0..n * n {
             vq[k] -= phi_vq[k];
         }
-        minus_product(minv.matrix().as_slice(), G, dtaudq.as_mut_slice(), model.nonzero_rows()); // −M⁻¹ G
+        minus_product(Minv.as_slice(), G, dtaudq.as_mut_slice(), nonzero_rows); // −M⁻¹ G
     }
 }
 
@@ -146,10 +153,11 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
         let row = data.minv.matrix().column(i); // symmetric: a row is a column
         *mu = row.iter().zip(lambda).fold(S::zero(), |sum, (&x, &l)| x.mul_add(l, sum)); // μ = M⁻¹ λ
     }
-    rnea_hessian::run(model, data, &mu);
+    rnea_hessian::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &mu);
     data.aba_hessian.mu = mu;
-    run(model, data);
-    let state = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives).state;
+    let (first, Minv) = (&data.aba_derivatives, data.minv.matrix());
+    run(model.nonzero_rows(), first, Minv, &data.rnea_hessian, &mut data.aba_hessian);
+    let state = rnea_derivatives::view(model, data).state;
     let first = data.aba_derivatives.view(data.minv.matrix(), state);
     let Workspace { dqdq, dvdq, dvdv, dtaudq, .. } = &data.aba_hessian;
     AbaHessian { dqdq, dvdq, dvdv, dtaudq, first }

@@ -5,13 +5,14 @@
 
 use crate::centroidal::{self, CentroidalMapRate, shift_rate};
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -34,10 +35,10 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            a: vec![Motion::zero(); size.bodies],
-            f: vec![Force::zero(); size.bodies],
-            M: DMatrix::from_element(size.nv, size.nv, S::zero()),
-            h: vec![S::zero(); size.nv],
+            a: filled(Motion::zero(), size.bodies),
+            f: filled(Force::zero(), size.bodies),
+            M: zero_matrix(size.nv, size.nv),
+            h: filled(S::zero(), size.nv),
             twice: S::zero(),
         }
     }
@@ -114,8 +115,15 @@ pub struct AllTerms<'d, S, R = f64> {
 }
 
 kernel! {
-    fn run(model, data) {
-        pass(&Single::new(model), &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
+    /// For bodies whose velocities are known.
+    fn run<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        moving: &Moving<S>,
+        centroidal: &mut centroidal::Workspace<S>,
+        d: &mut Workspace<S>,
+    ) {
+        pass(&Single::new(model), world, moving, centroidal, d);
     }
 }
 
@@ -149,9 +157,9 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
-    positions(model, data, q);
-    velocities(model, data, v);
-    run(model, data);
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    run(model, &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
     let kinematics = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
     let moment = data.centroidal.IC[0].mass_com;
     AllTerms {

@@ -6,6 +6,7 @@
 
 use crate::aba;
 use crate::kinematics::World;
+use crate::workspace::filled;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 
@@ -51,7 +52,7 @@ impl<S: Scalar> Workspace<S> {
         let shared = columns.len() != nv;
         let paths = if shared || depths < LONG * nv { Vec::new() } else { paths(columns) };
         let places = paths.iter().map(|path| path.place + 1).max().unwrap_or(0);
-        let zeros = |n: usize| vec![S::zero(); n * SIDE];
+        let zeros = |n: usize| filled(S::zero(), n * SIDE);
         let x = zeros(if paths.is_empty() { 0 } else { nv });
         Self { x, P: zeros(6 * places), A: zeros(6 * places), paths }
     }

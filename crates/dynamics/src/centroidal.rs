@@ -7,13 +7,14 @@
 //! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::frames::{Accelerations, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
@@ -40,13 +41,13 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            IC: vec![Inertia::zero(); size.bodies],
-            BC: vec![Coriolis::zero(); size.bodies],
-            F: vec![Force::zero(); size.columns],
-            dF: vec![Force::zero(); size.columns],
-            Ag: DMatrix::from_element(6, size.nv, S::zero()),
-            dAg: DMatrix::from_element(6, size.nv, S::zero()),
-            Jcom: DMatrix::from_element(3, size.nv, S::zero()),
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
+            F: filled(Force::zero(), size.columns),
+            dF: filled(Force::zero(), size.columns),
+            Ag: zero_matrix(6, size.nv),
+            dAg: zero_matrix(6, size.nv),
+            Jcom: zero_matrix(3, size.nv),
         }
     }
 }
@@ -177,8 +178,9 @@ pub struct CentroidalMapRate<'d, S> {
 }
 
 kernel! {
-    fn run_map(model, data) {
-        map(&Single::new(model), &data.world, &mut data.centroidal);
+    /// For bodies that are placed.
+    fn run_map<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        map(&Single::new(model), world, d);
     }
 }
 
@@ -206,14 +208,15 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
 ) -> CentroidalMap<'d, S> {
     data.check(model);
     check("q", q.len(), model.nq());
-    positions(model, data, q);
-    run_map(model, data);
+    positions(model, &mut data.world, q);
+    run_map(model, &data.world, &mut data.centroidal);
     shift_map(model, &mut data.centroidal)
 }
 
 kernel! {
-    fn run_map_rate(model, data) {
-        map_rate(&Single::new(model), &data.world, &data.moving, &mut data.centroidal);
+    /// For bodies whose velocities are known.
+    fn run_map_rate<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        map_rate(&Single::new(model), world, moving, d);
     }
 }
 
@@ -243,9 +246,9 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
-    positions(model, data, q);
-    velocities(model, data, v);
-    run_map_rate(model, data);
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    run_map_rate(model, &data.world, &data.moving, &mut data.centroidal);
     shift_rate(model, &mut data.centroidal)
 }
 

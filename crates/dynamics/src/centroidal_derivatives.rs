@@ -14,12 +14,13 @@
 
 use crate::centroidal::{about, add};
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::kinematics::{Moving, World, accelerations, positions, velocities};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -59,11 +60,11 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let rows = |n| DMatrix::from_element(n, size.nv, S::zero());
+        let rows = |n| zero_matrix(n, size.nv);
         let (six, three, o) = (rows(6), rows(3), Force::zero());
         Self {
-            IC: vec![Inertia::zero(); size.bodies],
-            BC: vec![Coriolis::zero(); size.bodies],
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
             F: vec![o; size.bodies],
             columns: vec![Column { h_q: o, F_q: o, F_v: o, F_a: o }; size.columns],
             dh_dq: six.clone(),
@@ -175,8 +176,9 @@ pub struct CentroidalDerivatives<'d, S> {
 }
 
 kernel! {
-    fn run(model, data) {
-        pass(&Single::new(model), &data.world, &data.moving, &mut data.centroidal_derivatives);
+    /// For bodies whose accelerations are known.
+    fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        pass(&Single::new(model), world, moving, d);
     }
 }
 
@@ -209,9 +211,9 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
     check("a", a.len(), model.nv());
-    positions(model, data, q);
-    velocities(model, data, v);
-    accelerations(model, data, a);
-    run(model, data);
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    accelerations(model, &data.world, &mut data.moving, a);
+    run(model, &data.world, &data.moving, &mut data.centroidal_derivatives);
     shift(model, &mut data.centroidal_derivatives)
 }

@@ -13,15 +13,17 @@
 //! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
 //! programming for multi-phase rigid contact dynamics* (2018).
 
+use crate::constrained_dynamics::Inputs;
 use crate::constrained_equations;
-use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_set::ConstraintSet;
-use crate::data::{Data, Size};
+use crate::data::Data;
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::{minus_product, subtract_column};
 use condyle_model::Model;
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -42,9 +44,9 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        let square = zero_matrix(size.nv, size.nv);
         Self {
-            forces: vec![Force::zero(); size.bodies],
+            forces: filled(Force::zero(), size.bodies),
             P: square.clone(),
             dtau_dq: square.clone(),
             da_dq: square.clone(),
@@ -66,7 +68,7 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(A: &DMatrix<S>, B: &DMatrix<S>
 impl<S: Scalar> ConstraintSet<S> {
     /// Λ, J̄ and P of K⁻¹, for M and J M⁻¹ Jᵀ that are factorised.
     #[inline(always)]
-    pub(crate) fn invert(&mut self, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
+    fn invert(&mut self, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
         factor.inverse(P); // M⁻¹
         self.delassus.invert(self.proximal);
         let (n, rows) = (self.nv, self.lambda.len());
@@ -132,7 +134,7 @@ impl<S: Scalar> Equations<'_, S> {
 impl<S: Scalar> ConstraintSet<S> {
     /// The derivatives of acceleration and forces with respect to q, for r and `dgamma_dq`.
     #[inline(always)]
-    pub(crate) fn respond_to_q(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
+    fn respond_to_q(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
         let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, dgamma_dq, dlambda_dq, .. } = self;
         let (c, inertia) = (dgamma_dq, &delassus.inverse);
         Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching }.solve(da, dlambda_dq);
@@ -190,7 +192,7 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// let (mut touch, mut data) = (ConstraintSet::new(&arm, &[touch])?, Data::new(&arm));
 /// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
 /// let da_dtau = constrained_dynamics_derivatives(&arm, &mut data, &mut touch, &q, &v, &tau, &[]).da_dtau.clone();
-/// let mut J = DMatrix::<f64>::zeros(3, 7);
+/// let mut J = DMatrix::<f64>::zero_matrix(3, 7);
 /// touch.jacobian(&mut J);
 /// assert!((J * da_dtau).amax() < 1e-12); // no effort moves the point
 /// # Ok::<(), condyle_dynamics::Error>(())
@@ -209,8 +211,12 @@ pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> ConstrainedDerivatives<'d, S> {
     let inputs = Inputs { q, v, tau, f_ext };
-    constrained_work::check_arguments(model, data, constraints, &inputs);
-    constrained_work::run(Derivatives, model, data, constraints, inputs);
+    inputs.check(model, data, constraints);
+    constrained_equations::differentiate(model, data, constraints, inputs);
+    let (d, id) = (&mut data.constrained_derivatives, &data.rnea_derivatives);
+    invert(constraints, &data.constrained_dynamics.factor, &mut d.P);
+    respond_to_q(constraints, &d.P, &d.dtau_dq, &mut d.da_dq);
+    respond_to_v(constraints, &d.P, &id.dtau_dv, &mut d.da_dv);
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ConstrainedDerivatives {
         a: &data.constrained_dynamics.qdd,
@@ -227,34 +233,23 @@ pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-struct Derivatives;
-
-impl Algorithm for Derivatives {
-    #[inline(always)]
-    fn run<S: Scalar, R: Constant<S>>(
-        model: &Model<R>,
-        data: &mut Data<S>,
-        constraints: &mut ConstraintSet<S>,
-        Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
-    ) {
-        pass(model, data, constraints, q, v, tau, f_ext);
+kernel! {
+    /// The blocks of K⁻¹.
+    pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
+        set.invert(factor, P);
     }
 }
 
-/// The whole algorithm.
-#[inline(always)]
-fn pass<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &mut Data<S>,
-    constraints: &mut ConstraintSet<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
-) {
-    constrained_equations::differentiate(model, data, constraints, q, v, tau, f_ext);
-    let (d, id) = (&mut data.constrained_derivatives, &data.rnea_derivatives);
-    constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
-    constraints.respond_to_q(&d.P, &d.dtau_dq, &mut d.da_dq);
-    constraints.respond_to_v(&d.P, &id.dtau_dv, &mut d.da_dv);
+kernel! {
+    /// The derivatives of acceleration and forces with respect to q, for r and `dgamma_dq`.
+    pub(crate) fn respond_to_q<S>(set: &mut ConstraintSet<S>, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
+        set.respond_to_q(P, r, da);
+    }
+}
+
+kernel! {
+    /// The same with respect to v, for r and `dgamma_dv`.
+    fn respond_to_v<S>(set: &mut ConstraintSet<S>, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
+        set.respond_to_v(P, r, da);
+    }
 }

@@ -11,17 +11,18 @@
 //! Source: Udwadia and Kalaba, *A new perspective on constrained motion* (1992); Carpentier, Budhiraja, Mansard, *Proximal
 //! and sparse resolution of constrained dynamic equations* (2021).
 
-use crate::constrained_work::{self, Algorithm, Inputs};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::crba;
-use crate::data::{Data, Size};
-use crate::dispatch::Kernel;
-use crate::kinematics::{World, place};
+use crate::data::{Data, check_forces};
+use crate::kinematics::{World, positions};
 use crate::limbs;
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::Ltdl;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::layout::{Pairs, Single};
+use condyle_model::layout::{Layout, Pairs, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -50,14 +51,14 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         Self {
-            v: vec![Motion::zero(); size.bodies],
-            a: vec![Motion::zero(); size.bodies],
-            IC: vec![Inertia::zero(); size.bodies],
-            F: vec![Force::zero(); size.bodies],
-            M: DMatrix::from_element(size.nv, size.nv, S::zero()),
+            v: filled(Motion::zero(), size.bodies),
+            a: filled(Motion::zero(), size.bodies),
+            IC: filled(Inertia::zero(), size.bodies),
+            F: filled(Force::zero(), size.bodies),
+            M: zero_matrix(size.nv, size.nv),
             factor: Ltdl::new(model),
-            effort: vec![S::zero(); size.nv],
-            qdd: vec![S::zero(); size.nv],
+            effort: filled(S::zero(), size.nv),
+            qdd: filled(S::zero(), size.nv),
         }
     }
 }
@@ -92,15 +93,6 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
     crba::carry(l, w, IC, M.as_mut_slice());
 }
 
-/// M alone, for bodies that are placed.
-#[inline(always)]
-pub(crate) fn inertia<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
-    for i in l.bodies() {
-        d.IC[i] = w.oX[i].act(l.inertia(i));
-    }
-    crba::carry(l, w, &mut d.IC, d.M.as_mut_slice());
-}
-
 impl<S: Scalar> ConstraintSet<S> {
     /// y = J x + y.
     #[inline(always)]
@@ -131,7 +123,7 @@ impl<S: Scalar> ConstraintSet<S> {
 
     /// λ and the acceleration x for an effort, so that J x + γ = 0; for M that is factorised.
     #[inline(always)]
-    pub(crate) fn solve(&mut self, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
+    fn solve(&mut self, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
         x.copy_from_slice(effort);
         factor.solve(x); // M⁻¹ (τ − h)
         let mut b = core::mem::take(&mut self.error);
@@ -151,11 +143,10 @@ impl<S: Scalar> ConstraintSet<S> {
     }
 
     /// The largest |J q̈ + γ|.
-    #[inline(always)]
     pub(crate) fn residual(&self) -> S {
-        let mut largest = S::zero();
-        S::enter(Largest(&self.error, &mut largest));
-        largest
+        let mut residual = S::zero();
+        largest(&self.error, &mut residual);
+        residual
     }
 
     /// The force of constraint k as the last call left it, at the origin of its frame, along the axes of its rows; of a
@@ -222,9 +213,9 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> Constrained<'d, S> {
     let inputs = Inputs { q, v, tau, f_ext };
-    constrained_work::check_arguments(model, data, constraints, &inputs);
+    inputs.check(model, data, constraints);
     if !limbs::run_constrained(model, data, constraints, inputs) {
-        constrained_work::run(Forward, model, data, constraints, inputs);
+        run(model, data, constraints, inputs);
     }
     Constrained {
         a: &data.constrained_dynamics.qdd,
@@ -234,62 +225,107 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-struct Forward;
+/// What dynamics under constraints read.
+#[derive(Clone, Copy)]
+pub(crate) struct Inputs<'a, S> {
+    pub q: &'a [S],
+    pub v: &'a [S],
+    pub tau: &'a [S],
+    pub f_ext: &'a [Force<S>],
+}
 
-impl Algorithm for Forward {
-    #[inline(always)]
-    fn run<S: Scalar, R: Constant<S>>(
-        model: &Model<R>,
-        data: &mut Data<S>,
-        constraints: &mut ConstraintSet<S>,
-        Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
-    ) {
-        pass(&Single::new(model), data, constraints, q, v, tau, f_ext);
+impl<S: Scalar> Inputs<'_, S> {
+    /// Panics unless the arguments of forward dynamics fit.
+    #[inline]
+    #[track_caller]
+    pub(crate) fn check<R>(&self, model: &Model<R>, data: &Data<S>, constraints: &ConstraintSet<S>) {
+        data.check(model);
+        constraints.check(model);
+        model.check_regular();
+        check("q", self.q.len(), model.nq());
+        check("v", self.v.len(), model.nv());
+        check("tau", self.tau.len(), model.nv());
+        check_forces(self.f_ext.len(), model.nodes().len());
     }
 }
 
-/// The whole algorithm.
-#[inline(always)]
-pub(crate) fn pass<L: Pairs>(
-    l: &L,
-    data: &mut Data<L::S>,
-    constraints: &mut ConstraintSet<L::S>,
-    q: &[L::S],
-    qd: &[L::S],
-    tau: &[L::S],
-    f_ext: &[Force<L::S>],
+/// The whole algorithm over the factor of M, for arguments that fit.
+pub(crate) fn run<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
 ) {
-    place(l, &mut data.world, q);
+    positions(model, &mut data.world, q);
     let (world, d) = (&data.world, &mut data.constrained_dynamics);
-    bias(l, world, d, qd, f_ext);
-    for k in 0..tau.len() {
-        d.effort[k] = tau[k] - d.effort[k]; // τ − h
-    }
-    d.factor.factorize(&d.M);
-    for (i, plan) in constraints.plans.iter().enumerate() {
-        let target = &constraints.targets[i];
-        let ends = Ends::new(plan, target, world, &d.v, &d.a);
-        ends.jacobian(plan, &world.S, &mut constraints.J);
-        let gamma = ends.acceleration(plan, target).to_array();
-        for r in 0..plan.rows() {
-            constraints.gamma[plan.row + r] = gamma[r];
-        }
-    }
-    constraints.solve(&d.factor, &d.effort, &mut d.qdd);
+    equations(model, world, d, v, tau, f_ext);
+    factorize(d);
+    constrain(world, d, constraints);
+    solve(constraints, &d.factor, &d.effort, &mut d.qdd);
 }
 
-/// The largest absolute value of some numbers.
-struct Largest<'a, S>(&'a [S], &'a mut S);
-
-impl<S: Scalar> Kernel for Largest<'_, S> {
-    #[inline(always)]
-    fn run(self) {
-        for &x in self.0 {
-            *self.1 = S::select(self.1.lt(x.abs()), x.abs(), *self.1);
+kernel! {
+    /// M and τ − h, for bodies that are placed.
+    fn equations<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        d: &mut Workspace<S>,
+        v: &[S],
+        tau: &[S],
+        f_ext: &[Force<S>],
+    ) {
+        bias(&Single::new(model), world, d, v, f_ext);
+        for k in 0..tau.len() {
+            d.effort[k] = tau[k] - d.effort[k]; // τ − h
         }
     }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
+}
+
+kernel! {
+    /// M alone, for bodies that are placed.
+    pub(crate) fn inertia<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        let l = Single::new(model);
+        for i in l.bodies() {
+            d.IC[i] = world.oX[i].act(l.inertia(i));
+        }
+        crba::carry(&l, world, &mut d.IC, d.M.as_mut_slice());
+    }
+}
+
+kernel! {
+    /// The factor of M.
+    pub(crate) fn factorize<S>(d: &mut Workspace<S>) {
+        d.factor.factorize(&d.M);
+    }
+}
+
+kernel! {
+    /// J and γ, for bodies whose motion is known.
+    fn constrain<S>(world: &World<S>, d: &Workspace<S>, set: &mut ConstraintSet<S>) {
+        for (i, plan) in set.plans.iter().enumerate() {
+            let target = &set.targets[i];
+            let ends = Ends::new(plan, target, world, &d.v, &d.a);
+            ends.jacobian(plan, &world.S, &mut set.J);
+            let gamma = ends.acceleration(plan, target).to_array();
+            for r in 0..plan.rows() {
+                set.gamma[plan.row + r] = gamma[r];
+            }
+        }
+    }
+}
+
+kernel! {
+    /// λ and the acceleration x for an effort.
+    pub(crate) fn solve<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
+        set.solve(factor, effort, x);
+    }
+}
+
+kernel! {
+    /// The largest absolute value of some numbers.
+    fn largest<S>(of: &[S], largest: &mut S) {
+        for &x in of {
+            *largest = S::select(largest.lt(x.abs()), x.abs(), *largest);
+        }
     }
 }

@@ -12,8 +12,7 @@
 //! body is carried by frame 1 (a point's force: turned by frame 1, its point carried by body 2). Source: Carpentier and
 //! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
 
-use crate::constrained_dynamics;
-use crate::constrained_work::{self, Algorithm, Inputs};
+use crate::constrained_dynamics::{self, Inputs};
 use crate::constraint::ConstraintKind;
 use crate::constraint_motion::{Columns, Ends};
 use crate::constraint_set::ConstraintSet;
@@ -22,7 +21,7 @@ use crate::frames::Placements;
 use crate::kinematics::World;
 use crate::rnea_derivatives;
 use condyle_model::Model;
-use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
 use nalgebra::DMatrix;
 
@@ -53,13 +52,7 @@ impl<S: Scalar> ConstraintSet<S> {
 
     /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
     #[inline(always)]
-    pub(crate) fn load<R: Constant<S>>(
-        &self,
-        model: &Model<R>,
-        world: &World<S>,
-        f_ext: &[Force<S>],
-        forces: &mut [Force<S>],
-    ) {
+    fn load<R: Constant<S>>(&self, model: &Model<R>, world: &World<S>, f_ext: &[Force<S>], forces: &mut [Force<S>]) {
         forces.fill(Force::zero());
         forces[..f_ext.len()].copy_from_slice(f_ext);
         for (i, plan) in self.plans.iter().enumerate() {
@@ -72,7 +65,7 @@ impl<S: Scalar> ConstraintSet<S> {
 
     /// Adds to r = ∂(M q̈ + h − Jᵀ λ)/∂q what is different from forces that are fixed in their bodies.
     #[inline(always)]
-    pub(crate) fn add_turning(&self, world: &World<S>, r: &mut DMatrix<S>) {
+    fn add_turning(&self, world: &World<S>, r: &mut DMatrix<S>) {
         for (i, plan) in self.plans.iter().enumerate() {
             if plan.bodies[1] > 0 {
                 let ends = Ends::at_rest(plan, &self.targets[i], world);
@@ -179,8 +172,8 @@ pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> ConstrainedEquations<'d, S> {
     let inputs = Inputs { q, v, tau, f_ext };
-    constrained_work::check_arguments(model, data, constraints, &inputs);
-    constrained_work::run(Equations, model, data, constraints, inputs);
+    inputs.check(model, data, constraints);
+    differentiate(model, data, constraints, inputs);
     ConstrainedEquations {
         a: &data.constrained_dynamics.qdd,
         lambda: &constraints.lambda,
@@ -194,46 +187,55 @@ pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-struct Equations;
-
-impl Algorithm for Equations {
-    #[inline(always)]
-    fn run<S: Scalar, R: Constant<S>>(
-        model: &Model<R>,
-        data: &mut Data<S>,
-        constraints: &mut ConstraintSet<S>,
-        Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
-    ) {
-        differentiate(model, data, constraints, q, v, tau, f_ext);
-    }
-}
-
-/// The whole algorithm.
-#[inline(always)]
+/// The whole algorithm, for arguments that fit.
 pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
     constraints: &mut ConstraintSet<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
+    inputs: Inputs<'_, S>,
 ) {
-    let l = Single::new(model);
-    constrained_dynamics::pass(&l, data, constraints, q, v, tau, f_ext);
+    constrained_dynamics::run(model, data, constraints, inputs);
     let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
     let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
-    constraints.load(model, world, f_ext, &mut d.forces);
-    rnea_derivatives::pass(&l, world, id.parts(), v, qdd, &d.forces, l.minus_gravity(), false);
-    d.dtau_dq.as_mut_slice().copy_from_slice(id.dtau_dq.as_slice());
-    constraints.add_turning(world, &mut d.dtau_dq);
-    let columns = Columns { S: &world.S, Psid: &id.bodies.Psid, Psidd: &id.bodies.Psidd, PsidSd: &id.bodies.PsidSd };
-    let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = &mut *constraints;
-    dgamma_dq.as_mut_slice().fill(S::zero());
-    dgamma_dv.as_mut_slice().fill(S::zero());
-    for (plan, target) in plans.iter().zip(targets.iter()) {
-        let ends = Ends::new(plan, target, world, &id.bodies.v, &id.bodies.a);
-        let error = &error[plan.row..plan.row + plan.rows()];
-        ends.acceleration_derivatives(plan, target, columns, error, dgamma_dq, dgamma_dv);
+    load(model, constraints, world, inputs.f_ext, &mut d.forces);
+    rnea_derivatives::run(model, world, id, inputs.v, qdd, &d.forces, &[]);
+    turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
+    differentiate_motion(constraints, world, &id.bodies);
+}
+
+kernel! {
+    /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
+    pub(crate) fn load<S, R>(
+        model: &Model<R>,
+        set: &ConstraintSet<S>,
+        world: &World<S>,
+        f_ext: &[Force<S>],
+        forces: &mut [Force<S>],
+    ) {
+        set.load(model, world, f_ext, forces);
+    }
+}
+
+kernel! {
+    /// r_q, from the derivative for forces that are fixed in their bodies.
+    pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &DMatrix<S>, r: &mut DMatrix<S>) {
+        r.as_mut_slice().copy_from_slice(fixed.as_slice());
+        set.add_turning(world, r);
+    }
+}
+
+kernel! {
+    /// c_q and c_v, for bodies whose motion is known.
+    fn differentiate_motion<S>(set: &mut ConstraintSet<S>, world: &World<S>, bodies: &rnea_derivatives::Bodies<S>) {
+        let rnea_derivatives::Bodies { v, a, Psid, Psidd, PsidSd, .. } = bodies;
+        let columns = Columns { S: &world.S, Psid, Psidd, PsidSd };
+        let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = set;
+        dgamma_dq.as_mut_slice().fill(S::zero());
+        dgamma_dv.as_mut_slice().fill(S::zero());
+        for (plan, target) in plans.iter().zip(targets.iter()) {
+            let ends = Ends::new(plan, target, world, v, a);
+            let error = &error[plan.row..plan.row + plan.rows()];
+            ends.acceleration_derivatives(plan, target, columns, error, dgamma_dq, dgamma_dv);
+        }
     }
 }

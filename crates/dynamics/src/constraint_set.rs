@@ -322,6 +322,7 @@ impl<S: Scalar> ConstraintSet<S> {
     }
 
     /// Panics unless this was made for a model of the same tree.
+    #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
         assert!(self.tree == model.tree_hash(), "constraints: made for another model than `{}`", model.name());

@@ -11,12 +11,13 @@
 //! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 numbers other than zero, given by the momentum
 //! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::kinematics::{Moving, World, positions, velocities};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;
 
@@ -95,9 +96,9 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            IC: vec![Inertia::zero(); size.bodies],
-            BC: vec![Coriolis::zero(); size.bodies],
-            C: DMatrix::from_element(size.nv, size.nv, S::zero()),
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
+            C: zero_matrix(size.nv, size.nv),
         }
     }
 }
@@ -140,8 +141,9 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    fn run(model, data) {
-        pass(&Single::new(model), &data.world, &data.moving, &mut data.coriolis);
+    /// For bodies whose velocities are known.
+    fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        pass(&Single::new(model), world, moving, d);
     }
 }
 
@@ -174,8 +176,8 @@ pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
-    positions(model, data, q);
-    velocities(model, data, v);
-    run(model, data);
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    run(model, &data.world, &data.moving, &mut data.coriolis);
     &data.coriolis.C
 }

@@ -3,13 +3,14 @@
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2; in the world's frame, where a composite is
 //! a plain sum.
 
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::kinematics::{World, positions};
 use crate::limbs;
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
 
@@ -24,7 +25,7 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        Self { IC: vec![Inertia::zero(); size.bodies], M: DMatrix::from_element(size.nv, size.nv, S::zero()) }
+        Self { IC: filled(Inertia::zero(), size.bodies), M: zero_matrix(size.nv, size.nv) }
     }
 }
 
@@ -68,9 +69,10 @@ pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [
 }
 
 kernel! {
-    fn run(model, data) {
-        let Workspace { IC, M } = &mut data.crba;
-        pass(&Single::new(model), &data.world, IC, M.as_mut_slice());
+    /// Body by body, for bodies that are placed.
+    fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        let Workspace { IC, M } = d;
+        pass(&Single::new(model), world, IC, M.as_mut_slice());
     }
 }
 
@@ -96,7 +98,7 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     if limbs::run(limbs::Task::Crba, model, data, q, &[], &[], &[]) {
         return &data.crba.M;
     }
-    positions(model, data, q);
-    run(model, data);
+    positions(model, &mut data.world, q);
+    run(model, &data.world, &mut data.crba);
     &data.crba.M
 }

@@ -129,7 +129,7 @@ impl LaneJacobian {
     ///
     /// # Panics
     /// If n is less than nq.
-    pub fn new<R>(model: &Model<R>, n: usize, results: usize) -> Self {
+    pub fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
         let width = match level() {
             Level::Avx512 => Width::Long(Box::new(Directions::new(model, n, results))),
@@ -173,7 +173,7 @@ struct Directions<S> {
 }
 
 impl<S: Block<Number = f64>> Directions<S> {
-    fn new<R>(model: &Model<R>, n: usize, results: usize) -> Self {
+    fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         let zeros = |n: usize| vec![LaneDual::<S>::zero(); n];
         let data = Data::new(model);
         Self { data, delta: zeros(n - model.nq() + model.nv()), x: zeros(n), moved: zeros(n), y: zeros(results) }
@@ -241,10 +241,6 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
             }
             first += S::LANES;
         }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
     }
 }
 

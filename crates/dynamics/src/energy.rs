@@ -1,11 +1,12 @@
 //! Kinetic and potential energy, and their derivatives: sums over the moving bodies.
 
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, forward_velocities};
+use crate::workspace::{Size, filled};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
@@ -80,10 +81,10 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let zeros = || vec![S::zero(); size.nv];
+        let zeros = || filled(S::zero(), size.nv);
         Self {
-            IC: vec![Inertia::zero(); size.bodies],
-            h: vec![Force::zero(); size.bodies],
+            IC: filled(Inertia::zero(), size.bodies),
+            h: filled(Force::zero(), size.bodies),
             dT_dq: zeros(),
             dT_dv: zeros(),
             dV_dq: zeros(),
@@ -130,8 +131,9 @@ pub struct EnergyDerivatives<'d, S> {
 }
 
 kernel! {
-    fn run(model, data) {
-        derivatives(&Single::new(model), &data.world, &data.moving, &mut data.energy);
+    /// For bodies whose velocities are known.
+    fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        derivatives(&Single::new(model), world, moving, d);
     }
 }
 
@@ -159,7 +161,7 @@ pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> EnergyDerivatives<'d, S> {
     forward_velocities(model, data, q, v);
-    run(model, data);
+    run(model, &data.world, &data.moving, &mut data.energy);
     let Workspace { dT_dq, dT_dv, dV_dq, .. } = &data.energy;
     EnergyDerivatives { dT_dq, dT_dv, dV_dq }
 }

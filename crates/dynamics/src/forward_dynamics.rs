@@ -3,13 +3,15 @@
 use crate::aba::aba;
 use crate::crba::crba;
 use crate::data::{Data, check_forces};
-use crate::dispatch::kernel;
 use crate::rnea::rnea;
+use crate::workspace::filled;
 use condyle_linalg::Cholesky;
 use condyle_linalg::Ltdl;
 use condyle_linalg::check;
 use condyle_model::Model;
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
+use nalgebra::DMatrix;
 
 /// A way to compute forward dynamics. All give the same numbers, up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +32,7 @@ pub(crate) struct Workspace<S> {
     /// A factor of M. Written by: `forward_dynamics`.
     dense: Cholesky<S>,
     /// τ − h, then joint accelerations. Shape: nv. Written by: `forward_dynamics`.
-    qdd: Vec<S>,
+    pub qdd: Vec<S>,
     /// Zeros. Shape: nv. Written by: nobody.
     zero: Vec<S>,
 }
@@ -40,8 +42,8 @@ impl<S: Scalar> Workspace<S> {
         Self {
             sparse: Ltdl::new(model),
             dense: Cholesky::new(model.nv()),
-            qdd: vec![S::zero(); model.nv()],
-            zero: vec![S::zero(); model.nv()],
+            qdd: filled(S::zero(), model.nv()),
+            zero: filled(S::zero(), model.nv()),
         }
     }
 }
@@ -73,19 +75,19 @@ fn subtract<S: Scalar>(tau: &[S], h: &[S], out: &mut [S]) {
 }
 
 kernel! {
-    fn run_dense(_model, data, tau: &[S]) {
-        let Workspace { dense, qdd, .. } = &mut data.forward_dynamics;
-        subtract(tau, data.rnea.tau(), qdd);
-        dense.factorize(data.crba.matrix());
+    fn run_dense<S>(d: &mut Workspace<S>, h: &[S], M: &DMatrix<S>, tau: &[S]) {
+        let Workspace { dense, qdd, .. } = d;
+        subtract(tau, h, qdd);
+        dense.factorize(M);
         dense.solve(qdd); // M q̈ = τ − h
     }
 }
 
 kernel! {
-    fn run_sparse(_model, data, tau: &[S]) {
-        let Workspace { sparse, qdd, .. } = &mut data.forward_dynamics;
-        subtract(tau, data.rnea.tau(), qdd);
-        sparse.factorize(data.crba.matrix());
+    fn run_sparse<S>(d: &mut Workspace<S>, h: &[S], M: &DMatrix<S>, tau: &[S]) {
+        let Workspace { sparse, qdd, .. } = d;
+        subtract(tau, h, qdd);
+        sparse.factorize(M);
         sparse.solve(qdd); // M q̈ = τ − h
     }
 }
@@ -125,17 +127,32 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     check("v", v.len(), model.nv());
     check("tau", tau.len(), model.nv());
     check_forces(f_ext.len(), model.nodes().len());
-    let method = method.unwrap_or(Method::fastest(model));
-    if method == Method::ArticulatedBody {
-        return aba(model, data, q, v, tau, f_ext);
+    match method.unwrap_or(Method::fastest(model)) {
+        Method::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
+        method => {
+            by_factor(model, data, q, v, tau, f_ext, method);
+            &data.forward_dynamics.qdd
+        }
     }
+}
+
+/// Over a factor of M.
+pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+    method: Method,
+) {
     let zero = core::mem::take(&mut data.forward_dynamics.zero);
     rnea(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
     data.forward_dynamics.zero = zero;
     crba(model, data, q);
+    let (d, h, M) = (&mut data.forward_dynamics, data.rnea.tau(), data.crba.matrix());
     match method {
-        Method::Dense => run_dense(model, data, tau),
-        _ => run_sparse(model, data, tau),
+        Method::Dense => run_dense(d, h, M, tau),
+        _ => run_sparse(d, h, M, tau),
     }
-    &data.forward_dynamics.qdd
 }

@@ -15,17 +15,20 @@
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
 //! ```
 
-use crate::constrained_dynamics::inertia;
-use crate::constrained_work::{self, Algorithm, Inputs};
+use crate::constrained_derivatives::{invert, respond_to_q};
+use crate::constrained_dynamics::{factorize, inertia, solve};
+use crate::constrained_equations::{load, turn};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
-use crate::data::{Data, Size};
-use crate::kinematics::{World, place};
+use crate::data::Data;
+use crate::kinematics::{World, positions};
 use crate::rnea_derivatives;
+use crate::workspace::{Size, filled};
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::layout::{Layout, Pairs, Single};
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -47,11 +50,11 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            v_after: vec![S::zero(); size.nv],
-            w: vec![S::zero(); size.nv],
-            velocity: vec![Motion::zero(); size.bodies],
-            Psid: vec![Motion::zero(); size.columns],
-            zero: vec![S::zero(); size.nv],
+            v_after: filled(S::zero(), size.nv),
+            w: filled(S::zero(), size.nv),
+            velocity: filled(Motion::zero(), size.bodies),
+            Psid: filled(Motion::zero(), size.columns),
+            zero: filled(S::zero(), size.nv),
         }
     }
 }
@@ -102,8 +105,7 @@ pub fn impulse_dynamics<'d, S: Scalar, R: Constant<S>>(
     restitution: S,
 ) -> Impulse<'d, S> {
     checks(model, data, constraints, q, v);
-    let inputs = Inputs { q, v, tau: &[restitution], f_ext: &[] };
-    constrained_work::run(Impact, model, data, constraints, inputs);
+    run(model, data, constraints, q, v, restitution);
     Impulse {
         v: &data.impulse_dynamics.v_after,
         lambda: &constraints.lambda,
@@ -124,80 +126,65 @@ where
     check("v", v.len(), model.nv());
 }
 
-struct Impact;
-
-impl Algorithm for Impact {
-    #[inline(always)]
-    fn run<S: Scalar, R: Constant<S>>(
-        model: &Model<R>,
-        data: &mut Data<S>,
-        constraints: &mut ConstraintSet<S>,
-        Inputs { q, v, tau, .. }: Inputs<'_, S>,
-    ) {
-        pass(&Single::new(model), data, constraints, q, v, tau[0]);
-    }
-}
-
-struct ImpactDerivatives;
-
-impl Algorithm for ImpactDerivatives {
-    #[inline(always)]
-    fn run<S: Scalar, R: Constant<S>>(
-        model: &Model<R>,
-        data: &mut Data<S>,
-        constraints: &mut ConstraintSet<S>,
-        Inputs { q, v, tau, .. }: Inputs<'_, S>,
-    ) {
-        let restitution = tau[0];
-        let l = Single::new(model);
-        pass(&l, data, constraints, q, v, restitution);
-        let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
-        let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
-        constraints.load(model, world, &[], &mut d.forces);
-        rnea_derivatives::pass(&l, world, id.parts(), &out.zero, change, &d.forces, Vec3::zero(), false); // ∂(M Δ − Jᵀ Λ)/∂q
-        d.dtau_dq.as_mut_slice().copy_from_slice(id.dtau_dq.as_slice());
-        constraints.add_turning(world, &mut d.dtau_dq);
-        spread(&l, world, out);
-        constraints.dgamma_dq.as_mut_slice().fill(S::zero());
-        for (plan, target) in constraints.plans.iter().zip(&constraints.targets) {
-            let ends = Ends::new(plan, target, world, &out.velocity, &out.velocity);
-            let value = &constraints.error[plan.row..plan.row + plan.rows()];
-            ends.velocity_derivative(plan, &world.S, &out.Psid, value, &mut constraints.dgamma_dq);
-        }
-        constraints.invert(&data.constrained_dynamics.factor, &mut d.P);
-        constraints.respond_to_q(&d.P, &d.dtau_dq, &mut d.da_dq);
-        constraints.respond_to_v_before(restitution, &mut d.da_dv);
-    }
-}
-
-/// The whole algorithm.
-#[inline(always)]
-fn pass<L: Pairs>(
-    l: &L,
-    data: &mut Data<L::S>,
-    constraints: &mut ConstraintSet<L::S>,
-    q: &[L::S],
-    v: &[L::S],
-    restitution: L::S,
+/// The whole algorithm, for arguments that fit.
+fn run<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    restitution: S,
 ) {
-    place(l, &mut data.world, q);
+    positions(model, &mut data.world, q);
     let (world, d, out) = (&data.world, &mut data.constrained_dynamics, &mut data.impulse_dynamics);
-    inertia(l, world, d);
-    d.factor.factorize(&d.M);
-    for (i, plan) in constraints.plans.iter().enumerate() {
-        Ends::at_rest(plan, &constraints.targets[i], world).jacobian(plan, &world.S, &mut constraints.J);
-    }
-    for k in 0..v.len() {
-        out.w[k] = v[k].mul_add(restitution, v[k]); // (1 + ε) v
-    }
-    let mut gamma = core::mem::take(&mut constraints.gamma);
-    gamma.fill(L::S::zero());
-    constraints.add_motion(&out.w, &mut gamma);
-    constraints.gamma = gamma;
-    constraints.solve(&d.factor, &out.zero, &mut d.qdd); // Δ
+    inertia(model, world, d);
+    factorize(d);
+    approach(world, constraints, out, v, restitution);
+    solve(constraints, &d.factor, &out.zero, &mut d.qdd); // Δ
     for k in 0..v.len() {
         out.v_after[k] = v[k] + d.qdd[k];
         out.w[k] = v[k].mul_add(restitution, out.v_after[k]);
+    }
+}
+
+kernel! {
+    /// J and γ = (1 + ε) J v, for bodies that are placed.
+    fn approach<S>(world: &World<S>, set: &mut ConstraintSet<S>, d: &mut Workspace<S>, v: &[S], restitution: S) {
+        for (i, plan) in set.plans.iter().enumerate() {
+            Ends::at_rest(plan, &set.targets[i], world).jacobian(plan, &world.S, &mut set.J);
+        }
+        for k in 0..v.len() {
+            d.w[k] = v[k].mul_add(restitution, v[k]); // (1 + ε) v
+        }
+        let mut gamma = core::mem::take(&mut set.gamma);
+        gamma.fill(S::zero());
+        set.add_motion(&d.w, &mut gamma);
+        set.gamma = gamma;
+    }
+}
+
+kernel! {
+    /// c, for bodies that are placed.
+    fn differentiate_motion<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        d: &mut Workspace<S>,
+        set: &mut ConstraintSet<S>,
+    ) {
+        spread(&Single::new(model), world, d);
+        set.dgamma_dq.as_mut_slice().fill(S::zero());
+        for (plan, target) in set.plans.iter().zip(&set.targets) {
+            let ends = Ends::new(plan, target, world, &d.velocity, &d.velocity);
+            let value = &set.error[plan.row..plan.row + plan.rows()];
+            ends.velocity_derivative(plan, &world.S, &d.Psid, value, &mut set.dgamma_dq);
+        }
+    }
+}
+
+kernel! {
+    /// The derivatives with respect to the velocity before the impact.
+    fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut DMatrix<S>) {
+        set.respond_to_v_before(restitution, dv);
     }
 }
 
@@ -268,8 +255,16 @@ pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     restitution: S,
 ) -> ImpulseDerivatives<'d, S> {
     checks(model, data, constraints, q, v);
-    let inputs = Inputs { q, v, tau: &[restitution], f_ext: &[] };
-    constrained_work::run(ImpactDerivatives, model, data, constraints, inputs);
+    run(model, data, constraints, q, v, restitution);
+    let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
+    let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
+    load(model, constraints, world, &[], &mut d.forces);
+    rnea_derivatives::run(model, world, id, &out.zero, change, &d.forces, &[Vec3::zero()]); // ∂(M Δ − Jᵀ Λ)/∂q
+    turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
+    differentiate_motion(model, world, out, constraints);
+    invert(constraints, &data.constrained_dynamics.factor, &mut d.P);
+    respond_to_q(constraints, &d.P, &d.dtau_dq, &mut d.da_dq);
+    respond_to_v_before(constraints, restitution, &mut d.da_dv);
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ImpulseDerivatives {
         v: &data.impulse_dynamics.v_after,

@@ -73,13 +73,6 @@ pub(crate) struct State<'d, S, R> {
     pub limbs: Option<Seen<'d>>,
 }
 
-impl<'d, S, R> State<'d, S, R> {
-    /// Of bodies that were computed one by one.
-    pub(crate) fn new(model: &'d Model<R>, world: &'d World<S>, pass: &'d Workspace<S>) -> Self {
-        Self { model, world, pass, limbs: None }
-    }
-}
-
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     /// oXb, in the body's public frame.
     fn pose(&self, b: usize) -> Se3<S> {

@@ -1,15 +1,16 @@
 //! Where the bodies are and how they move: one pass from the root to the tips for all bodies. What can then be asked is
 //! in `frames.rs`.
 
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::frames::{Accelerations, Placements, Velocities};
 use crate::limbs;
+use crate::workspace::{Size, filled};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
 /// What depends on the position alone, in the world's frame.
@@ -41,8 +42,8 @@ impl<S: Scalar> World<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
             sin_cos: JointSinCos::new(size.bodies),
-            oX: vec![Se3::identity(); size.bodies],
-            S: vec![Motion::zero(); size.columns],
+            oX: filled(Se3::identity(), size.bodies),
+            S: filled(Motion::zero(), size.columns),
             placed: Placed::Nowhere,
         }
     }
@@ -79,10 +80,10 @@ pub(crate) struct Moving<S> {
 impl<S: Scalar> Moving<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            v: vec![Motion::zero(); size.bodies],
-            dS: vec![Motion::zero(); size.columns],
-            qd: vec![S::zero(); size.nv],
-            a: vec![Motion::zero(); size.bodies],
+            v: filled(Motion::zero(), size.bodies),
+            dS: filled(Motion::zero(), size.columns),
+            qd: filled(S::zero(), size.nv),
+            a: filled(Motion::zero(), size.bodies),
         }
     }
 }
@@ -120,22 +121,22 @@ fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L:
 
 kernel! {
     /// Places all bodies.
-    pub(crate) fn positions(model, data, q: &[S]) {
-        place(&Single::new(model), &mut data.world, q);
+    pub(crate) fn positions<S, R>(model: &Model<R>, world: &mut World<S>, q: &[S]) {
+        place(&Single::new(model), world, q);
     }
 }
 
 kernel! {
     /// The velocities of bodies that are placed.
-    pub(crate) fn velocities(model, data, v: &[S]) {
-        advance(&Single::new(model), &data.world, &mut data.moving, v);
+    pub(crate) fn velocities<S, R>(model: &Model<R>, world: &World<S>, moving: &mut Moving<S>, v: &[S]) {
+        advance(&Single::new(model), world, moving, v);
     }
 }
 
 kernel! {
     /// The accelerations of bodies whose velocities are known.
-    pub(crate) fn accelerations(model, data, a: &[S]) {
-        accelerate(&Single::new(model), &data.world, &mut data.moving, a);
+    pub(crate) fn accelerations<S, R>(model: &Model<R>, world: &World<S>, moving: &mut Moving<S>, a: &[S]) {
+        accelerate(&Single::new(model), world, moving, a);
     }
 }
 
@@ -187,7 +188,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 ) -> Placements<'d, S, R> {
     data.check(model);
     check("q", q.len(), model.nq());
-    positions(model, data, q);
+    positions(model, &mut data.world, q);
     Placements { model, world: &data.world }
 }
 
@@ -216,8 +217,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
-    positions(model, data, q);
-    velocities(model, data, v);
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
 }
 
@@ -250,9 +251,9 @@ pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
     check("a", a.len(), model.nv());
-    positions(model, data, q);
-    velocities(model, data, v);
-    accelerations(model, data, a);
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    accelerations(model, &data.world, &mut data.moving, a);
     let velocities = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
     Accelerations { velocities }
 }

@@ -7,15 +7,15 @@
 
 use crate::aba;
 use crate::crba::crba;
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::kinematics::{World, positions};
 use crate::limbs;
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::layout::Single;
 use condyle_model::tree::Column;
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 
@@ -45,9 +45,9 @@ impl<S: Scalar> Workspace<S> {
         Self {
             by_factor: model.has_mimic() || factor.nonzeros() <= SHORT_ROWS * size.nv,
             factor,
-            P: vec![S::zero(); 6 * size.columns],
-            A: vec![S::zero(); (1 + size.depth) * 6 * size.columns],
-            Minv: DMatrix::from_element(size.nv, size.nv, S::zero()),
+            P: filled(S::zero(), 6 * size.columns),
+            A: filled(S::zero(), (1 + size.depth) * 6 * size.columns),
+            Minv: zero_matrix(size.nv, size.nv),
         }
     }
 }
@@ -122,37 +122,18 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
     }
 }
 
-/// M⁻¹ from M.
-#[inline(always)]
-fn from_matrix<S: Scalar>(d: &mut Workspace<S>, M: &DMatrix<S>) {
-    d.factor.factorize(M);
-    d.factor.inverse(&mut d.Minv);
-}
-
 kernel! {
-    fn factorize(model, data) {
-        aba::factorize(&Single::new(model), &data.world, &mut data.aba);
+    /// M⁻¹ from M.
+    pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &DMatrix<S>) {
+        d.factor.factorize(M);
+        d.factor.inverse(&mut d.Minv);
     }
 }
 
 kernel! {
-    /// After `rnea_derivatives`, where M = ∂τ/∂a.
-    pub(crate) fn from_derivatives(_model, data) {
-        from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
-    }
-}
-
-kernel! {
-    /// After `aba`.
-    pub(crate) fn from_factors(model, data) {
-        sweep(model.columns(), &data.world, &data.aba, &mut data.minv);
-    }
-}
-
-kernel! {
-    /// After `crba`.
-    fn from_crba(_model, data) {
-        from_matrix(&mut data.minv, data.crba.matrix());
+    /// M⁻¹ from the factors of the articulated bodies.
+    pub(crate) fn from_factors<S>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
+        sweep(columns, w, f, d);
     }
 }
 
@@ -182,11 +163,11 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
             return &data.minv.Minv;
         }
         crba(model, data, q);
-        from_crba(model, data);
+        from_matrix(&mut data.minv, data.crba.matrix());
         return &data.minv.Minv;
     }
-    positions(model, data, q);
-    factorize(model, data);
-    from_factors(model, data);
+    positions(model, &mut data.world, q);
+    aba::factors(model, &data.world, &mut data.aba);
+    from_factors(model.columns(), &data.world, &data.aba, &mut data.minv);
     &data.minv.Minv
 }

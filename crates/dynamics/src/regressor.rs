@@ -11,9 +11,10 @@
 //! Source: Atkeson, An, Hollerbach, *Estimation of inertial parameters of manipulator loads and links* (1986);
 //! the form y makes the 6 × 10 matrices of that paper superfluous.
 
-use crate::data::{Data, Size};
+use crate::data::Data;
 use crate::frames::Placements;
 use crate::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Motion, Scalar};
@@ -37,9 +38,9 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let parameters = PARAMETERS * (size.bodies - 1);
         Self {
-            torque: DMatrix::from_element(size.nv, parameters, S::zero()),
-            kinetic: vec![S::zero(); parameters],
-            potential: vec![S::zero(); parameters],
+            torque: zero_matrix(size.nv, parameters),
+            kinetic: filled(S::zero(), parameters),
+            potential: filled(S::zero(), parameters),
         }
     }
 }

@@ -5,15 +5,16 @@
 //! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
 //! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
 
-use crate::data::{Data, Size, check_forces};
-use crate::dispatch::kernel;
-use crate::kinematics::Placed;
+use crate::data::{Data, check_forces};
+use crate::kinematics::{Placed, World};
 use crate::limbs;
+use crate::workspace::{Size, filled};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
 /// In the bodies' turned frames.
@@ -22,7 +23,7 @@ use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 pub(crate) struct Workspace<S> {
     /// λXi. Shape: levels. Written by: `pass`.
     X: Vec<Se3<S>>,
-    /// How the body turns and its origin accelerates, with gravity as the world's. Shape: levels. Written by: `pass`.
+    /// How the body sin_cos and its origin accelerates, with gravity as the world's. Shape: levels. Written by: `pass`.
     motion: Vec<ClassicalMotion<S>>,
     /// K; the world's stays 0. Shape: levels. Written by: `pass`.
     K: Vec<Mat3<S>>,
@@ -38,12 +39,12 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let still = ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() };
         Self {
-            X: vec![Se3::identity(); size.levels],
-            motion: vec![still; size.levels],
-            K: vec![Mat3::zero(); size.levels],
-            f: vec![Force::zero(); size.levels],
-            tau: vec![S::zero(); size.nv],
-            zero: vec![S::zero(); size.nv],
+            X: filled(Se3::identity(), size.levels),
+            motion: filled(still, size.levels),
+            K: filled(Mat3::zero(), size.levels),
+            f: filled(Force::zero(), size.levels),
+            tau: filled(S::zero(), size.nv),
+            zero: filled(S::zero(), size.nv),
         }
     }
 }
@@ -111,19 +112,26 @@ pub(crate) fn pass<L: Layout>(
 }
 
 kernel! {
-    fn one_by_one(model, data, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
-        data.world.placed = Placed::Nowhere;
-        pass(&Single::new(model), &mut data.world.sin_cos, &mut data.rnea, q, v, a, f_ext);
+    /// Body by body.
+    fn one_by_one<S, R>(
+        model: &Model<R>,
+        world: &mut World<S>,
+        d: &mut Workspace<S>,
+        q: &[S],
+        v: &[S],
+        a: &[S],
+        f_ext: &[Force<S>],
+    ) {
+        world.placed = Placed::Nowhere;
+        pass(&Single::new(model), &mut world.sin_cos, d, q, v, a, f_ext);
     }
 }
 
 /// With the limbs side by side where there are some, else body by body.
-#[inline(always)]
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
-    if limbs::run(limbs::Task::Rnea, model, data, q, v, a, f_ext) {
-        return;
+    if !limbs::run(limbs::Task::Rnea, model, data, q, v, a, f_ext) {
+        one_by_one(model, &mut data.world, &mut data.rnea, q, v, a, f_ext);
     }
-    one_by_one(model, data, q, v, a, f_ext);
 }
 
 /// τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n).

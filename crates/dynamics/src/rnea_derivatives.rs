@@ -21,15 +21,16 @@
 //! (Iᶜ, B, F of the joint of d).
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size, check_forces};
-use crate::dispatch::kernel;
+use crate::data::{Data, check_forces};
 use crate::inputs::State;
-use crate::kinematics::{World, positions};
+use crate::kinematics::{Placed, World, positions};
 use crate::limbs;
 use crate::side_by_side::{self, Rows};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -60,14 +61,14 @@ pub(crate) struct Bodies<S> {
 impl<S: Scalar> Bodies<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            v: vec![Motion::zero(); size.bodies],
-            a: vec![Motion::zero(); size.bodies],
-            IC: vec![Inertia::zero(); size.bodies],
-            BC: vec![Coriolis::zero(); size.bodies],
-            F: vec![Force::zero(); size.bodies],
-            Psid: vec![Motion::zero(); size.columns],
-            Psidd: vec![Motion::zero(); size.columns],
-            PsidSd: vec![Motion::zero(); size.columns],
+            v: filled(Motion::zero(), size.bodies),
+            a: filled(Motion::zero(), size.bodies),
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
+            F: filled(Force::zero(), size.bodies),
+            Psid: filled(Motion::zero(), size.columns),
+            Psidd: filled(Motion::zero(), size.columns),
+            PsidSd: filled(Motion::zero(), size.columns),
             rows: Rows::new(size.columns),
         }
     }
@@ -92,12 +93,12 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        let square = zero_matrix(size.nv, size.nv);
         Self {
             bodies: Bodies::new(size),
-            qd: vec![S::zero(); size.nv],
-            qdd: vec![S::zero(); size.nv],
-            still: vec![S::zero(); size.nv],
+            qd: filled(S::zero(), size.nv),
+            qdd: filled(S::zero(), size.nv),
+            still: filled(S::zero(), size.nv),
             dtau_dq: square.clone(),
             dtau_dv: square.clone(),
             dtau_da: square,
@@ -204,8 +205,16 @@ pub(crate) fn pass<L: Columns>(
 
 kernel! {
     /// For bodies that are placed, under the model's gravity if no other acceleration of the world is given.
-    pub(crate) fn run(model, data, v: &[S], a: &[S], f_ext: &[Force<S>], world: &[Vec3<S>]) {
-        let (l, w, d) = (Single::new(model), &data.world, &mut data.rnea_derivatives);
+    pub(crate) fn run<S, R>(
+        model: &Model<R>,
+        w: &World<S>,
+        d: &mut Workspace<S>,
+        v: &[S],
+        a: &[S],
+        f_ext: &[Force<S>],
+        world: &[Vec3<S>],
+    ) {
+        let l = Single::new(model);
         let minus_gravity = if world.is_empty() { l.minus_gravity() } else { world[0] };
         let by_rows = side_by_side::pays::<S, R>(model);
         d.qd.copy_from_slice(v);
@@ -258,11 +267,11 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     if limbs::run(limbs::Task::RneaDerivatives, model, data, q, v, a, f_ext) {
         data.rnea_derivatives.qd.copy_from_slice(v);
         data.rnea_derivatives.qdd.copy_from_slice(a);
-        return view_of_limbs(model, data);
+    } else {
+        positions(model, &mut data.world, q);
+        run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
     }
-    positions(model, data, q);
-    run(model, data, v, a, f_ext, &[]);
-    view(model, &data.world, &data.rnea_derivatives)
+    view(model, data)
 }
 
 /// Panics unless the arguments fit.
@@ -286,24 +295,17 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) {
     check_arguments(model, data, q, v, a, f_ext);
-    positions(model, data, q);
-    run(model, data, v, a, f_ext, &[]);
+    positions(model, &mut data.world, q);
+    run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
 
-/// What `pass` has left in the limbs' lanes.
-pub(crate) fn view_of_limbs<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
-    let mut view = view(model, &data.world, &data.rnea_derivatives);
-    view.state.limbs = data.limbs.as_ref().zip(model.limbs()).map(|(scratch, plan)| limbs::Seen::new(plan, scratch));
-    view
-}
-
-/// What `pass` has left.
-pub(crate) fn view<'d, S, R>(
-    model: &'d Model<R>,
-    world: &'d World<S>,
-    d: &'d Workspace<S>,
-) -> RneaDerivatives<'d, S, R> {
-    let state = State::new(model, world, d);
+/// What `pass` has left, body by body or in the limbs' lanes.
+pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
+    let d = &data.rnea_derivatives;
+    let in_limbs = data.world.placed == Placed::Limbs;
+    let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
+    let limbs = limbs.map(|(scratch, plan)| limbs::Seen::new(plan, scratch));
+    let state = State { model, world: &data.world, pass: d, limbs };
     RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
 }
 
@@ -341,8 +343,8 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
     let still = core::mem::take(&mut data.rnea_derivatives.still);
-    positions(model, data, q);
-    run(model, data, v, &still, &[], &[Vec3::zero()]);
+    positions(model, &mut data.world, q);
+    run(model, &data.world, &mut data.rnea_derivatives, v, &still, &[], &[Vec3::zero()]);
     let d = &mut data.rnea_derivatives;
     d.still = still;
     CoriolisDerivatives { dq: &d.dtau_dq, dv: &d.dtau_dv }

@@ -30,13 +30,14 @@
 //! programming for rigid-body systems* (2021); the sums above are those of the first, contracted before they are expanded.
 
 use crate::coriolis::Coriolis;
-use crate::data::{Data, Size};
-use crate::dispatch::kernel;
+use crate::data::Data;
 use crate::kinematics::World;
 use crate::rnea_derivatives::{self, RneaDerivatives};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -64,12 +65,12 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let square = DMatrix::from_element(size.nv, size.nv, S::zero());
+        let square = zero_matrix(size.nv, size.nv);
         Self {
-            w: vec![Motion::zero(); size.bodies],
-            W: vec![Motion::zero(); size.columns],
-            PD: vec![Coriolis::zero(); size.bodies],
-            Q: vec![Vec3::zero(); size.bodies],
+            w: filled(Motion::zero(), size.bodies),
+            W: filled(Motion::zero(), size.columns),
+            PD: filled(Coriolis::zero(), size.bodies),
+            Q: filled(Vec3::zero(), size.bodies),
             dqdq: square.clone(),
             dvdq: square.clone(),
             dvdv: square.clone(),
@@ -157,8 +158,14 @@ fn pass<L: Pairs>(
 
 kernel! {
     /// After `rnea_derivatives::pass`.
-    pub(crate) fn run(model, data, lambda: &[S]) {
-        pass(&Single::new(model), &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
+    pub(crate) fn run<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        first: &rnea_derivatives::Bodies<S>,
+        d: &mut Workspace<S>,
+        lambda: &[S],
+    ) {
+        pass(&Single::new(model), world, first, d, lambda);
     }
 }
 
@@ -212,8 +219,8 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
 ) -> RneaHessian<'d, S, R> {
     check("lambda", lambda.len(), model.nv());
     rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
-    run(model, data, lambda);
-    let first = rnea_derivatives::view(model, &data.world, &data.rnea_derivatives);
+    run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
+    let first = rnea_derivatives::view(model, data);
     let Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
     RneaHessian { dqdq, dvdq, dvdv, dadq, first }
 }
@@ -236,8 +243,8 @@ pub struct RneaSecondDerivatives<S> {
 impl<S: Scalar> RneaSecondDerivatives<S> {
     /// Memory for the tensors of a model.
     pub fn new<R>(model: &Model<R>) -> Self {
-        let zeros = || vec![DMatrix::from_element(model.nv(), model.nv(), S::zero()); model.nv()];
-        let lambda = vec![S::zero(); model.nv()];
+        let zeros = || vec![zero_matrix(model.nv(), model.nv()); model.nv()];
+        let lambda = filled(S::zero(), model.nv());
         Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
     }
 }
@@ -272,7 +279,7 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     rnea_derivatives::one_by_one(model, data, q, v, a, f_ext);
     for i in 0..model.nv() {
         out.lambda[i] = S::one();
-        run(model, data, &out.lambda);
+        run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &out.lambda);
         out.lambda[i] = S::zero();
         let Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
         out.dqdq[i].copy_from(dqdq);

@@ -8,12 +8,13 @@
 //! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)
 //! ```
 
-use crate::data::{Data, Size, check_forces};
-use crate::dispatch::kernel;
+use crate::data::{Data, check_forces};
 use crate::kinematics::{World, positions};
+use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::gate::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
@@ -34,10 +35,10 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            F: vec![Force::zero(); size.bodies],
-            tau: vec![S::zero(); size.nv],
-            IC: vec![Inertia::zero(); size.bodies],
-            dtau_dq: DMatrix::from_element(size.nv, size.nv, S::zero()),
+            F: filled(Force::zero(), size.bodies),
+            tau: filled(S::zero(), size.nv),
+            IC: filled(Inertia::zero(), size.bodies),
+            dtau_dq: zero_matrix(size.nv, size.nv),
         }
     }
 }
@@ -66,8 +67,9 @@ fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    fn run(model, data, f_ext: &[Force<S>]) {
-        pass(&Single::new(model), &data.world, &mut data.statics, f_ext);
+    /// For bodies that are placed.
+    fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
+        pass(&Single::new(model), world, d, f_ext);
     }
 }
 
@@ -83,7 +85,7 @@ kernel! {
 /// let quadruped = robots::quadruped();
 /// let mut data = Data::new(&quadruped);
 /// let q = condyle_dynamics::neutral(&quadruped);
-/// let mut f_ext = vec![Force::zero(); quadruped.bodies().len()];
+/// let mut f_ext = filled(Force::zero(), quadruped.bodies().len());
 /// f_ext[1].linear.z = 9.81 * quadruped.total_mass(); // hung up by its trunk
 /// let tau = static_torque(&quadruped, &mut data, &q, &f_ext);
 /// assert!(f64::abs(tau[2]) < 1e-9); // nothing else need carry it
@@ -100,8 +102,8 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq());
     check_forces(f_ext.len(), model.nodes().len());
-    positions(model, data, q);
-    run(model, data, f_ext);
+    positions(model, &mut data.world, q);
+    run(model, &data.world, &mut data.statics, f_ext);
     &data.statics.tau
 }
 
@@ -143,8 +145,9 @@ fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Worksp
 }
 
 kernel! {
-    fn run_derivative(model, data, f_ext: &[Force<S>]) {
-        derivative(&Single::new(model), &data.world, &mut data.statics, f_ext);
+    /// For bodies that are placed.
+    fn run_derivative<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
+        derivative(&Single::new(model), world, d, f_ext);
     }
 }
 
@@ -172,7 +175,7 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     data.check(model);
     check("q", q.len(), model.nq());
     check_forces(f_ext.len(), model.nodes().len());
-    positions(model, data, q);
-    run_derivative(model, data, f_ext);
+    positions(model, &mut data.world, q);
+    run_derivative(model, &data.world, &mut data.statics, f_ext);
     &data.statics.dtau_dq
 }

@@ -1,12 +1,10 @@
 //! X = −A B, of square matrices, where the columns of B have the zeros of a tree.
 
 use crate::axpy::axpy;
-use crate::cast::{as_f64, as_f64_mut, as_fused, as_fused_mut};
 use crate::sparsity::NonzeroRows;
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real};
-use condyle_spatial::lanes::{Fused, Kernel, short};
-use condyle_spatial::level::{Level, level};
+use condyle_spatial::block::Block;
+use condyle_spatial::gate::{Kernel, Level, Long, Short, is, kernel, level, renamed};
 use core::marker::PhantomData;
 
 /// C = −A B, where column j of B has zeros but in the rows of `nonzero_rows[j]`.
@@ -143,62 +141,32 @@ fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: 
 /// `nonzero_rows[j]`.
 #[inline]
 pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
-    let products = Products { A, B, X, nonzero_rows };
-    let n = nonzero_rows.len();
-    match level() {
-        level if level >= Level::Avx512 && n >= 8 => products.enter_registers::<<f64 as Real>::Long>(),
-        level if level > Level::Baseline && n >= 4 => products.enter_registers::<<f64 as Real>::Short>(),
-        _ => S::enter(products),
+    if !is::<S, f64>() || level() == Level::Baseline || nonzero_rows.len() < 4 {
+        return as_they_are(A, B, X, nonzero_rows);
     }
+    // SAFETY: S is f64.
+    #[allow(unsafe_code)]
+    let (A, B, X) = unsafe { (renamed(A), renamed(B), renamed(X)) };
+    in_registers(A, B, X, nonzero_rows);
 }
 
-struct Products<'a, S> {
-    A: &'a [S],
-    B: [&'a [S]; 2],
-    X: [&'a mut [S]; 2],
-    nonzero_rows: &'a [NonzeroRows],
-}
-
-impl<S: Scalar> Products<'_, S> {
-    /// Runs in vector registers if the numbers are `f64`, which are then several times as fast; else as they are.
-    #[inline]
-    fn enter_registers<V: Block<Number = f64>>(self) {
-        let Self { A, B, X: [X0, X1], nonzero_rows } = self;
-        if let (Some(A), Some(B0), Some(B1)) = (as_f64(A), as_f64(B[0]), as_f64(B[1]))
-            && let (Some(X0), Some(X1)) = (as_f64_mut(X0), as_f64_mut(X1))
-        {
-            V::enter(InRegisters::<V> { A, B: [B0, B1], X: [X0, X1], nonzero_rows, vector: PhantomData });
-        } else {
-            S::enter(Products { A, B, X: [X0, X1], nonzero_rows });
-        }
-    }
-}
-
-impl<S: Scalar> Kernel for Products<'_, S> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { A, B, X, nonzero_rows } = self;
+kernel! {
+    /// The products of numbers that fill a register each, or none.
+    fn as_they_are<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
         if S::LANES > 1 {
             minus_product_twice(A, B, X, nonzero_rows);
         } else {
             B.into_iter().zip(X).for_each(|(B, X)| minus_product(A, B, X, nonzero_rows));
         }
     }
-    #[inline(always)]
-    fn run_fused(self) {
-        let Self { A, B, X: [X0, X1], nonzero_rows } = self;
-        if let (Some(A), Some(B0), Some(B1)) = (as_fused(A), as_fused(B[0]), as_fused(B[1]))
-            && let (Some(X0), Some(X1)) = (as_fused_mut(X0), as_fused_mut(X1))
-        {
-            let fused = Products::<Fused> { A, B: [B0, B1], X: [X0, X1], nonzero_rows };
-            // SAFETY: by contract the processor has the level.
-            #[allow(unsafe_code)]
-            unsafe {
-                short(fused);
-            }
-        } else {
-            Products { A, B, X: [X0, X1], nonzero_rows }.run();
-        }
+}
+
+/// The products of single numbers, several to a register.
+fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[NonzeroRows]) {
+    if level() >= Level::Avx512 && nonzero_rows.len() >= 8 {
+        Long::enter(Products::<Long> { A, B, X, nonzero_rows, vector: PhantomData });
+    } else {
+        Short::enter(Products::<Short> { A, B, X, nonzero_rows, vector: PhantomData });
     }
 }
 
@@ -211,7 +179,7 @@ const UNDER_WAY: usize = 8;
 ///
 /// As many entries of four columns of X as there are registers for stay there while their sums grow. The last of them begin
 /// where they still fit, and so are computed twice. Each entry is the same sum in the same order as in `minus_product`.
-struct InRegisters<'a, V> {
+struct Products<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],
     X: [&'a mut [f64]; 2],
@@ -219,7 +187,7 @@ struct InRegisters<'a, V> {
     vector: PhantomData<V>,
 }
 
-impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
+impl<V: Block<Number = f64>> Kernel for Products<'_, V> {
     #[inline(always)]
     fn run(mut self) {
         let n = self.nonzero_rows.len();
@@ -237,13 +205,9 @@ impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
             _ => self.all::<3>(),
         }
     }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
 }
 
-impl<V: Block<Number = f64>> InRegisters<'_, V> {
+impl<V: Block<Number = f64>> Products<'_, V> {
     #[inline(always)]
     fn all<const N: usize>(&mut self) {
         let mut j = 0;

@@ -256,10 +256,6 @@ impl<S: Scalar> Kernel for Multiple<'_, S> {
         }
         *result = [cos, if k < 0.0 { -sin } else { sin }];
     }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
 }
 
 /// X_T, then a rotation about z.

@@ -19,6 +19,13 @@ impl Fused {
         // SAFETY: it is a transparent wrapper.
         unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) }
     }
+
+    /// Numbers to be written, under this name.
+    #[inline(always)]
+    pub fn of_mut(x: &mut [f64]) -> &mut [Self] {
+        // SAFETY: as for `of`.
+        unsafe { core::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), x.len()) }
+    }
 }
 
 impl Block for Fused {
@@ -60,6 +67,7 @@ impl Neg for Fused {
 impl Scalar for Fused {
     type Mask = bool;
     const LANES: usize = 1;
+    const COMPILED: bool = true;
 
     #[inline(always)]
     fn enter(kernel: impl Kernel) {

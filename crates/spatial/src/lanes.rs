@@ -103,8 +103,10 @@ pub struct Lanes<T: Element<N>, const N: usize>(T::Register);
 pub trait Kernel: Sized {
     /// The work.
     fn run(self);
-    /// If it is work on `f64`, the same on [`Fused`], through [`short`]; called where the processor can.
-    fn run_fused(self);
+    /// Never called; to be taken out.
+    fn run_fused(self) {
+        self.run();
+    }
 }
 
 /// Runs a kernel with the instructions of [`Real::Short`](crate::block::Real::Short): those of
@@ -112,6 +114,7 @@ pub trait Kernel: Sized {
 ///
 /// # Safety
 /// The processor must have them.
+#[inline(never)]
 #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
 pub unsafe fn short(kernel: impl Kernel) {
     kernel.run();
@@ -247,6 +250,7 @@ impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
 impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     type Mask = <T::Register as Register<T, N>>::Mask;
     const LANES: usize = N;
+    const COMPILED: bool = T::COMPILED;
 
     #[inline(always)]
     fn enter(kernel: impl Kernel) {

@@ -1,7 +1,6 @@
 //! The numbers an algorithm can run on.
 
 use crate::lanes::{Kernel, Number};
-use crate::level::{Level, level};
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -38,6 +37,9 @@ pub trait Scalar:
     type Mask: Copy;
     /// How many numbers lie side by side in one value.
     const LANES: usize;
+    /// Whether the crates that own algorithms have compiled them for it: `f64` and its lanes.
+    #[doc(hidden)]
+    const COMPILED: bool = false;
 
     /// Runs a kernel on this scalar, compiled for its level.
     #[doc(hidden)]
@@ -112,15 +114,12 @@ impl<S: Scalar> Constant<S> for f64 {
 }
 
 macro_rules! impl_float {
-    ($($float:ident),*) => {$(
+    ($($float:ident $compiled:literal),*) => {$(
         impl Scalar for $float {
             type Mask = bool;
             const LANES: usize = 1;
+            const COMPILED: bool = $compiled;
 
-            #[inline(always)]
-            fn enter(kernel: impl Kernel) {
-                if level() > Level::Baseline { kernel.run_fused() } else { kernel.run() }
-            }
             #[inline(always)]
             fn splat(x: f64) -> Self {
                 x as $float
@@ -176,4 +175,4 @@ macro_rules! impl_float {
         }
     )*};
 }
-impl_float!(f64, f32);
+impl_float!(f64 true, f32 false);

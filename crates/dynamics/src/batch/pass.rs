@@ -8,6 +8,7 @@ use crate::data::Data;
 use crate::minv::minv;
 use crate::rnea::{gravity, nonlinear_effects, rnea};
 use crate::rnea_derivatives::rnea_derivatives;
+use crate::workspace::{filled, zero_matrix};
 use condyle_model::Model;
 use condyle_spatial::Force;
 use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter};
@@ -44,9 +45,9 @@ impl<S: Block> Worker<S> {
     fn new(model: &Model) -> Self {
         Self {
             data: Data::new(model),
-            q: vec![S::zero(); model.nq()],
-            v: vec![S::zero(); model.nv()],
-            x: vec![S::zero(); model.nv()],
+            q: filled(S::zero(), model.nq()),
+            v: filled(S::zero(), model.nv()),
+            x: filled(S::zero(), model.nv()),
             f_ext: Vec::with_capacity(model.nodes().len()),
         }
     }
@@ -54,7 +55,7 @@ impl<S: Block> Worker<S> {
 
 impl<S: Block> Group<S> {
     pub(super) fn new(model: &Model, states: usize, threads: usize) -> Self {
-        let square = || DMatrix::from_element(model.nv(), model.nv(), S::zero());
+        let square = || zero_matrix(model.nv(), model.nv());
         let matrices = |_| core::array::from_fn(|_| square());
         Self {
             workers: (0..threads).map(|_| Worker::new(model)).collect(),

@@ -18,18 +18,18 @@
 use super::forces::{Left, six};
 use super::held::{All, Held, WIDE};
 use super::lanes::{Four, Limbs, numbers, numbers_mut};
-use super::pass::{Arguments, Eight, load, ready, scatter};
+use super::pass::{Arguments, load, ready, scatter};
 use super::{LANES, Plan, Scratch};
 use crate::aba;
-use crate::constrained_work::{Inputs, fused_set};
+use crate::constrained_dynamics::Inputs;
 use crate::constraint::ConstraintKind;
 use crate::constraint_motion::Ends;
 use crate::constraint_set::{ConstraintSet, Plan as Constraint};
 use crate::data::Data;
-use crate::dispatch::{fused, same, slice, slice_mut};
 use crate::kinematics::{Placed, place};
 use condyle_model::Model;
 use condyle_spatial::block::Block;
+use condyle_spatial::gate::{Long, Short, renamed};
 use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::{Constant, Scalar, moves};
@@ -64,7 +64,7 @@ impl Held {
         }
         all.carry_on::<V, N>(&set.plans, left, &mut set.J);
         // SAFETY: `Fused` is a transparent wrapper of `f64`.
-        let (G, stride): (&mut [f64], _) = (unsafe { slice_mut(&mut set.delassus.CE) }, set.delassus.stride);
+        let (G, stride): (&mut [f64], _) = (unsafe { renamed(&mut set.delassus.CE[..]) }, set.delassus.stride);
         all.multiply::<V, N>(set.lambda.len(), G, stride);
         for (of, plan) in rows.iter().zip(&set.plans) {
             for (j, runs) in &of.beside {
@@ -110,7 +110,7 @@ impl Held {
 struct Call<'a, V> {
     model: &'a Model,
     plan: &'a Plan,
-    data: &'a mut Data<Fused>,
+    data: &'a mut Data<f64>,
     set: &'a mut ConstraintSet<Fused>,
     arguments: Arguments<'a>,
     /// The largest vector that there is.
@@ -141,7 +141,7 @@ impl<V: Block<Number = f64>> Call<'_, V> {
         // SAFETY: these are vectors.
         held.push(plan, &set.plans, unsafe { numbers_mut(&mut aba.u) });
         aba::outward(&l, world, aba);
-        scatter(plan, &aba.qdd, &mut data.constrained_dynamics.qdd);
+        scatter(plan, &aba.qdd, Fused::of_mut(&mut data.constrained_dynamics.qdd));
         // SAFETY: motions are made of vectors.
         let a = unsafe { numbers(&aba.a) };
         for (of, constraint) in held.rows.iter().zip(&set.plans) {
@@ -160,10 +160,6 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
     fn run(self) {
         if V::LANES == WIDE { self.by::<1>() } else { self.by::<2>() }
     }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
 }
 
 /// Constrained dynamics with the limbs side by side, where this model, `data` and `constraints` have them; whether they
@@ -176,15 +172,16 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
 ) -> bool {
     let Some(plan) = ready(model, data).filter(|_| constraints.limbs.is_some()) else { return false };
-    // SAFETY: S and R are f64, and the processor has the level.
-    unsafe {
-        let arguments = Arguments { q: slice(q), v: slice(v), x: slice(tau), f_ext: slice(f_ext) };
-        let (model, data, set) = (same(model), fused(data), fused_set(constraints));
-        if level() >= Level::Avx512 {
-            Eight::enter(Call::<Eight> { model, plan, data, set, arguments, vector: PhantomData }); // and twice the registers
-        } else {
-            Four::enter(Call::<Four> { model, plan, data, set, arguments, vector: PhantomData });
-        }
-    }
+    // SAFETY: S and R are f64, and `Fused` is the same.
+    unsafe { enter(renamed(model), plan, renamed(data), renamed(constraints), Arguments::new(q, v, tau, f_ext)) }
     true
+}
+
+/// The call, compiled for the level.
+fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintSet<Fused>, arguments: Arguments<'_>) {
+    if level() >= Level::Avx512 {
+        Long::enter(Call::<Long> { model, plan, data, set, arguments, vector: PhantomData }); // and twice the registers
+    } else {
+        Short::enter(Call::<Short> { model, plan, data, set, arguments, vector: PhantomData });
+    }
 }

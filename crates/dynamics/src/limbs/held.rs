@@ -3,7 +3,7 @@
 use super::LANES;
 use crate::constraint_set::Plan;
 use condyle_model::Model;
-use core::any::TypeId;
+use condyle_spatial::gate::is;
 
 /// So many rows of constraints stand side by side: in one vector, or in two.
 pub(super) const WIDE: usize = 2 * LANES;
@@ -65,7 +65,7 @@ pub(crate) struct Held {
 impl Held {
     /// For a robot with limbs on which no joint follows another.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>, plans: &[Plan]) -> Option<Box<Self>> {
-        if model.limbs().is_none() || model.has_mimic() || TypeId::of::<S>() != TypeId::of::<f64>() {
+        if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() {
             return None;
         }
         let alone = model.nodes().iter().skip(1).filter(|node| node.parent == 0).count() == 1;

@@ -3,21 +3,19 @@
 
 use super::lanes::{Four, Limbs, numbers};
 use super::{LANES, Plan, inverse};
-use crate::data::{Data, Size};
-use crate::dispatch::{fused, is_f64, same, slice};
+use crate::data::Data;
 use crate::kinematics::{Placed, World, place};
+use crate::workspace::{Size, filled};
 use crate::{aba, crba, rnea, rnea_derivatives};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_model::limbs::schedule::Source;
-use condyle_spatial::block::{Block, Real, lanes};
+use condyle_spatial::block::{Block, lanes};
+use condyle_spatial::gate::{Long, Short, is, renamed};
 use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::{Constant, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
-use core::any::TypeId;
 use core::marker::PhantomData;
-
-pub(super) type Eight = <f64 as Real>::Long;
 
 /// What passes in lanes write.
 #[derive(Clone, Debug)]
@@ -42,20 +40,20 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// For a model with limbs, on a processor that can.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
-        let plan = model.limbs().filter(|_| TypeId::of::<S>() == TypeId::of::<f64>() && level() > Level::Baseline)?;
+        let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
         let (steps, nv) = (plan.steps.len(), plan.coordinates.len());
         let size = Size { bodies: steps, columns: nv + plan.copies.len(), depth: 0, levels: steps, nv };
-        let zeros = vec![Four::zero(); nv];
+        let zeros = filled(Four::zero(), nv);
         Some(Box::new(Self {
-            q: vec![Four::zero(); plan.positions.len()],
+            q: filled(Four::zero(), plan.positions.len()),
             v: zeros.clone(),
             x: zeros,
-            f_ext: vec![Force::zero(); steps],
+            f_ext: filled(Force::zero(), steps),
             padded: vec![Fused(0.0); model.nq().max(model.nv()) + 1],
             world: World::new(size),
             rnea: rnea::Workspace::new(size),
             aba: aba::Workspace::new(size),
-            IC: vec![Inertia::zero(); steps],
+            IC: filled(Inertia::zero(), steps),
             bodies: rnea_derivatives::Bodies::new(size),
             inverted: inverse::Scratch::new(model.nv(), plan),
         }))
@@ -77,6 +75,17 @@ pub(super) struct Arguments<'a> {
     /// An acceleration or an effort.
     pub x: &'a [Fused],
     pub f_ext: &'a [Force<Fused>],
+}
+
+impl<'a> Arguments<'a> {
+    /// The arguments of a call.
+    ///
+    /// # Safety
+    /// `S` is `f64`.
+    pub(super) unsafe fn new<S>(q: &'a [S], v: &'a [S], x: &'a [S], f_ext: &'a [Force<S>]) -> Self {
+        // SAFETY: `Fused` is a transparent wrapper, and a force is `repr(C)`.
+        unsafe { Self { q: renamed(q), v: renamed(v), x: renamed(x), f_ext: renamed(f_ext) } }
+    }
 }
 
 /// Brings the arguments into lanes.
@@ -147,7 +156,7 @@ struct Call<'a, V> {
     task: Task,
     model: &'a Model,
     plan: &'a Plan,
-    data: &'a mut Data<Fused>,
+    data: &'a mut Data<f64>,
     arguments: Arguments<'a>,
     /// The largest vector that there is.
     vector: PhantomData<V>,
@@ -165,36 +174,34 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
         if let Task::Rnea = task {
             data.world.placed = Placed::Nowhere;
             rnea::pass(&l, &mut world.sin_cos, rnea, q, v, x, f_ext);
-            scatter(plan, &rnea.tau, &mut data.rnea.tau);
-            Single::<Fused, f64>::new(model).add_armature_torque(arguments.x, &mut data.rnea.tau);
+            let tau = Fused::of_mut(&mut data.rnea.tau);
+            scatter(plan, &rnea.tau, tau);
+            Single::<Fused, f64>::new(model).add_armature_torque(arguments.x, tau);
             return;
         }
         place(&l, world, q);
         data.world.placed = Placed::Limbs;
         l.broadcast(&mut world.S);
         if let Task::Crba = task {
-            crba::pass(&l, world, IC, data.crba.M.as_mut_slice());
+            crba::pass(&l, world, IC, Fused::of_mut(data.crba.M.as_mut_slice()));
         }
         if let Task::Minv = task {
             aba::factorize(&l, world, aba);
         }
         if let Task::Aba | Task::AbaDerivatives = task {
             aba::pass(&l, world, aba, v, x, f_ext);
-            scatter(plan, &aba.qdd, &mut data.aba.qdd);
+            scatter(plan, &aba.qdd, Fused::of_mut(&mut data.aba.qdd));
         }
         if let Task::Minv | Task::AbaDerivatives = task {
             l.broadcast(&mut aba.D_inv);
-            inverted.inverse::<V>(&l, world, aba, &plan.blocks, data.minv.Minv.as_mut_slice());
+            let Minv = Fused::of_mut(data.minv.Minv.as_mut_slice());
+            inverted.inverse::<V>(&l, world, aba, &plan.blocks, Minv);
         }
         if let Task::RneaDerivatives | Task::AbaDerivatives = task {
-            let (_, matrices) = data.rnea_derivatives.parts();
+            let matrices = data.rnea_derivatives.parts().1.map(|matrix| Fused::of_mut(matrix));
             let a = if let Task::AbaDerivatives = task { &aba.qdd } else { x };
             rnea_derivatives::pass(&l, world, (bodies, matrices), v, a, f_ext, l.minus_gravity(), false);
         }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
     }
 }
 
@@ -202,7 +209,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
 #[inline]
 pub(super) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
     let (Some(plan), Some(scratch)) = (model.limbs(), &data.limbs) else { return None };
-    (is_f64::<S, R>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
+    (is::<(S, R), (f64, f64)>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
 }
 
 /// An algorithm with the limbs side by side, where this model and `data` have them; whether they have. Arguments that it
@@ -221,37 +228,35 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     if model.has_mimic() && !matches!(task, Task::Rnea) {
         return false; // joints that share a coordinate
     }
-    // SAFETY: S and R are f64, and the processor has the level.
-    unsafe {
-        let arguments = Arguments { q: slice(q), v: slice(v), x: slice(x), f_ext: slice(f_ext) };
-        let (model, data) = (same(model), fused(data));
-        if level() >= Level::Avx512 {
-            Eight::enter(Call::<Eight> { task, model, plan, data, arguments, vector: PhantomData }); // and twice the registers
-        } else {
-            Four::enter(Call::<Four> { task, model, plan, data, arguments, vector: PhantomData });
-        }
-    }
+    // SAFETY: S and R are f64.
+    unsafe { enter(task, renamed(model), plan, renamed(data), Arguments::new(q, v, x, f_ext)) }
     true
+}
+
+/// A task, compiled for the level.
+fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments: Arguments<'_>) {
+    if level() >= Level::Avx512 {
+        Long::enter(Call::<Long> { task, model, plan, data, arguments, vector: PhantomData }); // and twice the registers
+    } else {
+        Short::enter(Call::<Short> { task, model, plan, data, arguments, vector: PhantomData });
+    }
 }
 
 /// Takes the placements that a call left in lanes to where those of single bodies stand.
 pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let Some(plan) = ready(model, data) else { return };
-    // SAFETY: S is f64.
-    let Data { limbs: Some(scratch), world: World { oX, S, placed, .. }, .. } = (unsafe { fused(data) }) else {
-        return;
-    };
+    let Data { limbs: Some(scratch), world: World { oX, S: columns, placed, .. }, .. } = data else { return };
     // SAFETY: poses and motions are made of vectors.
     let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
     for i in 1..oX.len() {
         let ((step, lane), column) = (plan.place[i], model.nodes()[i].column);
-        let pose = |k: usize| Fused(poses[(12 * step + k) * LANES + lane]);
+        let pose = |k: usize| S::splat(poses[(12 * step + k) * LANES + lane]);
         let axis = |k: usize| Vec3::new(pose(k), pose(k + 1), pose(k + 2));
         oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));
         for k in 0..model.nodes()[i].joint.nv() {
             let slot = plan.steps[step].idx_v + k;
-            let number = |r: usize| Fused(motions[(6 * slot + r) * LANES + lane]);
-            S[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));
+            let number = |r: usize| S::splat(motions[(6 * slot + r) * LANES + lane]);
+            columns[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));
         }
     }
     *placed = Placed::Bodies;

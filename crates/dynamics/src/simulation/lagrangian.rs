@@ -18,6 +18,7 @@
 //! ```
 
 use crate::kinematics::World;
+use crate::workspace::filled;
 use condyle_model::Model;
 use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
@@ -53,17 +54,17 @@ impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
         let (bodies, columns, nv) = (model.nodes().len(), model.columns().len(), model.nv());
         Self {
-            v: vec![Motion::zero(); bodies],
-            IC: vec![Inertia::zero(); bodies],
-            hC: vec![Force::zero(); bodies],
-            FC: vec![Force::zero(); bodies],
-            Psid: vec![Motion::zero(); columns],
-            Psidd: vec![Motion::zero(); columns],
-            p: vec![S::zero(); nv],
-            L_q: vec![S::zero(); nv],
-            M: vec![S::zero(); nv * nv],
-            p_q: vec![S::zero(); nv * nv],
-            L_qq: vec![S::zero(); nv * nv],
+            v: filled(Motion::zero(), bodies),
+            IC: filled(Inertia::zero(), bodies),
+            hC: filled(Force::zero(), bodies),
+            FC: filled(Force::zero(), bodies),
+            Psid: filled(Motion::zero(), columns),
+            Psidd: filled(Motion::zero(), columns),
+            p: filled(S::zero(), nv),
+            L_q: filled(S::zero(), nv),
+            M: filled(S::zero(), nv * nv),
+            p_q: filled(S::zero(), nv * nv),
+            L_qq: filled(S::zero(), nv * nv),
         }
     }
 }

@@ -126,7 +126,7 @@ struct Input<'a, S> {
 /// Several simulations run side by side on a scalar with lanes, and on dual numbers a simulation gives its own
 /// derivatives. Newton's method then iterates until all lanes have converged.
 #[derive(Clone, Debug)]
-pub struct Simulation<'m, S, R = f64> {
+pub struct Simulation<'m, S: Scalar, R = f64> {
     /// May be changed between steps.
     pub settings: Settings,
     model: &'m Model<R>,

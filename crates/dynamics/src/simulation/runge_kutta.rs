@@ -11,6 +11,7 @@
 
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
+use crate::workspace::filled;
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_model::joint::GroupJacobian;
@@ -33,7 +34,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = vec![S::zero(); model.nv()];
+        let zero = filled(S::zero(), model.nv());
         Self {
             effort: zero.clone(),
             xi: zero.clone(),

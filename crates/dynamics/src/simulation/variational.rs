@@ -25,6 +25,7 @@ use crate::crba::crba;
 use crate::data::Data;
 use crate::kinematics::place;
 use crate::passive::{passive_torque, passive_torque_derivative};
+use crate::workspace::filled;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::integrate;
@@ -63,7 +64,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = vec![S::zero(); model.nv()];
+        let zero = filled(S::zero(), model.nv());
         Self {
             p: zero.clone(),
             w: zero.clone(),
@@ -76,7 +77,7 @@ impl<S: Scalar> Workspace<S> {
             carried: zero.clone(),
             pushed: zero.clone(),
             residual: zero,
-            slope: vec![S::zero(); model.nv() * model.nv()],
+            slope: filled(S::zero(), model.nv() * model.nv()),
             lagrangian: lagrangian::Workspace::new(model),
             M: Ltdl::new(model),
         }

@@ -55,7 +55,7 @@ impl AsMut<Seen> for Outcome {
 }
 
 #[derive(Clone, Debug)]
-struct Group<S> {
+struct Group<S: Block<Number = f64>> {
     data: Data<S>,
     eyes: Eyes<S>,
     /// None of a robot that touches nothing.

@@ -7,13 +7,12 @@ use super::limits::Set;
 use super::residual::{Part, Residual};
 use super::terms::{Plan, Room};
 use super::watch::Needs;
-use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
     Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
 };
 use condyle_spatial::block::Block;
-use condyle_spatial::lanes::{Fused, Kernel};
+use condyle_spatial::lanes::Kernel;
 use condyle_spatial::{Force, Mat3, Motion, Quaternion, Se3, Vec3, lie};
 use nalgebra::DMatrix;
 
@@ -194,41 +193,6 @@ impl<S: Block<Number = f64>> Eyes<S> {
         if stacks[0].needs().eyes() {
             S::enter(Look { eyes: self, model, data, x, slopes, stacks, to });
         }
-    }
-}
-
-/// The eyes of a single knot, which sees what a lane does.
-#[derive(Clone, Debug)]
-pub(super) struct OwnEyes {
-    /// Where products are fused.
-    fused: Eyes<Fused>,
-    plain: Eyes<f64>,
-}
-
-impl OwnEyes {
-    pub(super) fn new(model: &Model) -> Self {
-        Self { fused: Eyes::new(model), plain: Eyes::new(model) }
-    }
-
-    /// As [`Eyes::look`].
-    pub(super) fn look(
-        &mut self,
-        model: &Model,
-        data: &mut Data<f64>,
-        x: [&[f64]; 3],
-        slopes: bool,
-        stack: Stack<'_>,
-        to: &mut Seen,
-    ) {
-        if !stack.needs().eyes() {
-            return;
-        }
-        let (stacks, to) = (&[stack], core::slice::from_mut(to));
-        if level() == Level::Baseline {
-            return self.plain.look(model, data, x, slopes, stacks, to);
-        }
-        data.placements(model); // of limbs side by side, too
-        self.fused.look(model, data.fused(), x.map(Fused::of), slopes, stacks, to);
     }
 }
 

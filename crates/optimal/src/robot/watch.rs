@@ -1,7 +1,7 @@
 //! What the dynamics of a knot offer to its residuals, and what residuals share.
 
 use super::quadratic::{Row, Rows};
-use super::sight::{Known, OwnEyes, Seen, Stack};
+use super::sight::{Eyes, Known, Seen, Stack};
 use super::state::groups;
 use super::terms::{Room, View};
 use condyle_dynamics::{Data, Model, centroidal_derivatives, forward_kinematics, forward_velocities};
@@ -117,7 +117,7 @@ impl core::ops::BitOr for Needs {
 #[derive(Clone, Debug)]
 pub(super) struct Watch {
     data: Data<f64>,
-    eyes: OwnEyes,
+    eyes: Eyes<f64>,
     seen: Seen,
     pub scratch: Scratch,
 }
@@ -161,7 +161,7 @@ impl Watch {
         };
         let mut seen = Seen::default();
         seen.make_room(nv, room);
-        Self { data: Data::new(model), eyes: OwnEyes::new(model), seen, scratch }
+        Self { data: Data::new(model), eyes: Eyes::new(model), seen, scratch }
     }
 
     /// Makes room for other residuals.
@@ -195,8 +195,9 @@ impl Watch {
             scratch.com[0].as_mut_slice().copy_from_slice(d.dcom_dq.as_slice());
             scratch.com[1].as_mut_slice().copy_from_slice(d.dvcom_dq.as_slice());
         }
-        let mut look = |data| {
-            eyes.look(model, data, [q, v, scene.a], slopes, stack, own);
+        let mut look = |data: &mut Data<f64>| {
+            data.placements(model); // of limbs side by side, too
+            eyes.look(model, data, [q, v, scene.a], slopes, &[stack], core::slice::from_mut(own));
         };
         let sight = match known {
             Known::Seen(seen) => seen.all(),

@@ -17,6 +17,7 @@ impl Real for f32 {
 ///
 /// # Safety
 /// The processor must have them.
+#[inline(never)]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
 unsafe fn long(kernel: impl Kernel) {
     kernel.run();
