@@ -35,8 +35,7 @@ impl ModelBuilder {
     /// M is singular where q₁ = ±π/2. [`Joint::Spherical`] has no such place.
     ///
     /// ```
-    /// use condyle_model::{ModelBuilder, WORLD};
-    /// use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
+    /// use condyle_model::{Inertia, ModelBuilder, Se3, Sym3, Vec3, WORLD};
     /// let mut robot = ModelBuilder::new("ball");
     /// robot.spherical_zyx("ball", WORLD, Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(0.1)));
     /// let ball = robot.build()?;

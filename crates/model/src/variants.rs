@@ -35,8 +35,7 @@ impl Model {
     /// is a plain number: it follows if the new ones are.
     ///
     /// ```
-    /// use condyle_model::robots;
-    /// use condyle_spatial::Inertia;
+    /// use condyle_model::{Inertia, robots};
     /// use num_dual::Dual64;
     /// // ∂/∂(mass of the last body): seed that one number
     /// let arm = robots::arm7();
