@@ -6,14 +6,14 @@
 //! matrix is inverted.
 
 use crate::data::{Data, check_forces};
-use crate::dispatch::kernel;
 use crate::forward_dynamics::{Method, by_factor};
 use crate::kinematics::{World, positions};
 use crate::limbs;
 use crate::workspace::{Size, filled};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 
 /// In the world's frame.

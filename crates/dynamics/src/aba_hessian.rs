@@ -12,14 +12,15 @@
 //! second-order differential dynamic programming for rigid-body systems* (2021).
 
 use crate::aba::check_arguments;
-use crate::aba_derivatives::{self, AbaDerivatives, minus_product};
+use crate::aba_derivatives::{self, AbaDerivatives};
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::workspace::{Size, filled, zero_matrix};
 use crate::{rnea_derivatives, rnea_hessian};
+use condyle_linalg::check;
 use condyle_linalg::sparsity::NonzeroRows;
+use condyle_linalg::tree_product::minus_product;
 use condyle_model::Model;
-use condyle_model::check;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 

@@ -6,13 +6,13 @@
 use crate::centroidal::{self, CentroidalMapRate, shift_rate};
 use crate::coriolis::Coriolis;
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, positions, velocities};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Layout, Pairs, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

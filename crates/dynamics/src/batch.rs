@@ -9,8 +9,8 @@
 
 mod pass;
 
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_spatial::Force;
 use condyle_spatial::block::Real;
 use condyle_spatial::level::{Level, level};

@@ -15,12 +15,12 @@
 use crate::centroidal::{about, add};
 use crate::coriolis::Coriolis;
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, accelerations, positions, velocities};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

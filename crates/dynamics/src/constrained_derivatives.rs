@@ -13,16 +13,17 @@
 //! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
 //! programming for multi-phase rigid contact dynamics* (2018).
 
-use crate::aba_derivatives::{minus_product, subtract_column};
 use crate::constrained_dynamics::Inputs;
 use crate::constrained_equations;
 use crate::constraint_set::ConstraintSet;
 use crate::data::Data;
-use crate::dispatch::kernel;
-use crate::ltdl::{Ltdl, axpy};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::Ltdl;
+use condyle_linalg::axpy::axpy;
 use condyle_linalg::sparsity::NonzeroRows;
+use condyle_linalg::tree_product::{minus_product, subtract_column};
 use condyle_model::Model;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 

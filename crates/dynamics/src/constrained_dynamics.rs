@@ -15,14 +15,14 @@ use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::crba;
 use crate::data::{Data, check_forces};
-use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
 use crate::limbs;
-use crate::ltdl::Ltdl;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::Ltdl;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Layout, Pairs, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

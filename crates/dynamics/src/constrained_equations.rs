@@ -17,11 +17,11 @@ use crate::constraint::ConstraintKind;
 use crate::constraint_motion::{Columns, Ends};
 use crate::constraint_set::ConstraintSet;
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::frames::Placements;
 use crate::kinematics::World;
 use crate::rnea_derivatives;
 use condyle_model::Model;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
 use nalgebra::DMatrix;
 

@@ -6,10 +6,10 @@
 
 use crate::constraint::{Constraint, ConstraintKind, Target};
 use crate::delassus::Delassus;
-use crate::elimination::NONE;
 use crate::frames::ReferenceFrame;
 use crate::limbs::Held;
-use crate::ltdl::Ltdl;
+use condyle_linalg::Ltdl;
+use condyle_linalg::elimination_tree::NONE;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Error;
 use condyle_model::Model;

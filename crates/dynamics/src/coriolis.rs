@@ -12,12 +12,12 @@
 //! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::kinematics::{Moving, World, positions, velocities};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;
 

@@ -4,13 +4,13 @@
 //! a plain sum.
 
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
 use crate::limbs;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Columns, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
 

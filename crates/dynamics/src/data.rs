@@ -1,7 +1,6 @@
 //! All that algorithms write: scratch and results.
 #![allow(unsafe_code)]
 
-use crate::dispatch::{Long, Short, is, renamed};
 use crate::kinematics::{Moving, World};
 use crate::workspace::Size;
 use crate::{
@@ -11,6 +10,7 @@ use crate::{
 };
 use condyle_model::Model;
 use condyle_spatial::Scalar;
+use condyle_spatial::gate::{Long, Short, is, renamed};
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
 ///

@@ -6,7 +6,8 @@
 //! sparsity in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
 
 use crate::constraint_set::{Plan, Proximal};
-use crate::ltdl::{Ltdl, axpy, dot};
+use condyle_linalg::Ltdl;
+use condyle_linalg::axpy::{axpy, dot};
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 

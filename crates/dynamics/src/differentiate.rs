@@ -9,8 +9,8 @@
 //! pair of directions. What has a derivative by hand has it many times faster.
 
 use crate::data::Data;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::integrate;
 use condyle_spatial::block::{Block, Real};
 use condyle_spatial::lane_dual::LaneDual;

@@ -1,12 +1,12 @@
 //! Kinetic and potential energy, and their derivatives: sums over the moving bodies.
 
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::frames::{Placements, Velocities};
 use crate::kinematics::{Moving, World, forward_velocities};
 use crate::workspace::{Size, filled};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {

@@ -1,15 +1,15 @@
 //! Forward dynamics by the method that is fastest for the model.
 
 use crate::aba::aba;
-use crate::cholesky::Cholesky;
 use crate::crba::crba;
 use crate::data::{Data, check_forces};
-use crate::dispatch::kernel;
-use crate::ltdl::Ltdl;
 use crate::rnea::rnea;
 use crate::workspace::filled;
+use condyle_linalg::Cholesky;
+use condyle_linalg::Ltdl;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 

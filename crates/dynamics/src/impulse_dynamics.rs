@@ -21,14 +21,14 @@ use crate::constrained_equations::{load, turn};
 use crate::constraint_motion::Ends;
 use crate::constraint_set::ConstraintSet;
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
-use crate::ltdl::axpy;
 use crate::rnea_derivatives;
 use crate::workspace::{Size, filled};
+use condyle_linalg::axpy::axpy;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

@@ -2,15 +2,15 @@
 //! in `frames.rs`.
 
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::frames::{Accelerations, Placements, Velocities};
 use crate::limbs;
 use crate::workspace::{Size, filled};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
 /// What depends on the position alone, in the world's frame.

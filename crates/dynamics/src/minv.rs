@@ -8,14 +8,14 @@
 use crate::aba;
 use crate::crba::crba;
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
 use crate::limbs;
-use crate::ltdl::Ltdl;
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::Ltdl;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::tree::Column;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 

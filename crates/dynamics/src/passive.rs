@@ -11,8 +11,8 @@
 //! and to 1e-6 from 7.25 ε, and at rest a joint creeps (a load below f moves it with less than ε artanh(load/f))
 //! instead of sticking. An explicit integrator needs steps shorter than 2 ε m/f, m the inertia that the joint feels.
 
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::elementary::tanh;
 use condyle_spatial::Scalar;
 

@@ -6,15 +6,15 @@
 //! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
 
 use crate::data::{Data, check_forces};
-use crate::dispatch::kernel;
 use crate::kinematics::{Placed, World};
 use crate::limbs;
 use crate::workspace::{Size, filled};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
 /// In the bodies' turned frames.

@@ -22,15 +22,15 @@
 
 use crate::coriolis::Coriolis;
 use crate::data::{Data, check_forces};
-use crate::dispatch::kernel;
 use crate::inputs::State;
 use crate::kinematics::{Placed, World, positions};
 use crate::limbs;
 use crate::side_by_side::{self, Rows};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Columns, Layout, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

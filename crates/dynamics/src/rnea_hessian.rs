@@ -31,13 +31,13 @@
 
 use crate::coriolis::Coriolis;
 use crate::data::Data;
-use crate::dispatch::kernel;
 use crate::kinematics::World;
 use crate::rnea_derivatives::{self, RneaDerivatives};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

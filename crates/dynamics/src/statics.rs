@@ -9,12 +9,12 @@
 //! ```
 
 use crate::data::{Data, check_forces};
-use crate::dispatch::kernel;
 use crate::kinematics::{World, positions};
 use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

@@ -17,11 +17,11 @@
 //! resist it either. Without them that is not so: what follows may have no inertia of its own.
 
 use crate::assembly::Link;
-use crate::cholesky::Cholesky;
 use crate::crba::crba;
 use crate::data::Data;
-use crate::ltdl::{axpy, dot};
 use crate::parts::Dof;
+use condyle_linalg::Cholesky;
+use condyle_linalg::axpy::{axpy, dot};
 use condyle_model::Model;
 use condyle_model::random_configuration;
 use condyle_spatial::{Constant, Scalar};

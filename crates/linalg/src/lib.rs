@@ -2,4 +2,26 @@
 #![allow(non_snake_case)]
 
 #[doc(hidden)]
+pub mod axpy;
+#[doc(hidden)]
+pub mod cast;
+mod cholesky;
+#[doc(hidden)]
+pub mod elimination_tree;
+mod ltdl;
+#[doc(hidden)]
 pub mod sparsity;
+#[doc(hidden)]
+pub mod tree_product;
+
+pub use cholesky::Cholesky;
+pub use elimination_tree::ColumnTree;
+pub use ltdl::Ltdl;
+
+/// Panics unless an argument has as many numbers as it must have.
+#[doc(hidden)]
+#[inline]
+#[track_caller]
+pub fn check(argument: &str, found: usize, expected: usize) {
+    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
+}

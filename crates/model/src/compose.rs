@@ -2,11 +2,11 @@
 
 use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
-use crate::check;
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::layout::Single;
 use crate::model::Model;
+use condyle_linalg::check;
 use condyle_spatial::{Inertia, Se3, Vec3};
 
 impl ModelBuilder {

@@ -1,9 +1,9 @@
 //! The space of positions: a product of vector spaces and groups, with q ⊕ v on the tangent vectors v.
 
-use crate::check;
 use crate::joint::GroupJacobian;
 use crate::model::Model;
 use crate::tree::Space;
+use condyle_linalg::check;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 

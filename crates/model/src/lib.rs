@@ -49,11 +49,3 @@ pub use io::sdf::SdfOptions;
 pub use io::urdf::UrdfOptions;
 pub use joint::{Joint, Mimic};
 pub use model::Model;
-
-/// Panics unless an argument has as many numbers as it must have.
-#[doc(hidden)]
-#[inline]
-#[track_caller]
-pub fn check(argument: &str, found: usize, expected: usize) {
-    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
-}

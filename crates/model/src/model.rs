@@ -4,6 +4,7 @@ use crate::body::{Body, Frame, FrameKind, Limits};
 use crate::error::{Error, Warning, nearest};
 use crate::limbs::Plan;
 use crate::tree::{Column, Node, Tree};
+use condyle_linalg::ColumnTree;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::Vec3;
 use std::fmt;
@@ -169,6 +170,22 @@ impl<R> Model<R> {
     #[inline(always)]
     pub fn tree_hash(&self) -> u64 {
         self.tree.hash
+    }
+}
+
+/// The tree of the inertia matrix M: columns are the degrees of freedom of the joints, rows the coordinates.
+impl<R> ColumnTree for Model<R> {
+    fn rows(&self) -> usize {
+        self.nv()
+    }
+    fn columns(&self) -> usize {
+        self.tree.columns.len()
+    }
+    fn parent(&self, c: usize) -> Option<usize> {
+        self.tree.columns[c].parent
+    }
+    fn row(&self, c: usize) -> usize {
+        self.tree.columns[c].coordinate
     }
 }
 

@@ -1,9 +1,9 @@
 //! The same robot with something changed.
 
 use crate::body::Body;
-use crate::check;
 use crate::limbs::Plan;
 use crate::model::Model;
+use condyle_linalg::check;
 use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
 use std::any::Any;
 

@@ -23,6 +23,8 @@ mod dual;
 #[doc(hidden)]
 pub mod finite;
 mod fused;
+#[doc(hidden)]
+pub mod gate;
 mod inertia;
 #[doc(hidden)]
 pub mod lane_dual;

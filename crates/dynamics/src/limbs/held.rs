@@ -2,8 +2,8 @@
 
 use super::LANES;
 use crate::constraint_set::Plan;
-use crate::dispatch::is;
 use condyle_model::Model;
+use condyle_spatial::gate::is;
 
 /// So many rows of constraints stand side by side: in one vector, or in two.
 pub(super) const WIDE: usize = 2 * LANES;

@@ -4,7 +4,6 @@
 use super::lanes::{Four, Limbs, numbers};
 use super::{LANES, Plan, inverse};
 use crate::data::Data;
-use crate::dispatch::{Long, Short, is, renamed};
 use crate::kinematics::{Placed, World, place};
 use crate::workspace::{Size, filled};
 use crate::{aba, crba, rnea, rnea_derivatives};
@@ -12,6 +11,7 @@ use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_model::limbs::schedule::Source;
 use condyle_spatial::block::{Block, lanes};
+use condyle_spatial::gate::{Long, Short, is, renamed};
 use condyle_spatial::lanes::{Fused, Kernel};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::{Constant, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};

@@ -24,8 +24,8 @@ mod variational;
 use crate::aba::aba;
 use crate::data::{Data, check_forces};
 use crate::passive::passive_torque;
+use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::check;
 use condyle_spatial::{Constant, Force, Scalar};
 
 /// How a step is computed. τ and the external forces stay as they are during a step, forces in the body's frame;

@@ -1,6 +1,7 @@
-//! The gate to vector instructions: where passes are compiled, for which scalars, and with what.
+//! The gate to vector instructions: where kernels are compiled, for which scalars, and with what.
 //!
-//! `kernel!` wraps a pass, whose body is generic and inlined throughout, into a function that is called:
+//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factor, whose body is generic and inlined throughout, into a function
+//! that is called:
 //!
 //! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
 //!   instructions that the scalar is made of; whoever uses the library calls that code;
@@ -9,20 +10,20 @@
 //! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
 #![allow(unsafe_code)]
 
-use condyle_spatial::block::Real;
-pub(crate) use condyle_spatial::lanes::{Fused, Kernel};
-pub(crate) use condyle_spatial::level::{Level, level};
+use crate::block::Real;
+pub use crate::lanes::{Fused, Kernel};
+pub use crate::level::{Level, level};
 use core::any::TypeId;
 use core::mem::ManuallyDrop;
 
 /// Four numbers at once, with AVX2 or NEON.
-pub(crate) type Short = <f64 as Real>::Short;
+pub type Short = <f64 as Real>::Short;
 /// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
-pub(crate) type Long = <f64 as Real>::Long;
+pub type Long = <f64 as Real>::Long;
 
 /// Whether two types are the same one.
 #[inline(always)]
-pub(crate) fn is<A: 'static, B: 'static>() -> bool {
+pub fn is<A: 'static, B: 'static>() -> bool {
     TypeId::of::<A>() == TypeId::of::<B>()
 }
 
@@ -34,24 +35,26 @@ pub(crate) fn is<A: 'static, B: 'static>() -> bool {
 /// over a `Vec`. Of `Vec` it is taken for granted that its three words stand in the same order whatever it holds;
 /// `tests::one_layout` looks.
 #[inline(always)]
-pub(crate) unsafe fn renamed<A, B>(a: A) -> B {
+pub unsafe fn renamed<A, B>(a: A) -> B {
     assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
     // SAFETY: by the caller; `a` is not dropped, so there is one of it.
     unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
 /// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
-/// the head of `dispatch.rs`. It returns nothing: what it computes is in its arguments.
+/// [`gate`](crate::gate). It returns nothing: what it computes is in its arguments.
+#[macro_export]
+#[doc(hidden)]
 macro_rules! kernel {
     ($(#[$doc:meta])* $vis:vis fn $name:ident<$S:ident $(, $R:ident)?>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$doc])*
         #[inline]
         #[allow(unsafe_code, clippy::too_many_arguments)]
-        $vis fn $name<$S: Scalar $(, $R: Constant<$S>)?>($($arg: $type),*) {
-            use $crate::dispatch::{Fused, Kernel, Level, Long, Short, is, level};
+        $vis fn $name<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?>($($arg: $type),*) {
+            use $crate::gate::{Fused, Kernel, Level, Long, Short, is, level};
 
-            struct Work<T, Scalars>(T, core::marker::PhantomData<Scalars>);
-            impl<$S: Scalar $(, $R: Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
+            struct Work<T, Scalars>(T, ::core::marker::PhantomData<Scalars>);
+            impl<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
                 #[inline(always)]
                 fn run(self) {
                     let Work(($($arg,)*), _) = self;
@@ -60,14 +63,14 @@ macro_rules! kernel {
             }
 
             if !$S::COMPILED {
-                return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), core::marker::PhantomData));
+                return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
             $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
             let (f64, fused) = (is::<$S, f64>(), is::<$S, f64>() && level() > Level::Baseline);
-            $crate::dispatch::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
-            $crate::dispatch::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
-            $crate::dispatch::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
-            $crate::dispatch::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
         }
     };
     // the function compiled for one scalar, if it is the one
@@ -78,17 +81,15 @@ macro_rules! kernel {
             $(type $R = f64;)?
             #[inline(never)]
             fn compiled($($arg: $type),*) {
-                $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), core::marker::PhantomData));
+                $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
             if chosen {
                 // SAFETY: R is f64, and S is this scalar, or f64 in place of `Fused`.
-                return unsafe { compiled($($crate::dispatch::renamed($arg)),*) };
+                return unsafe { compiled($($crate::gate::renamed($arg)),*) };
             }
         }
     };
 }
-pub(crate) use kernel;
-
 #[cfg(test)]
 mod tests {
     use super::*;

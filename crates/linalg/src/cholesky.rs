@@ -2,8 +2,8 @@
 //!
 //! Source: Golub and Van Loan, *Matrix Computations* (4th edition), algorithm 4.2.1, column by column.
 
-use crate::ltdl::{axpy, dot};
-use condyle_model::check;
+use crate::axpy::{axpy, dot};
+use crate::check;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
@@ -59,7 +59,7 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
 /// [`Ltdl`](crate::Ltdl) has the same verbs and uses the zeros.
 ///
 /// ```
-/// use condyle_dynamics::Cholesky;
+/// use condyle_linalg::Cholesky;
 /// use nalgebra::dmatrix;
 /// let mut factor = Cholesky::new(2);
 /// factor.factorize(&dmatrix![4.0, 2.0; 2.0, 5.0]);

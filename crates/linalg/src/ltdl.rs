@@ -4,12 +4,11 @@
 //! Mᵢⱼ is zero unless one of the coordinates i, j carries the other. Eliminated from the tips to the root, the matrix
 //! keeps its zeros: row k of L has entries at the coordinates between k and the root and nowhere else.
 //!
-//! Where joints share a coordinate (mimic), the tree is that of `elimination.rs`: right everywhere, and without fill-in
-//! where the joints' own tree is.
+//! Where joints share a coordinate (mimic), the tree is that of `elimination_tree.rs`.
 
-use crate::elimination::{NONE, Tree};
-use condyle_model::Model;
-use condyle_model::check;
+use crate::axpy::{axpy, dot};
+use crate::check;
+use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
@@ -17,14 +16,6 @@ use nalgebra::DMatrix;
 /// row's end has no meaning.
 const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { 4 } else { 1 }
-}
-
-/// y += x s.
-#[inline(always)]
-pub(crate) fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
-    for (y, &x) in y.iter_mut().zip(x) {
-        *y = x.mul_add(s, *y);
-    }
 }
 
 /// y += Σ xₖ sₖ for some x, so that y is loaded and stored once; in whole steps.
@@ -51,29 +42,15 @@ fn update<S: Scalar, const N: usize>(s: [S; N], x: [&[S]; N], y: &mut [S]) {
     }
 }
 
-/// Σ xₖ yₖ in four sums, which do not wait for each other.
-#[inline(always)]
-pub(crate) fn dot<S: Scalar>(x: &[S], y: &[S]) -> S {
-    let n = x.len();
-    let y = &y[..n];
-    let mut sums = [S::zero(); 4];
-    let mut k = 0;
-    while k + 4 <= n {
-        for j in 0..4 {
-            sums[j] = x[k + j].mul_add(y[k + j], sums[j]);
-        }
-        k += 4;
-    }
-    for k in k..n {
-        sums[0] = x[k].mul_add(y[k], sums[0]);
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3])
-}
-
 /// Eliminates N consecutive places of a run; returns N.
 #[inline(always)]
-fn eliminate<S: Scalar, const N: usize>(tree: &Tree, rows: &mut [S], D_inv: &mut [S], start: usize) -> usize {
-    let Tree { parent, depth, first, .. } = tree;
+fn eliminate<S: Scalar, const N: usize>(
+    tree: &EliminationTree,
+    rows: &mut [S],
+    D_inv: &mut [S],
+    start: usize,
+) -> usize {
+    let EliminationTree { parent, depth, first, .. } = tree;
     let (above, block) = rows.split_at_mut(first[start]);
     let at = |k: usize| first[k] - first[start];
     for k in (start..start + N).rev() {
@@ -110,22 +87,20 @@ fn eliminate<S: Scalar, const N: usize>(tree: &Tree, rows: &mut [S], D_inv: &mut
 /// for any positive definite matrix.
 ///
 /// ```
-/// use condyle_dynamics::{Data, Ltdl, crba, robots};
-/// let quadruped = robots::quadruped();
-/// let q = condyle_dynamics::neutral(&quadruped);
-/// let mut data = Data::new(&quadruped);
-/// let M = crba(&quadruped, &mut data, &q);
-/// let mut factor = Ltdl::new(&quadruped);
-/// factor.factorize(M);
-/// let mut x = [1.0; 18];
-/// factor.solve(&mut x); // M x = 1
-/// assert!((M * nalgebra::DVector::from_row_slice(&x)).iter().all(|&y: &f64| (y - 1.0).abs() < 1e-10));
-/// assert_eq!(factor.nonzeros(), 21 + 4 * (7 + 8 + 9)); // the base, and three joints of each leg: not 171
+/// use condyle_linalg::Ltdl;
+/// use nalgebra::dmatrix;
+/// let tree = [None, Some(0), Some(0)]; // a trunk with two branches; a robot's model has such a tree
+/// let mut factor = Ltdl::new(&tree[..]);
+/// factor.factorize(&dmatrix![3.0, 1.0, 1.0; 1.0, 1.0, 0.0; 1.0, 0.0, 1.0]);
+/// let mut x = [5.0, 2.0, 2.0];
+/// factor.solve(&mut x); // M x = b
+/// assert_eq!(x, [1.0, 1.0, 1.0]);
+/// assert_eq!(factor.nonzeros(), 5); // not 6
 /// ```
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Ltdl<S> {
-    tree: Tree,
+    tree: EliminationTree,
     /// Each place's row of L from the root on, then its D. Shape: nonzeros, each row in whole steps. Written by:
     /// `factorize`.
     rows: Vec<S>,
@@ -134,26 +109,30 @@ pub struct Ltdl<S> {
 }
 
 impl<S: Scalar> Ltdl<S> {
-    /// Finds the zeros of a model's M and allocates the factor.
-    pub fn new<R>(model: &Model<R>) -> Self {
-        let tree = Tree::new(model.columns(), model.nv(), step::<S>());
-        Self { rows: vec![S::zero(); tree.first[model.nv()]], D_inv: vec![S::zero(); model.nv()], tree }
+    /// Finds the zeros of the matrices with the zeros of a tree, as a robot's model is one, and allocates the factor.
+    pub fn new(tree: &(impl ColumnTree + ?Sized)) -> Self {
+        let tree = EliminationTree::new(tree, step::<S>());
+        let n = tree.order.len();
+        Self { rows: vec![S::zero(); tree.first[n]], D_inv: vec![S::zero(); n], tree }
     }
 
     /// The order and the tree of the places.
-    pub(crate) fn tree(&self) -> &Tree {
+    #[doc(hidden)]
+    pub fn tree(&self) -> &EliminationTree {
         &self.tree
     }
 
     /// Row k of L from the root on, without its diagonal.
+    #[doc(hidden)]
     #[inline(always)]
-    pub(crate) fn row_from_root(&self, k: usize) -> &[S] {
+    pub fn row_from_root(&self, k: usize) -> &[S] {
         &self.rows[self.tree.first[k]..][..self.tree.depth[k]]
     }
 
     /// 1/D, in the order of the places.
+    #[doc(hidden)]
     #[inline(always)]
-    pub(crate) fn inverse_diagonal(&self) -> &[S] {
+    pub fn inverse_diagonal(&self) -> &[S] {
         &self.D_inv
     }
 
@@ -176,7 +155,7 @@ impl<S: Scalar> Ltdl<S> {
     pub fn row(&self, k: usize) -> impl Iterator<Item = (usize, S)> {
         let above = |k: usize| Some(self.tree.parent[k]).filter(|&p| p != NONE);
         let row = &self.rows[self.tree.first[k]..][..self.tree.depth[k]];
-        std::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
+        core::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
     }
 
     /// D, in the [`order`](Self::order) of the places.
@@ -187,7 +166,7 @@ impl<S: Scalar> Ltdl<S> {
     /// M = Lᵀ D L, in O(n d²). Of two entries that are equal by symmetry, one is read: that of the lower triangle in the
     /// [`order`](Self::order).
     ///
-    /// M: nv × nv, symmetric, positive definite (as [`crba`](crate::crba) gives it); if it is not, some D are not
+    /// M: nv × nv, symmetric, positive definite (as `crba` gives it); if it is not, some D are not
     /// positive. Allocates nothing. Source: Featherstone (2005).
     ///
     /// # Panics
@@ -197,7 +176,7 @@ impl<S: Scalar> Ltdl<S> {
         let nv = self.D_inv.len();
         assert!(M.shape() == (nv, nv), "M: expected {nv} × {nv}, found {:?}", M.shape());
         let Self { tree, rows, D_inv } = self;
-        let Tree { order, parent, depth, run, first, .. } = &*tree;
+        let EliminationTree { order, parent, depth, run, first, .. } = &*tree;
         let M = M.as_slice();
         for k in 0..nv {
             let (row, rest) = rows[first[k]..first[k + 1]].split_at_mut(depth[k] + 1);
@@ -228,7 +207,7 @@ impl<S: Scalar> Ltdl<S> {
     #[inline(always)]
     pub fn solve(&self, b: &mut [S]) {
         check("b", b.len(), self.D_inv.len());
-        let Tree { swaps, parent, depth, run, first, .. } = &self.tree;
+        let EliminationTree { swaps, parent, depth, run, first, .. } = &self.tree;
         for &(i, k) in swaps {
             b.swap(i, k);
         }
@@ -268,15 +247,14 @@ impl<S: Scalar> Ltdl<S> {
     /// B: nv rows, any number of columns. Allocates nothing.
     ///
     /// ```
-    /// use condyle_dynamics::{Data, Ltdl, crba, robots};
-    /// let arm = robots::arm7();
-    /// let mut data = Data::new(&arm);
-    /// let M = crba(&arm, &mut data, &[0.3; 7]);
-    /// let mut factor = Ltdl::new(&arm);
-    /// factor.factorize(M);
+    /// use condyle_linalg::Ltdl;
+    /// use nalgebra::{DMatrix, dmatrix};
+    /// let M = dmatrix![2.0, 1.0; 1.0, 3.0];
+    /// let mut factor = Ltdl::new(&[None, Some(0)][..]);
+    /// factor.factorize(&M);
     /// let mut B = M.clone();
     /// factor.solve_matrix(&mut B);
-    /// assert!((B - nalgebra::DMatrix::<f64>::identity(7, 7)).amax() < 1e-12);
+    /// assert!((B - DMatrix::<f64>::identity(2, 2)).amax() < 1e-15);
     /// ```
     ///
     /// # Panics
@@ -300,7 +278,7 @@ impl<S: Scalar> Ltdl<S> {
     pub fn inverse(&self, X: &mut DMatrix<S>) {
         let nv = self.D_inv.len();
         assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());
-        let Tree { swaps, parent, depth, first, .. } = &self.tree;
+        let EliminationTree { swaps, parent, depth, first, .. } = &self.tree;
         let rows = X.as_mut_slice(); // row k is column k: X is symmetric
         for k in 0..nv {
             let L = &self.rows[first[k]..first[k] + depth[k]];
