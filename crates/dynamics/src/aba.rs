@@ -13,7 +13,7 @@ use crate::workspace::{Size, filled};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Motion, Scalar, Vec3};
 
 /// In the world's frame.

@@ -18,7 +18,7 @@ use crate::rnea_derivatives;
 use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::tree_product::minus_products;
 use condyle_model::Model;
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -138,8 +138,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    let Minv = data.minv.matrix().as_slice();
-    minus_products(Minv, dtau, da, model.nonzero_rows());
+    minus_products(data.minv.matrix().as_slice(), dtau, da, model.nonzero_rows());
 }
 
 impl<S> Workspace<S> {

@@ -20,7 +20,7 @@ use condyle_linalg::check;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::minus_product;
 use condyle_model::Model;
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
@@ -71,17 +71,17 @@ impl<S: Scalar> Workspace<S> {
 kernel! {
     /// After `aba_derivatives` and the Hessian of φ.
     fn run<S>(
-        nonzero_rows: &[NonzeroRows],
+        coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,
         Minv: &DMatrix<S>,
         phi: &rnea_hessian::Workspace<S>,
         d: &mut Workspace<S>,
     ) {
         let Workspace { transpose, product, dqdq, dvdq, dvdv, dtaudq, .. } = d;
-        let (n, G) = (nonzero_rows.len(), phi.dadq.as_slice());
+        let (n, G) = (coupled.len(), phi.dadq.as_slice());
         let product = product.as_mut_slice();
         transpose_to(first.da_dq.as_slice(), transpose, n);
-        minus_product(transpose, G, product, nonzero_rows); // −(∂q̈/∂q)ᵀ G
+        minus_product(transpose, G, product, coupled); // −(∂q̈/∂q)ᵀ G
         let (qq, vv) = (dqdq.as_mut_slice(), dvdv.as_mut_slice());
         let (phi_qq, phi_vv) = (phi.dqdq.as_slice(), phi.dvdv.as_slice());
         for j in 0..n {
@@ -92,11 +92,11 @@ kernel! {
         }
         transpose_to(first.da_dv.as_slice(), transpose, n);
         let (vq, phi_vq) = (dvdq.as_mut_slice(), phi.dvdq.as_slice());
-        minus_product(transpose, G, vq, nonzero_rows); // −(∂q̈/∂v)ᵀ G
+        minus_product(transpose, G, vq, coupled); // −(∂q̈/∂v)ᵀ G
         for k in 0..n * n {
             vq[k] -= phi_vq[k];
         }
-        minus_product(Minv.as_slice(), G, dtaudq.as_mut_slice(), nonzero_rows); // −M⁻¹ G
+        minus_product(Minv.as_slice(), G, dtaudq.as_mut_slice(), coupled); // −M⁻¹ G
     }
 }
 

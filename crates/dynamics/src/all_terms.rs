@@ -12,7 +12,7 @@ use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

@@ -23,7 +23,7 @@ use condyle_linalg::axpy::axpy;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::{minus_product, subtract_column};
 use condyle_model::Model;
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 

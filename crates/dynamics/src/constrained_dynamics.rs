@@ -22,7 +22,7 @@ use condyle_linalg::Ltdl;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

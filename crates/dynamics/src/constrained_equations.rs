@@ -21,7 +21,7 @@ use crate::frames::Placements;
 use crate::kinematics::World;
 use crate::rnea_derivatives;
 use condyle_model::Model;
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
 use nalgebra::DMatrix;
 

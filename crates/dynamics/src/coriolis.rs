@@ -17,7 +17,7 @@ use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Force, Inertia, Motion, Scalar, Sym3, Vec3};
 use nalgebra::DMatrix;
 

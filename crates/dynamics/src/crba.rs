@@ -10,7 +10,7 @@ use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Inertia, Scalar};
 use nalgebra::DMatrix;
 

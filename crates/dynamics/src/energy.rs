@@ -6,7 +6,7 @@ use crate::kinematics::{Moving, World, forward_velocities};
 use crate::workspace::{Size, filled};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {

@@ -9,7 +9,7 @@ use condyle_linalg::Cholesky;
 use condyle_linalg::Ltdl;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 

@@ -28,7 +28,7 @@ use condyle_linalg::axpy::axpy;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 

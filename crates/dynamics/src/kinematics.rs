@@ -10,7 +10,7 @@ use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Cross, Motion, Scalar, Se3};
 
 /// What depends on the position alone, in the world's frame.

@@ -15,7 +15,7 @@ use condyle_linalg::Ltdl;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::tree::Column;
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 

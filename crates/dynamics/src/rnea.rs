@@ -14,7 +14,7 @@ use condyle_model::Model;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::gate::kernel;
+use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
 /// In the bodies' turned frames.
@@ -23,7 +23,7 @@ use condyle_spatial::{Act, Constant, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 pub(crate) struct Workspace<S> {
     /// λXi. Shape: levels. Written by: `pass`.
     X: Vec<Se3<S>>,
-    /// How the body sin_cos and its origin accelerates, with gravity as the world's. Shape: levels. Written by: `pass`.
+    /// How the body turns and its origin accelerates, with gravity as the world's. Shape: levels. Written by: `pass`.
     motion: Vec<ClassicalMotion<S>>,
     /// K; the world's stays 0. Shape: levels. Written by: `pass`.
     K: Vec<Mat3<S>>,

@@ -3,6 +3,8 @@
 
 #[doc(hidden)]
 pub mod axpy;
+#[doc(hidden)]
+pub mod cast;
 mod cholesky;
 #[doc(hidden)]
 pub mod elimination_tree;

@@ -1,10 +1,12 @@
 //! X = −A B, of square matrices, where the columns of B have the zeros of a tree.
 
 use crate::axpy::axpy;
+use crate::cast::{as_f64, as_f64_mut};
 use crate::sparsity::NonzeroRows;
 use condyle_spatial::Scalar;
 use condyle_spatial::block::Block;
-use condyle_spatial::gate::{Kernel, Level, Long, Short, is, kernel, level, renamed};
+use condyle_spatial::gate::{Kernel, Level, Long, Short, level};
+use condyle_spatial::kernel;
 use core::marker::PhantomData;
 
 /// C = −A B, where column j of B has zeros but in the rows of `nonzero_rows[j]`.
@@ -141,18 +143,20 @@ fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: 
 /// `nonzero_rows[j]`.
 #[inline]
 pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
-    if !is::<S, f64>() || level() == Level::Baseline || nonzero_rows.len() < 4 {
-        return as_they_are(A, B, X, nonzero_rows);
+    let [X0, X1] = X;
+    if nonzero_rows.len() >= 4
+        && level() > Level::Baseline
+        && let (Some(A), Some(B0), Some(B1)) = (as_f64(A), as_f64(B[0]), as_f64(B[1]))
+        && let (Some(X0), Some(X1)) = (as_f64_mut(X0), as_f64_mut(X1))
+    {
+        return in_registers(A, [B0, B1], [X0, X1], nonzero_rows);
     }
-    // SAFETY: S is f64.
-    #[allow(unsafe_code)]
-    let (A, B, X) = unsafe { (renamed(A), renamed(B), renamed(X)) };
-    in_registers(A, B, X, nonzero_rows);
+    one_by_one(A, B, [X0, X1], nonzero_rows);
 }
 
 kernel! {
-    /// The products of numbers that fill a register each, or none.
-    fn as_they_are<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+    /// The products, scalar by scalar.
+    fn one_by_one<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
         if S::LANES > 1 {
             minus_product_twice(A, B, X, nonzero_rows);
         } else {
@@ -161,12 +165,12 @@ kernel! {
     }
 }
 
-/// The products of single numbers, several to a register.
+/// The products of single numbers, in the vector registers of the level.
 fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[NonzeroRows]) {
     if level() >= Level::Avx512 && nonzero_rows.len() >= 8 {
-        Long::enter(Products::<Long> { A, B, X, nonzero_rows, vector: PhantomData });
+        Long::enter(InRegisters::<Long> { A, B, X, nonzero_rows, vector: PhantomData });
     } else {
-        Short::enter(Products::<Short> { A, B, X, nonzero_rows, vector: PhantomData });
+        Short::enter(InRegisters::<Short> { A, B, X, nonzero_rows, vector: PhantomData });
     }
 }
 
@@ -179,7 +183,7 @@ const UNDER_WAY: usize = 8;
 ///
 /// As many entries of four columns of X as there are registers for stay there while their sums grow. The last of them begin
 /// where they still fit, and so are computed twice. Each entry is the same sum in the same order as in `minus_product`.
-struct Products<'a, V> {
+struct InRegisters<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],
     X: [&'a mut [f64]; 2],
@@ -187,7 +191,7 @@ struct Products<'a, V> {
     vector: PhantomData<V>,
 }
 
-impl<V: Block<Number = f64>> Kernel for Products<'_, V> {
+impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
     #[inline(always)]
     fn run(mut self) {
         let n = self.nonzero_rows.len();
@@ -207,7 +211,7 @@ impl<V: Block<Number = f64>> Kernel for Products<'_, V> {
     }
 }
 
-impl<V: Block<Number = f64>> Products<'_, V> {
+impl<V: Block<Number = f64>> InRegisters<'_, V> {
     #[inline(always)]
     fn all<const N: usize>(&mut self) {
         let mut j = 0;

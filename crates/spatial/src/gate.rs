@@ -1,6 +1,7 @@
-//! The gate to vector instructions: where passes are compiled, for which scalars, and with what.
+//! The gate to vector instructions: where kernels are compiled, for which scalars, and with what.
 //!
-//! `kernel!` wraps a pass, whose body is generic and inlined throughout, into a function that is called:
+//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factor, whose body is generic and inlined throughout, into a function
+//! that is called:
 //!
 //! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
 //!   instructions that the scalar is made of; whoever uses the library calls that code;
@@ -41,19 +42,19 @@ pub unsafe fn renamed<A, B>(a: A) -> B {
 }
 
 /// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
-/// the head of `gate.rs`. It returns nothing: what it computes is in its arguments.
-#[doc(hidden)]
+/// [`gate`](crate::gate). It returns nothing: what it computes is in its arguments.
 #[macro_export]
+#[doc(hidden)]
 macro_rules! kernel {
     ($(#[$doc:meta])* $vis:vis fn $name:ident<$S:ident $(, $R:ident)?>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$doc])*
         #[inline]
         #[allow(unsafe_code, clippy::too_many_arguments)]
-        $vis fn $name<$S: Scalar $(, $R: Constant<$S>)?>($($arg: $type),*) {
+        $vis fn $name<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?>($($arg: $type),*) {
             use $crate::gate::{Fused, Kernel, Level, Long, Short, is, level};
 
-            struct Work<T, Scalars>(T, core::marker::PhantomData<Scalars>);
-            impl<$S: Scalar $(, $R: Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
+            struct Work<T, Scalars>(T, ::core::marker::PhantomData<Scalars>);
+            impl<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
                 #[inline(always)]
                 fn run(self) {
                     let Work(($($arg,)*), _) = self;
@@ -62,14 +63,14 @@ macro_rules! kernel {
             }
 
             if !$S::COMPILED {
-                return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), core::marker::PhantomData));
+                return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
             $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
             let (f64, fused) = (is::<$S, f64>(), is::<$S, f64>() && level() > Level::Baseline);
-            $crate::gate::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
-            $crate::gate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
-            $crate::gate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
-            $crate::gate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
         }
     };
     // the function compiled for one scalar, if it is the one
@@ -80,7 +81,7 @@ macro_rules! kernel {
             $(type $R = f64;)?
             #[inline(never)]
             fn compiled($($arg: $type),*) {
-                $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), core::marker::PhantomData));
+                $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
             if chosen {
                 // SAFETY: R is f64, and S is this scalar, or f64 in place of `Fused`.
@@ -89,8 +90,6 @@ macro_rules! kernel {
         }
     };
 }
-pub use kernel;
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -208,7 +208,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
 /// The plan, where this model and `data` have limbs side by side, and the processor can.
 #[inline]
 pub(super) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
-    let (Some(plan), Some(scratch)) = (model.limbs(), &data.limbs) else { return None };
+    let (Some(plan), Some(scratch)) = (&model.limbs(), &data.limbs) else { return None };
     (is::<(S, R), (f64, f64)>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
 }
 
