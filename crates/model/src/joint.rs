@@ -194,6 +194,17 @@ impl Joint {
         }
     }
 
+    /// Whether the position of a joint that follows is ratio · q + offset of its leader's.
+    pub(crate) fn follows_by_sums(self) -> bool {
+        !matches!(self, Self::Continuous { .. })
+    }
+
+    /// Whether two joints are computed by the same operations.
+    pub(crate) fn is_computed_as(self, other: Self) -> bool {
+        let pitch = |joint| if let Self::Helical { pitch, .. } = joint { pitch } else { 0.0 };
+        core::mem::discriminant(&self) == core::mem::discriminant(&other) && pitch(self) == pitch(other)
+    }
+
     /// The k-th number of the position of a joint that follows; q begins with its leader's.
     #[inline(always)]
     pub fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {

@@ -87,7 +87,7 @@ impl Held {
         for (of, constraint) in self.rows.iter().zip(constraints) {
             let lambda = &lambda[constraint.row..];
             for link in of.ways.iter().flatten() {
-                let (step, lane) = plan.place[link.body];
+                let (step, lane) = plan.place(link.body);
                 for k in 0..link.nv {
                     let Y = &self.Y[of.start + (link.at + k) * of.wide..];
                     let sum = if of.wide == LANES { product::<1>(Y, lambda) } else { product::<2>(Y, lambda) };
@@ -96,7 +96,7 @@ impl Held {
             }
         }
         for k in 0..*nv {
-            let u = &mut u[(plan.steps[plan.place[*root].0].idx_v + k) * LANES..]; // in all lanes
+            let u = &mut u[(plan.steps[plan.place(*root).0].idx_v + k) * LANES..]; // in all lanes
             let mut sum = Four::load(u);
             for first in (0..stride - WIDE).step_by(WIDE) {
                 sum += product::<2>(&Y[k * stride + first..], &lambda[first..]);
@@ -146,7 +146,7 @@ impl<V: Block<Number = f64>> Call<'_, V> {
         let a = unsafe { numbers(&aba.a) };
         for (of, constraint) in held.rows.iter().zip(&set.plans) {
             let [one, other] = constraint.bodies;
-            let error = of.error([six(a, plan.place[one]), six(a, plan.place[other])]);
+            let error = of.error([six(a, plan.place(one)), six(a, plan.place(other))]);
             for r in 0..constraint.rows() {
                 set.error[constraint.row + r] = Fused(error[r]);
             }

@@ -42,7 +42,7 @@ impl<'a> Left<'a> {
     /// ₀X of a body.
     #[inline(always)]
     pub(super) fn pose(self, body: usize) -> Se3<Fused> {
-        let (step, lane) = self.plan.place[body];
+        let (step, lane) = self.plan.place(body);
         let x = &self.oX[12 * LANES * step + lane..][..11 * LANES + 1];
         let mut columns = [Vec3::zero(); 4];
         for k in 0..4 {
@@ -56,7 +56,7 @@ impl<'a> Left<'a> {
     /// The velocity of a body.
     #[inline(always)]
     pub(super) fn velocity(self, body: usize) -> Motion<Fused> {
-        let x = six(self.v, self.plan.place[body]);
+        let x = six(self.v, self.plan.place(body));
         let mut v = [Fused(0.0); 6];
         for k in 0..6 {
             v[k] = Fused(x[k * LANES]);
@@ -215,7 +215,7 @@ impl Rows {
                 }
             }
             for link in way {
-                let (step, lane) = left.plan.place[link.body];
+                let (step, lane) = left.plan.place(link.body);
                 for k in (0..link.nv).rev() {
                     let (slot, place) = (left.plan.steps[step].idx_v + k, link.at + k);
                     let mut numbers = [0.0; WIDE];
@@ -311,7 +311,7 @@ impl All {
         J: &mut [Fused],
     ) {
         let stride = self.stride;
-        let (step, lane) = left.plan.place[self.root];
+        let (step, lane) = left.plan.place(self.root);
         for first in (0..stride - WIDE).step_by(WIDE) {
             let whole = read_forces::<V, N>(&self.whole[first..], stride);
             let mut f = read_forces::<V, N>(&self.rest[first..], stride);

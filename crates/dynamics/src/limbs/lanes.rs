@@ -5,8 +5,8 @@ use super::{LANES, Plan};
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Columns, Layout};
-use condyle_model::limbs::column_map::{Before, Link, Pair};
-use condyle_model::limbs::schedule::{Parents, Source, Step};
+use condyle_model::limbs::column_map::{ColumnMap, LaneColumn, Pair, Predecessor};
+use condyle_model::limbs::steps::{Parents, Source, Step};
 use condyle_spatial::lanes::{Fused, Lanes};
 use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::{Act, Force, Inertia, Se3, Vec3};
@@ -17,11 +17,11 @@ pub(super) type Four = Lanes<f64, LANES>;
 /// Steps in place of bodies, lanes in place of numbers.
 pub(super) struct Limbs<'a> {
     pub(super) steps: &'a [Step],
-    pub(super) links: &'a [Link],
+    pub(super) support: &'a [LaneColumn],
     pairs: &'a [Pair],
     copies: &'a [Vec<(usize, Move)>],
-    before: &'a [Before],
-    finished: &'a [usize],
+    predecessors: &'a [Predecessor],
+    closed: &'a [usize],
     coordinates: &'a [Source],
     pub armature: &'a [f64],
     pub gravity: Vec3<f64>,
@@ -128,15 +128,15 @@ impl Layout for Limbs<'_> {
     #[inline(always)]
     fn parent<T: Copy>(&self, of: &[T], i: usize) -> T {
         match &self.steps[i].parents {
-            Parents::Below(step) => of[*step],
-            Parents::Apart { from, .. } => gathered(of, from),
+            Parents::InPlace(step) => of[*step],
+            Parents::Moved { from, .. } => gathered(of, from),
         }
     }
     #[inline(always)]
     fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
         match &self.steps[i].parents {
-            Parents::Below(step) => onto[*step] += x,
-            Parents::Apart { to, .. } => {
+            Parents::InPlace(step) => onto[*step] += x,
+            Parents::Moved { to, .. } => {
                 for (step, by) in to {
                     onto[*step] += moved(x, by);
                 }
@@ -150,7 +150,7 @@ impl Layout for Limbs<'_> {
     /// All of them, when the pass has gone down to the last.
     #[inline(always)]
     fn closed_by(&self, i: usize) -> &[usize] {
-        if i + 1 == self.steps.len() { self.finished } else { &[] }
+        if i + 1 == self.steps.len() { self.closed } else { &[] }
     }
     #[inline(always)]
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T {
@@ -197,25 +197,27 @@ impl Layout for Limbs<'_> {
 impl<'a> Limbs<'a> {
     #[inline(always)]
     pub(super) fn new(plan: &'a Plan, model: &'a Model) -> Self {
-        let Plan { steps, links, pairs, copies, before, finished, coordinates, .. } = plan;
+        let Plan { steps, closed, state, columns, .. } = plan;
+        let ColumnMap { support, pairs, copies, predecessors, .. } = columns;
         let (armature, gravity) = (model.armature(), *model.gravity());
-        Self { steps, links, pairs, copies, before, finished, coordinates, armature, gravity }
+        let coordinates = &state.coordinates;
+        Self { steps, support, pairs, copies, predecessors, closed, coordinates, armature, gravity }
     }
 
-    /// What stands at the link before.
+    /// What stands at the predecessor of an entry of the support.
     #[inline(always)]
-    pub(super) fn before<T: Copy>(&self, of: &[T], link: usize) -> T {
-        match &self.before[link] {
-            Before::Here(before) => of[*before],
-            Before::Apart(from) => gathered(of, from),
+    pub(super) fn predecessor<T: Copy>(&self, of: &[T], entry: usize) -> T {
+        match &self.predecessors[entry] {
+            Predecessor::InPlace(before) => of[*before],
+            Predecessor::Moved(from) => gathered(of, from),
         }
     }
 
     /// The places of a pair.
     #[inline(always)]
-    pub(super) fn pair(&self, e: Link, k: usize) -> &Pair {
+    pub(super) fn pair(&self, e: LaneColumn, k: usize) -> &Pair {
         debug_assert!(e.pair + k < self.pairs.len());
-        // SAFETY: the plan has a pair for each link of a step and each column k of its joints.
+        // SAFETY: the plan has a pair for each entry of a step's support and each column k of its joints.
         unsafe { self.pairs.get_unchecked(e.pair + k) }
     }
 
@@ -232,23 +234,23 @@ impl<'a> Limbs<'a> {
 }
 
 impl Columns for Limbs<'_> {
-    type Column = Link;
+    type Column = LaneColumn;
     /// The how manieth of its joint.
     type OwnColumn = usize;
     type Number = Fused;
 
     #[inline(always)]
-    fn support(&self, i: usize) -> &[Link] {
-        let (first, end) = self.steps[i].links;
-        &self.links[first..end]
+    fn support(&self, i: usize) -> &[LaneColumn] {
+        let (first, end) = self.steps[i].support;
+        &self.support[first..end]
     }
     #[inline(always)]
     fn own_column(&self, _: usize, k: usize) -> usize {
         k
     }
     #[inline(always)]
-    fn at<T: Copy>(&self, of: &[T], column: Link) -> T {
-        of[column.slot]
+    fn at<T: Copy>(&self, of: &[T], column: LaneColumn) -> T {
+        of[column.column]
     }
     #[inline(always)]
     fn broadcast<T: Copy>(&self, of: &mut [T]) {
@@ -261,12 +263,12 @@ impl Columns for Limbs<'_> {
         assert!(matrix.len() == self.armature.len() * self.armature.len());
     }
     #[inline(always)]
-    fn set_row(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
-        Self::put(matrix, &self.pair(e, k).below, value);
+    fn set_row(&self, matrix: &mut [Fused], k: usize, e: LaneColumn, value: Four) {
+        Self::put(matrix, &self.pair(e, k).in_row, value);
     }
     #[inline(always)]
-    fn set_column(&self, matrix: &mut [Fused], k: usize, e: Link, value: Four) {
-        Self::put(matrix, &self.pair(e, k).right, value);
+    fn set_column(&self, matrix: &mut [Fused], k: usize, e: LaneColumn, value: Four) {
+        Self::put(matrix, &self.pair(e, k).in_column, value);
     }
     #[inline(always)]
     fn add_armature(&self, matrix: &mut [Fused]) {

@@ -9,7 +9,7 @@ use crate::workspace::{Size, filled};
 use crate::{aba, crba, rnea, rnea_derivatives};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
-use condyle_model::limbs::schedule::Source;
+use condyle_model::limbs::steps::Source;
 use condyle_spatial::block::{Block, lanes};
 use condyle_spatial::gate::{Long, Short, is, renamed};
 use condyle_spatial::lanes::{Fused, Kernel};
@@ -41,11 +41,11 @@ impl Scratch {
     /// For a model with limbs, on a processor that can.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
         let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
-        let (steps, nv) = (plan.steps.len(), plan.coordinates.len());
-        let size = Size { bodies: steps, columns: nv + plan.copies.len(), depth: 0, levels: steps, nv };
+        let (steps, nv) = (plan.steps.len(), plan.state.coordinates.len());
+        let size = Size { bodies: steps, columns: nv + plan.columns.copies.len(), depth: 0, levels: steps, nv };
         let zeros = filled(Four::zero(), nv);
         Some(Box::new(Self {
-            q: filled(Four::zero(), plan.positions.len()),
+            q: filled(Four::zero(), plan.state.positions.len()),
             v: zeros.clone(),
             x: zeros,
             f_ext: filled(Force::zero(), steps),
@@ -62,7 +62,12 @@ impl Scratch {
     /// Whether it was made for this plan, or one of the same shape.
     fn fits(&self, plan: &Plan) -> bool {
         (self.q.len(), self.v.len(), self.f_ext.len(), self.world.S.len())
-            == (plan.positions.len(), plan.coordinates.len(), plan.steps.len(), self.v.len() + plan.copies.len())
+            == (
+                plan.state.positions.len(),
+                plan.state.coordinates.len(),
+                plan.steps.len(),
+                self.v.len() + plan.columns.copies.len(),
+            )
             && self.inverted.fits(plan)
     }
 }
@@ -91,10 +96,10 @@ impl<'a> Arguments<'a> {
 /// Brings the arguments into lanes.
 #[inline(always)]
 pub(super) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
-    gather(&plan.positions, &mut to.padded, from.q, &mut to.q);
+    gather(&plan.state.positions, &mut to.padded, from.q, &mut to.q);
     if !from.v.is_empty() {
-        gather(&plan.coordinates, &mut to.padded, from.v, &mut to.v);
-        gather(&plan.coordinates, &mut to.padded, from.x, &mut to.x);
+        gather(&plan.state.coordinates, &mut to.padded, from.v, &mut to.v);
+        gather(&plan.state.coordinates, &mut to.padded, from.x, &mut to.x);
     }
     if from.f_ext.is_empty() {
         return;
@@ -132,10 +137,10 @@ fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]
 #[inline(always)]
 pub(super) fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
     let numbers = lanes(from);
-    for (to, &at) in to.iter_mut().zip(&plan.leaders) {
+    for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
         *to = Fused(numbers[at]);
     }
-    for &(k, at, ratio) in &plan.followers {
+    for &(k, at, ratio) in &plan.state.followers {
         to[k] += Fused(numbers[at] * ratio);
     }
 }
@@ -195,7 +200,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
         if let Task::Minv | Task::AbaDerivatives = task {
             l.broadcast(&mut aba.D_inv);
             let Minv = Fused::of_mut(data.minv.Minv.as_mut_slice());
-            inverted.inverse::<V>(&l, world, aba, &plan.blocks, Minv);
+            inverted.inverse::<V>(&l, world, aba, &plan.columns.blocks, Minv);
         }
         if let Task::RneaDerivatives | Task::AbaDerivatives = task {
             let matrices = data.rnea_derivatives.parts().1.map(|matrix| Fused::of_mut(matrix));
@@ -249,7 +254,7 @@ pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Dat
     // SAFETY: poses and motions are made of vectors.
     let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
     for i in 1..oX.len() {
-        let ((step, lane), column) = (plan.place[i], model.nodes()[i].column);
+        let ((step, lane), column) = (plan.place(i), model.nodes()[i].column);
         let pose = |k: usize| S::splat(poses[(12 * step + k) * LANES + lane]);
         let axis = |k: usize| Vec3::new(pose(k), pose(k + 1), pose(k + 2));
         oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));

@@ -20,7 +20,7 @@ impl<'d> Seen<'d> {
 
     /// oX of body b.
     pub(crate) fn pose<S: Scalar>(self, b: usize) -> Se3<S> {
-        let (step, lane) = self.plan.place[b];
+        let (step, lane) = self.plan.place(b);
         let Se3 { rotation: Mat3 { x, y, z }, translation } = self.scratch.world.oX[step];
         let rotation = Mat3 { x: vector(x, lane), y: vector(y, lane), z: vector(z, lane) };
         Se3::new(rotation, vector(translation, lane))
@@ -28,19 +28,19 @@ impl<'d> Seen<'d> {
 
     /// S of a column of body b, the k-th.
     pub(crate) fn column<S: Scalar>(self, b: usize, k: usize) -> Motion<S> {
-        let (step, lane) = self.plan.place[b];
+        let (step, lane) = self.plan.place(b);
         motion(self.scratch.world.S[self.plan.steps[step].idx_v + k], lane)
     }
 
     /// Velocity of body b, and its acceleration with gravity as the world's.
     pub(crate) fn moving<S: Scalar>(self, b: usize) -> (Motion<S>, Motion<S>) {
-        let (step, lane) = self.plan.place[b];
+        let (step, lane) = self.plan.place(b);
         (motion(self.scratch.bodies.v[step], lane), motion(self.scratch.bodies.a[step], lane))
     }
 
     /// Iᶜ of body b.
     pub(crate) fn carried<S: Scalar>(self, b: usize) -> Inertia<S> {
-        let (step, lane) = self.plan.place[b];
+        let (step, lane) = self.plan.place(b);
         let Inertia { mass, mass_com, rotational: r } = self.scratch.bodies.IC[step];
         let n = |x| number(x, lane);
         let rotational = Sym3 { xx: n(r.xx), xy: n(r.xy), yy: n(r.yy), xz: n(r.xz), yz: n(r.yz), zz: n(r.zz) };

@@ -4,18 +4,39 @@
 //! another lane. Columns from there to the root are copied: into places behind those of all columns, once a call, so that
 //! whatever comes further out finds all that it needs in its own lanes.
 //!
-//! What belongs to a column and changes from body to body on the way out (`inverse.rs`) has a place for each link.
+//! What belongs to a column and changes from body to body on the way out (as the columns of M⁻¹'s factor do) has a place
+//! for each entry of the support.
 
-use super::{LANES, Plan};
+use super::LANES;
+use super::schedule::Schedule;
+use super::steps::Step;
 use crate::tree::Tree;
 use condyle_spatial::moves::Move;
+use core::iter::successors;
+
+/// Where columns and the entries of matrices stand.
+#[derive(Clone, Debug)]
+pub struct ColumnMap {
+    /// The columns from the root to each step's joints, step by step.
+    pub support: Vec<LaneColumn>,
+    /// The pairs of each such column with the step's own.
+    pub pairs: Vec<Pair>,
+    /// What stands behind the columns of all steps: copies of columns, of which steps, and how their lanes change.
+    pub copies: Vec<Vec<(usize, Move)>>,
+    /// Of each entry of the support, the one before it on the way out.
+    pub predecessors: Vec<Predecessor>,
+    /// All columns, those after one another together.
+    pub blocks: Vec<ColumnBlock>,
+    /// How large the matrices are that hold Z.
+    pub sizes: Sizes,
+}
 
 /// A column of each lane, among those from the root to a step's joints.
 #[derive(Clone, Copy, Debug)]
-pub struct Link {
+pub struct LaneColumn {
     /// Where it stands in arrays by columns.
-    pub slot: usize,
-    /// Where its pairs with the step's own columns stand in `Plan::pairs`, one after the other.
+    pub column: usize,
+    /// Where its pairs with the step's own columns stand in `ColumnMap::pairs`, one after the other.
     pub pair: usize,
 }
 
@@ -23,173 +44,196 @@ pub struct Link {
 /// pair point to an entry that is set after all others, and there by the first lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
-    /// In the row of the step's own column.
-    pub below: [u32; LANES],
-    /// In the column of the step's own column.
-    pub right: [u32; LANES],
-    /// In the two matrices of `inverse.rs`.
-    pub deep: [u32; LANES],
-    pub wide: [u32; LANES],
+    /// The entry in the row of the step's own column.
+    pub in_row: [u32; LANES],
+    /// The entry in the column of the step's own column.
+    pub in_column: [u32; LANES],
+    /// The entry of Z D⁻¹.
+    pub in_ZD: [u32; LANES],
+    /// The entry of Zᵀ.
+    pub in_Zt: [u32; LANES],
 }
 
-/// From where a link gets what changes on the way out.
+/// From where an entry of the support gets what changes on the way out.
 #[derive(Clone, Debug)]
-pub enum Before {
-    /// From this link, in the same lanes; the step's own columns from themselves.
-    Here(usize),
-    /// From several links or lanes.
-    Apart(Vec<(usize, Move)>),
+pub enum Predecessor {
+    /// From this entry, in the same lanes; the step's own columns from themselves.
+    InPlace(usize),
+    /// From several entries, or from other lanes.
+    Moved(Vec<(usize, Move)>),
 }
 
 /// Some columns of which each carries the next, and all columns from the root to the last of them.
 #[derive(Clone, Debug)]
-pub struct Block {
+pub struct ColumnBlock {
+    /// The first of them.
     pub first: usize,
-    pub many: usize,
-    pub way: Vec<usize>,
+    /// How many they are.
+    pub count: usize,
+    /// All columns from the root to the last of them.
+    pub path: Vec<usize>,
 }
 
-/// How large the two matrices are that hold Z = L⁻¹ of the inertia matrix, row by row.
-#[derive(Clone, Copy, Debug, Default)]
+/// How large the two matrices are that hold Z = L⁻¹, of the inertia matrix M = Lᵀ D L: see `dynamics::limbs::inverse`.
+#[derive(Clone, Copy, Debug)]
 pub struct Sizes {
+    /// How many rows both have.
     pub rows: usize,
-    /// The length of a row that has the columns from the root on.
-    pub deep: usize,
-    /// The length of a row that has all columns, in whole vectors.
-    pub wide: usize,
+    /// The length of a row of Z D⁻¹, which has the columns from the root on.
+    pub ZD: usize,
+    /// The length of a row of Zᵀ, which has all columns, in whole vectors.
+    pub Zt: usize,
 }
 
 impl Sizes {
-    /// For a robot's inertia matrix.
     fn new(tree: &Tree<f64>) -> Self {
-        let deep = tree.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0);
-        Self { rows: tree.nv, deep, wide: tree.nv.next_multiple_of(2 * LANES) }
+        let depth = tree.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0);
+        Self { rows: tree.nv, ZD: depth, Zt: tree.nv.next_multiple_of(2 * LANES) }
     }
 
-    /// The place behind all rows: of what lanes without a body write.
-    pub fn deep_behind(self) -> usize {
-        self.rows * self.deep
+    /// The place behind all rows of Z D⁻¹, where lanes without a body write.
+    pub fn end_of_ZD(self) -> usize {
+        self.rows * self.ZD
     }
 
-    /// The same of the other matrix.
-    pub fn wide_behind(self) -> usize {
-        self.rows * self.wide
+    /// The place behind all rows of Zᵀ, where lanes without a body write.
+    pub fn end_of_Zt(self) -> usize {
+        self.rows * self.Zt
     }
 }
 
-/// How many rows a block has at most.
-const ROWS: usize = 4;
+/// How many columns a block has at most.
+const COUNT: usize = 4;
 
 /// The blocks of all columns.
-fn blocks(tree: &Tree<f64>) -> Vec<Block> {
+fn blocks(tree: &Tree<f64>) -> Vec<ColumnBlock> {
     let columns = &tree.columns;
-    let mut blocks: Vec<Block> = Vec::new();
+    let mut blocks: Vec<ColumnBlock> = Vec::new();
     for c in 0..columns.len() {
-        let mut way: Vec<usize> = std::iter::successors(Some(c), |&c| columns[c].parent).collect();
-        way.reverse();
+        let mut path: Vec<usize> = successors(Some(c), |&c| columns[c].parent).collect();
+        path.reverse();
         match blocks.last_mut() {
-            Some(block) if c > 0 && columns[c].parent == Some(c - 1) && block.many < ROWS => {
-                (block.many, block.way) = (block.many + 1, way);
+            Some(block) if c > 0 && columns[c].parent == Some(c - 1) && block.count < COUNT => {
+                (block.count, block.path) = (block.count + 1, path);
             }
-            _ => blocks.push(Block { first: c, many: 1, way }),
+            _ => blocks.push(ColumnBlock { first: c, count: 1, path }),
         }
     }
     blocks
 }
 
-/// A column of a lane on the way from the root: its slot, lane and coordinate, and its link to the lane's body.
-type Item = (usize, usize, usize, usize);
+/// A column on the way from the root to the body of a lane.
+#[derive(Clone, Copy)]
+struct Ancestor {
+    /// Where it stands in arrays by columns.
+    column: usize,
+    /// In which lane it stands.
+    lane: usize,
+    coordinate: usize,
+    /// Its entry in the support of the step before.
+    entry: usize,
+}
 
-/// A link under construction: its slot, and the coordinate in each lane.
+/// An entry of the support under construction: where it stands in arrays by columns, and the coordinate in each lane.
 type Draft = (usize, [Option<usize>; LANES]);
 
-impl Plan {
-    /// Fills in the links of all steps.
-    pub(super) fn add_links(&mut self, tree: &Tree<f64>) {
-        let mut drafts: Vec<Vec<Draft>> = vec![Vec::new()];
-        let first = self.bodies.get(1).map_or(0, |bodies| bodies[0]); // whose last column is set last, in the first lane
+impl ColumnMap {
+    /// The map for the steps of a schedule, which are told where their support stands.
+    pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule, steps: &mut [Step]) -> Self {
+        let sizes = Sizes::new(tree);
+        let (support, pairs, copies, predecessors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut map = Self { support, pairs, copies, predecessors, blocks: blocks(tree), sizes };
+        let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]); // whose last column is set last, in the first lane
         let last = tree.nodes[first].idx_v + tree.nodes[first].joint.nv().saturating_sub(1);
         let unused = (last * (tree.nv + 1)) as u32;
-        let sizes = Sizes::new(tree);
-        self.sizes = sizes;
-        self.blocks = blocks(tree);
-        for s in 1..self.steps.len() {
-            let mut draft = self.before(tree, &drafts, s);
-            let (bodies, joint, slot) = (self.bodies[s], self.steps[s].joint, self.steps[s].idx_v);
+        let mut drafts: Vec<Vec<Draft>> = vec![Vec::new()];
+        for s in 1..steps.len() {
+            let mut draft = map.ancestors(tree, schedule, steps, &drafts, s);
+            let (bodies, joint, column) = (schedule.bodies[s], steps[s].joint, steps[s].idx_v);
             let coordinate = |k: usize| bodies.map(|i| (i > 0).then(|| tree.nodes[i].idx_v + k));
-            draft.extend((0..joint.nv()).map(|k| (slot + k, coordinate(k))));
-            let first = self.links.len();
-            for &(slot, others) in &draft {
-                self.links.push(Link { slot, pair: self.pairs.len() });
+            draft.extend((0..joint.nv()).map(|k| (column + k, coordinate(k))));
+            let first = map.support.len();
+            for &(column, others) in &draft {
+                map.support.push(LaneColumn { column, pair: map.pairs.len() });
                 for k in 0..joint.nv() {
                     let mut own = coordinate(k);
-                    if self.in_all_lanes(s) {
+                    if schedule.in_all_lanes(s) {
                         own[1..].fill(None);
                     }
-                    let (deep, wide) = ([sizes.deep_behind() as u32; LANES], [sizes.wide_behind() as u32; LANES]);
-                    let mut pair = Pair { below: [unused; LANES], right: [unused; LANES], deep, wide };
+                    let (in_ZD, in_Zt) = ([sizes.end_of_ZD() as u32; LANES], [sizes.end_of_Zt() as u32; LANES]);
+                    let mut pair = Pair { in_row: [unused; LANES], in_column: [unused; LANES], in_ZD, in_Zt };
                     for lane in 0..LANES {
                         if let (Some(d), Some(e)) = (own[lane], others[lane]) {
-                            (pair.below[lane], pair.right[lane]) = ((d + tree.nv * e) as u32, (e + tree.nv * d) as u32);
+                            pair.in_row[lane] = (d + tree.nv * e) as u32;
+                            pair.in_column[lane] = (e + tree.nv * d) as u32;
                             if !tree.has_mimic() {
-                                pair.deep[lane] = (d * sizes.deep + tree.columns[e].depth) as u32;
-                                pair.wide[lane] = (e * sizes.wide + d) as u32;
+                                pair.in_ZD[lane] = (d * sizes.ZD + tree.columns[e].depth) as u32;
+                                pair.in_Zt[lane] = (e * sizes.Zt + d) as u32;
                             }
                         }
                     }
-                    self.pairs.push(pair);
+                    map.pairs.push(pair);
                 }
             }
-            let last = self.links.len();
-            self.before.extend((self.before.len()..last).map(Before::Here)); // the step's own
-            self.steps[s].links = (first, last);
-            let hangs_here = |&i: &usize| i > 0 && self.place[tree.nodes[i].parent].0 == s;
-            self.steps[s].tip = !self.bodies.iter().flatten().any(hangs_here);
+            let end = map.support.len();
+            map.predecessors.extend((map.predecessors.len()..end).map(Predecessor::InPlace)); // the step's own
+            steps[s].support = (first, end);
             drafts.push(draft);
         }
+        map
     }
 
     /// The columns before those of step s, with copies of what stands elsewhere.
-    fn before(&mut self, tree: &Tree<f64>, drafts: &[Vec<Draft>], s: usize) -> Vec<Draft> {
-        let mut ways: Vec<Vec<Item>> = vec![Vec::new(); LANES];
-        for lane in (0..LANES).filter(|&lane| self.bodies[s][lane] > 0) {
-            let (step, its) = self.place[tree.nodes[self.bodies[s][lane]].parent];
-            let its = if self.in_all_lanes(step) { lane } else { its };
-            let columns = drafts[step].iter().enumerate();
-            let link = self.steps[step].links.0;
-            ways[lane] = columns.filter_map(|(at, (slot, c))| c[its].map(|c| (*slot, its, c, link + at))).collect();
+    fn ancestors(
+        &mut self,
+        tree: &Tree<f64>,
+        schedule: &Schedule,
+        steps: &[Step],
+        drafts: &[Vec<Draft>],
+        s: usize,
+    ) -> Vec<Draft> {
+        let mut paths: Vec<Vec<Ancestor>> = vec![Vec::new(); LANES];
+        for lane in (0..LANES).filter(|&lane| schedule.bodies[s][lane] > 0) {
+            let (step, its) = schedule.parent(&tree.nodes, s, lane);
+            let first = steps[step].support.0;
+            let ancestor = |(k, &(column, coordinates)): (usize, &Draft)| {
+                Some(Ancestor { column, lane: its, coordinate: coordinates[its]?, entry: first + k })
+            };
+            paths[lane] = drafts[step].iter().enumerate().filter_map(ancestor).collect();
         }
-        let longest = ways.iter().map(Vec::len).max().unwrap_or(0);
+        let longest = paths.iter().map(Vec::len).max().unwrap_or(0);
+        let behind = steps.last().map_or(0, |last| last.idx_v + last.joint.nv()); // the columns of all steps
         (0..longest)
             .map(|at| {
-                let here = [0, 1, 2, 3].map(|lane| ways[lane].get(at).copied());
-                let of_links = [0, 1, 2, 3].map(|lane| here[lane].map(|(_, its, _, link)| (link, its)));
-                self.before.push(match in_place(of_links) {
-                    Some(link) => Before::Here(link),
-                    None => Before::Apart(moves(of_links)),
+                let here = [0, 1, 2, 3].map(|lane| paths[lane].get(at).copied());
+                let entries = here.map(|a| a.map(|a| (a.entry, a.lane)));
+                self.predecessors.push(match in_place(entries) {
+                    Some(entry) => Predecessor::InPlace(entry),
+                    None => Predecessor::Moved(moves(entries)),
                 });
                 // a column in all lanes is in this one, too
-                let in_all = |slot: usize| self.shared && slot < self.steps[1].joint.nv();
-                let of_slots = [0, 1, 2, 3]
-                    .map(|lane| here[lane].map(|(slot, its, ..)| (slot, if in_all(slot) { lane } else { its })));
-                let slot = in_place(of_slots).unwrap_or_else(|| {
-                    self.copies.push(moves(of_slots));
-                    self.coordinates.len() + self.copies.len() - 1
+                let in_all = |column: usize| schedule.shared && column < steps[1].joint.nv();
+                let columns = [0, 1, 2, 3]
+                    .map(|lane| here[lane].map(|a| (a.column, if in_all(a.column) { lane } else { a.lane })));
+                let column = in_place(columns).unwrap_or_else(|| {
+                    self.copies.push(moves(columns));
+                    behind + self.copies.len() - 1
                 });
-                (slot, here.map(|x| x.map(|(_, _, coordinate, _)| coordinate)))
+                (column, here.map(|a| a.map(|a| a.coordinate)))
             })
             .collect()
     }
 }
 
-/// Of each lane the place and lane from where something comes: the place, if it is the same for all, and no lane changes.
+/// The place from which all lanes have what they need, each from the same lane, if there is one: of each lane, (place, lane)
+/// is given.
 fn in_place(from: [Option<(usize, usize)>; LANES]) -> Option<usize> {
     let (first, _) = from.iter().flatten().next()?;
     let stays = |(lane, from): (usize, &Option<(usize, usize)>)| from.is_none_or(|from| from == (*first, lane));
     from.iter().enumerate().all(stays).then_some(*first)
 }
 
-/// The same otherwise: what comes from which place.
+/// What comes from which place, where lanes have it from several places or from other lanes.
 fn moves(from: [Option<(usize, usize)>; LANES]) -> Vec<(usize, Move)> {
     let mut places: Vec<usize> = from.iter().flatten().map(|x| x.0).collect();
     places.sort_unstable();

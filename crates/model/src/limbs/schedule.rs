@@ -1,168 +1,98 @@
-//! What a pass needs of the bodies of a step, lane by lane.
+//! Which bodies go together.
+//!
+//! A list schedule: step after step takes up to four bodies whose parents are done, those with the longest way to their tips
+//! first, and leaves each in its parent's lane, which it waits for if there is time. The body on which all others hang stands
+//! in all lanes, each of which adds up what its own limbs exert on it.
 
-use super::{LANES, Plan};
-use crate::joint::Joint;
-use crate::tree::Tree;
-use condyle_spatial::moves::Move;
-use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
+use super::LANES;
+use crate::tree::Node;
 
-/// Four bodies as a pass sees them.
+/// From how many bodies a step on it pays, the world counted: two legs of six joints each, under one trunk, just do.
+const WORTH: usize = 2;
+
+/// The bodies of each step, and the step of each body.
 #[derive(Clone, Debug)]
-pub struct Step {
-    /// The kind of their joints.
-    pub joint: Joint,
-    pub bodies: [usize; LANES],
-    pub placement: Se3<[f64; LANES]>,
-    pub inertia: Inertia<[f64; LANES]>,
-    pub axis_rotation: Mat3<[f64; LANES]>,
-    /// Where the positions and the velocities of their joints begin among those in lanes.
-    pub idx_q: usize,
-    pub idx_v: usize,
-    pub parents: Parents,
-    /// Where its links stand in `Plan::links`.
-    pub links: (usize, usize),
-    /// Nothing hangs on any of its bodies.
-    pub tip: bool,
+pub(super) struct Schedule {
+    /// The bodies of each step, one in each lane, 0 where there is none.
+    pub bodies: Vec<[usize; LANES]>,
+    /// The step and lane of each body.
+    pub place: Vec<(usize, usize)>,
+    /// Whether the first step is one body in all lanes.
+    pub shared: bool,
 }
 
-/// Where the parents of a step's bodies stand.
-#[derive(Clone, Debug)]
-pub enum Parents {
-    /// In one step, each in its child's lane.
-    Below(usize),
-    /// Elsewhere: what comes from which step, and what goes there.
-    Apart { from: Vec<(usize, Move)>, to: Vec<(usize, Move)> },
-}
+impl Schedule {
+    /// The schedule for a robot, if it has limbs enough.
+    pub(super) fn new(nodes: &[Node<f64>]) -> Option<Self> {
+        // Who has the longest way goes first: that tells how many steps there are. Then who has time to wait for a lane
+        // waits.
+        let hasty = Self::until(nodes, 0);
+        let patient = Self::until(nodes, hasty.bodies.len() - 1);
+        let schedule = if patient.bodies.len() > hasty.bodies.len() { hasty } else { patient };
+        (nodes.len() >= WORTH * (schedule.bodies.len() - 1)).then_some(schedule)
+    }
 
-/// Where the four numbers of a position or a velocity come from: the one of the robot times `ratio`, plus `offset`.
-#[derive(Clone, Copy, Debug)]
-pub struct Source {
-    /// One past the robot's last in a lane without a joint.
-    pub from: [usize; LANES],
-    pub ratio: [f64; LANES],
-    pub offset: [f64; LANES],
-}
-
-impl Plan {
-    /// Fills in the constants of all steps.
-    pub(super) fn add_steps(&mut self, tree: &Tree<f64>) {
-        for s in 0..self.bodies.len() {
-            let bodies = self.bodies[s];
-            let some = bodies.into_iter().find(|&i| i > 0).unwrap_or(0);
-            let joint = tree.nodes[some].joint;
-            let (idx_q, idx_v) = (self.positions.len(), self.coordinates.len());
-            if s > 0 {
-                self.add_sources(tree, s, joint);
-            }
-            // what a body in all lanes weighs, the first lane carries
-            let carried = |lane: usize| match bodies[lane] {
-                0 => Inertia::zero(),
-                _ if self.in_all_lanes(s) && lane > 0 => Inertia::zero(),
-                i => tree.nodes[i].inertia,
+    /// A schedule in which bodies that must not wait, if `last` is to be the last step, are served first.
+    fn until(nodes: &[Node<f64>], last: usize) -> Self {
+        let n = nodes.len();
+        let mut children = vec![Vec::new(); n];
+        let mut height = vec![0; n]; // bodies on the longest way to a tip
+        for i in (1..n).rev() {
+            children[nodes[i].parent].push(i);
+            height[nodes[i].parent] = height[nodes[i].parent].max(height[i] + 1);
+        }
+        let shared = n > 1 && children[0].len() == 1;
+        let mut schedule = Self { bodies: vec![[0; LANES]], place: vec![(0, 0); n], shared };
+        let mut ready = children[0].clone();
+        if shared {
+            let root = ready.remove(0);
+            schedule.bodies.push([root; LANES]);
+            schedule.place[root] = (1, 0);
+            ready = children[root].clone();
+        }
+        while !ready.is_empty() {
+            let now = schedule.bodies.len();
+            ready.sort_by_key(|&i| (core::cmp::Reverse(height[i]), i));
+            let first = nodes[ready[0]].joint;
+            let fits = |i: &usize| nodes[*i].joint.is_computed_as(first);
+            let urgent = |i: &usize| now + height[*i] >= last;
+            let (hurry, wait): (Vec<_>, Vec<_>) = ready.iter().copied().filter(fits).partition(urgent);
+            let hurry = &hurry[..hurry.len().min(LANES)];
+            let wanted = |lane: usize| {
+                let home = |&i: &usize| schedule.place[nodes[i].parent];
+                ready.iter().any(|i| !schedule.in_all_lanes(home(i).0) && home(i).1 == lane)
             };
-            let placement = bodies.map(|i| tree.nodes[i].placement);
-            self.steps.push(Step {
-                joint,
-                bodies,
-                placement: Se3 {
-                    rotation: rotation(placement.map(|X| X.rotation)),
-                    translation: vector(placement.map(|X| X.translation)),
-                },
-                inertia: inertia([0, 1, 2, 3].map(carried)),
-                axis_rotation: rotation(bodies.map(|i| tree.nodes[i].axis_rotation)),
-                idx_q,
-                idx_v,
-                parents: self.parents(tree, s),
-                links: (0, 0),
-                tip: false,
-            });
-        }
-    }
-
-    /// Of all positions and degrees of freedom of step s.
-    fn add_sources(&mut self, tree: &Tree<f64>, s: usize, joint: Joint) {
-        let bodies = self.bodies[s];
-        let mut neutral = vec![0.0; joint.nq()];
-        joint.neutral(&mut neutral); // where there is no joint
-        let follows = bodies.map(|i| tree.nodes[i].mimic);
-        let ratio = follows.map(|m| m.map_or(1.0, |m| m.ratio));
-        for (k, neutral) in neutral.into_iter().enumerate() {
-            let from = bodies.map(|i| if i > 0 { tree.nodes[i].idx_q + k } else { tree.nq });
-            let mut offset = follows.map(|m| m.map_or(0.0, |m| m.offset));
-            (0..LANES).filter(|&lane| bodies[lane] == 0).for_each(|lane| offset[lane] = neutral);
-            self.positions.push(Source { from, ratio, offset });
-        }
-        for k in 0..joint.nv() {
-            let from = bodies.map(|i| if i > 0 { tree.nodes[i].idx_v + k } else { tree.nv });
-            for lane in 0..if self.in_all_lanes(s) { 1 } else { LANES } {
-                let (to, here) = (from[lane], LANES * self.coordinates.len() + lane);
-                match follows[lane] {
-                    _ if bodies[lane] == 0 => {}
-                    None => self.leaders[to] = here,
-                    Some(mimic) => self.followers.push((to, here, mimic.ratio)),
-                }
-            }
-            self.coordinates.push(Source { from, ratio, offset: [0.0; LANES] });
-        }
-    }
-
-    /// Where the parents of step s stand.
-    fn parents(&self, tree: &Tree<f64>, s: usize) -> Parents {
-        // of each lane with a body: its parent's step and lane
-        let at: Vec<(usize, (usize, usize))> = (0..LANES)
-            .filter(|&lane| self.bodies[s][lane] > 0)
-            .map(|lane| {
-                let (step, its) = self.place[tree.nodes[self.bodies[s][lane]].parent];
-                (lane, (step, if self.in_all_lanes(step) { lane } else { its }))
-            })
-            .collect();
-        let Some(&(_, (first, _))) = at.first() else { return Parents::Below(0) };
-        if at.iter().all(|&(lane, parent)| parent == (first, lane)) {
-            return Parents::Below(first);
-        }
-        let (mut from, mut to) = (Vec::new(), Vec::new());
-        let mut sources: Vec<usize> = at.iter().map(|(_, (step, _))| *step).collect();
-        sources.sort_unstable();
-        sources.dedup();
-        for source in sources {
-            let mut pairs: Vec<_> =
-                at.iter().filter(|(_, (s, _))| *s == source).map(|(lane, (_, its))| (*its, *lane)).collect();
-            from.push((source, Move::new(&pairs)));
-            // upwards, no two into one lane at once
-            while !pairs.is_empty() {
-                let (mut now, mut later) = (Vec::<(usize, usize)>::new(), Vec::new());
-                for (its, lane) in pairs {
-                    if now.iter().any(|&(_, target)| target == its) {
-                        later.push((its, lane))
-                    } else {
-                        now.push((lane, its))
+            let wanted = [0, 1, 2, 3].map(wanted);
+            let mut step = [0; LANES];
+            for (these, at_home) in [(hurry, true), (hurry, false), (&wait, true), (&wait, false)] {
+                for &i in these {
+                    let (parent_step, parent_lane) = schedule.place[nodes[i].parent];
+                    let home = (!schedule.in_all_lanes(parent_step) && step[parent_lane] == 0).then_some(parent_lane);
+                    let free = (0..LANES).filter(|&lane| step[lane] == 0).min_by_key(|&lane| wanted[lane]);
+                    if let (false, Some(lane)) = (step.contains(&i), if at_home { home } else { free }) {
+                        step[lane] = i;
                     }
                 }
-                to.push((source, Move::new(&now)));
-                pairs = later;
             }
+            for (lane, &i) in step.iter().enumerate().filter(|(_, i)| **i > 0) {
+                schedule.place[i] = (now, lane);
+            }
+            schedule.bodies.push(step);
+            ready.retain(|i| !step.contains(i));
+            ready.extend(step.iter().flat_map(|&i| if i > 0 { &children[i][..] } else { &[] }));
         }
-        Parents::Apart { from, to }
+        schedule
     }
-}
 
-fn vector(x: [Vec3<f64>; LANES]) -> Vec3<[f64; LANES]> {
-    Vec3 { x: x.map(|v| v.x), y: x.map(|v| v.y), z: x.map(|v| v.z) }
-}
+    /// Whether a step's body is the same in all lanes: the world, or the one on which all others hang.
+    #[inline(always)]
+    pub(super) fn in_all_lanes(&self, step: usize) -> bool {
+        step == 0 || (step == 1 && self.shared)
+    }
 
-fn rotation(R: [Mat3<f64>; LANES]) -> Mat3<[f64; LANES]> {
-    Mat3 { x: vector(R.map(|R| R.x)), y: vector(R.map(|R| R.y)), z: vector(R.map(|R| R.z)) }
-}
-
-fn inertia(I: [Inertia<f64>; LANES]) -> Inertia<[f64; LANES]> {
-    let r = I.map(|I| I.rotational);
-    let rotational = Sym3 {
-        xx: r.map(|r| r.xx),
-        xy: r.map(|r| r.xy),
-        yy: r.map(|r| r.yy),
-        xz: r.map(|r| r.xz),
-        yz: r.map(|r| r.yz),
-        zz: r.map(|r| r.zz),
-    };
-    Inertia { mass: I.map(|I| I.mass), mass_com: vector(I.map(|I| I.mass_com)), rotational }
+    /// The step of the parent of the body in a lane, and the lane in which it stands for that body.
+    pub(super) fn parent(&self, nodes: &[Node<f64>], step: usize, lane: usize) -> (usize, usize) {
+        let (parent, its) = self.place[nodes[self.bodies[step][lane]].parent];
+        (parent, if self.in_all_lanes(parent) { lane } else { its })
+    }
 }
