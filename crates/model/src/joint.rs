@@ -1,4 +1,5 @@
-//! Joints: all that depends on the kind of a joint is here, and of the group of its positions in `joint/group.rs`.
+//! Joints: all that depends on the kind of a joint is in this file and its folder, the group of its positions in
+//! `joint/group.rs`, what passes ask of it in `joint/kinematics.rs`.
 //!
 //! A joint moves along some of the six unit motions of the body's frame, and these stay the same in that frame whatever
 //! its position: its motion subspace is constant in the body. The axis of a revolute or prismatic joint is turned to z
@@ -84,6 +85,7 @@ impl Joint {
     }
 
     /// How many numbers the position has.
+    #[inline]
     pub fn nq(self) -> usize {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } => 1,
@@ -100,8 +102,9 @@ impl Joint {
         self.axes().len()
     }
 
-    /// Which of the unit motions of the frame (linear x, y, z, angular x, y, z) it moves along: the columns of S. (A
-    /// screw moves along z as well, by its pitch.)
+    /// The unit motions of the frame (linear x, y, z, angular x, y, z) along which it moves: the columns of S. (A screw
+    /// moves along z as well, by its pitch.)
+    #[doc(hidden)]
     #[inline(always)]
     pub fn axes(self) -> &'static [usize] {
         match self {
@@ -146,6 +149,7 @@ impl Joint {
     /// The rotation bRz whose third column is the joint's axis: from the frame in which algorithms run to the body's.
     ///
     /// A permutation of axes, hence exact, for x, y and z; else the shortest rotation of z, or of −z, to the axis.
+    #[doc(hidden)]
     pub fn axis_rotation(self) -> Mat3<f64> {
         let Some(a) = self.axis() else { return Mat3::identity() };
         let unit = |x, y, z| Vec3::new(x, y, z);
@@ -169,8 +173,8 @@ impl Joint {
         }
     }
 
-    /// The kind as which a joint that follows another one is computed, or why it cannot follow: with numbers of the
-    /// leader's kind, (cos, sin) or one.
+    /// The kind as which a joint that follows another one is computed, or why it cannot follow. Its position has numbers of
+    /// the leader's kind: (cos, sin), or one.
     ///
     /// The (cos, sin) of a leader tells its angle up to whole turns, and a whole multiple of it up to whole turns too;
     /// what else would follow jumps wherever the leader completes a turn.
@@ -194,6 +198,12 @@ impl Joint {
         }
     }
 
+    /// Whether the group of its positions is commutative, so that q ⊕ v has the Jacobian 1.
+    #[doc(hidden)]
+    pub fn commutes(self) -> bool {
+        !matches!(self, Self::Spherical | Self::Planar | Self::FreeFlyer)
+    }
+
     /// Whether the position of a joint that follows is ratio · q + offset of its leader's.
     pub(crate) fn follows_by_sums(self) -> bool {
         !matches!(self, Self::Continuous { .. })
@@ -207,22 +217,23 @@ impl Joint {
 
     /// The k-th number of the position of a joint that follows; q begins with its leader's.
     #[inline(always)]
-    pub fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
+    pub(crate) fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
         match self {
             Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // its offset is part of X_T
             _ => q[k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
         }
     }
 
-    /// What of a follower's offset is part of its placement: the pose by which its frame, its axis turned to z, is moved.
+    /// The part of a follower's offset that belongs to its placement: the pose by which its turned frame is moved.
     pub(crate) fn mimic_offset(self, mimic: Mimic) -> Se3<f64> {
         match self {
-            Self::Continuous { .. } => turned(Se3::identity(), mimic.offset.sin(), mimic.offset.cos()),
+            Self::Continuous { .. } => rotated_about_z(Se3::identity(), mimic.offset.sin(), mimic.offset.cos()),
             _ => Se3::identity(),
         }
     }
 
     /// Column k of S of a joint whose body is at oX, in the world's frame.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
         let (R, p) = (oX.rotation, oX.translation);
@@ -240,8 +251,8 @@ impl Joint {
     }
 }
 
-/// cos kθ and sin kθ from cos θ and sin θ, k a whole number: (cos θ + i sin θ)ᵏ by repeated squaring. Rare, so kept out of
-/// the passes.
+/// cos kθ and sin kθ from cos θ and sin θ, k a whole number: (cos θ + i sin θ)ᵏ by repeated squaring. It is rare, so it is
+/// kept out of the passes.
 #[cold]
 #[inline(never)]
 fn multiple<S: Scalar>([cos, sin]: [S; 2], k: f64) -> [S; 2] {
@@ -271,7 +282,7 @@ impl<S: Scalar> Kernel for Multiple<'_, S> {
 
 /// X_T, then a rotation about z.
 #[inline(always)]
-fn turned<S: Scalar>(X_T: Se3<S>, sin: S, cos: S) -> Se3<S> {
+fn rotated_about_z<S: Scalar>(X_T: Se3<S>, sin: S, cos: S) -> Se3<S> {
     let Mat3 { x, y, z } = X_T.rotation;
     let rotation = Mat3 { x: x.scale_add(cos, y.scale(sin)), y: y.scale_add(cos, x.scale(-sin)), z };
     Se3::new(rotation, X_T.translation)

@@ -1,4 +1,4 @@
-//! How one pass of an algorithm sees model and state.
+//! How a pass sees model and state.
 //!
 //! An algorithm is written once, over [`Layout`]. It reaches its parent, its children's sums and its coordinates only
 //! through the verbs below, so that one source runs on
@@ -8,17 +8,17 @@
 //! - the limbs of one robot side by side: a body of the pass stands for a body of each limb, all of one joint kind.
 //!
 //! The first two are [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v: several
-//! joints may share a coordinate (mimic joints), v_joint = G v with one entry in each row of G. [`joint_velocity`](Layout::joint_velocity)
-//! applies G, [`add_joint_effort`](Layout::add_joint_effort), [`set_row`](Columns::set_row) and their like apply Gᵀ and Gᵀ · G, and no algorithm knows
-//! more.
+//! joints may share a coordinate (mimic joints), v_joint = G v with one entry in each row of G.
+//! [`joint_velocity`](Layout::joint_velocity) applies G, [`add_joint_effort`](Layout::add_joint_effort) Gᵀ,
+//! [`set_row`](Columns::set_row) and its like Gᵀ · G, and no algorithm knows more.
 
 use crate::joint::Joint;
 use crate::model::Model;
-use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3};
+use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};
 use core::marker::PhantomData;
 use core::ops::{AddAssign, Range};
 
-/// How one pass sees model and state.
+/// The bodies, joints and coordinates of a pass.
 pub trait Layout {
     /// The number that the pass computes with.
     type S: Scalar;
@@ -32,30 +32,30 @@ pub trait Layout {
     /// The body's inertia in its frame.
     fn inertia(&self, i: usize) -> Inertia<Self::S>;
     /// The acceleration of the world that stands for gravity, −g.
-    fn minus_gravity(&self) -> condyle_spatial::Vec3<Self::S>;
+    fn minus_gravity(&self) -> Vec3<Self::S>;
     /// The armature at degree of freedom k of joint i.
     fn armature(&self, i: usize, k: usize) -> Self::S;
     /// The external force on body i, given per body in the body's public frame (or none at all).
     fn force(&self, f_ext: &[Force<Self::S>], i: usize) -> Option<Force<Self::S>>;
 
-    /// The parent's entry.
+    /// The parent's entry in an array by bodies.
     fn parent<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds to the parent's entry.
+    /// Adds to the parent's entry in an array by bodies.
     fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// The place of body i among those on its way from the world, which has place 0: where a pass that goes down and up
-    /// the branches, one after the other, keeps what it needs of a body while its subtree is not finished.
+    /// The place of body i on the stack of a pass that goes down and up the branches, one after the other: the bodies on its
+    /// way from the world, which has place 0. There the pass keeps what it needs of a body until its subtree is closed.
     fn stack_index(&self, i: usize) -> usize;
-    /// The bodies whose subtrees are finished when the pass has gone down to body i: children before parents.
+    /// The bodies whose subtrees end with body i: children before parents.
     fn closed_by(&self, i: usize) -> &[usize];
-    /// The parent's entry in an array by levels.
+    /// The parent's entry on the stack.
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds to the parent's entry in an array by levels.
+    /// Adds to the parent's entry on the stack.
     fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// What the copies of body i hold together: a body may stand in several lanes, each with a part of what it carries.
+    /// The sum over the lanes in which body i stands: each may hold a part of what the body carries.
     fn sum_lanes<T: Copy>(&self, i: usize, x: T) -> T;
-    /// The same in an array by bodies, in its place.
+    /// Replaces the entry of body i in an array by bodies by its sum over the lanes.
     #[inline(always)]
     fn sum_lanes_at<T: Copy>(&self, of: &mut [T], i: usize) {
         of[i] = self.sum_lanes(i, of[i]);
@@ -63,63 +63,66 @@ pub trait Layout {
 
     /// The k-th number of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
-    /// The k-th number of the velocity (or acceleration, or effort) of joint i.
-    fn joint_velocity(&self, x: &[Self::S], i: usize, k: usize) -> Self::S;
-    /// Adds to the coordinate of degree of freedom k of joint i: the transpose of `joint_velocity`.
-    fn add_joint_effort(&self, x: &mut [Self::S], i: usize, k: usize, value: Self::S);
+    /// The k-th number of the velocity (or acceleration) of joint i.
+    fn joint_velocity(&self, v: &[Self::S], i: usize, k: usize) -> Self::S;
+    /// Adds the effort along degree of freedom k of joint i to its coordinate's: the transpose of `joint_velocity`.
+    fn add_joint_effort(&self, tau: &mut [Self::S], i: usize, k: usize, effort: Self::S);
 
-    /// The first of the places of joint i's columns, in an array with an entry for each column.
+    /// The first of joint i's columns, in an array by columns.
     fn column(&self, i: usize) -> usize;
-    /// Armature times acceleration, added to the coordinates of an effort.
+    /// Adds armature times acceleration to the efforts of all coordinates.
     fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
 }
 
-/// How a pass sees the columns before a joint, and the entries of matrices in coordinates, stored by columns, that it has
-/// with them.
+/// The columns from the root to a joint, and the entries that they have with the joint's own in matrices.
+///
+/// The matrices have a row and a column for each coordinate and are stored by columns.
 pub trait Columns: Layout {
-    /// Names a column, in the list of a body's ancestors.
+    /// Names a column, among those from the root to a joint.
     type Column: Copy;
     /// Names a column of a body's own joint.
     type OwnColumn: Copy;
-    /// What the matrices are made of.
+    /// The number that matrices are made of.
     type Number: Scalar;
 
     /// The columns of all joints from the root to joint i, its own last.
     fn support(&self, i: usize) -> &[Self::Column];
     /// Column k of joint i.
     fn own_column(&self, i: usize, k: usize) -> Self::OwnColumn;
-    /// The entry of a column.
+    /// The entry of a column in an array by columns.
     fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
-    /// Takes the entries of all columns to where `at` looks for them, if that is elsewhere.
+    /// Copies entries of an array by columns to where `at` looks for them, if that is elsewhere.
     fn broadcast<T: Copy>(&self, of: &mut [T]);
-    /// Makes a matrix ready for `set_row` and `set_column`. What no column of a joint puts there stays 0.
+    /// Makes a matrix ready for `set_row` and `set_column`. Entries that are never set are 0.
     fn clear(&self, matrix: &mut [Self::Number]);
-    /// Sets the entry of such a matrix in the row of a joint's own column and in the column e of its support, or adds to it
-    /// if several columns share it. Once for each pair of columns; that of the first body's last column with itself comes
+    /// Sets the entry in the row of a joint's own column and in the column e of its support, or adds to it if several
+    /// columns share it. To be called once for each pair of columns; that of the first body's last column with itself comes
     /// last of all.
     fn set_row(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
-    /// The same for the entry in the row of e and in the own column.
+    /// Sets the entry in the row of e and in the joint's own column, as `set_row` does.
     fn set_column(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
-    /// The armature of all coordinates, added to the diagonal of such a matrix.
+    /// Adds the armature of all coordinates to the diagonal of a matrix.
     fn add_armature(&self, matrix: &mut [Self::Number]);
 }
 
-/// How a pass sees any pair of columns.
+/// The entries of matrices for any pair of columns.
 pub trait Pairs: Columns<Number = <Self as Layout>::S> {
-    /// Sets the entry (row, column) of a matrix in coordinates after `clear`, or adds to it if several columns share it.
-    /// Once for each pair of columns.
+    /// Sets the entry (row, column) of a matrix after `clear`, or adds to it if several columns share it. To be called once
+    /// for each pair of columns.
     fn set_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
-    /// Adds to the entry (row, column) of a matrix in coordinates, stored by columns.
+    /// Adds to the entry (row, column) of a matrix.
     fn add_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
 }
 
-/// One body at a time: one state, or several knots of a horizon in the lanes of the scalar.
+/// One body at a time: of one state, or of several knots of a horizon in the lanes of the scalar.
 pub struct Single<'m, S, R> {
     model: &'m Model<R>,
     scalar: PhantomData<S>,
 }
 
 impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
+    /// The layout of a model.
+    #[inline(always)]
     pub fn new(model: &'m Model<R>) -> Self {
         Self { model, scalar: PhantomData }
     }
@@ -145,7 +148,7 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
         self.model.tree.nodes[i].inertia.lift()
     }
     #[inline(always)]
-    fn minus_gravity(&self) -> condyle_spatial::Vec3<S> {
+    fn minus_gravity(&self) -> Vec3<S> {
         -self.model.gravity.lift()
     }
     #[inline(always)]
@@ -154,7 +157,7 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     }
     #[inline(always)]
     fn force(&self, f_ext: &[Force<S>], i: usize) -> Option<Force<S>> {
-        let axis_rotation = Se3::new(self.model.tree.nodes[i].axis_rotation, condyle_spatial::Vec3::zero());
+        let axis_rotation = Se3::new(self.model.tree.nodes[i].axis_rotation, Vec3::zero());
         f_ext.get(i).map(|&f| axis_rotation.lift().act_inv(f))
     }
 

@@ -108,8 +108,7 @@ pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: Gr
 
 /// The joints whose group is not commutative: along which unit twists they move, and where they stand in v.
 fn twists<R>(model: &Model<R>) -> impl Iterator<Item = (&'static [usize], usize)> + '_ {
-    let turning = |joint| matches!(joint, Joint::Spherical | Joint::Planar | Joint::FreeFlyer);
-    joints(model).filter(move |&(joint, _)| turning(joint)).map(|(joint, at)| (joint.axes(), at))
+    joints(model).filter(|(joint, _)| !joint.commutes()).map(|(joint, at)| (joint.axes(), at))
 }
 
 /// The coordinates of a joint among the six of a twist.

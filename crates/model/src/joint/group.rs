@@ -1,12 +1,12 @@
 //! The group of a joint's positions: `q ⊕ δ` is its exponential, with δ in the body's frame.
 
-use super::{Joint, turned};
+use super::{Joint, rotated_about_z};
 use condyle_spatial::lie::{self, MotionMap, Quaternion};
 use condyle_spatial::{Motion, Scalar, Se3, Vec3};
 
 impl Joint {
     /// The position that leaves the body at its joint's frame.
-    pub fn neutral(self, q: &mut [f64]) {
+    pub(crate) fn neutral(self, q: &mut [f64]) {
         q.fill(0.0);
         match self {
             Self::Continuous { .. } => q[0] = 1.0,
@@ -17,8 +17,8 @@ impl Joint {
         }
     }
 
-    /// Which of the joint's coordinates are a vector of length 1.
-    pub fn unit_part(self) -> Option<core::ops::Range<usize>> {
+    /// The coordinates of the joint that are a vector of length 1.
+    pub(crate) fn unit_part(self) -> Option<core::ops::Range<usize>> {
         match self {
             Self::Continuous { .. } => Some(0..2),
             Self::Planar => Some(2..4),
@@ -29,7 +29,7 @@ impl Joint {
     }
 
     /// A position drawn uniformly: lengths and angles between their limits, rotations over the whole group.
-    pub fn random(self, rng: &mut impl rand::Rng, lower: &[f64], upper: &[f64], q: &mut [f64]) {
+    pub(crate) fn random(self, rng: &mut impl rand::Rng, lower: &[f64], upper: &[f64], q: &mut [f64]) {
         use rand::RngExt;
         for ((q, &lower), &upper) in q.iter_mut().zip(lower).zip(upper) {
             *q = lower + (upper - lower) * rng.random::<f64>();
@@ -51,7 +51,7 @@ impl Joint {
     }
 
     /// q ⊕ v: the position after moving with v for one unit of time.
-    pub fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
+    pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
                 for k in 0..q.len() {
@@ -76,7 +76,7 @@ impl Joint {
     }
 
     /// q₁ ⊖ q₀: the v with q₀ ⊕ v = q₁.
-    pub fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
+    pub(crate) fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
                 for k in 0..q0.len() {
@@ -97,9 +97,10 @@ impl Joint {
         }
     }
 
-    /// Which Jacobian of the joint's group, at tangent vector v, as a map of twists; `None` where it is the identity.
+    /// A Jacobian of the joint's group, at tangent vector v, as a map of twists; `None` where it is the identity.
+    #[doc(hidden)]
     pub fn jacobian<S: Scalar>(self, which: GroupJacobian, v: &[S]) -> Option<MotionMap<S>> {
-        if !matches!(self, Self::Spherical | Self::Planar | Self::FreeFlyer) {
+        if self.commutes() {
             return None;
         }
         let twist = self.twist(v);
@@ -128,7 +129,7 @@ impl Joint {
             Self::Spherical => (Quaternion::new(q[0], q[1], q[2], q[3]), Vec3::zero()),
             Self::Planar => {
                 let o = S::zero();
-                let R = turned(Se3::identity(), q[3], q[2]).rotation;
+                let R = rotated_about_z(Se3::identity(), q[3], q[2]).rotation;
                 (Quaternion::from_rotation(R), Vec3::new(q[0], q[1], o))
             }
             _ => (Quaternion::new(q[3], q[4], q[5], q[6]), Vec3::new(q[0], q[1], q[2])),
@@ -147,7 +148,7 @@ impl Joint {
     }
 }
 
-/// The Jacobians of a joint's group that integrating and taking differences need.
+/// A Jacobian of a joint's group: those that integrating and taking differences need.
 #[derive(Clone, Copy)]
 pub enum GroupJacobian {
     /// ∂(q ⊕ v)/∂v.

@@ -1,10 +1,11 @@
 //! What a pass asks of a joint: where its body is, how it moves, what efforts a force exerts.
 
-use super::{Joint, JointMotion, turned};
+use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
 use condyle_spatial::{Act, Force, Motion, Quaternion, Scalar, Se3, Vec3};
 
-/// Of each body's joint: see [`Joint::sin_cos`]. What stands behind the last body has no meaning.
+/// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands behind the last body has no
+/// meaning.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct JointSinCos<S> {
@@ -15,14 +16,16 @@ pub struct JointSinCos<S> {
 }
 
 impl<S: Scalar> JointSinCos<S> {
+    /// Allocates room for some bodies, the world included.
     pub fn new(bodies: usize) -> Self {
         let n = bodies.next_multiple_of(4);
         Self { sin: vec![S::zero(); n], cos: vec![S::zero(); n] }
     }
 }
 
+#[doc(hidden)]
 impl Joint {
-    /// The sine and cosine of what each joint turns by about z (0 and 1 where it does not), all of them at once.
+    /// The sine and cosine of the angle by which each joint turns about z (0 and 1 where it does not), all of them at once.
     #[inline(always)]
     pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
         for i in l.bodies() {
@@ -52,18 +55,18 @@ impl Joint {
         Self::placement_with(l, i, q, sin, cos)
     }
 
-    /// The same, the sine and cosine being known.
+    /// λXi = X_T X_J(q), for joint i of a pass, whose sine and cosine are known.
     #[inline(always)]
     pub fn placement_with<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         let X_T = l.placement(i);
         match l.joint(i) {
-            Self::Revolute { .. } | Self::Continuous { .. } => turned(X_T, sin, cos),
+            Self::Revolute { .. } | Self::Continuous { .. } => rotated_about_z(X_T, sin, cos),
             Self::Prismatic { .. } => {
                 let d = l.position(q, i, 0);
                 Se3::new(X_T.rotation, X_T.rotation.z.scale_add(d, X_T.translation))
             }
             Self::Helical { pitch, .. } => {
-                let X = turned(X_T, sin, cos);
+                let X = rotated_about_z(X_T, sin, cos);
                 let d = l.position(q, i, 0) * L::S::splat(pitch);
                 Se3::new(X.rotation, X.rotation.z.scale_add(d, X_T.translation))
             }
@@ -73,7 +76,7 @@ impl Joint {
             }
             Self::Planar => {
                 let p = Vec3::new(l.position(q, i, 0), l.position(q, i, 1), L::S::zero());
-                let X = turned(X_T, sin, cos);
+                let X = rotated_about_z(X_T, sin, cos);
                 Se3::new(X.rotation, X_T.act(p))
             }
             Self::Translation => Se3::new(X_T.rotation, X_T.act(point(l, i, q))),

@@ -1,4 +1,4 @@
-//! How a joint adds to the motion of a body.
+//! The motion of a joint, and how it adds to that of a body.
 
 use condyle_spatial::{Motion, Scalar, Vec3};
 
@@ -26,7 +26,7 @@ impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
     }
 }
 
-/// How a body turns, and how its origin accelerates: what the equations of Newton and Euler need.
+/// The rotation of a body and the acceleration of its origin, as the equations of Newton and Euler need them.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct ClassicalMotion<S> {
@@ -34,11 +34,12 @@ pub struct ClassicalMotion<S> {
     pub w: Vec3<S>,
     /// ω̇.
     pub dw: Vec3<S>,
-    /// The classical acceleration.
+    /// The classical acceleration of the origin.
     pub a: Vec3<S>,
 }
 
 impl<S: Scalar> JointMotion<S> {
+    /// The motion with all its six numbers.
     #[inline(always)]
     fn motion(self) -> Motion<S> {
         Motion::zero() + self
