@@ -180,7 +180,7 @@ kernel! {
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
 /// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
 /// Source: Featherstone (2008), table 7.1. Robots whose joints share a coordinate (mimic) go over a sparse factor
-/// of M, as [`forward_dynamics`] does with [`Method::Sparse`].
+/// of M, as [`forward_dynamics`](crate::forward_dynamics()) does with [`Method::Sparse`].
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba, robots, rnea};
