@@ -1,4 +1,4 @@
-//! A model, body by body.
+//! The builder: a model, body by body.
 
 use crate::body::{Body, Frame, FrameKind, Limits};
 use crate::error::Error;
@@ -10,14 +10,14 @@ use crate::validate;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use std::collections::HashSet;
 
-/// Names a body of a builder. [`WORLD`] is the one that is always there.
+/// The name of a body of a builder. [`WORLD`] is the one that is always there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodyId(usize);
 
 /// The world, on which the first joints sit.
 pub const WORLD: BodyId = BodyId(0);
 
-/// What a joint may have beside its kind; `Default` is: no limits, no losses, no rotor.
+/// Limits, losses and rotor of a joint; the default is none of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointOptions {
     /// Least and greatest position (rad, m), for joints with one coordinate.
@@ -37,9 +37,9 @@ pub struct JointOptions {
 struct Draft {
     body: Body,
     options: JointOptions,
-    /// Stands between the joints of a chain, without mass on purpose.
+    /// Whether it stands between the joints of a chain, without mass on purpose.
     between: bool,
-    /// Follows this body's joint, and how.
+    /// The body whose joint it follows, and how.
     mimic: Option<(usize, Mimic)>,
 }
 
@@ -146,7 +146,7 @@ impl ModelBuilder {
         }
     }
 
-    /// Says that a body without mass stands between the joints of a chain.
+    /// Marks a body without mass as one between the joints of a chain.
     pub(crate) fn between(&mut self, body: BodyId) {
         self.drafts[body.0].between = true;
     }
@@ -313,14 +313,14 @@ impl ModelBuilder {
 /// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
 const ROTATION_ROUNDING: f64 = 1e-6;
 
-/// Whether the columns are unit vectors at right angles, right-handed.
+/// Whether the columns of R are unit vectors at right angles, right-handed.
 fn is_rotation(R: Mat3<f64>) -> bool {
     let Mat3 { x, y, z } = R;
     let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
     off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
 }
 
-/// What a model has a number of for each coordinate.
+/// The numbers that a model has for each coordinate.
 #[derive(Default)]
 struct Coordinates {
     nq: usize,
