@@ -18,7 +18,7 @@ use crate::limbs::Seen;
 use crate::regressor::{PARAMETERS, effort};
 use crate::rnea_derivatives::{RneaDerivatives, Workspace};
 use condyle_model::Model;
-use condyle_model::elementary::tanh;
+use condyle_spatial::elementary::tanh;
 use condyle_spatial::{Act, Constant, Inertia, Motion, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 

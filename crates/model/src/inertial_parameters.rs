@@ -27,7 +27,7 @@
 //!
 //! so m = e²ᵅ and t is the centre of mass.
 
-use crate::elementary::exp;
+use condyle_spatial::elementary::exp;
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use nalgebra::{SMatrix, SVector};
 

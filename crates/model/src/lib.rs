@@ -18,8 +18,6 @@ mod body;
 mod builder;
 mod compose;
 mod configuration;
-#[doc(hidden)]
-pub mod elementary;
 mod error;
 pub mod inertial_parameters;
 mod io;

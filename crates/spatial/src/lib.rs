@@ -21,6 +21,8 @@
 pub mod block;
 mod dual;
 #[doc(hidden)]
+pub mod elementary;
+#[doc(hidden)]
 pub mod finite;
 mod fused;
 #[doc(hidden)]
