@@ -1,13 +1,28 @@
 //! All that algorithms write: scratch and results.
 #![allow(unsafe_code)]
 
-use crate::kinematics::{Moving, World};
+use crate::constraints::constrained_derivatives;
+use crate::constraints::constrained_dynamics;
+use crate::constraints::impulse_dynamics;
+use crate::derivatives::aba_derivatives;
+use crate::derivatives::aba_hessian;
+use crate::derivatives::centroidal_derivatives;
+use crate::derivatives::rnea_derivatives;
+use crate::derivatives::rnea_hessian;
+use crate::lanes::limbs::pass::Scratch;
+use crate::passes::aba;
+use crate::passes::all_terms;
+use crate::passes::centroidal;
+use crate::passes::coriolis;
+use crate::passes::crba;
+use crate::passes::energy;
+use crate::passes::factored_dynamics;
+use crate::passes::kinematics::{Moving, World};
+use crate::passes::minv;
+use crate::passes::regressor;
+use crate::passes::rnea;
+use crate::passes::statics;
 use crate::workspace::Size;
-use crate::{
-    aba, aba_derivatives, aba_hessian, all_terms, centroidal, centroidal_derivatives, constrained_derivatives,
-    constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, minv, regressor, rnea,
-    rnea_derivatives, rnea_hessian, statics,
-};
 use condyle_model::Model;
 use condyle_spatial::Scalar;
 use condyle_spatial::gate::{Long, Short, is, renamed};
@@ -48,10 +63,10 @@ pub struct Data<S> {
     pub(crate) centroidal_derivatives: centroidal_derivatives::Workspace<S>,
     pub(crate) energy: energy::Workspace<S>,
     pub(crate) all_terms: all_terms::Workspace<S>,
-    pub(crate) forward_dynamics: forward_dynamics::Workspace<S>,
+    pub(crate) forward_dynamics: factored_dynamics::Workspace<S>,
     pub(crate) regressor: regressor::Workspace<S>,
     /// Of single calls on robots with limbs.
-    pub(crate) limbs: Option<Box<crate::limbs::Scratch>>,
+    pub(crate) limbs: Option<Box<Scratch>>,
 }
 
 impl<S: Scalar> Data<S> {
@@ -96,9 +111,9 @@ impl<S: Scalar> Data<S> {
             centroidal_derivatives: centroidal_derivatives::Workspace::new(size),
             energy: energy::Workspace::new(size),
             all_terms: all_terms::Workspace::new(size),
-            forward_dynamics: forward_dynamics::Workspace::new(model),
+            forward_dynamics: factored_dynamics::Workspace::new(model),
             regressor: regressor::Workspace::new(size),
-            limbs: crate::limbs::Scratch::new::<S, R>(model),
+            limbs: Scratch::new::<S, R>(model),
         }
     }
 }

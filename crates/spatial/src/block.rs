@@ -21,41 +21,91 @@ pub trait Block: Scalar {
     fn transpose(rows: &mut [Self]);
 }
 
-/// Number i of row k becomes lane k of `to[i]`, for rows of as many numbers as `to` has, one after the other in `from`. If
-/// there are fewer of them than lanes, the last one fills up.
+/// Rows of numbers become vectors: number i of row k becomes lane k of `to[i]`, for rows of as many numbers as `to` has, one
+/// after the other in `from`. If there are fewer rows than lanes, the last one fills up.
 #[inline]
 pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
-    S::enter(Gather(from, rows, to));
+    let n = to.len();
+    gather_rows(&core::array::from_fn::<_, MOST, _>(|k| &from[k.min(rows - 1) * n..][..n])[..rows], to);
 }
 
-/// Lane k of `from[i]` becomes number i of row k, for the first `rows` lanes.
+/// Rows of numbers become vectors, as in [`gather`], for rows that stand anywhere.
+#[inline]
+pub fn gather_rows<S: Block>(from: &[&[S::Number]], to: &mut [S]) {
+    S::enter(Gather(from, to));
+}
+
+/// Vectors become rows of numbers: lane k of `from[i]` becomes number i of row k, for the first `rows` lanes.
 #[inline]
 pub fn scatter<S: Block>(from: &[S], rows: usize, to: &mut [S::Number]) {
-    S::enter(Scatter(from, rows, to));
+    let mut each: [&mut [S::Number]; MOST] = Default::default();
+    if !from.is_empty() {
+        for (row, to) in each.iter_mut().zip(to.chunks_exact_mut(from.len()).take(rows)) {
+            *row = to;
+        }
+        scatter_rows(from, &mut each[..rows]);
+    }
 }
 
-struct Gather<'a, S: Block>(&'a [S::Number], usize, &'a mut [S]);
+/// Vectors become rows of numbers, as in [`scatter`], to rows that stand anywhere.
+#[inline]
+pub fn scatter_rows<S: Block>(from: &[S], to: &mut [&mut [S::Number]]) {
+    let columns = from.len();
+    scatter_matrix(
+        &Strided { vectors: from, strides: [columns, 1], shape: [1, columns], negative: false },
+        to,
+        columns,
+    );
+}
+
+/// Lane k of a matrix of vectors becomes a matrix of numbers in `to[k]`, row by row, with `stride` numbers from one row to
+/// the next.
+#[inline]
+pub fn scatter_matrix<S: Block>(from: &Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
+    S::enter(Scatter(*from, to, stride));
+}
+
+/// A matrix of vectors, or minus it.
+#[derive(Clone, Copy, Debug)]
+pub struct Strided<'a, S> {
+    /// Its entries.
+    pub vectors: &'a [S],
+    /// How far it is from one row to the next, and from one column to the next.
+    pub strides: [usize; 2],
+    /// How many rows and columns it has.
+    pub shape: [usize; 2],
+    /// Whether minus the matrix is meant.
+    pub negative: bool,
+}
+
+struct Gather<'a, S: Block>(&'a [&'a [S::Number]], &'a mut [S]);
 
 impl<S: Block> Kernel for Gather<'_, S> {
     #[inline(always)]
     fn run(self) {
-        let Self(from, rows, to) = self;
-        let (n, mut i) = (to.len(), 0);
-        let row = |k: usize| k.min(rows - 1) * n;
-        while i + S::LANES <= n {
+        let Self(from, to) = self;
+        let n = to.len();
+        let row = |k: usize| from[k.min(from.len() - 1)];
+        if n < S::LANES {
+            let mut lanes = [S::Number::zero(); MOST];
+            for (i, to) in to.iter_mut().enumerate() {
+                for k in 0..S::LANES {
+                    lanes[k] = row(k)[i];
+                }
+                *to = S::load(&lanes);
+            }
+            return;
+        }
+        let mut i = 0;
+        loop {
             for k in 0..S::LANES {
-                to[i + k] = S::load(&from[row(k) + i..][..S::LANES]);
+                to[i + k] = S::load(&row(k)[i..][..S::LANES]);
             }
             S::transpose(&mut to[i..i + S::LANES]);
-            i += S::LANES;
-        }
-        let mut lanes = [S::Number::zero(); MOST];
-        while i < n {
-            for k in 0..S::LANES {
-                lanes[k] = from[row(k) + i];
+            if i + S::LANES >= n {
+                return;
             }
-            to[i] = S::load(&lanes);
-            i += 1;
+            i = (i + S::LANES).min(n - S::LANES); // the last tile overlaps the one before
         }
     }
     #[inline(always)]
@@ -64,29 +114,57 @@ impl<S: Block> Kernel for Gather<'_, S> {
     }
 }
 
-struct Scatter<'a, S: Block>(&'a [S], usize, &'a mut [S::Number]);
+struct Scatter<'a, 'b, S: Block>(Strided<'a, S>, &'a mut [&'b mut [S::Number]], usize);
 
-impl<S: Block> Kernel for Scatter<'_, S> {
+impl<S: Block> Kernel for Scatter<'_, '_, S> {
     #[inline(always)]
     fn run(self) {
-        let Self(from, rows, to) = self;
-        let (n, mut i) = (from.len(), 0);
-        let mut block = [S::zero(); MOST];
-        while i + S::LANES <= n {
-            block[..S::LANES].copy_from_slice(&from[i..i + S::LANES]);
-            S::transpose(&mut block[..S::LANES]);
-            for k in 0..rows {
-                block[k].store(&mut to[k * n + i..][..S::LANES]);
-            }
-            i += S::LANES;
+        let Self(Strided { vectors: from, strides: [down, along], shape: [rows, columns], negative }, to, stride) =
+            self;
+        if rows == 0 || columns == 0 || to.is_empty() {
+            return;
         }
-        let mut lanes = [S::Number::zero(); MOST];
-        while i < n {
-            from[i].store(&mut lanes);
-            for k in 0..rows {
-                to[k * n + i] = lanes[k];
+        if S::LANES == 1 && along == 1 && !negative {
+            for i in 0..rows {
+                to[0][i * stride..][..columns].copy_from_slice(lanes(&from[i * down..][..columns]));
             }
-            i += 1;
+            return;
+        }
+        let mut block = [S::zero(); MOST];
+        if columns < S::LANES {
+            let mut numbers = [S::Number::zero(); MOST];
+            for i in 0..rows {
+                for j in 0..columns {
+                    let x = from[i * down + j * along];
+                    let x = if negative { -x } else { x };
+                    x.store(&mut numbers);
+                    for (k, to) in to.iter_mut().enumerate() {
+                        to[i * stride + j] = numbers[k];
+                    }
+                }
+            }
+            return;
+        }
+        for i in 0..rows {
+            let mut j = 0;
+            loop {
+                for k in 0..S::LANES {
+                    block[k] = from[i * down + (j + k) * along];
+                }
+                if negative {
+                    for k in 0..S::LANES {
+                        block[k] = -block[k];
+                    }
+                }
+                S::transpose(&mut block[..S::LANES]);
+                for (k, to) in to.iter_mut().enumerate() {
+                    block[k].store(&mut to[i * stride + j..]);
+                }
+                if j + S::LANES >= columns {
+                    break;
+                }
+                j = (j + S::LANES).min(columns - S::LANES); // the last tile overlaps the one before
+            }
         }
     }
     #[inline(always)]
@@ -184,6 +262,32 @@ mod tests {
                 scatter(&vectors, some, &mut back);
                 assert!(back[..some * n] == rows[..some * n]);
                 assert!(back[some * n..].iter().all(|&x| x == S::Number::zero()));
+                if some == 0 {
+                    continue;
+                }
+                let mut again = vec![S::zero(); n];
+                gather(&rows[..some * n], some, &mut again);
+                scatter(&again, S::LANES, &mut back);
+                (0..S::LANES).for_each(|k| assert!(back[k * n..][..n] == rows[k.min(some - 1) * n..][..n]));
+            }
+            // as a matrix, and minus its transpose, of as many columns and of fewer than lanes
+            for columns in [n, 1] {
+                let shape = [n / columns, columns];
+                let upright = Strided { vectors: &vectors, strides: [columns, 1], shape, negative: false };
+                let turned = Strided { strides: [1, shape[1]], shape: [shape[1], shape[0]], negative: true, ..upright };
+                for (matrix, sign) in [(upright, 1.0), (turned, -1.0)] {
+                    let ([m, n], stride) = (matrix.shape, matrix.shape[1] + 3);
+                    let mut back = vec![S::Number::zero(); S::LANES * m * stride];
+                    let mut places: Vec<_> = back.chunks_exact_mut(m * stride).collect();
+                    scatter_matrix(&matrix, &mut places, stride);
+                    for (k, place) in places.iter().enumerate() {
+                        for (i, j) in (0..m).flat_map(|i| (0..stride).map(move |j| (i, j))) {
+                            let at = i * matrix.strides[0] + j * matrix.strides[1];
+                            let there = if j < n { rows[k * m * n + at] } else { S::Number::zero() };
+                            assert!(place[i * stride + j] == S::Number::splat(sign) * there);
+                        }
+                    }
+                }
             }
         }
         fn run_fused(self) {

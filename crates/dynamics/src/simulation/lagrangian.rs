@@ -17,7 +17,7 @@
 //! ∂²L/∂q_d∂q_e = Ψ̇_e · ∂hᶜ/∂q_d − Ψ̈_e · Iᶜ S_d     ∂²L/∂q_e∂q_d = Ψ̇_e · ∂hᶜ/∂q_d − S_e · ∂Fᶜ/∂q_d
 //! ```
 
-use crate::kinematics::World;
+use crate::passes::kinematics::World;
 use crate::workspace::filled;
 use condyle_model::Model;
 use condyle_model::layout::Pairs;

@@ -21,9 +21,9 @@ mod runge_kutta;
 mod tangent;
 mod variational;
 
-use crate::aba::aba;
+use crate::calls::forward_dynamics::aba;
 use crate::data::{Data, check_forces};
-use crate::passive::passive_torque;
+use crate::passes::passive::passive_torque;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};

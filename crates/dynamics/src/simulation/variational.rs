@@ -21,10 +21,10 @@
 //! midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. In coordinates v = M(q)⁻¹ p.
 
 use super::{Input, Settings, Status, everywhere, lagrangian, lu, tangent};
-use crate::crba::crba;
+use crate::calls::inertia::crba;
 use crate::data::Data;
-use crate::kinematics::place;
-use crate::passive::{passive_torque, passive_torque_derivative};
+use crate::passes::kinematics::place;
+use crate::passes::passive::{passive_torque, passive_torque_derivative};
 use crate::workspace::filled;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
@@ -215,7 +215,18 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
 #[cfg(test)]
 mod tests {
     use super::{Input, Single, Workspace, evaluate, integrate, place, slope};
-    use crate::{Data, Force, Inertia, Joint, Mimic, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, lie};
+    use crate::Data;
+    use crate::Force;
+    use crate::Inertia;
+    use crate::Joint;
+    use crate::Mimic;
+    use crate::Model;
+    use crate::ModelBuilder;
+    use crate::Se3;
+    use crate::Sym3;
+    use crate::Vec3;
+    use crate::WORLD;
+    use crate::lie;
     use num_dual::Dual64;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 

@@ -15,8 +15,7 @@ use condyle_dynamics::{
     constrained_dynamics_equations, rnea_derivatives,
 };
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real};
-use condyle_spatial::lanes::Kernel;
+use condyle_spatial::block::{Block, Real, Strided, gather_rows, scatter_matrix, scatter_rows};
 use nalgebra::DMatrix;
 
 type Short = <f64 as Real>::Short;
@@ -69,123 +68,6 @@ struct Group<S: Block<Number = f64>> {
     J: DMatrix<S>,
 }
 
-/// Writes numbers that lie knot after knot side by side; knots that are missing repeat the first one.
-struct Pack<'a, S> {
-    from: &'a [f64],
-    stride: usize,
-    count: usize,
-    to: &'a mut [S],
-}
-
-impl<S: Block<Number = f64>> Kernel for Pack<'_, S> {
-    #[inline(always)]
-    fn run(self) {
-        for (i, to) in self.to.iter_mut().enumerate() {
-            let mut x = [self.from[i]; WIDEST];
-            for k in 1..self.count {
-                x[k] = self.from[k * self.stride + i];
-            }
-            *to = S::load(&x);
-        }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
-}
-
-/// Writes the numbers of each lane to a place of its own.
-pub(super) struct Unpack<'a, 'b, S> {
-    pub from: &'a [S],
-    pub to: &'a mut [&'b mut [f64]],
-}
-
-impl<S: Block<Number = f64>> Kernel for Unpack<'_, '_, S> {
-    #[inline(always)]
-    fn run(self) {
-        let n = self.from.len();
-        if n < S::LANES {
-            for (i, from) in self.from.iter().enumerate() {
-                let mut x = [0.0; WIDEST];
-                from.store(&mut x);
-                for (k, to) in self.to.iter_mut().enumerate() {
-                    to[i] = x[k];
-                }
-            }
-            return;
-        }
-        let (mut i, mut block) = (0, [S::zero(); WIDEST]);
-        loop {
-            block[..S::LANES].copy_from_slice(&self.from[i..i + S::LANES]);
-            S::transpose(&mut block[..S::LANES]);
-            for (k, to) in self.to.iter_mut().enumerate() {
-                block[k].store(&mut to[i..]);
-            }
-            if i + S::LANES >= n {
-                return;
-            }
-            i = (i + S::LANES).min(n - S::LANES); // the last ones overlap those before
-        }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
-}
-
-/// Writes the numbers of each lane, times a factor, to rows of a place of its own.
-pub(super) struct UnpackRows<'a, 'b, S> {
-    pub from: &'a [S],
-    /// How far it is from one row to the next, and from one column to the next, where they come from.
-    pub strides: [usize; 2],
-    pub shape: [usize; 2],
-    pub factor: f64,
-    pub to: &'a mut [&'b mut [f64]],
-    pub stride: usize,
-}
-
-impl<S: Block<Number = f64>> Kernel for UnpackRows<'_, '_, S> {
-    #[inline(always)]
-    fn run(self) {
-        let ([rows, columns], [down, along]) = (self.shape, self.strides);
-        let factor = S::splat(self.factor);
-        if rows == 0 || columns == 0 {
-            return;
-        }
-        if columns < S::LANES {
-            for (i, j) in (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j))) {
-                let mut x = [0.0; WIDEST];
-                (self.from[i * down + j * along] * factor).store(&mut x);
-                for (k, to) in self.to.iter_mut().enumerate() {
-                    to[i * self.stride + j] = x[k];
-                }
-            }
-            return;
-        }
-        let mut block = [S::zero(); WIDEST];
-        for i in 0..rows {
-            let mut j = 0;
-            loop {
-                for k in 0..S::LANES {
-                    block[k] = self.from[i * down + (j + k) * along] * factor;
-                }
-                S::transpose(&mut block[..S::LANES]);
-                for (k, to) in self.to.iter_mut().enumerate() {
-                    block[k].store(&mut to[i * self.stride + j..]);
-                }
-                if j + S::LANES >= columns {
-                    break;
-                }
-                j = (j + S::LANES).min(columns - S::LANES); // the last ones overlap those before
-            }
-        }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
-}
-
 /// The part of each of some things that is to be written.
 #[inline(always)]
 pub(super) fn places<T>(of: &mut [T], part: impl Fn(&mut T) -> &mut [f64]) -> [&mut [f64]; WIDEST] {
@@ -196,26 +78,32 @@ pub(super) fn places<T>(of: &mut [T], part: impl Fn(&mut T) -> &mut [f64]) -> [&
     places
 }
 
+/// Writes numbers that lie knot after knot side by side.
+fn pack<S: Block<Number = f64>>(from: &[f64], stride: usize, count: usize, to: &mut [S]) {
+    let rows: [&[f64]; WIDEST] = core::array::from_fn(|k| &from[k.min(count - 1) * stride..][..to.len()]);
+    gather_rows(&rows[..count], to);
+}
+
 /// Unpacks a block of the equations: `at` is its first row and column there.
 fn unpack_rows<S: Block<Number = f64>>(
     from: &[S],
     strides: [usize; 2],
     shape: [usize; 2],
-    factor: f64,
+    negative: bool,
     to: &mut [Outcome],
     at: [usize; 2],
     tableau: Tableau,
 ) {
     let (stride, count) = (tableau.stride(), to.len());
     let mut places = places(to, |outcome| &mut outcome.equations[at[0] * stride + at[1]..]);
-    S::enter(UnpackRows { from, strides, shape, factor, to: &mut places[..count], stride });
+    scatter_matrix(&Strided { vectors: from, strides, shape, negative }, &mut places[..count], stride);
 }
 
 /// Unpacks to the part of each outcome that `part` names.
 fn unpack<S: Block<Number = f64>>(from: &[S], to: &mut [Outcome], part: impl Fn(&mut Outcome) -> &mut [f64]) {
     let count = to.len();
     let mut places = places(to, part);
-    S::enter(Unpack { from, to: &mut places[..count] });
+    scatter_rows(from, &mut places[..count]);
 }
 
 impl<S: Block<Number = f64>> Group<S> {
@@ -238,9 +126,9 @@ impl<S: Block<Number = f64>> Group<S> {
     ) {
         let (nq, nv, count, forces) = (model.nq(), model.nv(), out.len(), schedule.room().forces);
         let Self { data, set, q, v, tau, a, .. } = self;
-        S::enter(Pack { from: xs, stride: nq + nv, count, to: q });
-        S::enter(Pack { from: &xs[nq..], stride: nq + nv, count, to: v });
-        S::enter(Pack { from: taus, stride: nv, count, to: tau });
+        pack(xs, nq + nv, count, q);
+        pack(&xs[nq..], nq + nv, count, v);
+        pack(taus, nv, count, tau);
         match (set, wanted) {
             (_, Wanted::Equations) => self.equations(model, out),
             (None, Wanted::Motion) => unpack(aba(model, data, q, v, tau, &[]), out, |o| &mut o.a),
@@ -297,9 +185,9 @@ impl<S: Block<Number = f64>> Group<S> {
         let Tableau { nv, rows } = tableau;
         let x = nv + rows;
         let dynamics = |out: &mut [Outcome], M: &DMatrix<S>, dtau_dv: &DMatrix<S>, dtau_dq: &DMatrix<S>| {
-            unpack_rows(M.as_slice(), [nv, 1], [nv, nv], 1.0, out, [rows, 0], tableau); // M is symmetric
-            unpack_rows(dtau_dv.as_slice(), [1, nv], [nv, nv], 1.0, out, [rows, x], tableau);
-            unpack_rows(dtau_dq.as_slice(), [1, nv], [nv, nv], 1.0, out, [rows, x + nv], tableau);
+            unpack_rows(M.as_slice(), [nv, 1], [nv, nv], false, out, [rows, 0], tableau); // M is symmetric
+            unpack_rows(dtau_dv.as_slice(), [1, nv], [nv, nv], false, out, [rows, x], tableau);
+            unpack_rows(dtau_dq.as_slice(), [1, nv], [nv, nv], false, out, [rows, x + nv], tableau);
         };
         match set {
             None => {
@@ -313,12 +201,12 @@ impl<S: Block<Number = f64>> Group<S> {
                 a.copy_from_slice(d.a);
                 unpack(d.a, out, |o| &mut o.a);
                 unpack(d.lambda, out, |o| &mut o.lambda);
-                unpack_rows(d.dgamma_dv.as_slice(), [1, rows], [rows, nv], 1.0, out, [0, x], tableau);
-                unpack_rows(d.dgamma_dq.as_slice(), [1, rows], [rows, nv], 1.0, out, [0, x + nv], tableau);
+                unpack_rows(d.dgamma_dv.as_slice(), [1, rows], [rows, nv], false, out, [0, x], tableau);
+                unpack_rows(d.dgamma_dq.as_slice(), [1, rows], [rows, nv], false, out, [0, x + nv], tableau);
                 dynamics(out, d.M, d.dtau_dv, d.dtau_dq);
                 set.jacobian(J);
-                unpack_rows(J.as_slice(), [1, rows], [rows, nv], 1.0, out, [0, 0], tableau);
-                unpack_rows(J.as_slice(), [rows, 1], [nv, rows], -1.0, out, [rows, nv], tableau);
+                unpack_rows(J.as_slice(), [1, rows], [rows, nv], false, out, [0, 0], tableau);
+                unpack_rows(J.as_slice(), [rows, 1], [nv, rows], true, out, [rows, nv], tableau);
             }
         }
         let mu = self.set.as_ref().map_or(0.0, |set| set.proximal.mu);

@@ -2,7 +2,7 @@
 //! by side in the lanes of a vector register.
 
 use super::costs::Costs;
-use super::lanes::{Unpack, UnpackRows, WIDEST, places};
+use super::lanes::{WIDEST, places};
 use super::limits::Set;
 use super::residual::{Part, Residual};
 use super::terms::{Plan, Room};
@@ -11,7 +11,7 @@ use condyle_dynamics::{
     Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
 };
-use condyle_spatial::block::Block;
+use condyle_spatial::block::{Block, Strided, scatter_matrix, scatter_rows};
 use condyle_spatial::lanes::Kernel;
 use condyle_spatial::{Force, Mat3, Motion, Quaternion, Se3, Vec3, lie};
 use nalgebra::DMatrix;
@@ -390,7 +390,7 @@ fn write<S: Block<Number = f64>>(r: [S; 6], at: usize, to: &mut [impl AsMut<Seen
 #[inline(always)]
 fn write_all<S: Block<Number = f64>>(from: &[S], to: &mut [impl AsMut<Seen>], place: impl Fn(&mut Seen) -> &mut [f64]) {
     let count = to.len();
-    Unpack { from, to: &mut places(to, |to| place(to.as_mut()))[..count] }.run();
+    scatter_rows(from, &mut places(to, |to| place(to.as_mut()))[..count]);
 }
 
 /// Writes the first n rows of a Jacobian, each to the beginning of one of `width` numbers.
@@ -398,5 +398,5 @@ fn write_all<S: Block<Number = f64>>(from: &[S], to: &mut [impl AsMut<Seen>], pl
 fn write_rows<S: Block<Number = f64>>(J: &DMatrix<S>, n: usize, width: usize, at: usize, to: &mut [impl AsMut<Seen>]) {
     let (strides, shape, count) = ([1, J.nrows()], [n, J.ncols()], to.len());
     let to = &mut places(to, |to| &mut to.as_mut().rows[at..])[..count];
-    UnpackRows { from: J.as_slice(), strides, shape, factor: 1.0, to, stride: width }.run();
+    scatter_matrix(&Strided { vectors: J.as_slice(), strides, shape, negative: false }, to, width);
 }
