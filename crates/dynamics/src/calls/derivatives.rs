@@ -17,7 +17,7 @@ use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar, Vec3};
 use nalgebra::DMatrix;
 
-/// ∂τ/∂q of [`static_torque`], and without forces of [`gravity`](crate::gravity): exact, in O(n · depth).
+/// ∂τ/∂q of [`static_torque`](crate::static_torque()), and without forces of [`gravity`](crate::gravity): exact, in O(n · depth).
 ///
 /// q: nq numbers; f_ext: a force on each body in its frame (it moves with the body), or empty for none. Returns the full
 /// nv × nv matrix (N m/rad, N/m), entry (i, j) being ∂τᵢ/∂q_j. Allocates nothing. Source: see the head of the file.

@@ -73,7 +73,7 @@ impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
             inverted.inverse::<V>(&l, world, aba, &plan.columns.blocks, Minv);
         }
         if let Task::RneaDerivatives | Task::AbaDerivatives = task {
-            let matrices = data.rnea_derivatives.parts().1.map(|matrix| Fused::of_mut(matrix));
+            let matrices = data.rnea_derivatives.parts().1.map(Fused::of_mut);
             let a = if let Task::AbaDerivatives = task { &aba.qdd } else { x };
             rnea_derivatives::pass(&l, world, (bodies, matrices), v, a, f_ext, l.minus_gravity(), false);
         }

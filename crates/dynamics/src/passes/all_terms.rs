@@ -94,7 +94,7 @@ fn pass<L: Pairs>(
     l.add_armature(M);
 }
 
-/// What [`compute_all_terms`] gives.
+/// The results of [`compute_all_terms`](crate::compute_all_terms()).
 #[derive(Clone, Copy, Debug)]
 pub struct AllTerms<'d, S, R = f64> {
     /// Placements and velocities of bodies and frames, and their Jacobians J and dJ/dt, on demand.
