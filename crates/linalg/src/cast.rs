@@ -1,7 +1,7 @@
 //! Numbers by another name, where they are the same.
 #![allow(unsafe_code)]
 
-use condyle_spatial::lanes::Fused;
+use condyle_spatial::gate::Fused;
 use core::any::TypeId;
 
 macro_rules! casts {
