@@ -1,35 +1,18 @@
-//! Numbers by another name, where they are the same.
+//! Numbers of a generic type, by their own name where they are `f64`.
 #![allow(unsafe_code)]
 
-use condyle_spatial::gate::Fused;
-use core::any::TypeId;
+use condyle_spatial::gate::is;
 
-macro_rules! casts {
-    ($($(#[$doc:meta])* $name:ident $name_mut:ident $type:ty;)*) => {$(
-        $(#[$doc])*
-        #[inline(always)]
-        pub fn $name<S: 'static>(x: &[S]) -> Option<&[$type]> {
-            // SAFETY: S is f64, of which `Fused` is a transparent wrapper.
-            is_f64::<S>().then(|| unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) })
-        }
-
-        $(#[$doc])*
-        #[inline(always)]
-        pub fn $name_mut<S: 'static>(x: &mut [S]) -> Option<&mut [$type]> {
-            // SAFETY: S is f64, of which `Fused` is a transparent wrapper.
-            is_f64::<S>().then(|| unsafe { core::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), x.len()) })
-        }
-    )*};
-}
-
-casts! {
-    /// Numbers that are `f64`, as such.
-    as_f64 as_f64_mut f64;
-    /// Numbers that are `f64`, as numbers whose products and sums are fused.
-    as_fused as_fused_mut Fused;
-}
-
+/// Numbers as `f64`, if that is what they are.
 #[inline(always)]
-fn is_f64<S: 'static>() -> bool {
-    TypeId::of::<S>() == TypeId::of::<f64>()
+pub(crate) fn as_f64<S: 'static>(x: &[S]) -> Option<&[f64]> {
+    // SAFETY: S is f64.
+    is::<S, f64>().then(|| unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) })
+}
+
+/// Numbers to be written as `f64`, if that is what they are.
+#[inline(always)]
+pub(crate) fn as_f64_mut<S: 'static>(x: &mut [S]) -> Option<&mut [f64]> {
+    // SAFETY: S is f64.
+    is::<S, f64>().then(|| unsafe { core::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), x.len()) })
 }

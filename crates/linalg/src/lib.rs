@@ -3,8 +3,7 @@
 
 #[doc(hidden)]
 pub mod axpy;
-#[doc(hidden)]
-pub mod cast;
+mod cast;
 mod cholesky;
 #[doc(hidden)]
 pub mod elimination_tree;

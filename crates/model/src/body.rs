@@ -19,9 +19,9 @@ pub struct Body {
     pub placement: Se3<f64>,
     /// The inertia, in the body's frame.
     pub inertia: Inertia<f64>,
-    /// Where the joint's position begins in q.
+    /// The place in q at which the joint's position begins.
     pub idx_q: usize,
-    /// Where the joint's velocity begins in v.
+    /// The place in v at which the joint's velocity begins.
     pub idx_v: usize,
     /// Set if the joint has no coordinate of its own and follows another one's.
     pub mimic: Option<Mimic>,
@@ -32,7 +32,7 @@ pub struct Body {
 pub struct Frame {
     /// The name of the link or joint, or the user's.
     pub name: String,
-    /// Where it comes from.
+    /// The origin of the frame: a link, a joint, or the user.
     pub kind: FrameKind,
     /// The body to which it is fixed; 0 is the world.
     pub body: usize,
@@ -40,7 +40,7 @@ pub struct Frame {
     pub placement: Se3<f64>,
 }
 
-/// Where a frame comes from.
+/// The origin of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FrameKind {
     /// A link of the URDF.

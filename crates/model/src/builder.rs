@@ -1,4 +1,4 @@
-//! A model, body by body.
+//! The builder: a model, body by body.
 
 use crate::body::{Body, Frame, FrameKind, Limits};
 use crate::error::Error;
@@ -7,17 +7,17 @@ use crate::limbs::Plan;
 use crate::model::Model;
 use crate::tree::Tree;
 use crate::validate;
-use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
+use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
 use std::collections::HashSet;
 
-/// Names a body of a builder. [`WORLD`] is the one that is always there.
+/// The name of a body of a builder. [`WORLD`] is the one that is always there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodyId(usize);
 
 /// The world, on which the first joints sit.
 pub const WORLD: BodyId = BodyId(0);
 
-/// What a joint may have beside its kind; `Default` is: no limits, no losses, no rotor.
+/// Limits, losses and rotor of a joint; the default is none of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointOptions {
     /// Least and greatest position (rad, m), for joints with one coordinate.
@@ -37,9 +37,9 @@ pub struct JointOptions {
 struct Draft {
     body: Body,
     options: JointOptions,
-    /// Stands between the joints of a chain, without mass on purpose.
+    /// Whether it stands between the joints of a chain, without mass on purpose.
     between: bool,
-    /// Follows this body's joint, and how.
+    /// The body whose joint it follows, and how.
     mimic: Option<(usize, Mimic)>,
 }
 
@@ -146,7 +146,7 @@ impl ModelBuilder {
         }
     }
 
-    /// Says that a body without mass stands between the joints of a chain.
+    /// Marks a body without mass as one between the joints of a chain.
     pub(crate) fn between(&mut self, body: BodyId) {
         self.drafts[body.0].between = true;
     }
@@ -236,51 +236,21 @@ impl ModelBuilder {
         order
     }
 
+    /// Checks names, bodies, joints and frames, and makes axes unit vectors.
     fn check(&mut self) -> Result<(), Error> {
         let (mut bodies, mut joints, mut frames) = (HashSet::new(), HashSet::new(), HashSet::new());
         let mimics: Vec<bool> = self.drafts.iter().map(|d| d.mimic.is_some()).collect();
         let kinds: Vec<Joint> = self.drafts.iter().map(|d| d.body.joint).collect();
         for Draft { body, options, mimic, .. } in &mut self.drafts {
-            let wrong = |what: String| Error::Body { body: body.name.clone(), what };
             if !bodies.insert(body.name.clone()) {
                 return Err(Error::Duplicate { kind: "body", name: body.name.clone() });
             }
             if !joints.insert(body.joint_name.clone()) {
                 return Err(Error::Duplicate { kind: "joint", name: body.joint_name.clone() });
             }
+            let wrong = |what: String| Error::Body { body: body.name.clone(), what };
             body.joint = body.joint.normalized().map_err(wrong)?;
-            let I = body.inertia;
-            let finite = I.mass_com.norm_squared()
-                + [
-                    I.rotational.xx,
-                    I.rotational.yy,
-                    I.rotational.zz,
-                    I.rotational.xy,
-                    I.rotational.xz,
-                    I.rotational.yz,
-                ]
-                .iter()
-                .sum::<f64>()
-                + body.placement.translation.norm_squared()
-                + body.placement.rotation.columns().iter().map(|c| c.norm_squared()).sum::<f64>();
-            if !finite.is_finite() {
-                return Err(wrong("inertia or placement is not finite".to_owned()));
-            }
-            if !is_rotation(body.placement.rotation) {
-                return Err(wrong("placement is no rotation and translation".to_owned()));
-            }
-            if !(I.mass >= 0.0 && I.mass.is_finite()) {
-                return Err(wrong(format!("mass is {}", I.mass)));
-            }
-            if let Some((lower, upper)) = options.position
-                && (lower > upper || lower.is_nan() || upper.is_nan())
-            {
-                return Err(wrong(format!("lower limit {lower} is above upper limit {upper}")));
-            }
-            let others = [options.damping, options.friction, options.armature];
-            if others.iter().chain(&options.velocity).chain(&options.effort).any(|x| x.is_nan()) {
-                return Err(wrong("a limit, damping, friction or armature is not a number".to_owned()));
-            }
+            check_inertia(body).and_then(|()| check_options(options)).map_err(wrong)?;
             if let Some((leader, mimic)) = *mimic {
                 let wrong = |what: String| Error::Joint { joint: body.joint_name.clone(), what };
                 if !(mimic.ratio.is_finite() && mimic.offset.is_finite()) {
@@ -293,14 +263,12 @@ impl ModelBuilder {
             }
         }
         for frame in &self.frames {
-            let X = frame.placement;
-            let columns = X.rotation.columns().into_iter().chain([X.translation]);
-            if !columns.map(|c| c.norm_squared()).sum::<f64>().is_finite() {
-                return Err(Error::Frame { frame: frame.name.clone(), what: "is not finite".to_owned() });
+            let wrong = |what: &str| Error::Frame { frame: frame.name.clone(), what: what.to_owned() };
+            if !squares(frame.placement).is_finite() {
+                return Err(wrong("is not finite"));
             }
-            if !is_rotation(X.rotation) {
-                let what = "placement is no rotation and translation".to_owned();
-                return Err(Error::Frame { frame: frame.name.clone(), what });
+            if !is_rotation(frame.placement.rotation) {
+                return Err(wrong("placement is no rotation and translation"));
             }
             if !frames.insert((frame.name.clone(), frame.kind as u8)) {
                 return Err(Error::Duplicate { kind: "frame", name: frame.name.clone() });
@@ -310,17 +278,51 @@ impl ModelBuilder {
     }
 }
 
+/// Says what is wrong with a body's inertia or placement.
+fn check_inertia(Body { inertia: I, placement, .. }: &Body) -> Result<(), String> {
+    let Sym3 { xx, yy, zz, xy, xz, yz } = I.rotational;
+    if !(I.mass_com.norm_squared() + (xx + yy + zz + xy + xz + yz) + squares(*placement)).is_finite() {
+        return Err("inertia or placement is not finite".to_owned());
+    }
+    if !is_rotation(placement.rotation) {
+        return Err("placement is no rotation and translation".to_owned());
+    }
+    if !(I.mass >= 0.0 && I.mass.is_finite()) {
+        return Err(format!("mass is {}", I.mass));
+    }
+    Ok(())
+}
+
+/// Says what is wrong with a joint's limits and losses.
+fn check_options(options: &JointOptions) -> Result<(), String> {
+    if let Some((lower, upper)) = options.position
+        && (lower > upper || lower.is_nan() || upper.is_nan())
+    {
+        return Err(format!("lower limit {lower} is above upper limit {upper}"));
+    }
+    let others = [options.damping, options.friction, options.armature];
+    if others.iter().chain(&options.velocity).chain(&options.effort).any(|x| x.is_nan()) {
+        return Err("a limit, damping, friction or armature is not a number".to_owned());
+    }
+    Ok(())
+}
+
+/// The sum of the squares of all numbers of a pose: finite if they are.
+fn squares(X: Se3<f64>) -> f64 {
+    X.rotation.columns().into_iter().chain([X.translation]).map(|c| c.norm_squared()).sum()
+}
+
 /// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
 const ROTATION_ROUNDING: f64 = 1e-6;
 
-/// Whether the columns are unit vectors at right angles, right-handed.
+/// Whether the columns of R are unit vectors at right angles, right-handed.
 fn is_rotation(R: Mat3<f64>) -> bool {
     let Mat3 { x, y, z } = R;
     let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
     off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
 }
 
-/// What a model has a number of for each coordinate.
+/// The numbers that a model has for each coordinate.
 #[derive(Default)]
 struct Coordinates {
     nq: usize,

@@ -68,7 +68,7 @@ impl ModelBuilder {
         self.append_locked(parent, placement, model, prefix, &[], &[]);
     }
 
-    /// The same, with some bodies fixed where they are at q.
+    /// Adds a whole robot, as `append` does, with some bodies fixed where they are at q.
     fn append_locked(
         &mut self,
         parent: BodyId,
@@ -145,7 +145,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// What [`ModelBuilder::build`] finds.
+    /// Those of [`ModelBuilder::build`].
     ///
     /// # Panics
     /// If `q` has not nq numbers, or a body does not exist or is the world.

@@ -7,7 +7,7 @@ use condyle_linalg::check;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
-/// Where a random position lies in a coordinate that has no limits: within this of zero (rad, m).
+/// The greatest distance from zero (rad, m) of a random position in a coordinate that has no limits.
 const UNLIMITED: f64 = 3.0;
 
 /// The position in which every body is at its joint's frame: zeros, and rotations by nothing.
@@ -183,7 +183,7 @@ pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
     }
 }
 
-/// Which argument a Jacobian of [`integrate`] is taken with respect to.
+/// The argument with respect to which a Jacobian of [`integrate`] is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegrateArgument {
     /// The position q.
@@ -206,7 +206,7 @@ pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: Int
     block_diagonal(model, ("v", v), which, S::one(), J);
 }
 
-/// Which argument a Jacobian of [`difference`] is taken with respect to.
+/// The argument with respect to which a Jacobian of [`difference`] is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DifferenceArgument {
     /// The position q₀ that is subtracted.

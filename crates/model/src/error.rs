@@ -1,8 +1,8 @@
-//! What can be wrong with a robot model, and what is odd about it.
+//! Errors in a robot's description, and warnings about it.
 
 use serde::{Deserialize, Serialize};
 
-/// What is wrong with a robot's description, or with a name that was looked up in it.
+/// An error in a robot's description, or in a name that was looked up in it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -21,7 +21,7 @@ pub enum Error {
         address: String,
         /// The package's name.
         package: String,
-        /// Where the file would have been.
+        /// The places at which it was looked for.
         looked: Vec<String>,
     },
     /// The text is not XML.
@@ -39,11 +39,11 @@ pub enum Error {
     Urdf {
         /// Path, or `<string>`.
         file: String,
-        /// Where the element begins, counted from 1.
+        /// The line on which the element begins, counted from 1.
         line: u32,
         /// For example ``joint `elbow` ``.
         element: String,
-        /// What is wrong, with the numbers.
+        /// The fault, with the numbers.
         what: String,
     },
     /// An element of an MJCF or SDF is wrong.
@@ -51,11 +51,11 @@ pub enum Error {
     Element {
         /// Path, or `<string>`; of the included file, where it is in one.
         file: String,
-        /// Where the element begins, counted from 1.
+        /// The line on which the element begins, counted from 1.
         line: u32,
         /// For example ``joint `elbow` ``.
         element: String,
-        /// What is wrong, with the numbers.
+        /// The fault, with the numbers.
         what: String,
     },
     /// A body given to a builder is wrong.
@@ -63,7 +63,7 @@ pub enum Error {
     Body {
         /// The body's name.
         body: String,
-        /// What is wrong, with the numbers.
+        /// The fault, with the numbers.
         what: String,
     },
     /// A joint given to a builder is wrong.
@@ -71,7 +71,7 @@ pub enum Error {
     Joint {
         /// The joint's name.
         joint: String,
-        /// What is wrong, with the numbers.
+        /// The fault, with the numbers.
         what: String,
     },
     /// A frame is wrong.
@@ -79,25 +79,25 @@ pub enum Error {
     Frame {
         /// The frame's name.
         frame: String,
-        /// What is wrong, with the numbers.
+        /// The fault, with the numbers.
         what: String,
     },
     /// A list in a model's file is too short or too long.
     #[error("{name}: expected {expected} entries, found {found}")]
     Length {
-        /// Of the list, for example `limits.lower`.
+        /// The name of the list, for example `limits.lower`.
         name: &'static str,
-        /// How many there must be.
+        /// The number of entries that it must have.
         expected: usize,
-        /// How many there are.
+        /// The number of entries that it has.
         found: usize,
     },
     /// A constraint cannot be.
     #[error("constraint {constraint}: {what}")]
     Constraint {
-        /// Its number, counted from 0.
+        /// The constraint's number, counted from 0.
         constraint: usize,
-        /// What is wrong, with the numbers.
+        /// The fault, with the numbers.
         what: String,
     },
     /// A strict loader met what is only odd.
@@ -105,7 +105,7 @@ pub enum Error {
     Strict {
         /// Path, or `<string>`.
         file: String,
-        /// What is odd.
+        /// The warning.
         warning: Warning,
     },
     /// Two bodies, joints or frames of one kind have the same name.
@@ -134,7 +134,7 @@ pub enum Error {
     },
 }
 
-/// What is odd about a model. Loaders collect these, or refuse the model when they are strict.
+/// Something odd about a model. Loaders collect warnings, or refuse the model when they are strict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
@@ -174,12 +174,12 @@ pub enum Warning {
     LeftOut {
         /// For example ``joint `loop` ``.
         element: String,
-        /// What was left out, and why.
+        /// The thing that was left out, and why.
         what: String,
     },
 }
 
-/// What [`Error::Package`] says of where it looked.
+/// The end of the message of [`Error::Package`].
 fn where_looked(looked: &[String]) -> String {
     if looked.is_empty() {
         return "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)".to_owned();

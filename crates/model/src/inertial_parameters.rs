@@ -27,7 +27,7 @@
 //!
 //! so m = e²ᵅ and t is the centre of mass.
 
-use crate::elementary::exp;
+use condyle_spatial::elementary::exp;
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use nalgebra::{SMatrix, SVector};
 
@@ -191,7 +191,7 @@ pub fn from_log_cholesky<S: Scalar>(theta: [S; 10]) -> Inertia<S> {
 
 /// ∂π/∂θ, 10 × 10 and never singular: how the ten parameters change with the log-Cholesky parameters.
 ///
-/// Source: Rucker and Wensing (2022). With a [regressor](crate::joint_torque_regressor) Y, Y ∂π/∂θ is the
+/// Source: Rucker and Wensing (2022). With `joint_torque_regressor` Y, Y ∂π/∂θ is the
 /// slope of the torques in θ.
 ///
 /// ```

@@ -1,7 +1,8 @@
-//! Robots from files.
+//! Files of robots: URDF, MJCF, SDF, and those of serde.
 
+mod description;
 pub(crate) mod mjcf;
-pub(crate) mod packages;
+mod packages;
 pub(crate) mod sdf;
 pub(crate) mod urdf;
 mod xml;

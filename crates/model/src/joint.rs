@@ -84,7 +84,7 @@ impl Joint {
         }
     }
 
-    /// How many numbers the position has.
+    /// The number of entries of the position.
     #[inline]
     pub fn nq(self) -> usize {
         match self {
@@ -96,7 +96,7 @@ impl Joint {
         }
     }
 
-    /// How many degrees of freedom it has: the numbers of its velocity.
+    /// The number of degrees of freedom: the entries of the velocity.
     #[inline]
     pub fn nv(self) -> usize {
         self.axes().len()

@@ -18,9 +18,6 @@ mod body;
 mod builder;
 mod compose;
 mod configuration;
-mod description;
-#[doc(hidden)]
-pub mod elementary;
 mod error;
 pub mod inertial_parameters;
 mod io;

@@ -16,7 +16,7 @@ use column_map::ColumnMap;
 use schedule::Schedule;
 use steps::{StateMap, Step};
 
-/// How many bodies stand side by side.
+/// The number of bodies side by side.
 pub const LANES: usize = 4;
 
 /// A schedule, and what a pass needs of it. Step 0 is the world.
@@ -27,9 +27,9 @@ pub struct Plan {
     pub steps: Vec<Step>,
     /// All steps but the world, the last first.
     pub closed: Vec<usize>,
-    /// Where the numbers in lanes come from.
+    /// The places from which the numbers in lanes come.
     pub state: StateMap,
-    /// Where columns and the entries of matrices stand.
+    /// The places of columns and of the entries of matrices.
     pub columns: ColumnMap,
 }
 

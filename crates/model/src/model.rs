@@ -7,7 +7,7 @@ use crate::tree::{Column, Node, Tree};
 use condyle_linalg::ColumnTree;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::Vec3;
-use std::fmt;
+use core::fmt;
 
 /// A robot: bodies, joints, frames, inertias, limits. Frozen, checked when built, shared between threads.
 ///
@@ -34,9 +34,9 @@ pub struct Model<R = f64> {
     pub(crate) friction: Vec<f64>,
     pub(crate) armature: Vec<R>,
     pub(crate) gravity: Vec3<R>,
-    /// The same robot as passes see it.
+    /// The robot as passes see it.
     pub(crate) tree: Tree<R>,
-    /// How single calls compute several bodies at once, if they do.
+    /// The plan by which single calls compute several bodies at once, if they do.
     pub(crate) limbs: Option<Plan>,
     pub(crate) warnings: Vec<Warning>,
     /// Bodies whose joints make M singular.
@@ -49,12 +49,12 @@ impl<R> Model<R> {
     pub fn name(&self) -> &str {
         &self.name
     }
-    /// How many numbers a position q has.
+    /// nq, the number of entries of a position q.
     #[inline(always)]
     pub fn nq(&self) -> usize {
         self.tree.nq
     }
-    /// How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector.
+    /// nv, the number of degrees of freedom: the entries of v, a, τ and of a tangent vector.
     #[inline(always)]
     pub fn nv(&self) -> usize {
         self.tree.nv
@@ -128,7 +128,7 @@ impl<R> Model<R> {
     }
 }
 
-/// What passes are told.
+/// The model as passes see it.
 #[doc(hidden)]
 impl<R> Model<R> {
     /// The bodies as passes see them.
@@ -146,7 +146,7 @@ impl<R> Model<R> {
     pub fn support(&self, node: &Node<R>) -> &[usize] {
         self.tree.support(node)
     }
-    /// How many pairs there are of a body and a column from the root to its joint.
+    /// The number of pairs of a body and a column from the root to its joint.
     #[inline(always)]
     pub fn support_len(&self) -> usize {
         self.tree.support.len()
@@ -161,7 +161,7 @@ impl<R> Model<R> {
     pub fn closed(&self) -> &[usize] {
         &self.tree.closed
     }
-    /// How single calls compute several bodies at once, if they do.
+    /// The plan by which single calls compute several bodies at once, if they do.
     #[inline(always)]
     pub fn limbs(&self) -> Option<&Plan> {
         self.limbs.as_ref()

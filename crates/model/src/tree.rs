@@ -17,21 +17,21 @@ pub struct Node<R> {
     pub joint: Joint,
     /// The parent's number.
     pub parent: usize,
-    /// Where the joint's position begins in q.
+    /// The place in q at which the joint's position begins.
     pub idx_q: usize,
-    /// Where the joint's velocity begins in v.
+    /// The place in v at which the joint's velocity begins.
     pub idx_v: usize,
-    /// How the joint follows another one, if it does.
+    /// The way in which the joint follows another one, if it does.
     pub mimic: Option<Mimic>,
     /// The number of the joint's first column.
     pub column: usize,
-    /// Where the columns from the root to this joint begin in `Tree::support`.
+    /// The place in `Tree::support` at which the columns from the root to this joint begin.
     pub support: usize,
-    /// How many columns there are from the root to this joint, its own included.
+    /// The number of columns from the root to this joint, its own included.
     pub depth: usize,
-    /// How many bodies there are between it and the world, itself included.
+    /// The number of bodies between it and the world, itself included.
     pub level: usize,
-    /// Where the bodies whose subtrees end with this body stand in `Tree::closed`: from, to.
+    /// The places in `Tree::closed`, from and to, of the bodies whose subtrees end with this body.
     pub closed: (usize, usize),
     /// X_T, between turned frames.
     pub placement: Se3<R>,
@@ -46,13 +46,13 @@ pub struct Node<R> {
 pub struct Column {
     /// The coordinate's number.
     pub coordinate: usize,
-    /// The joint's velocity is so many times the coordinate's.
+    /// The joint's velocity divided by the coordinate's.
     pub ratio: f64,
     /// The column before it on the way to the root.
     pub parent: Option<usize>,
-    /// One past the last column of its subtree.
+    /// The column after the last of its subtree.
     pub end: usize,
-    /// How many columns there are between it and the root.
+    /// The number of columns between it and the root.
     pub depth: usize,
 }
 
@@ -65,7 +65,7 @@ pub(crate) struct Space {
     pub v: Range<usize>,
 }
 
-/// What passes need of a robot's bodies and joints.
+/// A robot's bodies and joints, as passes need them.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree<R> {
     pub nq: usize,
@@ -73,7 +73,7 @@ pub(crate) struct Tree<R> {
     /// Shape: bodies, the world included.
     pub nodes: Vec<Node<R>>,
     pub columns: Vec<Column>,
-    /// Of body after body, the columns from the root to its joint.
+    /// The columns from the root to the joint of one body, then of the next, and so on.
     pub support: Vec<usize>,
     /// The bodies, children before parents.
     pub closed: Vec<usize>,

@@ -1,4 +1,4 @@
-//! What is odd about a model, though it loads: inertias that no body has, degrees of freedom along which M is singular.
+//! The validation of a model: inertias that no body has, degrees of freedom along which M is singular.
 
 use crate::body::Body;
 use crate::configuration::random_configuration;
@@ -41,7 +41,7 @@ pub(crate) fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warni
 }
 
 impl Model {
-    /// What is odd about the robot, though it could be built.
+    /// Warnings about the robot, which is odd though it could be built.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }

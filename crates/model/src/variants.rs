@@ -5,7 +5,7 @@ use crate::limbs::Plan;
 use crate::model::Model;
 use condyle_linalg::check;
 use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
-use std::any::Any;
+use core::any::Any;
 
 impl<R> Model<R> {
     /// The same robot under another gravity (m/s², in the world's frame).

@@ -19,6 +19,8 @@
 
 mod algebra;
 #[doc(hidden)]
+pub mod elementary;
+#[doc(hidden)]
 pub mod finite;
 mod scalar;
 #[doc(hidden)]

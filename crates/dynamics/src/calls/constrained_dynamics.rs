@@ -244,7 +244,7 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// let (mut touch, mut data) = (ConstraintSet::new(&arm, &[touch])?, Data::new(&arm));
 /// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
 /// let da_dtau = constrained_dynamics_derivatives(&arm, &mut data, &mut touch, &q, &v, &tau, &[]).da_dtau.clone();
-/// let mut J = DMatrix::<f64>::zero_matrix(3, 7);
+/// let mut J = DMatrix::<f64>::zeros(3, 7);
 /// touch.jacobian(&mut J);
 /// assert!((J * da_dtau).amax() < 1e-12); // no effort moves the point
 /// # Ok::<(), condyle_dynamics::Error>(())

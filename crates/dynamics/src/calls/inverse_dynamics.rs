@@ -106,7 +106,7 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
 /// let quadruped = robots::quadruped();
 /// let mut data = Data::new(&quadruped);
 /// let q = condyle_dynamics::neutral(&quadruped);
-/// let mut f_ext = filled(Force::zero(), quadruped.bodies().len());
+/// let mut f_ext = vec![Force::zero(); quadruped.bodies().len()];
 /// f_ext[1].linear.z = 9.81 * quadruped.total_mass(); // hung up by its trunk
 /// let tau = static_torque(&quadruped, &mut data, &q, &f_ext);
 /// assert!(f64::abs(tau[2]) < 1e-9); // nothing else need carry it

@@ -15,7 +15,7 @@ use super::derivatives::{AbaDerivatives, RneaDerivatives};
 use super::differentiated::State;
 use crate::passes::regressor::{PARAMETERS, effort};
 use condyle_model::Model;
-use condyle_model::elementary::tanh;
+use condyle_spatial::elementary::tanh;
 use condyle_spatial::{Act, Constant, Scalar};
 use nalgebra::DMatrix;
 

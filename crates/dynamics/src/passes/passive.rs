@@ -13,8 +13,8 @@
 
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::elementary::tanh;
 use condyle_spatial::Scalar;
+use condyle_spatial::elementary::tanh;
 
 /// τ = −d v − f tanh(v/ε): the efforts of damping and smoothed friction, in O(n).
 ///

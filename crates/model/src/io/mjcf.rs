@@ -107,15 +107,15 @@ fn model(
     }
 }
 
-/// What a body consists of, with what is inside its `<frame>`s.
+/// The parts of a body, with those inside its `<frame>`s.
 #[derive(Default)]
 struct Parts<'a> {
     inertial: Option<&'a Element>,
     joints: Vec<Attributes<'a>>,
-    /// With the pose of the `<frame>` around it.
+    /// The geoms, each with the pose of the `<frame>` around it.
     geoms: Vec<(Attributes<'a>, Se3<f64>)>,
     sites: Vec<(Attributes<'a>, Se3<f64>)>,
-    /// With its own pose, and the class for what is in it.
+    /// The bodies in it, each with its own pose, and the class for what is in it.
     bodies: Vec<(&'a Element, Se3<f64>, &'a str)>,
 }
 
@@ -123,9 +123,9 @@ struct Parts<'a> {
 struct Waiting<'a> {
     element: &'a Element,
     class: &'a str,
-    /// The model's body that the parent is part of.
+    /// The body of the model of which the parent is a part.
     on: BodyId,
-    /// The pose there.
+    /// The pose in that body.
     placement: Se3<f64>,
     /// Whether the parent is the world itself.
     top: bool,
@@ -135,12 +135,12 @@ struct Reader<'a> {
     options: &'a MjcfOptions,
     compiler: Compiler,
     defaults: &'a Defaults,
-    /// How many bodies there are so far: MuJoCo's number of the last one.
+    /// The number of bodies so far: MuJoCo's number of the last one.
     bodies: usize,
-    /// Who has a name, by kind and name.
+    /// The elements that have names, by kind and name.
     names: HashMap<(&'static str, String), &'a Element>,
     joints: Joints,
-    /// Of all bodies so far (kg).
+    /// The mass of all bodies so far (kg).
     mass: f64,
     warnings: Vec<Warning>,
 }

@@ -357,8 +357,8 @@ fn pitch(joint: &Element) -> Result<f64, Error> {
     if pitch.is_finite() { Ok(pitch) } else { Err(joint.wrong("has no finite screw_thread_pitch")) }
 }
 
-/// What an `<axis>` says beside its direction. 1e16 and more is SDF's way to say that there is no limit, and so is a
-/// negative effort or velocity.
+/// The options that an `<axis>` gives beside its direction. 1e16 and more is SDF's way to say that there is no limit, and so
+/// is a negative effort or velocity.
 fn limits(joint: &Element, axis: &Element, kind: Joint) -> Result<JointOptions, Error> {
     let number = |inside: Option<&Element>, tag: &str, otherwise| match inside {
         Some(inside) => optional(joint, inside, tag, otherwise),

@@ -4,7 +4,7 @@
 //! `<visual>` and `<collision>` left out, so that whatever it refuses has a name and a line, and no mesh can be in the
 //! way.
 
-use super::packages;
+use super::{packages, xml};
 use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
@@ -44,9 +44,7 @@ impl Model {
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
         let path = packages::locate(path.as_ref(), &options.packages)?;
         let file = path.display().to_string();
-        let text =
-            std::fs::read_to_string(&path).map_err(|e| Error::File { file: file.clone(), what: e.to_string() })?;
-        Reader::new(&text, &file)?.model(options)
+        Reader::new(&xml::read(&path)?, &file)?.model(options)
     }
 
     /// Reads a URDF from a string; see [`from_urdf`](Self::from_urdf).
@@ -154,7 +152,7 @@ impl<'a> Reader<'a> {
         self.wrong(joint.line, format!("joint `{}`", joint.content.name), what)
     }
 
-    /// What urdf-rs makes of one link or joint, without its shapes.
+    /// One link or joint, without its shapes, as urdf-rs reads it.
     fn parse(&self, text: &str, node: Node, line: u32, name: &str) -> Result<urdf_rs::Robot, Error> {
         let tag = node.tag_name().name();
         let wrong = |what: String| self.wrong(line, format!("{tag} `{name}`"), what);
@@ -275,7 +273,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// What the builder found wrong, with the line of the link or joint.
+    /// The error that the builder found, with the line of the link or joint.
     fn locate(&self, error: Error) -> Error {
         let own = || "the name belongs to the library".to_owned();
         match &error {

@@ -1,4 +1,4 @@
-//! XML as the readers of MJCF and SDF want it: elements that know their file and line.
+//! XML as the readers want it: elements that know their file and line.
 
 use crate::error::Error;
 use roxmltree::{Document, Node};
@@ -38,7 +38,7 @@ impl Element {
         Self::own(document.root_element(), &ends, &file.into(), 0)
     }
 
-    /// The same element without its document; `ends` is where lines end.
+    /// An element without its document; `ends` are the places at which lines end.
     fn own(node: Node, ends: &[usize], file: &Rc<str>, depth: usize) -> Result<Self, Error> {
         let line = 1 + ends.partition_point(|&end| end < node.range().start) as u32;
         let plain = node.attributes().filter(|a| a.namespace().is_none());

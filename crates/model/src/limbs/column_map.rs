@@ -1,4 +1,5 @@
-//! Which columns of other steps the columns of a step meet in matrices, and where the entries of such pairs stand.
+//! The map of columns: which columns of other steps those of a step meet in matrices, and where the entries of such pairs
+//! stand.
 //!
 //! Of the bodies of a step, those before them stand in the same lanes, step by step, until a limb hangs on a body in
 //! another lane. Columns from there to the root are copied: into places behind those of all columns, once a call, so that
@@ -14,33 +15,33 @@ use crate::tree::Tree;
 use condyle_spatial::moves::Move;
 use core::iter::successors;
 
-/// Where columns and the entries of matrices stand.
+/// The places of columns and of the entries of matrices.
 #[derive(Clone, Debug)]
 pub struct ColumnMap {
     /// The columns from the root to each step's joints, step by step.
     pub support: Vec<LaneColumn>,
     /// The pairs of each such column with the step's own.
     pub pairs: Vec<Pair>,
-    /// What stands behind the columns of all steps: copies of columns, of which steps, and how their lanes change.
+    /// The copies of columns that stand behind those of all steps: the columns, and how their lanes change.
     pub copies: Vec<Vec<(usize, Move)>>,
-    /// Of each entry of the support, the one before it on the way out.
+    /// For each entry of the support, the one before it on the way out.
     pub predecessors: Vec<Predecessor>,
     /// All columns, those after one another together.
     pub blocks: Vec<ColumnBlock>,
-    /// How large the matrices are that hold Z.
+    /// The sizes of the matrices that hold Z.
     pub sizes: Sizes,
 }
 
 /// A column of each lane, among those from the root to a step's joints.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneColumn {
-    /// Where it stands in arrays by columns.
+    /// The place in arrays by columns.
     pub column: usize,
-    /// Where its pairs with the step's own columns stand in `ColumnMap::pairs`, one after the other.
+    /// The place in `ColumnMap::pairs` of its pairs with the step's own columns, one after the other.
     pub pair: usize,
 }
 
-/// Where the entries of a pair of columns stand, one in each lane, in a matrix stored by columns. Lanes that have no such
+/// The places of the entries of a pair of columns, one in each lane, in a matrix stored by columns. Lanes that have no such
 /// pair point to an entry that is set after all others, and there by the first lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
@@ -54,7 +55,7 @@ pub struct Pair {
     pub in_Zt: [u32; LANES],
 }
 
-/// From where an entry of the support gets what changes on the way out.
+/// The entry from which an entry of the support gets what changes on the way out.
 #[derive(Clone, Debug)]
 pub enum Predecessor {
     /// From this entry, in the same lanes; the step's own columns from themselves.
@@ -63,21 +64,21 @@ pub enum Predecessor {
     Moved(Vec<(usize, Move)>),
 }
 
-/// Some columns of which each carries the next, and all columns from the root to the last of them.
+/// A run of columns of which each carries the next.
 #[derive(Clone, Debug)]
 pub struct ColumnBlock {
     /// The first of them.
     pub first: usize,
-    /// How many they are.
+    /// Their number.
     pub count: usize,
     /// All columns from the root to the last of them.
     pub path: Vec<usize>,
 }
 
-/// How large the two matrices are that hold Z = L⁻¹, of the inertia matrix M = Lᵀ D L: see `dynamics::limbs::inverse`.
+/// The sizes of the two matrices that hold Z = L⁻¹, where M = Lᵀ D L is the inertia matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes {
-    /// How many rows both have.
+    /// The number of rows of both.
     pub rows: usize,
     /// The length of a row of Z D⁻¹, which has the columns from the root on.
     pub ZD: usize,
@@ -102,7 +103,7 @@ impl Sizes {
     }
 }
 
-/// How many columns a block has at most.
+/// The greatest number of columns of a block.
 const COUNT: usize = 4;
 
 /// The blocks of all columns.
@@ -125,16 +126,16 @@ fn blocks(tree: &Tree<f64>) -> Vec<ColumnBlock> {
 /// A column on the way from the root to the body of a lane.
 #[derive(Clone, Copy)]
 struct Ancestor {
-    /// Where it stands in arrays by columns.
+    /// The place in arrays by columns.
     column: usize,
-    /// In which lane it stands.
+    /// The lane in which it stands.
     lane: usize,
     coordinate: usize,
-    /// Its entry in the support of the step before.
+    /// The entry of the support of the step before.
     entry: usize,
 }
 
-/// An entry of the support under construction: where it stands in arrays by columns, and the coordinate in each lane.
+/// An entry of the support under construction: the place in arrays by columns, and the coordinate in each lane.
 type Draft = (usize, [Option<usize>; LANES]);
 
 impl ColumnMap {
@@ -233,7 +234,7 @@ fn in_place(from: [Option<(usize, usize)>; LANES]) -> Option<usize> {
     from.iter().enumerate().all(stays).then_some(*first)
 }
 
-/// What comes from which place, where lanes have it from several places or from other lanes.
+/// The places from which lanes have what they need, and how it changes lanes, where `in_place` finds no single one.
 fn moves(from: [Option<(usize, usize)>; LANES]) -> Vec<(usize, Move)> {
     let mut places: Vec<usize> = from.iter().flatten().map(|x| x.0).collect();
     places.sort_unstable();

@@ -1,4 +1,4 @@
-//! Which bodies go together.
+//! The schedule: which bodies go together.
 //!
 //! A list schedule: step after step takes up to four bodies whose parents are done, those with the longest way to their tips
 //! first, and leaves each in its parent's lane, which it waits for if there is time. The body on which all others hang stands
@@ -7,7 +7,8 @@
 use super::LANES;
 use crate::tree::Node;
 
-/// From how many bodies a step on it pays, the world counted: two legs of six joints each, under one trunk, just do.
+/// The number of bodies a step, the world counted, from which limbs side by side pay: two legs of six joints each, under one
+/// trunk, just do.
 const WORTH: usize = 2;
 
 /// The bodies of each step, and the step of each body.

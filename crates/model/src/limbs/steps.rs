@@ -1,4 +1,4 @@
-//! What a pass needs of the bodies of a step, lane by lane.
+//! The steps of a pass: its bodies, lane by lane, and where their numbers come from.
 
 use super::LANES;
 use super::schedule::Schedule;
@@ -20,53 +20,53 @@ pub struct Step {
     pub inertia: Inertia<[f64; LANES]>,
     /// bRz: the turned frame in the body's.
     pub axis_rotation: Mat3<[f64; LANES]>,
-    /// Where the positions of their joints begin among those in lanes.
+    /// The place at which the positions of their joints begin among those in lanes.
     pub idx_q: usize,
-    /// Where the velocities of their joints begin among those in lanes.
+    /// The place at which the velocities of their joints begin among those in lanes.
     pub idx_v: usize,
-    /// Where their parents stand.
+    /// The places of their parents.
     pub parents: Parents,
-    /// Where the columns from the root to their joints stand in `ColumnMap::support`: from, to.
+    /// The places in `ColumnMap::support`, from and to, of the columns from the root to their joints.
     pub support: (usize, usize),
     /// Whether nothing hangs on any of its bodies.
     pub tip: bool,
 }
 
-/// Where the parents of a step's bodies stand.
+/// The places of the parents of a step's bodies.
 #[derive(Clone, Debug)]
 pub enum Parents {
     /// In one step, each in its child's lane.
     InPlace(usize),
     /// In several steps or in other lanes.
     Moved {
-        /// What comes from which step.
+        /// The steps from which something comes, and how its lanes change.
         from: Vec<(usize, Move)>,
-        /// What goes to which step.
+        /// The steps to which something goes, and how its lanes change.
         to: Vec<(usize, Move)>,
     },
 }
 
-/// Where the four numbers of a position or a velocity come from: the one of the robot times `ratio`, plus `offset`.
+/// The places from which the four numbers of a position or a velocity come: each is the robot's times `ratio`, plus `offset`.
 #[derive(Clone, Copy, Debug)]
 pub struct Source {
-    /// The number's place in the robot's; one past the last in a lane without a joint.
+    /// The places in the robot's q or v; one past its end in a lane without a joint.
     pub from: [usize; LANES],
-    /// Of joints that follow others; else 1.
+    /// The ratios of joints that follow others; else 1.
     pub ratio: [f64; LANES],
-    /// Of joints that follow others; else 0.
+    /// The offsets of joints that follow others; else 0.
     pub offset: [f64; LANES],
 }
 
-/// Where the numbers in lanes come from, and where they go.
+/// The places from which the numbers in lanes come, and to which they go.
 #[derive(Clone, Debug)]
 pub struct StateMap {
     /// The positions of all steps.
     pub positions: Vec<Source>,
     /// The degrees of freedom of all steps.
     pub coordinates: Vec<Source>,
-    /// Of each coordinate, where its number stands among those in lanes.
+    /// The place of each coordinate's number among those in lanes.
     pub leaders: Vec<usize>,
-    /// Of joints that follow others: coordinate, place of the number, ratio.
+    /// The joints that follow others: coordinate, place of the number in lanes, ratio.
     pub followers: Vec<(usize, usize, f64)>,
 }
 
@@ -138,7 +138,7 @@ impl StateMap {
     }
 }
 
-/// Where the parents of step s stand.
+/// The places of the parents of step s.
 fn parents(tree: &Tree<f64>, schedule: &Schedule, s: usize) -> Parents {
     // of each lane with a body: its parent's step and lane
     let at: Vec<(usize, (usize, usize))> = (0..LANES)

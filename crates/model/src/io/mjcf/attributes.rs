@@ -61,14 +61,14 @@ impl Defaults {
     }
 }
 
-/// An element's attributes, its class's where it has none of its own.
+/// The attributes of an element, those of its class where it has none of its own.
 pub(super) struct Attributes<'a> {
     pub(super) element: &'a Element,
     class: Option<&'a HashMap<String, String>>,
 }
 
 impl<'a> Attributes<'a> {
-    /// Of an element that has no class.
+    /// The attributes of an element that has no class.
     pub(super) fn plain(element: &'a Element) -> Self {
         Self { element, class: None }
     }
@@ -77,7 +77,7 @@ impl<'a> Attributes<'a> {
         self.element.attribute(name).or_else(|| self.class?.get(name).map(String::as_str))
     }
 
-    /// What a reader of text makes of an attribute, if it is there.
+    /// The value of an attribute, as a reader of text understands it, if it is there.
     fn read<T>(&self, name: &str, f: impl Fn(&str) -> Result<T, String>) -> Result<Option<T>, Error> {
         let read = |text| f(text).map_err(|what| self.element.wrong(format!("{name}: {what}")));
         self.get(name).map(read).transpose()
@@ -119,7 +119,7 @@ pub(super) enum FromGeoms {
     Always,
 }
 
-/// What `<compiler>` says.
+/// The settings of `<compiler>`.
 pub(super) struct Compiler {
     /// Radians in a unit of angle.
     pub(super) angle: f64,
@@ -132,7 +132,7 @@ pub(super) struct Compiler {
     pub(super) bounds: [f64; 2],
     /// Whether principal moments that no body has are replaced by their mean.
     pub(super) balance: bool,
-    /// What all masses are scaled to (kg).
+    /// The mass to which all masses are scaled (kg).
     pub(super) total_mass: Option<f64>,
 }
 

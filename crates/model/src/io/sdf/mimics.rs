@@ -1,4 +1,4 @@
-//! Axes that follow others.
+//! The axes of an SDF that follow others.
 
 use super::poses::optional;
 use crate::builder::{BodyId, ModelBuilder};
@@ -7,7 +7,7 @@ use crate::io::xml::Element;
 use crate::joint::Mimic;
 use std::collections::HashMap;
 
-/// What moves about or along each axis, by the joint's name and the axis's tag, and who follows.
+/// The bodies that move about or along each axis, by the joint's name and the axis's tag, and those that follow.
 #[derive(Default)]
 pub(super) struct Axes<'a> {
     bodies: HashMap<(&'a str, &'static str), BodyId>,

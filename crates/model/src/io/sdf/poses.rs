@@ -1,4 +1,4 @@
-//! Where links, joints and frames of an SDF are, and in which frames axes are given.
+//! The poses of links, joints and frames of an SDF, and the frames in which axes are given.
 
 use super::WORLD_LINK;
 use crate::error::{Error, nearest};
@@ -149,7 +149,7 @@ impl<'a> Poses<'a> {
     }
 }
 
-/// What a pose says that it is relative to; `frame` is how SDF 1.6 wrote it.
+/// The frame to which a pose says that it is relative; SDF 1.6 wrote it `frame`.
 fn relative_to(pose: &Element) -> Option<&str> {
     pose.attribute("relative_to").or_else(|| pose.attribute("frame")).filter(|n| !n.is_empty())
 }

@@ -1,6 +1,6 @@
-//! Functions that a [`Scalar`] does not have, out of its arithmetic: one source for floats, lanes and dual numbers.
+//! tanh and exp of a [`Scalar`], out of its arithmetic: one source for floats, lanes and dual numbers.
 
-use condyle_spatial::Scalar;
+use crate::scalar::Scalar;
 
 /// From here on tanh is 1 to the last bit of a double.
 const SATURATED: f64 = 20.0;

@@ -1,4 +1,5 @@
-//! A model in files: what a user may edit. All else follows from it, and is made and checked when a file is read.
+//! Models in files of serde's formats: they have what a user may edit. All else follows from it, and is made and checked when
+//! a file is read.
 
 use crate::body::{Body, Frame, Limits};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
@@ -7,7 +8,7 @@ use crate::model::Model;
 use condyle_spatial::{Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What a file has of a model; each field as in [`Model`].
+/// The fields of a model that stand in a file, each as in [`Model`].
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
