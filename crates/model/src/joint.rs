@@ -9,7 +9,7 @@ mod group;
 pub mod kinematics;
 mod motion;
 
-use condyle_spatial::lanes::Kernel;
+use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 pub use group::GroupJacobian;
 pub use motion::{ClassicalMotion, JointMotion};

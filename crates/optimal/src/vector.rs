@@ -2,8 +2,9 @@
 
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real};
-use condyle_spatial::lanes::{Element, Kernel, Lanes};
+use condyle_spatial::lanes::{Element, Lanes};
 use condyle_spatial::level::{Level, level};
+use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
 /// N numbers in a register.

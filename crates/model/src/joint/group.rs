@@ -1,7 +1,8 @@
 //! The group of a joint's positions: `q ⊕ δ` is its exponential, with δ in the body's frame.
 
 use super::{Joint, rotated_about_z};
-use condyle_spatial::lie::{self, MotionMap, Quaternion};
+use condyle_spatial::Quaternion;
+use condyle_spatial::lie::{self, MotionMap};
 use condyle_spatial::{Motion, Scalar, Se3, Vec3};
 
 impl Joint {

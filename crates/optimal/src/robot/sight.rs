@@ -12,7 +12,7 @@ use condyle_dynamics::{
     forward_velocities, gravity, rnea, rnea_derivatives, static_torque_derivative,
 };
 use condyle_spatial::block::{Block, Strided, scatter_matrix, scatter_rows};
-use condyle_spatial::lanes::Kernel;
+use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Force, Mat3, Motion, Quaternion, Se3, Vec3, lie};
 use nalgebra::DMatrix;
 

@@ -7,7 +7,7 @@
 use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
 use crate::passes::kinematics::World;
 use condyle_model::Model;
-use condyle_spatial::lanes::Fused;
+use condyle_spatial::gate::Fused;
 use condyle_spatial::{Force, Scalar, Vec3};
 use core::any::{Any, TypeId};
 

@@ -24,8 +24,8 @@ use crate::constraints::constraint_motion::Ends;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::plan::Plan as Constraint;
 use condyle_spatial::block::Block;
+use condyle_spatial::gate::Fused;
 use condyle_spatial::gate::renamed;
-use condyle_spatial::lanes::Fused;
 use condyle_spatial::{Scalar, moves};
 
 /// xᵀ y of N vectors, in every lane.

@@ -11,7 +11,7 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
 use condyle_spatial::block::Block;
-use condyle_spatial::lanes::Fused;
+use condyle_spatial::gate::Fused;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 
 /// What the articulated-body algorithm has left, number by number.

@@ -18,7 +18,7 @@ use crate::passes::kinematics::World;
 use condyle_model::layout::Layout;
 use condyle_model::limbs::column_map::{ColumnBlock, Sizes};
 use condyle_spatial::block::Block;
-use condyle_spatial::lanes::Fused;
+use condyle_spatial::gate::Fused;
 use condyle_spatial::{Motion, Scalar};
 
 /// How many vectors of each row are summed up at once.

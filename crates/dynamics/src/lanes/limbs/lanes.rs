@@ -7,8 +7,9 @@ use condyle_model::joint::Joint;
 use condyle_model::layout::{Columns, Layout};
 use condyle_model::limbs::column_map::{ColumnMap, LaneColumn, Pair, Predecessor};
 use condyle_model::limbs::steps::{Parents, Source, Step};
-use condyle_spatial::lanes::{Fused, Lanes};
+use condyle_spatial::lanes::Lanes;
 use condyle_spatial::moves::{Move, sum};
+use condyle_spatial::simd::Fused;
 use condyle_spatial::{Act, Force, Inertia, Se3, Vec3};
 use core::ops::{AddAssign, Range};
 

@@ -11,8 +11,8 @@ use crate::workspace::{Size, filled};
 use condyle_model::Model;
 use condyle_model::limbs::steps::Source;
 use condyle_spatial::block::lanes;
+use condyle_spatial::gate::Fused;
 use condyle_spatial::gate::{is, renamed};
-use condyle_spatial::lanes::Fused;
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::{Force, Inertia, Scalar};
 

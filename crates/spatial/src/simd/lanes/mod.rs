@@ -2,7 +2,7 @@
 //!
 //! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON, where they are two registers each;
 //! `Lanes<f64, 8>` and `Lanes<f32, 16>` AVX-512; and [`Fused`] is a single `f64` where products and sums are fused. They are
-//! for code that has been entered through a function compiled for their [`Level`](crate::level::Level), which is the
+//! for code that has been entered through a function compiled for their [`Level`](crate::simd::level::Level), which is the
 //! business of a dispatcher: anywhere else each operation would be a function call, and on a processor without the
 //! instructions an illegal one. Every operation treats each lane alone, so what one lane holds (not-a-numbers included) never
 //! reaches another.
@@ -10,27 +10,18 @@
 //! What a processor does is in the file of its kind, x86.rs or neon.rs, as an implementation of [`Register`].
 #![allow(unsafe_code)]
 
-pub use crate::fused::Fused;
+use crate::scalar::number::Number;
+use crate::scalar::operators::operators;
 use crate::scalar::{Constant, Scalar};
+use crate::simd::kernel::Kernel;
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-pub use processor::moves;
+pub use processor::{LongF32, LongF64, moves};
 
-#[cfg_attr(target_arch = "x86_64", path = "lanes/x86.rs")]
-#[cfg_attr(target_arch = "aarch64", path = "lanes/neon.rs")]
-#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), path = "lanes/array.rs")]
+#[cfg_attr(target_arch = "x86_64", path = "x86.rs")]
+#[cfg_attr(target_arch = "aarch64", path = "neon.rs")]
+#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), path = "array.rs")]
 mod processor;
-
-/// A number that lanes are made of.
-pub trait Number: Scalar<Mask = bool> {
-    /// How large an angle may be for `near`.
-    const LARGEST: f64;
-
-    /// (sin x, cos x) in this precision, for |x| up to `LARGEST`.
-    fn near<S: Scalar>(x: S) -> (S, S);
-    /// (sin self, cos self), however large, of the platform.
-    fn far(self) -> (Self, Self);
-}
 
 /// A number of which vectors of N exist.
 pub trait Element<const N: usize>: Number {
@@ -99,27 +90,6 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
 #[repr(transparent)]
 pub struct Lanes<T: Element<N>, const N: usize>(T::Register);
 
-/// Work that is to be compiled for a level: `run` is always inlined, and so takes the level of the function it stands in.
-pub trait Kernel: Sized {
-    /// The work.
-    fn run(self);
-    /// Never called; to be taken out.
-    fn run_fused(self) {
-        self.run();
-    }
-}
-
-/// Runs a kernel with the instructions of [`Real::Short`](crate::block::Real::Short): those of
-/// [`Level::Avx2`](crate::level::Level::Avx2), or of [`Level::Neon`](crate::level::Level::Neon), which every 64-bit Arm has.
-///
-/// # Safety
-/// The processor must have them.
-#[inline(never)]
-#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
-pub unsafe fn short(kernel: impl Kernel) {
-    kernel.run();
-}
-
 /// Functions of the instructions that a processor has.
 #[allow(unused_macros)] // where it has none
 macro_rules! instructions {
@@ -135,24 +105,6 @@ macro_rules! instructions {
 }
 #[allow(unused_imports)]
 use instructions;
-
-macro_rules! operators {
-    ($type:ty $(, $($of:tt)*)?) => {
-        impl $(<$($of)*>)? AddAssign for $type {
-            #[inline(always)]
-            fn add_assign(&mut self, o: Self) {
-                *self = *self + o;
-            }
-        }
-        impl $(<$($of)*>)? SubAssign for $type {
-            #[inline(always)]
-            fn sub_assign(&mut self, o: Self) {
-                *self = *self - o;
-            }
-        }
-    };
-}
-pub(crate) use operators;
 
 macro_rules! register_operators {
     ($($trait:ident $name:ident),*) => {$(
@@ -214,25 +166,6 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
             (a[k], b[k]) = f(x[k]);
         }
         (Self::from_array(a), Self::from_array(b))
-    }
-}
-
-impl<const N: usize> Lanes<f64, N>
-where
-    f64: Element<N>,
-{
-    /// Single numbers, one for each lane.
-    #[inline(always)]
-    pub fn from_fused(x: &[Fused; N]) -> Self {
-        // SAFETY: `Fused` is a transparent wrapper of `f64`.
-        Self::from_array(unsafe { *core::ptr::from_ref(x).cast() })
-    }
-    /// The single number in each lane.
-    #[inline(always)]
-    pub fn to_fused(self) -> [Fused; N] {
-        let x = self.to_array();
-        // SAFETY: as for `from_fused`.
-        unsafe { *core::ptr::from_ref(&x).cast() }
     }
 }
 

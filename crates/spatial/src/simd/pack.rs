@@ -4,9 +4,10 @@
 //! of which keeps one half of a vector and takes the other from its partner.
 #![allow(unsafe_code)]
 
-use crate::lanes::{Element, Kernel, Lanes};
-use crate::motion::Force;
+use crate::algebra::motion::Force;
 use crate::scalar::Scalar;
+use crate::simd::kernel::Kernel;
+use crate::simd::lanes::{self, Element, Lanes};
 
 /// A scalar that is made of numbers side by side, or is one of them.
 pub trait Block: Scalar {
@@ -108,10 +109,6 @@ impl<S: Block> Kernel for Gather<'_, S> {
             i = (i + S::LANES).min(n - S::LANES); // the last tile overlaps the one before
         }
     }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
 }
 
 struct Scatter<'a, 'b, S: Block>(Strided<'a, S>, &'a mut [&'b mut [S::Number]], usize);
@@ -166,10 +163,6 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
                 j = (j + S::LANES).min(columns - S::LANES); // the last tile overlaps the one before
             }
         }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
     }
 }
 
@@ -232,16 +225,25 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 
 /// A number with its vectors.
 pub trait Real: Block<Number = Self> {
-    /// Those of [`Level::Avx2`](crate::level::Level::Avx2), or of [`Level::Neon`](crate::level::Level::Neon).
+    /// Those of [`Level::Avx2`](crate::simd::level::Level::Avx2), or of [`Level::Neon`](crate::simd::level::Level::Neon).
     type Short: Block<Number = Self>;
-    /// Those of [`Level::Avx512`](crate::level::Level::Avx512), or the same as short ones where there is none.
+    /// Those of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as short ones where there is none.
     type Long: Block<Number = Self>;
+}
+
+impl Real for f64 {
+    type Short = Lanes<Self, 4>;
+    type Long = lanes::LongF64;
+}
+impl Real for f32 {
+    type Short = Lanes<Self, 8>;
+    type Long = lanes::LongF32;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::level::{Level, Unsupported};
+    use crate::simd::level::{Level, Unsupported};
 
     /// Rows there and back, with some rows and numbers over.
     struct Back<S>(core::marker::PhantomData<S>);
@@ -289,9 +291,6 @@ mod tests {
                     }
                 }
             }
-        }
-        fn run_fused(self) {
-            self.run();
         }
     }
 

@@ -45,26 +45,26 @@ macro_rules! impl_linear {
             /// All components zero.
             #[inline(always)]
             pub fn zero() -> Self {
-                Self { $($field: crate::vector::Zero::zero()),* }
+                Self { $($field: crate::algebra::vector::Zero::zero()),* }
             }
             /// Each component times s.
             #[inline(always)]
             pub fn scale(self, s: S) -> Self {
-                Self { $($field: crate::vector::Scale::scale(self.$field, s)),* }
+                Self { $($field: crate::algebra::vector::Scale::scale(self.$field, s)),* }
             }
             /// self · s + o, fused where the instruction set has it.
             #[inline(always)]
             pub fn scale_add(self, s: S, o: Self) -> Self {
-                Self { $($field: crate::vector::Scale::scale_add(self.$field, s, o.$field)),* }
+                Self { $($field: crate::algebra::vector::Scale::scale_add(self.$field, s, o.$field)),* }
             }
         }
-        impl<S: Scalar> crate::vector::Zero for $type<S> {
+        impl<S: Scalar> crate::algebra::vector::Zero for $type<S> {
             #[inline(always)]
             fn zero() -> Self {
                 Self::zero()
             }
         }
-        impl<S: Scalar> crate::vector::Scale<S> for $type<S> {
+        impl<S: Scalar> crate::algebra::vector::Scale<S> for $type<S> {
             #[inline(always)]
             fn scale(self, s: S) -> Self {
                 self.scale(s)
@@ -74,7 +74,7 @@ macro_rules! impl_linear {
                 self.scale_add(s, o)
             }
         }
-        crate::vector::impl_lift!($type { $($field),* });
+        crate::algebra::vector::impl_lift!($type { $($field),* });
     };
 }
 pub(crate) use impl_linear;

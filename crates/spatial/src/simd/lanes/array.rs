@@ -1,17 +1,14 @@
 //! Lanes of a processor whose vectors we do not know: arrays, as the compiler sees fit. No level uses them; they are here so
 //! that code on lanes needs no second version.
 
-use super::{Element, Kernel, Lanes, Number, Register};
-use crate::block::Real;
+use super::{Element, Lanes, Register};
+use crate::scalar::number::Number;
+use crate::simd::kernel::Kernel;
 
-impl Real for f64 {
-    type Short = Lanes<Self, 4>;
-    type Long = Self::Short;
-}
-impl Real for f32 {
-    type Short = Lanes<Self, 8>;
-    type Long = Self::Short;
-}
+/// The widest vectors of `f64`.
+pub type LongF64 = Lanes<f64, 4>;
+/// The widest vectors of `f32`.
+pub type LongF32 = Lanes<f32, 8>;
 impl Element<4> for f64 {
     type Register = [Self; 4];
 }

@@ -1,9 +1,9 @@
 //! Inertias of rigid bodies, and of articulated ones.
 
-use crate::motion::{Force, Motion};
+use crate::algebra::motion::{Force, Motion};
+use crate::algebra::se3::{Act, Se3};
+use crate::algebra::vector::{Mat3, Sym3, Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
-use crate::se3::{Act, Se3};
-use crate::vector::{Mat3, Sym3, Vec3, impl_linear};
 use core::ops::Mul;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Dual numbers over lanes: derivatives in as many directions as there are lanes, or of as many states, in one pass.
 
-use crate::lanes::Kernel;
-use crate::scalar::{Constant, Scalar};
+use super::{Constant, Scalar};
+use crate::simd::kernel::Kernel;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// x + x′ε with ε² = 0, both vectors of numbers: lane by lane a value and its derivative.

@@ -1,18 +1,14 @@
 //! Lanes by NEON, which every 64-bit Arm has: two registers side by side, so that there is as much to do at once as with
 //! AVX2, and one source and one plan of limbs serve both.
 
-use super::{Element, Kernel, Lanes, Register, instructions, short};
-use crate::block::Real;
+use super::{Element, Lanes, Register, instructions};
+use crate::simd::kernel::{Kernel, short};
 use core::arch::aarch64::*;
 
-impl Real for f64 {
-    type Short = Lanes<Self, 4>;
-    type Long = Self::Short;
-}
-impl Real for f32 {
-    type Short = Lanes<Self, 8>;
-    type Long = Self::Short;
-}
+/// The widest vectors of `f64`.
+pub type LongF64 = Lanes<f64, 4>;
+/// The widest vectors of `f32`.
+pub type LongF32 = Lanes<f32, 8>;
 
 /// A mask is two vectors with all bits of a lane set or none.
 macro_rules! pair {

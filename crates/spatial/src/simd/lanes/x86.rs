@@ -1,19 +1,15 @@
 //! Lanes by AVX2 with FMA, and by AVX-512.
 
-use super::{Element, Kernel, Lanes, Register, instructions, short};
-use crate::block::Real;
+use super::{Element, Lanes, Register, instructions};
+use crate::simd::kernel::{Kernel, short};
 use core::arch::x86_64::*;
 
-impl Real for f64 {
-    type Short = Lanes<Self, 4>;
-    type Long = Lanes<Self, 8>;
-}
-impl Real for f32 {
-    type Short = Lanes<Self, 8>;
-    type Long = Lanes<Self, 16>;
-}
+/// The widest vectors of `f64`.
+pub type LongF64 = Lanes<f64, 8>;
+/// The widest vectors of `f32`.
+pub type LongF32 = Lanes<f32, 16>;
 
-/// Runs a kernel with the instructions of [`Level::Avx512`](crate::level::Level::Avx512).
+/// Runs a kernel with the instructions of [`Level::Avx512`](crate::simd::level::Level::Avx512).
 ///
 /// # Safety
 /// The processor must have them.

@@ -10,9 +10,10 @@
 //! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
 #![allow(unsafe_code)]
 
-use crate::block::Real;
-pub use crate::lanes::{Fused, Kernel};
-pub use crate::level::{Level, level};
+pub use crate::simd::fused::Fused;
+pub use crate::simd::kernel::Kernel;
+pub use crate::simd::level::{Level, level};
+use crate::simd::pack::Real;
 use core::any::TypeId;
 use core::mem::ManuallyDrop;
 
@@ -42,7 +43,7 @@ pub unsafe fn renamed<A, B>(a: A) -> B {
 }
 
 /// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
-/// [`gate`](crate::gate). It returns nothing: what it computes is in its arguments.
+/// [`gate`](crate::simd::gate). It returns nothing: what it computes is in its arguments.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! kernel {
@@ -51,7 +52,7 @@ macro_rules! kernel {
         #[inline]
         #[allow(unsafe_code, clippy::too_many_arguments)]
         $vis fn $name<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?>($($arg: $type),*) {
-            use $crate::gate::{Fused, Kernel, Level, Long, Short, is, level};
+            use $crate::simd::gate::{Fused, Kernel, Level, Long, Short, is, level};
 
             struct Work<T, Scalars>(T, ::core::marker::PhantomData<Scalars>);
             impl<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
@@ -85,7 +86,7 @@ macro_rules! kernel {
             }
             if chosen {
                 // SAFETY: R is f64, and S is this scalar, or f64 in place of `Fused`.
-                return unsafe { compiled($($crate::gate::renamed($arg)),*) };
+                return unsafe { compiled($($crate::simd::gate::renamed($arg)),*) };
             }
         }
     };

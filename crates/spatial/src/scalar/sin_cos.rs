@@ -5,8 +5,8 @@
 //! functions*, 1980), each but the last short enough that its product with n is exact; then a polynomial for each of the
 //! two, with the coefficients of Moshier's Cephes library. In `f64`, for |x| up to 1e5, the error is at most 2.3e-16.
 
-use crate::lanes::Number;
-use crate::scalar::Scalar;
+use super::Scalar;
+use super::number::Number;
 
 /// What a precision needs to know.
 struct Precision<const T: usize> {

@@ -1,9 +1,9 @@
 //! Poses, and how they act on motions, forces, inertias and points.
 
-use crate::lie::Quaternion;
-use crate::motion::{Force, Motion};
+use crate::algebra::motion::{Force, Motion};
+use crate::algebra::quaternion::Quaternion;
+use crate::algebra::vector::{Mat3, Vec3, impl_lift};
 use crate::scalar::{Constant, Scalar};
-use crate::vector::{Mat3, Vec3, impl_lift};
 use core::ops::Mul;
 use serde::{Deserialize, Serialize};
 

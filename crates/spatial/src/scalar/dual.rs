@@ -2,7 +2,7 @@
 //!
 //! The dual types nest: `Dual<Dual64>` carries second derivatives, and so on. A comparison looks at the real part.
 
-use crate::scalar::{Constant, Scalar};
+use super::{Constant, Scalar};
 use nalgebra::Const;
 use num_dual::{Dual, Dual2, Dual3, DualNum, DualVec, HyperDual, HyperHyperDual};
 

@@ -1,7 +1,7 @@
 //! Spatial vectors: motions (velocities, accelerations) and forces.
 
+use crate::algebra::vector::{Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
-use crate::vector::{Vec3, impl_linear};
 use serde::{Deserialize, Serialize};
 
 /// The cross product of spatial algebra, chosen by type: v × m of motions, v ×* f of a motion and a force.

@@ -1,10 +1,13 @@
 //! A single number that computes as a lane does.
 #![allow(unsafe_code)]
 
-use crate::block::Block;
-use crate::lanes::{Kernel, Lanes, Number, operators, short};
-use crate::level::{Level, level};
 use crate::scalar::Scalar;
+use crate::scalar::number::Number;
+use crate::scalar::operators::operators;
+use crate::simd::kernel::{Kernel, short};
+use crate::simd::lanes::{Element, Lanes};
+use crate::simd::level::{Level, level};
+use crate::simd::pack::Block;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// An `f64` whose products and sums are fused: what a lane is, alone.
@@ -135,5 +138,24 @@ impl Scalar for Fused {
     #[inline(always)]
     fn or(a: bool, b: bool) -> bool {
         a || b
+    }
+}
+
+impl<const N: usize> Lanes<f64, N>
+where
+    f64: Element<N>,
+{
+    /// Single numbers, one for each lane.
+    #[inline(always)]
+    pub fn from_fused(x: &[Fused; N]) -> Self {
+        // SAFETY: `Fused` is a transparent wrapper of `f64`.
+        Self::from_array(unsafe { *core::ptr::from_ref(x).cast() })
+    }
+    /// The single number in each lane.
+    #[inline(always)]
+    pub fn to_fused(self) -> [Fused; N] {
+        let x = self.to_array();
+        // SAFETY: as for `from_fused`.
+        unsafe { *core::ptr::from_ref(&x).cast() }
     }
 }
