@@ -19,8 +19,6 @@
 
 mod algebra;
 #[doc(hidden)]
-pub mod elementary;
-#[doc(hidden)]
 pub mod finite;
 mod scalar;
 #[doc(hidden)]
@@ -32,9 +30,9 @@ pub use algebra::motion::{Cross, Force, Motion};
 pub use algebra::quaternion::Quaternion;
 pub use algebra::se3::{Act, Se3};
 pub use algebra::vector::{Mat3, Sym3, Vec3};
-#[doc(hidden)]
-pub use scalar::lane_dual;
 pub use scalar::{Constant, Scalar};
+#[doc(hidden)]
+pub use scalar::{elementary, lane_dual};
 pub use simd::level;
 #[doc(hidden)]
 pub use simd::{gate, lanes, lanes::moves, pack as block};

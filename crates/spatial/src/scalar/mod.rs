@@ -1,6 +1,8 @@
 //! The numbers an algorithm can run on.
 
 mod dual;
+#[doc(hidden)]
+pub mod elementary;
 mod float;
 #[doc(hidden)]
 pub mod lane_dual;
