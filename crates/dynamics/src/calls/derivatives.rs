@@ -7,9 +7,9 @@ use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
 use crate::derivatives::centroidal_derivatives::{self as centroidal, CentroidalDerivatives, shift};
 use crate::derivatives::{aba_derivatives as aba, rnea_derivatives as rnea};
-use crate::lanes::limbs::Seen;
+use crate::lanes::limbs::LaneView;
 use crate::passes::energy::{self, EnergyDerivatives};
-use crate::passes::kinematics::{Placed, accelerations, positions, velocities};
+use crate::passes::kinematics::{PlacementCache, accelerations, positions, velocities};
 use crate::passes::{minv, statics};
 use condyle_linalg::check;
 use condyle_linalg::tree_product::minus_products;
@@ -150,9 +150,9 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
 /// What `pass` has left, body by body or in the limbs' lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
-    let in_limbs = data.world.placed == Placed::Limbs;
+    let in_limbs = data.world.placed == PlacementCache::Limbs;
     let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
-    let limbs = limbs.map(|(scratch, plan)| Seen::new(plan, scratch));
+    let limbs = limbs.map(|(scratch, plan)| LaneView::new(plan, scratch));
     let state = State { model, world: &data.world, pass: d, limbs };
     RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
 }

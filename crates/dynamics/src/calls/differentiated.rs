@@ -1,7 +1,7 @@
 //! The state at which inverse dynamics has been differentiated, with all that its passes have left of the bodies.
 
 use crate::derivatives::rnea_derivatives::Workspace;
-use crate::lanes::limbs::Seen;
+use crate::lanes::limbs::LaneView;
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
@@ -14,7 +14,7 @@ pub(crate) struct State<'d, S, R> {
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
     /// Where what there is of the bodies stands, if they were not computed one by one.
-    pub limbs: Option<Seen<'d>>,
+    pub limbs: Option<LaneView<'d>>,
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {

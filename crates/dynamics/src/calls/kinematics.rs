@@ -3,7 +3,7 @@
 use super::limbs::spread;
 use crate::data::Data;
 use crate::passes::frames::{Accelerations, Placements, Velocities};
-use crate::passes::kinematics::{Placed, accelerations, positions, velocities};
+use crate::passes::kinematics::{PlacementCache, accelerations, positions, velocities};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar};
@@ -26,10 +26,10 @@ impl<S: Scalar> Data<S> {
     /// If this was made for a model of another tree.
     pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
         self.check(model);
-        if self.world.placed == Placed::Limbs {
+        if self.world.placed == PlacementCache::Limbs {
             spread(model, self);
         }
-        (self.world.placed == Placed::Bodies).then_some(Placements { model, world: &self.world })
+        (self.world.placed == PlacementCache::Bodies).then_some(Placements { model, world: &self.world })
     }
 }
 

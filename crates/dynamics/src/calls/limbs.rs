@@ -6,14 +6,13 @@ use crate::derivatives::rnea_derivatives;
 use crate::lanes::limbs::lanes::{Limbs, numbers};
 use crate::lanes::limbs::pass::{Arguments, Scratch, load, scatter};
 use crate::lanes::limbs::{LANES, Plan};
-use crate::passes::kinematics::{Placed, World, place};
+use crate::passes::kinematics::{PlacementCache, World, place};
 use crate::passes::{aba, crba, rnea};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
-use condyle_spatial::block::Block;
-use condyle_spatial::gate::{Fused, Kernel, Level, Long, Short, is, level, renamed};
+use condyle_spatial::gate::{Fused, Level, is, level, renamed};
+use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Force, Mat3, Motion, Scalar, Se3, Vec3};
-use core::marker::PhantomData;
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -26,58 +25,84 @@ pub(crate) enum Task {
     AbaDerivatives,
 }
 
-/// A call of an algorithm.
-struct Call<'a, V> {
-    task: Task,
-    model: &'a Model,
-    plan: &'a Plan,
-    data: &'a mut Data<f64>,
-    arguments: Arguments<'a>,
-    /// The largest vector that there is.
-    vector: PhantomData<V>,
+register_kernel! {
+    /// τ by steps.
+    fn rnea_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, a: &[Fused], f_ext: bool, tau: &mut [Fused]) {
+        let l = Limbs::new(plan, model);
+        rnea::pass(&l, &mut s.world.sin_cos, &mut s.rnea, &s.q, &s.v, &s.x, given(f_ext, &s.f_ext));
+        scatter(plan, &s.rnea.tau, tau);
+        Single::<Fused, f64>::new(model).add_armature_torque(a, tau);
+    }
 }
 
-impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { task, model, plan, data, arguments, .. } = self;
-        let Some(scratch) = &mut data.limbs else { return };
-        load(plan, scratch, arguments);
-        let Scratch { q, v, x, f_ext, world, rnea, aba, IC, bodies, inverted, .. } = &mut **scratch;
-        let f_ext = if arguments.f_ext.is_empty() { &[] } else { &f_ext[..] };
-        let l = Limbs::new(plan, model);
-        if let Task::Rnea = task {
-            data.world.placed = Placed::Nowhere;
-            rnea::pass(&l, &mut world.sin_cos, rnea, q, v, x, f_ext);
-            let tau = Fused::of_mut(&mut data.rnea.tau);
-            scatter(plan, &rnea.tau, tau);
-            Single::<Fused, f64>::new(model).add_armature_torque(arguments.x, tau);
-            return;
-        }
-        place(&l, world, q);
-        data.world.placed = Placed::Limbs;
-        l.broadcast(&mut world.S);
-        if let Task::Crba = task {
-            crba::pass(&l, world, IC, Fused::of_mut(data.crba.M.as_mut_slice()));
-        }
-        if let Task::Minv = task {
-            aba::factorize(&l, world, aba);
-        }
-        if let Task::Aba | Task::AbaDerivatives = task {
-            aba::pass(&l, world, aba, v, x, f_ext);
-            scatter(plan, &aba.qdd, Fused::of_mut(&mut data.aba.qdd));
-        }
-        if let Task::Minv | Task::AbaDerivatives = task {
-            l.broadcast(&mut aba.D_inv);
-            let Minv = Fused::of_mut(data.minv.Minv.as_mut_slice());
-            inverted.inverse::<V>(&l, world, aba, &plan.columns.blocks, Minv);
-        }
-        if let Task::RneaDerivatives | Task::AbaDerivatives = task {
-            let matrices = data.rnea_derivatives.parts().1.map(Fused::of_mut);
-            let a = if let Task::AbaDerivatives = task { &aba.qdd } else { x };
-            rnea_derivatives::pass(&l, world, (bodies, matrices), v, a, f_ext, l.minus_gravity(), false);
-        }
+register_kernel! {
+    /// Arguments in lanes.
+    pub(super) fn load_steps<V>(plan: &Plan, s: &mut Scratch, arguments: Arguments<'_>) {
+        load(plan, s, arguments);
     }
+}
+
+register_kernel! {
+    /// Placements and columns of all steps.
+    pub(super) fn place_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
+        let l = Limbs::new(plan, model);
+        place(&l, &mut s.world, &s.q);
+        l.broadcast(&mut s.world.S);
+    }
+}
+
+register_kernel! {
+    /// M by steps that are placed.
+    fn crba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, M: &mut [Fused]) {
+        crba::pass(&Limbs::new(plan, model), &s.world, &mut s.IC, M);
+    }
+}
+
+register_kernel! {
+    /// The factors of the articulated bodies, by steps that are placed.
+    fn factorize_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
+        aba::factorize(&Limbs::new(plan, model), &s.world, &mut s.aba);
+    }
+}
+
+register_kernel! {
+    /// q̈ by steps that are placed.
+    fn aba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool, qdd: &mut [Fused]) {
+        aba::pass(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, given(f_ext, &s.f_ext));
+        scatter(plan, &s.aba.qdd, qdd);
+    }
+}
+
+register_kernel! {
+    /// M⁻¹ from the factors of the articulated bodies.
+    fn inverse_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, Minv: &mut [Fused]) {
+        let l = Limbs::new(plan, model);
+        l.broadcast(&mut s.aba.D_inv);
+        s.inverted.inverse::<V>(&l, &s.world, &s.aba, &plan.columns.blocks, Minv);
+    }
+}
+
+register_kernel! {
+    /// ∂τ/∂q, ∂τ/∂v and M by steps that are placed, at the acceleration that was given or, `after_aba`, at that found.
+    fn rnea_derivatives_by_steps<V>(
+        model: &Model,
+        plan: &Plan,
+        s: &mut Scratch,
+        after_aba: bool,
+        f_ext: bool,
+        matrices: [&mut [Fused]; 3],
+    ) {
+        let l = Limbs::new(plan, model);
+        let a = if after_aba { &s.aba.qdd } else { &s.x };
+        let f_ext = given(f_ext, &s.f_ext);
+        rnea_derivatives::pass(&l, &s.world, (&mut s.bodies, matrices), &s.v, a, f_ext, l.minus_gravity(), false);
+    }
+}
+
+/// The forces on all steps, or none.
+#[inline(always)]
+fn given<T>(some: bool, f_ext: &[T]) -> &[T] {
+    if some { f_ext } else { &[] }
 }
 
 /// The plan, where this model and `data` have limbs side by side, and the processor can.
@@ -108,12 +133,29 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// A task, compiled for the level.
+/// A task on arguments that fit.
 fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments: Arguments<'_>) {
-    if level() >= Level::Avx512 {
-        Long::enter(Call::<Long> { task, model, plan, data, arguments, vector: PhantomData }); // and twice the registers
-    } else {
-        Short::enter(Call::<Short> { task, model, plan, data, arguments, vector: PhantomData });
+    let Some(s) = data.limbs.as_deref_mut() else { return };
+    let f_ext = !arguments.f_ext.is_empty();
+    load_steps(plan, s, arguments);
+    if let Task::Rnea = task {
+        data.world.placed = PlacementCache::Nowhere;
+        return rnea_by_steps(model, plan, s, arguments.x, f_ext, Fused::of_mut(&mut data.rnea.tau));
+    }
+    place_steps(model, plan, s);
+    data.world.placed = PlacementCache::Limbs;
+    match task {
+        Task::Crba => crba_by_steps(model, plan, s, Fused::of_mut(data.crba.M.as_mut_slice())),
+        Task::Minv => factorize_by_steps(model, plan, s),
+        Task::Aba | Task::AbaDerivatives => aba_by_steps(model, plan, s, f_ext, Fused::of_mut(&mut data.aba.qdd)),
+        Task::Rnea | Task::RneaDerivatives => {}
+    }
+    if let Task::Minv | Task::AbaDerivatives = task {
+        inverse_by_steps(model, plan, s, Fused::of_mut(data.minv.Minv.as_mut_slice()));
+    }
+    if let Task::RneaDerivatives | Task::AbaDerivatives = task {
+        let matrices = data.rnea_derivatives.parts().1.map(Fused::of_mut);
+        rnea_derivatives_by_steps(model, plan, s, matches!(task, Task::AbaDerivatives), f_ext, matrices);
     }
 }
 
@@ -134,5 +176,5 @@ pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Dat
             columns[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));
         }
     }
-    *placed = Placed::Bodies;
+    *placed = PlacementCache::Bodies;
 }

@@ -1,76 +1,80 @@
 //! Dynamics under constraints with the limbs of a robot side by side.
 #![allow(unsafe_code)]
 
-use super::limbs::ready;
+use super::limbs::{load_steps, place_steps, ready};
 use crate::constraints::constrained_dynamics::Inputs;
-use crate::constraints::constraint_lanes::WIDE;
+use crate::constraints::constraint_lanes::{ConstraintLanes, WIDE};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::data::Data;
 use crate::lanes::limbs::Plan;
 use crate::lanes::limbs::forces::{Left, six};
 use crate::lanes::limbs::lanes::{Limbs, numbers, numbers_mut};
-use crate::lanes::limbs::pass::{Arguments, Scratch, load, scatter};
+use crate::lanes::limbs::pass::{Arguments, Scratch, scatter};
 use crate::passes::aba;
-use crate::passes::kinematics::{Placed, place};
+use crate::passes::kinematics::PlacementCache;
 use condyle_model::Model;
-use condyle_spatial::block::Block;
-use condyle_spatial::gate::{Fused, Kernel, Level, Long, Short, level, renamed};
+use condyle_spatial::gate::{Fused, renamed};
 use condyle_spatial::{Constant, Scalar};
-use core::marker::PhantomData;
+use condyle_spatial::{kernel, register_kernel};
 
-/// A call of the algorithm.
-struct Call<'a, V> {
-    model: &'a Model,
-    plan: &'a Plan,
-    data: &'a mut Data<f64>,
-    set: &'a mut ConstraintSet<Fused>,
-    arguments: Arguments<'a>,
-    /// The largest vector that there is.
-    vector: PhantomData<V>,
+register_kernel! {
+    /// The articulated bodies, for steps that are placed.
+    fn articulate<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool) {
+        let f_ext = if f_ext { &s.f_ext[..] } else { &[] };
+        aba::inward(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, f_ext);
+    }
 }
 
-impl<V: Block<Number = f64>> Call<'_, V> {
-    /// With `WIDE` rows in N vectors.
-    #[inline(always)]
-    fn by<const N: usize>(self) {
-        let Self { model, plan, data, set, arguments, .. } = self;
-        let (Some(scratch), Some(mut held)) = (&mut data.limbs, set.limbs.take()) else { return };
-        load(plan, scratch, arguments);
-        let Scratch { q, v, x, f_ext, world, aba, .. } = &mut **scratch;
-        let f_ext = if arguments.f_ext.is_empty() { &[] } else { &f_ext[..] };
-        let l = Limbs::new(plan, model);
-        place(&l, world, q);
-        data.world.placed = Placed::Limbs;
-        aba::inward(&l, world, aba, v, x, f_ext);
-        held.carry::<V, N>(Left::new(plan, model, world, aba), set);
+register_kernel! {
+    /// J, J M⁻¹ Jᵀ, and −(J q̈ + γ) for λ = 0 in place of λ.
+    fn carry_forces<V>(
+        model: &Model,
+        plan: &Plan,
+        s: &Scratch,
+        lanes: &mut ConstraintLanes,
+        set: &mut ConstraintSet<Fused>,
+    ) {
+        let left = Left::new(plan, model, &s.world, &s.aba);
+        if V::LANES == WIDE { lanes.carry::<V, 1>(left, set) } else { lanes.carry::<V, 2>(left, set) }
         for r in 0..set.lambda.len() {
-            set.lambda[r] = Fused(-held.all.x[r]);
+            set.lambda[r] = Fused(-lanes.all.x[r]);
         }
+    }
+}
+
+kernel! {
+    /// λ from J M⁻¹ Jᵀ.
+    fn decompose<S>(set: &mut ConstraintSet<S>) {
         set.delassus.decompose(set.proximal, &mut set.lambda);
+    }
+}
+
+register_kernel! {
+    /// q̈ and J q̈ + γ for λ.
+    fn accelerate<V>(
+        model: &Model,
+        plan: &Plan,
+        s: &mut Scratch,
+        lanes: &mut ConstraintLanes,
+        set: &mut ConstraintSet<Fused>,
+        qdd: &mut [Fused],
+    ) {
         for r in 0..set.lambda.len() {
-            held.all.x[r] = set.lambda[r].0;
+            lanes.all.x[r] = set.lambda[r].0;
         }
         // SAFETY: these are vectors.
-        held.push(plan, &set.plans, unsafe { numbers_mut(&mut aba.u) });
-        aba::outward(&l, world, aba);
-        scatter(plan, &aba.qdd, Fused::of_mut(&mut data.constrained_dynamics.qdd));
+        lanes.push(plan, &set.plans, unsafe { numbers_mut(&mut s.aba.u) });
+        aba::outward(&Limbs::new(plan, model), &s.world, &mut s.aba);
+        scatter(plan, &s.aba.qdd, qdd);
         // SAFETY: motions are made of vectors.
-        let a = unsafe { numbers(&aba.a) };
-        for (of, constraint) in held.rows.iter().zip(&set.plans) {
+        let a = unsafe { numbers(&s.aba.a) };
+        for (of, constraint) in lanes.rows.iter().zip(&set.plans) {
             let [one, other] = constraint.bodies;
             let error = of.error([six(a, plan.place(one)), six(a, plan.place(other))]);
             for r in 0..constraint.rows() {
                 set.error[constraint.row + r] = Fused(error[r]);
             }
         }
-        set.limbs = Some(held);
-    }
-}
-
-impl<V: Block<Number = f64>> Kernel for Call<'_, V> {
-    #[inline(always)]
-    fn run(self) {
-        if V::LANES == WIDE { self.by::<1>() } else { self.by::<2>() }
     }
 }
 
@@ -89,11 +93,15 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// The call, compiled for the level.
+/// The call, for arguments that fit.
 fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintSet<Fused>, arguments: Arguments<'_>) {
-    if level() >= Level::Avx512 {
-        Long::enter(Call::<Long> { model, plan, data, set, arguments, vector: PhantomData }); // and twice the registers
-    } else {
-        Short::enter(Call::<Short> { model, plan, data, set, arguments, vector: PhantomData });
-    }
+    let (Some(s), Some(mut lanes)) = (data.limbs.as_deref_mut(), set.limbs.take()) else { return };
+    load_steps(plan, s, arguments);
+    place_steps(model, plan, s);
+    data.world.placed = PlacementCache::Limbs;
+    articulate(model, plan, s, !arguments.f_ext.is_empty());
+    carry_forces(model, plan, s, &mut lanes, set);
+    decompose(set);
+    accelerate(model, plan, s, &mut lanes, set, Fused::of_mut(&mut data.constrained_dynamics.qdd));
+    set.limbs = Some(lanes);
 }

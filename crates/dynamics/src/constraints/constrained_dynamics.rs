@@ -11,7 +11,7 @@
 //! Source: Udwadia and Kalaba, *A new perspective on constrained motion* (1992); Carpentier, Budhiraja, Mansard, *Proximal
 //! and sparse resolution of constrained dynamic equations* (2021).
 
-use crate::constraints::constraint_motion::Ends;
+use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::crba;
 use crate::passes::kinematics::World;
@@ -199,7 +199,7 @@ kernel! {
     pub(crate) fn constrain<S>(world: &World<S>, d: &Workspace<S>, set: &mut ConstraintSet<S>) {
         for (i, plan) in set.plans.iter().enumerate() {
             let target = &set.targets[i];
-            let ends = Ends::new(plan, target, world, &d.v, &d.a);
+            let ends = FramePair::new(plan, target, world, &d.v, &d.a);
             ends.jacobian(plan, &world.S, &mut set.J);
             let gamma = ends.acceleration(plan, target).to_array();
             for r in 0..plan.rows() {

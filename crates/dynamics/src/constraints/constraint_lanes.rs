@@ -54,7 +54,7 @@ pub(crate) struct All {
 
 /// The constraints of a set.
 #[derive(Clone, Debug)]
-pub(crate) struct Held {
+pub(crate) struct ConstraintLanes {
     pub(crate) rows: Vec<Rows>,
     /// Y and Y D⁻¹. Shape: places of each constraint × its width. Written by: `carry`.
     pub(crate) Y: Vec<f64>,
@@ -62,7 +62,7 @@ pub(crate) struct Held {
     pub(crate) all: All,
 }
 
-impl Held {
+impl ConstraintLanes {
     /// For a robot with limbs on which no joint follows another.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>, plans: &[Plan]) -> Option<Box<Self>> {
         if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() {

@@ -27,7 +27,7 @@ use nalgebra::DMatrix;
 
 /// Where the two frames of a constraint are and how their bodies move, in the world's frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ends<S> {
+pub(crate) struct FramePair<S> {
     /// ₀X₁: the frame.
     pub x1: Se3<S>,
     /// ₀X₂: the target in the other frame.
@@ -68,7 +68,7 @@ fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
     Motion::new(w.cross(m.linear), w.cross(m.angular))
 }
 
-impl<S: Scalar> Ends<S> {
+impl<S: Scalar> FramePair<S> {
     /// Of bodies in these poses, at rest.
     #[inline(always)]
     pub(crate) fn between(plan: &Plan, target: &Target<S>, [one, other]: [Se3<S>; 2]) -> Self {

@@ -5,9 +5,9 @@
 //! of J are stored on these coordinates alone.
 
 use crate::constraints::constraint::{Constraint, Target};
-use crate::constraints::constraint_lanes::Held;
+use crate::constraints::constraint_lanes::ConstraintLanes;
 use crate::constraints::delassus::Delassus;
-use crate::constraints::plan::{Plan, Proximal, Touch, common};
+use crate::constraints::plan::{Plan, Proximal, SupportColumn, common};
 use condyle_linalg::Ltdl;
 use condyle_linalg::elimination_tree::NONE;
 use condyle_linalg::sparsity::NonzeroRows;
@@ -67,7 +67,7 @@ pub struct ConstraintSet<S> {
     pub(crate) dlambda_dv: DMatrix<S>,
     pub(crate) dlambda_dtau: DMatrix<S>,
     /// Of single calls on robots with limbs.
-    pub(crate) limbs: Option<Box<Held>>,
+    pub(crate) limbs: Option<Box<ConstraintLanes>>,
 }
 
 impl<S: Scalar> ConstraintSet<S> {
@@ -105,7 +105,7 @@ impl<S: Scalar> ConstraintSet<S> {
             let columns: BTreeSet<usize> = bodies.iter().flat_map(|&body| support(body)).copied().collect();
             let touch = |column: usize| {
                 let c = &model.columns()[column];
-                Touch {
+                SupportColumn {
                     column,
                     at: places.binary_search(&place[c.coordinate]).expect("its place is on the way"),
                     coordinate: c.coordinate,
@@ -171,7 +171,7 @@ impl<S: Scalar> ConstraintSet<S> {
             dlambda_dq: wide.clone(),
             dlambda_dv: wide.clone(),
             dlambda_dtau: wide,
-            limbs: Held::new::<S, R>(model, &plans),
+            limbs: ConstraintLanes::new::<S, R>(model, &plans),
             plans,
         })
     }

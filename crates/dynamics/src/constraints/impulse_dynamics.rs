@@ -15,7 +15,7 @@
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
 //! ```
 
-use crate::constraints::constraint_motion::Ends;
+use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
@@ -57,7 +57,7 @@ kernel! {
     /// J and γ = (1 + ε) J v, for bodies that are placed.
     pub(crate) fn approach<S>(world: &World<S>, set: &mut ConstraintSet<S>, d: &mut Workspace<S>, v: &[S], restitution: S) {
         for (i, plan) in set.plans.iter().enumerate() {
-            Ends::at_rest(plan, &set.targets[i], world).jacobian(plan, &world.S, &mut set.J);
+            FramePair::at_rest(plan, &set.targets[i], world).jacobian(plan, &world.S, &mut set.J);
         }
         for k in 0..v.len() {
             d.w[k] = v[k].mul_add(restitution, v[k]); // (1 + ε) v
@@ -80,7 +80,7 @@ kernel! {
         spread(&Single::new(model), world, d);
         set.dgamma_dq.as_mut_slice().fill(S::zero());
         for (plan, target) in set.plans.iter().zip(&set.targets) {
-            let ends = Ends::new(plan, target, world, &d.velocity, &d.velocity);
+            let ends = FramePair::new(plan, target, world, &d.velocity, &d.velocity);
             let value = &set.error[plan.row..plan.row + plan.rows()];
             ends.velocity_derivative(plan, &world.S, &d.Psid, value, &mut set.dgamma_dq);
         }

@@ -13,7 +13,7 @@
 //! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
 
 use crate::constraints::constraint::ConstraintKind;
-use crate::constraints::constraint_motion::{Columns, Ends};
+use crate::constraints::constraint_motion::{Columns, FramePair};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::derivatives::rnea_derivatives;
 use crate::passes::frames::Placements;
@@ -26,7 +26,7 @@ use nalgebra::DMatrix;
 impl<S: Scalar> ConstraintSet<S> {
     /// The force λ of constraint i along the axes of its frame.
     #[inline(always)]
-    fn local_force(&self, i: usize, ends: &Ends<S>) -> Force<S> {
+    fn local_force(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
         let f = self.force(i);
         if self.plans[i].aligned() {
             let R = ends.x1.rotation;
@@ -37,7 +37,7 @@ impl<S: Scalar> ConstraintSet<S> {
 
     /// The force on the other body, its sign turned, in the world's frame.
     #[inline(always)]
-    fn reaction(&self, i: usize, ends: &Ends<S>) -> Force<S> {
+    fn reaction(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
         let f = self.local_force(i, ends);
         match self.plans[i].kind {
             ConstraintKind::Rigid => ends.x1.act(f),
@@ -54,7 +54,7 @@ impl<S: Scalar> ConstraintSet<S> {
         forces.fill(Force::zero());
         forces[..f_ext.len()].copy_from_slice(f_ext);
         for (i, plan) in self.plans.iter().enumerate() {
-            let ends = Ends::at_rest(plan, &self.targets[i], world);
+            let ends = FramePair::at_rest(plan, &self.targets[i], world);
             forces[plan.bodies[0]] += plan.placements[0].lift().act(self.local_force(i, &ends));
             let oXb = Placements { model, world }.body(plan.bodies[1]);
             forces[plan.bodies[1]] -= oXb.act_inv(self.reaction(i, &ends));
@@ -66,7 +66,7 @@ impl<S: Scalar> ConstraintSet<S> {
     fn add_turning(&self, world: &World<S>, r: &mut DMatrix<S>) {
         for (i, plan) in self.plans.iter().enumerate() {
             if plan.bodies[1] > 0 {
-                let ends = Ends::at_rest(plan, &self.targets[i], world);
+                let ends = FramePair::at_rest(plan, &self.targets[i], world);
                 let f = self.reaction(i, &ends);
                 for e in &plan.touches {
                     if e.first == e.second {
@@ -139,7 +139,7 @@ kernel! {
         dgamma_dq.as_mut_slice().fill(S::zero());
         dgamma_dv.as_mut_slice().fill(S::zero());
         for (plan, target) in plans.iter().zip(targets.iter()) {
-            let ends = Ends::new(plan, target, world, v, a);
+            let ends = FramePair::new(plan, target, world, v, a);
             let error = &error[plan.row..plan.row + plan.rows()];
             ends.acceleration_derivatives(plan, target, columns, error, dgamma_dq, dgamma_dv);
         }

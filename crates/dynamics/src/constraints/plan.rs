@@ -33,7 +33,7 @@ impl Default for Proximal {
 
 /// A degree of freedom that moves a frame of a constraint.
 #[derive(Clone, Debug)]
-pub(crate) struct Touch {
+pub(crate) struct SupportColumn {
     /// The joint's column.
     pub column: usize,
     /// Where its coordinate stands among the constraint's.
@@ -65,7 +65,7 @@ pub(crate) struct Plan {
     /// How many places both ways share, and where the second way goes on.
     pub shared: usize,
     pub second: usize,
-    pub touches: Vec<Touch>,
+    pub touches: Vec<SupportColumn>,
     /// Where its rows begin in an array with an entry for each place of each row.
     pub start: usize,
     /// For each constraint up to this one, the runs of places that both touch: where here, where there, how many.

@@ -37,7 +37,7 @@ const WIDTH: usize = 6 + 6 + 1 + 6;
 
 /// A piece between two handles.
 #[derive(Clone, Debug)]
-pub(crate) struct TwoHandles<S> {
+pub(crate) struct ArticulatedPair<S> {
     /// The body below in the frame of the body above.
     pub X: Se3<S>,
     /// The velocity of the body below relative to the body above, in that frame.
@@ -60,7 +60,7 @@ pub(crate) struct TwoHandles<S> {
     e: Motion<S>,
 }
 
-impl<S: Scalar> TwoHandles<S> {
+impl<S: Scalar> ArticulatedPair<S> {
     /// Nothing between two handles that are the same body.
     pub(crate) fn nothing() -> Self {
         Self {

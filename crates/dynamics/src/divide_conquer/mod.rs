@@ -3,9 +3,9 @@
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
 //! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999). The robot is cut in two
 //! at a joint, each half again, and so on (`assembly.rs`); two pieces that are known at their handles make one that is
-//! (`two_handles.rs`), and from the whole the accelerations and forces at the cuts follow, down to each joint. Positions
+//! (`articulated_pair.rs`), and from the whole the accelerations and forces at the cuts follow, down to each joint. Positions
 //! and velocities are found the same way, so no pass waits for a chain of bodies. All joints may have armature and any
-//! number of degrees of freedom. Joints that share a coordinate are set free, and tied again afterwards (`ties.rs`).
+//! number of degrees of freedom. Joints that share a coordinate are set free, and tied again afterwards (`mimic.rs`).
 
 mod articulated_pair;
 pub(crate) mod assembly;
@@ -13,7 +13,7 @@ mod mimic;
 mod scratch;
 
 use crate::data::check_forces;
-use crate::divide_conquer::articulated_pair::TwoHandles;
+use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::divide_conquer::mimic::Ties;
 use crate::divide_conquer::scratch::{Body, Dof, Part};
@@ -56,7 +56,7 @@ pub struct DivideConquer<S> {
     /// In the order of the assembly. Shape: degrees of freedom of all joints.
     dofs: Vec<Dof<S>>,
     /// Shape: pieces. Written by: `relate`, `assemble`.
-    handles: Vec<TwoHandles<S>>,
+    handles: Vec<ArticulatedPair<S>>,
     ties: Ties<S>,
     /// Zeros. Shape: nv. Written by: nobody.
     zero: Vec<S>,
@@ -90,7 +90,7 @@ impl<S: Scalar> DivideConquer<S> {
             tree: model.tree_hash(),
             bodies: vec![body; assembly.links.len()],
             dofs: vec![dof; model.columns().len()],
-            handles: vec![TwoHandles::nothing(); assembly.pieces.len()],
+            handles: vec![ArticulatedPair::nothing(); assembly.pieces.len()],
             ties: Ties::new(model, &assembly.links),
             zero: vec![S::zero(); model.nv()],
             qdd: vec![S::zero(); model.nv()],
@@ -281,7 +281,7 @@ impl<L: Layout + Sync> Job<'_, L> {
             }
             Kind::Join => {
                 let (mut upper, mut lower) = rest.split();
-                let TwoHandles { X, w, .. } = &upper.handles[0];
+                let ArticulatedPair { X, w, .. } = &upper.handles[0];
                 let (oX2, v2) = (oX * *X, v + oX.act(*w)); // of the last body of the upper piece
                 let v2 = Se3::new(Mat3::identity(), oX2.translation).act_inv(v2); // seen from its origin
                 let oX2 = Se3::new(oX2.rotation, Vec3::zero());
@@ -324,7 +324,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         link: Link,
         body: &Body<L::S>,
         dofs: &mut [Dof<L::S>],
-        handle: &mut TwoHandles<L::S>,
+        handle: &mut ArticulatedPair<L::S>,
     ) -> (ArticulatedInertia<L::S>, Force<L::S>) {
         let nv = self.l.joint(link.body).nv();
         let (mut Ia, mut pa) = (body.IA, body.pA);

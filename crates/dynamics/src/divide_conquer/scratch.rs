@@ -1,7 +1,7 @@
 //! The scratch of the divide-and-conquer algorithm, in the order of the assembly, so that a piece is a slice of it and two
 //! pieces are two slices, which two threads may have.
 
-use crate::divide_conquer::articulated_pair::TwoHandles;
+use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Kind, Link, Piece};
 use condyle_spatial::{ArticulatedInertia, Force, Motion, Se3};
 
@@ -29,7 +29,7 @@ pub(crate) struct Body<S> {
 pub(crate) struct Dof<S> {
     /// Effort. Written by: `aba` and `run`.
     pub tau: S,
-    /// Armature, and in a robot whose joints were set free the rotor of `ties.rs`. Written by: `aba` and `add_rotors`.
+    /// Armature, and in a robot whose joints were set free the rotor of `mimic.rs`. Written by: `aba` and `add_rotors`.
     pub rotor: S,
     /// Written by: `place`.
     pub S: Motion<S>,
@@ -49,7 +49,7 @@ pub(crate) struct Part<'d, S> {
     pub links: &'d [Link],
     pub bodies: &'d mut [Body<S>],
     pub dofs: &'d mut [Dof<S>],
-    pub handles: &'d mut [TwoHandles<S>],
+    pub handles: &'d mut [ArticulatedPair<S>],
 }
 
 impl<'d, S> Part<'d, S> {
@@ -96,5 +96,5 @@ pub(crate) struct Own<'d, S> {
     pub links: &'d [Link],
     pub bodies: &'d mut [Body<S>],
     pub dofs: &'d mut [Dof<S>],
-    pub handle: &'d mut TwoHandles<S>,
+    pub handle: &'d mut ArticulatedPair<S>,
 }

@@ -20,12 +20,12 @@ pub(crate) struct World<S> {
     /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
     pub S: Vec<Motion<S>>,
     /// Where the last call has placed the bodies. Written by: `place`, by `rnea`, and by limbs.
-    pub placed: Placed,
+    pub placed: PlacementCache,
 }
 
 /// Where the bodies' placements stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Placed {
+pub(crate) enum PlacementCache {
     /// They were not computed.
     Nowhere,
     /// Body by body.
@@ -40,7 +40,7 @@ impl<S: Scalar> World<S> {
             sin_cos: JointSinCos::new(size.bodies),
             oX: filled(Se3::identity(), size.bodies),
             S: filled(Motion::zero(), size.columns),
-            placed: Placed::Nowhere,
+            placed: PlacementCache::Nowhere,
         }
     }
 }
@@ -48,7 +48,7 @@ impl<S: Scalar> World<S> {
 /// oXi = oXλ λXi, and the columns of S, for all bodies.
 #[inline(always)]
 pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
-    *placed = Placed::Bodies;
+    *placed = PlacementCache::Bodies;
     Joint::sin_cos(l, q, sin_cos);
     for i in l.bodies() {
         oX[i] = l.parent(oX, i) * Joint::placement_with(l, i, q, sin_cos.sin[i], sin_cos.cos[i]); // oXi = oXλ λXi

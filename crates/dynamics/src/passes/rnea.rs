@@ -5,7 +5,7 @@
 //! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
 //! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
 
-use crate::passes::kinematics::{Placed, World};
+use crate::passes::kinematics::{PlacementCache, World};
 use crate::workspace::{Size, filled};
 use condyle_model::Model;
 use condyle_model::joint::kinematics::JointSinCos;
@@ -119,7 +119,7 @@ kernel! {
         a: &[S],
         f_ext: &[Force<S>],
     ) {
-        world.placed = Placed::Nowhere;
+        world.placed = PlacementCache::Nowhere;
         pass(&Single::new(model), &mut world.sin_cos, d, q, v, a, f_ext);
     }
 }

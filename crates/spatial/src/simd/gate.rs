@@ -8,6 +8,8 @@
 //! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same 64 bits
 //!   under another name;
 //! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
+//!
+//! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one state.
 #![allow(unsafe_code)]
 
 pub use crate::simd::fused::Fused;
@@ -91,6 +93,36 @@ macro_rules! kernel {
         }
     };
 }
+/// A function on `f64` whose body is generic over the vector registers `V` that it may use: the widest of the level, compiled
+/// for them in the crate that owns it. It is for levels that have registers, above the baseline, and returns nothing.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! register_kernel {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident<$V:ident>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+        $(#[$doc])*
+        #[allow(clippy::too_many_arguments)]
+        $vis fn $name($($arg: $type),*) {
+            use $crate::simd::gate::{Kernel, Level, Long, Short, level};
+
+            struct Work<T, V>(T, ::core::marker::PhantomData<V>);
+            impl<$V: $crate::simd::pack::Block<Number = f64>> Kernel for Work<($($type,)*), $V> {
+                #[inline(always)]
+                fn run(self) {
+                    let Work(($($arg,)*), _) = self;
+                    $body
+                }
+            }
+
+            let work = ($($arg,)*);
+            if level() >= Level::Avx512 {
+                <Long as $crate::Scalar>::enter(Work::<_, Long>(work, ::core::marker::PhantomData));
+            } else {
+                <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
+            }
+        }
+    };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

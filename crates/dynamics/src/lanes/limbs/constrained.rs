@@ -19,8 +19,8 @@ use super::forces::Left;
 use super::lanes::Four;
 use super::{LANES, Plan};
 use crate::constraints::constraint::ConstraintKind;
-use crate::constraints::constraint_lanes::{All, Held, WIDE};
-use crate::constraints::constraint_motion::Ends;
+use crate::constraints::constraint_lanes::{All, ConstraintLanes, WIDE};
+use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::plan::Plan as Constraint;
 use condyle_spatial::block::Block;
@@ -38,7 +38,7 @@ fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
     moves::sum(sum)
 }
 
-impl Held {
+impl ConstraintLanes {
     /// J, J M⁻¹ Jᵀ, and J q̈ + γ for λ = 0.
     #[inline(always)]
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
@@ -51,7 +51,7 @@ impl Held {
         for (k, of) in rows.iter_mut().enumerate() {
             let (plan, target) = (&set.plans[k], &set.targets[k]);
             let [one, other] = plan.bodies;
-            let mut ends = Ends::between(plan, target, [left.pose(one), left.pose(other)]);
+            let mut ends = FramePair::between(plan, target, [left.pose(one), left.pose(other)]);
             ends.v = [left.velocity(one), left.velocity(other)];
             of.begin(plan, &ends, ends.acceleration(plan, target).to_array());
             match plan.kind {

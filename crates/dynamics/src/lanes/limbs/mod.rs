@@ -3,9 +3,9 @@
 mod constrained;
 pub(crate) mod forces;
 mod inverse;
+mod lane_view;
 pub(crate) mod lanes;
 pub(crate) mod pass;
-mod seen;
 
 pub(crate) use condyle_model::limbs::{LANES, Plan};
-pub(crate) use seen::Seen;
+pub(crate) use lane_view::LaneView;

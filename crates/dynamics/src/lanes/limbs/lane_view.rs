@@ -8,12 +8,12 @@ use condyle_spatial::{Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
 /// Of the derivatives of inverse dynamics.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen<'d> {
+pub(crate) struct LaneView<'d> {
     plan: &'d Plan,
     scratch: &'d Scratch,
 }
 
-impl<'d> Seen<'d> {
+impl<'d> LaneView<'d> {
     pub(crate) fn new(plan: &'d Plan, scratch: &'d Scratch) -> Self {
         Self { plan, scratch }
     }
