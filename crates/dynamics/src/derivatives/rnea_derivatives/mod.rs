@@ -52,7 +52,7 @@ pub(crate) struct Bodies<S> {
     pub Psidd: Vec<Motion<S>>,
     /// Ψ̇ + Ṡ. Shape: columns. Written by: `pass`.
     pub PsidSd: Vec<Motion<S>>,
-    /// Written by: `pass`, for `side_by_side`.
+    /// Written by: `pass`, for `vectorized`.
     pub rows: Rows<S>,
 }
 
