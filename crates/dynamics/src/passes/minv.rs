@@ -9,6 +9,7 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::Ltdl;
+use condyle_linalg::axpy::axpy;
 use condyle_model::Model;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
@@ -56,14 +57,6 @@ impl<S> Workspace<S> {
 
     pub(crate) fn matrix(&self) -> &DMatrix<S> {
         &self.Minv
-    }
-}
-
-/// y += x s, entry by entry.
-#[inline(always)]
-fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
-    for (y, &x) in y.iter_mut().zip(x) {
-        *y = x.mul_add(s, *y);
     }
 }
 
