@@ -27,51 +27,7 @@ use crate::lq::{LqKnot, LqNode};
 use crate::riccati::Work;
 use crate::structure::EulerBlock;
 use crate::vector::Vector;
-
-/// Rows of numbers over (w, δv, δq), with zeros up to their stride, and for each which blocks are not zero.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Rows {
-    pub(crate) numbers: Vec<f64>,
-    pub(crate) masks: Vec<u64>,
-}
-
-impl Rows {
-    /// Makes it so many rows; allocates only where there were never so many.
-    pub(crate) fn resize(&mut self, rows: usize, stride: usize) {
-        self.numbers.resize(rows * stride, 0.0);
-        self.masks.resize(rows, 0);
-    }
-
-    /// Notes which blocks are not zero.
-    #[inline(always)]
-    pub(crate) fn mark(&mut self, stride: usize) {
-        for (to, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
-            *to = mask(row);
-        }
-    }
-}
-
-/// Which blocks of a row are not zero.
-#[inline(always)]
-pub(crate) fn mask(row: &[f64]) -> u64 {
-    let (wide, mut mask) = (block(row.len()) / 8, 0);
-    let (eights, rest) = row.as_chunks::<8>();
-    for (k, x) in eights.iter().enumerate() {
-        let mut bits = 0;
-        for i in 0..8 {
-            bits |= x[i].to_bits() << 1; // all but the sign
-        }
-        mask |= u64::from(bits != 0) << (k / wide);
-    }
-    let rest = rest.iter().any(|x| *x != 0.0);
-    mask | u64::from(rest) << (eights.len() / wide)
-}
-
-/// How many columns one bit of a mask stands for.
-#[inline(always)]
-pub(crate) fn block(stride: usize) -> usize {
-    8 * stride.div_ceil(8 * 64)
-}
+use condyle_linalg::{SparseRows, block};
 
 /// A knot's rows; see the head of the file. `r`, `q` and the part of `Q` for δq are those of the node; of its `A`, `B`, `S`
 /// and `R` nothing is used.
@@ -88,11 +44,11 @@ pub(crate) struct Implicit {
     /// The other coordinates.
     pub(crate) dependent: Vec<usize>,
     /// U.
-    pub(crate) efforts: Rows,
+    pub(crate) efforts: SparseRows,
     /// D, a row for each dependent coordinate.
-    pub(crate) steps: Rows,
+    pub(crate) steps: SparseRows,
     /// G, and a′ and a″.
-    pub(crate) costs: Rows,
+    pub(crate) costs: SparseRows,
     pub(crate) slopes: Vec<[f64; 2]>,
     /// The diagonals of Q for δv and of R, one after the other.
     pub(crate) diagonal: Vec<f64>,

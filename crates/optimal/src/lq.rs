@@ -2,8 +2,9 @@
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use crate::error::assert_length;
-use crate::implicit::Implicit;
-use crate::structure::{EulerBlock, LARGEST_BLOCK, Structure};
+pub(crate) use crate::implicit::Implicit;
+pub(crate) use crate::structure::LARGEST_BLOCK;
+use crate::structure::{EulerBlock, Structure};
 use nalgebra::{DMatrix, DVector};
 
 /// Beyond this a value has diverged and the sweep or the trial is given up.
