@@ -1,4 +1,4 @@
-//! The equations of a knot in contact, solved for what is not chosen: see [`implicit`](crate::implicit).
+//! The equations of a knot in contact, solved for what is not chosen: see [`Implicit`].
 //!
 //! Changes of accelerations a and forces f satisfy
 //!
@@ -16,9 +16,8 @@
 
 use super::quadratic::Row;
 use super::watch::{Signal, Slopes};
-use crate::dense::{SLACK, copy_scaled, max_abs};
-use crate::implicit::{Implicit, Rows, block, mask};
-use crate::vector::{Dense, Vector, at_level};
+use crate::lq::Implicit;
+use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, block, copy_scaled, mask, max_abs};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
 const PREFERENCE: f64 = 1e-2;
@@ -61,7 +60,7 @@ pub(super) struct Elimination {
     /// Runs of columns that are unknowns: the first column, the first unknown, how many.
     runs: Vec<[usize; 3]>,
     /// The forces that are not unknowns, over (w, δv, δq).
-    forces: Rows,
+    forces: SparseRows,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +87,7 @@ impl Elimination {
             pivots: Vec::with_capacity(rows + passive),
             place: vec![Place::Unknown(0); nv + rows],
             runs: Vec::with_capacity(nv + rows),
-            forces: Rows::default(),
+            forces: SparseRows::default(),
         }
     }
 
@@ -163,9 +162,9 @@ fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
     }
 }
 
-impl Dense for Run<'_> {
+impl Vectorized for Run<'_> {
     #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
+    fn run<V: Vector>(self) {
         let Self { elimination: e, T, dt, implicit, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
         let (solved, all) = (rows + e.passive, rows + nv);
@@ -276,7 +275,7 @@ pub(super) struct Unknowns<'a> {
 
 impl Unknowns<'_> {
     /// g += c times row k of some rows.
-    fn add(&self, rows: &Rows, k: usize, c: f64, g: &mut Row<'_>) {
+    fn add(&self, rows: &SparseRows, k: usize, c: f64, g: &mut Row<'_>) {
         let row = &rows.numbers[k * self.implicit.stride..];
         let (u, x) = row.split_at(g.u.len());
         let (v, q) = x.split_at(g.v.len());

@@ -3,9 +3,9 @@
 
 use super::integrated::{ContinuousModel, Derivatives};
 use super::limits::limit_term;
-use crate::lq::LqNode;
-use crate::structure::{EulerBlock, LARGEST_BLOCK};
-use crate::vector::{Dense, Vector, at_level};
+use crate::EulerBlock;
+use crate::lq::{LARGEST_BLOCK, LqNode};
+use condyle_linalg::{Vector, Vectorized, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -126,9 +126,9 @@ fn write_blocks<M: ContinuousModel>(
 /// Derivatives of accelerations, nv numbers a column, become those of steps: [a Δt²; a Δt].
 struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
 
-impl<const N: usize> Dense for Steps<'_, N> {
+impl<const N: usize> Vectorized for Steps<'_, N> {
     #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
+    fn run<V: Vector>(self) {
         let Self(parts, nv, dt) = self;
         for (from, to) in parts {
             for (column, a) in to.chunks_exact_mut(2 * nv).zip(from.chunks_exact(nv)) {
@@ -150,9 +150,9 @@ struct Blocks<'a> {
     rows: usize,
 }
 
-impl Dense for Blocks<'_> {
+impl Vectorized for Blocks<'_> {
     #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
+    fn run<V: Vector>(self) {
         let Self { E, group, X, rows } = self;
         let (start, size) = (group.start, group.len());
         let mut block = [[0.0; 8]; LARGEST_BLOCK]; // column by column, with zeros up to a whole register

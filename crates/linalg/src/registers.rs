@@ -7,22 +7,32 @@ use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// N numbers in a register.
-pub(crate) trait Vector: Copy {
+/// The registers of [`Level::Avx512`], and the columns of a tile that suit their number.
+#[cfg(target_arch = "x86_64")]
+pub(crate) type Long = <f64 as Real>::Long;
+/// The registers of [`Level::Avx2`] or [`Level::Neon`].
+pub(crate) type Short = <f64 as Real>::Short;
+
+/// A register of N numbers.
+pub trait Vector: Copy {
+    /// How many numbers it holds.
     const N: usize;
 
     /// The first N numbers of `x`.
     fn load(x: &[f64]) -> Self;
-    /// Into the first N numbers of `x`.
+    /// Writes the first N numbers of `x`.
     fn store(self, x: &mut [f64]);
     /// x in every lane.
     fn splat(x: f64) -> Self;
     /// self · b + c, fused where the processor can.
     fn mul_add(self, b: Self, c: Self) -> Self;
+    /// self + b.
     fn add(self, b: Self) -> Self;
+    /// self − b.
     fn sub(self, b: Self) -> Self;
+    /// self · b.
     fn mul(self, b: Self) -> Self;
-    /// Of N registers, number i of register k becomes number k of register i.
+    /// The transpose of N registers: number i of register k becomes number k of register i.
     fn transpose(rows: &mut [Self]);
 }
 
@@ -111,32 +121,52 @@ where
     }
 }
 
-/// Work on dense matrices, generic over the registers and over the columns of a tile, NR, that suit their number.
-pub(crate) trait Dense: Sized {
-    fn run<V: Vector, const NR: usize>(self);
+/// Work with vector loops, generic over the registers; see [`at_level`].
+pub trait Vectorized: Sized {
+    /// The work. It must be `#[inline(always)]`, and so must be what it calls with registers: so all is compiled for the
+    /// instructions of the function that [`at_level`] puts it in.
+    fn run<V: Vector>(self);
 }
 
 /// Runs `work` with the vector instructions in use (see [`level`]).
-pub(crate) fn at_level(work: impl Dense) {
-    struct At<W, V, const NR: usize>(W, PhantomData<V>);
-    impl<W: Dense, V: Vector, const NR: usize> Kernel for At<W, V, NR> {
+///
+/// ```
+/// use condyle_linalg::{Vector, Vectorized, at_level};
+///
+/// /// x ← 2 x on eight numbers.
+/// struct Double<'a>(&'a mut [f64; 8]);
+///
+/// impl Vectorized for Double<'_> {
+///     #[inline(always)]
+///     fn run<V: Vector>(self) {
+///         for part in self.0.chunks_exact_mut(V::N) {
+///             V::load(part).mul(V::splat(2.0)).store(part);
+///         }
+///     }
+/// }
+///
+/// let mut x = [1.5; 8];
+/// at_level(Double(&mut x));
+/// assert_eq!(x, [3.0; 8]);
+/// ```
+pub fn at_level(work: impl Vectorized) {
+    /// Work on registers V, as the gate takes it.
+    struct On<W, V>(W, PhantomData<V>);
+    impl<W: Vectorized, V: Vector> Kernel for On<W, V> {
         #[inline(always)]
         fn run(self) {
-            self.0.run::<V, NR>();
+            self.0.run::<V>();
         }
         #[inline(always)]
         fn run_fused(self) {
             self.run();
         }
     }
-    /// On vectors V.
-    fn with<V: Vector + Scalar, const NR: usize>(work: impl Dense) {
-        V::enter(At::<_, V, NR>(work, PhantomData));
-    }
     match level() {
-        Level::Avx512 => with::<<f64 as Real>::Long, 8>(work),
-        Level::Avx2 | Level::Neon => with::<<f64 as Real>::Short, 4>(work),
-        Level::Baseline => work.run::<Pair, 4>(),
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => Long::enter(On::<_, Long>(work, PhantomData)),
+        Level::Baseline => work.run::<Pair>(),
+        _ => Short::enter(On::<_, Short>(work, PhantomData)),
     }
 }
 
