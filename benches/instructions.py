@@ -21,10 +21,12 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).resolve().parents[1]
 BASELINE = Path(__file__).with_suffix(".json")
 ROBOTS = ("arm7", "quadruped", "humanoid")
-STATES = 16
+STATES, KNOTS, ITERATIONS = 16, 32, 5
 """As in instructions.rs."""
+PHASES = {"calc_diff": "fddp_derivatives", "sweep": "fddp_sweep", "line_search": "fddp_rollout"}
+"""The parts of an iteration of FDDP, by the functions of the solver."""
 GROWTH = 1.03
-LINE = re.compile(r"^\s*([\d,]+) .*\binstructions::measured::(\w+)")
+LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured|Fddp)::(\w+)")
 
 
 def run(*command: str | Path, **options: object) -> str:
@@ -41,7 +43,7 @@ def build() -> Path:
 
 
 def counts(program: Path, robot: str) -> dict[str, int]:
-    """Instructions of one state, of each algorithm."""
+    """Instructions of each algorithm for one state, and of each part of an iteration of FDDP for one knot."""
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
         command = ("valgrind", "--quiet", "--tool=callgrind", f"--callgrind-out-file={profile}", program, robot)
@@ -49,7 +51,11 @@ def counts(program: Path, robot: str) -> dict[str, int]:
         table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", profile)
     found: dict[str, int] = {}
     for match in filter(None, map(LINE.match, table.splitlines())):  # a function stands in a line for each of its files
-        name, n = match[2], int(match[1].replace(",", "")) // STATES
+        name, n = match[2], int(match[1].replace(",", ""))
+        if "Fddp::" in match[0] and name not in PHASES:
+            continue
+        n //= KNOTS * ITERATIONS if name in PHASES else STATES
+        name = PHASES.get(name, name)
         found[name] = max(n, found.get(name, 0))
     if not found:
         raise SystemExit("callgrind names no function of instructions::measured")

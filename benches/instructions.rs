@@ -1,10 +1,13 @@
 //! How many instructions an algorithm takes, for `instructions.py`, which runs this under callgrind and knows the functions
 //! by their names. A thousandth more or less can be told there, where times differ by a tenth from run to run.
 
-use condyle::{Batch, Data, Model, random_configuration, robots};
+use condyle::optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
+use condyle::optimal::{ActionModel, Fddp, Problem};
+use condyle::{Batch, Constraint, Data, Model, neutral, random_configuration, robots};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
+use std::sync::Arc;
 
 /// So many states, one after the other.
 const STATES: usize = 16;
@@ -65,6 +68,48 @@ measured! {
     aba_derivatives(m, d, q, v, x) condyle::aba_derivatives(m, d, q, v, x, &[]);
 }
 
+/// So many iterations of FDDP, on so many knots.
+const ITERATIONS: usize = 5;
+const KNOTS: usize = 32;
+
+/// A robot bends what can bend while its feet stay, if it has any, and then comes to rest.
+fn motion(robot: &Arc<Model>, feet: &[&str], bent: &[(&str, f64)]) -> (Problem, Vec<f64>, Vec<f64>) {
+    let (nv, mut q) = (robot.nv(), neutral(robot));
+    for (joint, angle) in bent {
+        q[robot.bodies()[robot.joint(joint).expect("one of its joints")].idx_q] = *angle;
+    }
+    let x0 = [q, vec![0.0; nv]].concat();
+    let mut there = x0.clone();
+    for (i, x) in there[..robot.nq()].iter_mut().enumerate().skip(if feet.is_empty() { 0 } else { 7 }) {
+        *x += 0.1 * (i as f64).sin();
+    }
+    let rest = Cost::new("rest", 1e1, Residual::State { reference: there }, Activation::Quadratic);
+    let nu = if feet.is_empty() { nv } else { nv - 6 };
+    let effort = Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic);
+    let tip = robot.frames().len() - 1;
+    let reach = Residual::FrameTranslation { frame: tip, target: [0.4, 0.2, 0.5].into() };
+    let reach = Cost::new("reach", 1e0, reach, Activation::Quadratic);
+    let running = vec![rest.clone(), effort, reach];
+    let (action, u): (Box<dyn ActionModel>, _) = if feet.is_empty() {
+        let mut action = FreeDynamics::running(robot.clone(), 0.02, running).expect("costs of an arm");
+        let u = action.quasi_static(&x0);
+        (Box::new(action), u)
+    } else {
+        let contact = |foot: &&str| {
+            let frame = robot.frame(foot).expect("one of its feet");
+            let constraint = if feet.len() == 4 { Constraint::point(frame) } else { Constraint::rigid(frame) };
+            Contact::new(foot, Constraint { kd: 50.0, ..constraint })
+        };
+        let contacts: Vec<_> = feet.iter().map(contact).collect();
+        let mut action = ContactDynamics::running(robot.clone(), &contacts, 0.02, running).expect("costs on feet");
+        let u = action.quasi_static(&x0);
+        (Box::new(action), u)
+    };
+    let end = FreeDynamics::terminal(robot.clone(), vec![rest]).expect("a cost of states");
+    let problem = Problem::new(x0.clone(), vec![action], vec![0; KNOTS], Box::new(end)).expect("knots of one robot");
+    (problem, x0.repeat(KNOTS + 1), u.repeat(KNOTS))
+}
+
 fn main() {
     let robots = [("arm7", robots::arm7()), ("quadruped", robots::quadruped()), ("humanoid", robots::humanoid())];
     let Some((_, m)) = std::env::args().nth(1).and_then(|name| robots.into_iter().find(|(robot, _)| *robot == name))
@@ -72,6 +117,19 @@ fn main() {
         println!("python3 benches/instructions.py runs this");
         return;
     };
+    let (feet, bent): (&[&str], &[(&str, f64)]) = match m.nv() {
+        7 => (&[], &[]),
+        18 => (
+            &["LF_foot", "LH_foot", "RF_foot", "RH_foot"],
+            &[("LF_KFE", -1.4), ("LH_KFE", 1.4), ("RF_KFE", -1.4), ("RH_KFE", 1.4)],
+        ),
+        _ => (&["left_sole", "right_sole"], &[("left_knee", 0.8), ("right_knee", 0.8)]),
+    };
+    let (mut problem, xs, us) = motion(&Arc::new(m.clone()), feet, bent);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = ITERATIONS;
+    black_box(solver.solve(&mut problem, &xs, &us).expect("a warm start that fits"));
+
     let (d, b, s) = (&mut Data::new(&m), &mut Batch::new(&m, STATES, 1), &States::random(&m));
     all(&m, d, s);
     measured::batch_aba(&m, b, s);

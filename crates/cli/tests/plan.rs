@@ -50,7 +50,7 @@ fn the_arm_that_comes_along_reaches_its_target() {
 #[test]
 fn a_robot_from_a_file_is_drawn_as_bones() {
     let folder = folder("file");
-    let urdf = include_str!("../../dynamics/models/arm7.urdf");
+    let urdf = include_str!("../../model/models/arm7.urdf");
     let robot = folder.join("robot.urdf");
     let without_shapes: Vec<&str> = urdf
         .split("<visual")
@@ -78,7 +78,7 @@ fn what_is_wrong_is_named() {
         std::fs::write(folder.join(name), text).unwrap();
         folder.join(name).to_str().unwrap().to_owned()
     };
-    let urdf = include_str!("../../dynamics/models/arm7.urdf");
+    let urdf = include_str!("../../model/models/arm7.urdf");
     let malformed = write("malformed.urdf", &urdf.replace("</robot>", ""));
     let unknown = write("unknown.urdf", &urdf.replacen("<child link=\"link1\"/>", "<child link=\"lnik1\"/>", 1));
     for (arguments, words) in [

@@ -1,13 +1,31 @@
 //! All that algorithms write: scratch and results.
+#![allow(unsafe_code)]
 
-use crate::kinematics::{Moving, World};
-use crate::model::Model;
-use crate::{
-    aba, aba_derivatives, aba_hessian, all_terms, centroidal, centroidal_derivatives, constrained_derivatives,
-    constrained_dynamics, coriolis, crba, energy, forward_dynamics, impulse_dynamics, minv, regressor, rnea,
-    rnea_derivatives, rnea_hessian, statics,
-};
+use crate::constraints::constrained_derivatives;
+use crate::constraints::constrained_dynamics;
+use crate::constraints::impulse_dynamics;
+use crate::derivatives::aba_derivatives;
+use crate::derivatives::aba_hessian;
+use crate::derivatives::centroidal_derivatives;
+use crate::derivatives::rnea_derivatives;
+use crate::derivatives::rnea_hessian;
+use crate::lanes::limbs::pass::Scratch;
+use crate::passes::aba;
+use crate::passes::all_terms;
+use crate::passes::centroidal;
+use crate::passes::coriolis;
+use crate::passes::crba;
+use crate::passes::energy;
+use crate::passes::factored_dynamics;
+use crate::passes::kinematics::{Moving, World};
+use crate::passes::minv;
+use crate::passes::regressor;
+use crate::passes::rnea;
+use crate::passes::statics;
+use crate::workspace::Size;
+use condyle_model::Model;
 use condyle_spatial::Scalar;
+use condyle_spatial::gate::{Long, Short, is, renamed};
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
 ///
@@ -20,7 +38,7 @@ use condyle_spatial::Scalar;
 /// let data = Data::<f64>::new(&arm);
 /// # let _ = data;
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 #[repr(C)]
 pub struct Data<S> {
     size: Size,
@@ -45,40 +63,35 @@ pub struct Data<S> {
     pub(crate) centroidal_derivatives: centroidal_derivatives::Workspace<S>,
     pub(crate) energy: energy::Workspace<S>,
     pub(crate) all_terms: all_terms::Workspace<S>,
-    pub(crate) forward_dynamics: forward_dynamics::Workspace<S>,
+    pub(crate) forward_dynamics: factored_dynamics::Workspace<S>,
     pub(crate) regressor: regressor::Workspace<S>,
     /// Of single calls on robots with limbs.
-    pub(crate) limbs: Option<Box<crate::limbs::Scratch>>,
-}
-
-/// How large the arrays of a workspace are.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Size {
-    /// Bodies, the world included.
-    pub bodies: usize,
-    /// Degrees of freedom of all joints.
-    pub columns: usize,
-    /// Columns on the longest way from the root.
-    pub depth: usize,
-    /// Bodies on the longest way from the root, the world included.
-    pub levels: usize,
-    /// Coordinates.
-    pub nv: usize,
+    pub(crate) limbs: Option<Box<Scratch>>,
 }
 
 impl<S: Scalar> Data<S> {
     /// Allocates everything for a model.
-    pub fn new<R>(model: &Model<R>) -> Self {
-        let size = Size {
-            bodies: model.nodes.len(),
-            columns: model.columns.len(),
-            depth: model.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0),
-            levels: model.nodes.iter().map(|n| n.level + 1).max().unwrap_or(1),
-            nv: model.nv,
-        };
+    pub fn new<R: 'static>(model: &Model<R>) -> Self {
+        if !S::COMPILED || !is::<R, f64>() {
+            return Self::allocate(model);
+        }
+        // SAFETY: R is f64, and S is the scalar of the data that is given back.
+        unsafe {
+            if is::<S, f64>() {
+                renamed(new_single(renamed(model)))
+            } else if is::<S, Short>() {
+                renamed(new_short(renamed(model)))
+            } else {
+                renamed(new_long(renamed(model)))
+            }
+        }
+    }
+
+    fn allocate<R>(model: &Model<R>) -> Self {
+        let size = Size::new(model);
         Self {
             size,
-            tree: model.tree,
+            tree: model.tree_hash(),
             world: World::new(size),
             moving: Moving::new(size),
             rnea: rnea::Workspace::new(size),
@@ -98,9 +111,78 @@ impl<S: Scalar> Data<S> {
             centroidal_derivatives: centroidal_derivatives::Workspace::new(size),
             energy: energy::Workspace::new(size),
             all_terms: all_terms::Workspace::new(size),
-            forward_dynamics: forward_dynamics::Workspace::new(model),
+            forward_dynamics: factored_dynamics::Workspace::new(model),
             regressor: regressor::Workspace::new(size),
-            limbs: crate::limbs::Scratch::new::<S, R>(model),
+            limbs: Scratch::new::<S, R>(model),
+        }
+    }
+}
+
+/// What this crate compiles of [`Data::new`] and of `clone`, for whoever uses it.
+fn new_single(model: &Model) -> Data<f64> {
+    Data::allocate(model)
+}
+fn new_short(model: &Model) -> Data<Short> {
+    Data::allocate(model)
+}
+fn new_long(model: &Model) -> Data<Long> {
+    Data::allocate(model)
+}
+fn clone_single(data: &Data<f64>) -> Data<f64> {
+    data.copy()
+}
+fn clone_short(data: &Data<Short>) -> Data<Short> {
+    data.copy()
+}
+fn clone_long(data: &Data<Long>) -> Data<Long> {
+    data.copy()
+}
+
+impl<S: Scalar> Data<S> {
+    fn copy(&self) -> Self {
+        Self {
+            size: self.size,
+            tree: self.tree,
+            world: self.world.clone(),
+            moving: self.moving.clone(),
+            rnea: self.rnea.clone(),
+            crba: self.crba.clone(),
+            aba: self.aba.clone(),
+            minv: self.minv.clone(),
+            rnea_derivatives: self.rnea_derivatives.clone(),
+            aba_derivatives: self.aba_derivatives.clone(),
+            rnea_hessian: self.rnea_hessian.clone(),
+            aba_hessian: self.aba_hessian.clone(),
+            constrained_dynamics: self.constrained_dynamics.clone(),
+            constrained_derivatives: self.constrained_derivatives.clone(),
+            impulse_dynamics: self.impulse_dynamics.clone(),
+            statics: self.statics.clone(),
+            coriolis: self.coriolis.clone(),
+            centroidal: self.centroidal.clone(),
+            centroidal_derivatives: self.centroidal_derivatives.clone(),
+            energy: self.energy.clone(),
+            all_terms: self.all_terms.clone(),
+            forward_dynamics: self.forward_dynamics.clone(),
+            regressor: self.regressor.clone(),
+            limbs: self.limbs.clone(),
+        }
+    }
+}
+
+impl<S: Scalar> Clone for Data<S> {
+    fn clone(&self) -> Self {
+        if !S::COMPILED {
+            return self.copy();
+        }
+        // SAFETY: S is the scalar of the data that is given back.
+        unsafe {
+            if is::<S, f64>() {
+                renamed(clone_single(renamed(self)))
+            } else if is::<S, Short>() {
+                renamed(clone_short(renamed(self)))
+            } else {
+                renamed(clone_long(renamed(self)))
+            }
         }
     }
 }
@@ -111,20 +193,13 @@ impl<S> Data<S> {
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
         let made_for = (self.size.bodies, self.size.columns, self.size.nv);
-        let given = (model.nodes.len(), model.columns.len(), model.nv);
+        let given = (model.nodes().len(), model.columns().len(), model.nv());
         let other = if made_for == given { " in another tree" } else { "" };
         assert!(
-            self.tree == model.tree,
+            self.tree == model.tree_hash(),
             "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}{other}"
         );
     }
-}
-
-/// Panics unless an argument has as many numbers as it must have.
-#[inline]
-#[track_caller]
-pub(crate) fn check(argument: &str, found: usize, expected: usize) {
-    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
 }
 
 /// Panics unless there is a force for each body, the world included, or none at all.

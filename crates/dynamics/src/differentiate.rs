@@ -8,13 +8,14 @@
 //! exact second-derivative calculations*, 2011): derivatives are exact, and cost one evaluation of f for each direction or
 //! pair of directions. What has a derivative by hand has it many times faster.
 
-use crate::configuration::integrate;
-use crate::data::{Data, check};
-use crate::model::Model;
+use crate::data::Data;
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_model::integrate;
 use condyle_spatial::block::{Block, Real};
 use condyle_spatial::lane_dual::LaneDual;
-use condyle_spatial::lanes::Kernel;
 use condyle_spatial::level::{Level, level};
+use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Constant, Scalar};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, HyperDual64};
@@ -22,17 +23,17 @@ use num_dual::{Dual64, HyperDual64};
 /// x ⊕ δ, on numbers that know the directions of δ.
 fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
     let mut out: Vec<S> = x.iter().map(|&x| S::splat(x)).collect();
-    let (q, rest) = out.split_at_mut(model.nq);
+    let (q, rest) = out.split_at_mut(model.nq());
     let here = q.to_vec();
-    integrate(model, &here, &delta[..model.nv], q);
-    rest.iter_mut().zip(&delta[model.nv..]).for_each(|(x, &d)| *x += d);
+    integrate(model, &here, &delta[..model.nv()], q);
+    rest.iter_mut().zip(&delta[model.nv()..]).for_each(|(x, &d)| *x += d);
     out
 }
 
 /// How many directions a state has.
 fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
-    assert!(x.len() >= model.nq, "x: expected at least {} numbers, found {}", model.nq, x.len());
-    x.len() - model.nq + model.nv
+    assert!(x.len() >= model.nq(), "x: expected at least {} numbers, found {}", model.nq(), x.len());
+    x.len() - model.nq() + model.nv()
 }
 
 /// f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ, exact, in one evaluation of f for each direction.
@@ -128,14 +129,14 @@ impl LaneJacobian {
     ///
     /// # Panics
     /// If n is less than nq.
-    pub fn new<R>(model: &Model<R>, n: usize, results: usize) -> Self {
-        assert!(n >= model.nq, "n: expected at least {}, found {n}", model.nq);
+    pub fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
+        assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
         let width = match level() {
             Level::Avx512 => Width::Long(Box::new(Directions::new(model, n, results))),
             Level::Avx2 | Level::Neon => Width::Short(Box::new(Directions::new(model, n, results))),
             Level::Baseline => Width::One(Box::new(Directions::new(model, n, results))),
         };
-        Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq + model.nv) }
+        Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq() + model.nv()) }
     }
 
     /// f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ: m numbers, and an m × (nv + others) matrix.
@@ -172,10 +173,10 @@ struct Directions<S> {
 }
 
 impl<S: Block<Number = f64>> Directions<S> {
-    fn new<R>(model: &Model<R>, n: usize, results: usize) -> Self {
+    fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         let zeros = |n: usize| vec![LaneDual::<S>::zero(); n];
         let data = Data::new(model);
-        Self { data, delta: zeros(n - model.nq + model.nv), x: zeros(n), moved: zeros(n), y: zeros(results) }
+        Self { data, delta: zeros(n - model.nq() + model.nv()), x: zeros(n), moved: zeros(n), y: zeros(results) }
     }
 
     fn run<R: Constant<f64>>(
@@ -209,7 +210,7 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
     #[inline(always)]
     fn run(self) {
         let Self { directions: Directions { data, delta, x: from, moved, y }, model, x, f, value, J } = self;
-        let (n, nq, nv) = (delta.len(), model.nq, model.nv);
+        let (n, nq, nv) = (delta.len(), model.nq(), model.nv());
         for (to, &x) in from.iter_mut().zip(x) {
             *to = LaneDual::splat(x);
         }
@@ -240,10 +241,6 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
             }
             first += S::LANES;
         }
-    }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
     }
 }
 

@@ -16,118 +16,59 @@
 #![doc = include_str!("../CONVENTIONS.md")]
 #![allow(non_snake_case)]
 
-mod aba;
-mod aba_derivatives;
-mod aba_hessian;
-mod all_terms;
-mod articulated_solve;
-mod assembly;
 mod batch;
-mod builder;
-mod centroidal;
-mod centroidal_derivatives;
-mod cholesky;
-mod com;
-mod compose;
-mod configuration;
-mod constrained_derivatives;
-mod constrained_dynamics;
-mod constrained_equations;
-mod constrained_work;
-mod constraint;
-mod constraint_motion;
-mod constraint_set;
-mod coriolis;
-mod crba;
+mod calls;
+mod constraints;
 mod data;
-mod delassus;
-mod description;
+mod derivatives;
 mod differentiate;
-mod dispatch;
 mod divide_conquer;
-mod elementary;
-mod elimination;
-mod energy;
-mod error;
-mod forward_dynamics;
-mod frame_derivatives;
-mod frames;
-mod impulse_dynamics;
-pub mod inertial_parameters;
-mod inputs;
-mod joint;
-mod kinematics;
-mod layout;
-mod limbs;
-mod ltdl;
-mod minv;
-mod mjcf;
-mod model;
-mod nodes;
-mod package;
-mod parts;
-mod passive;
-mod product;
-mod regressor;
-mod rnea;
-mod rnea_derivatives;
-mod rnea_hessian;
-pub mod robots;
-mod sdf;
-mod side_by_side;
+mod lanes;
+mod passes;
 pub mod simulation;
-mod soundness;
-mod statics;
-mod ties;
-mod two_handles;
-mod urdf;
-mod xml;
+mod workspace;
 
-pub use aba::aba;
-pub use aba_derivatives::{AbaDerivatives, aba_derivatives};
-pub use aba_hessian::{AbaHessian, aba_hessian};
-pub use all_terms::{AllTerms, compute_all_terms};
-pub use assembly::AssemblySize;
 pub use batch::{Batch, BatchAbaDerivatives, BatchRneaDerivatives, Matrices, StateMatrix};
-pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
-pub use centroidal::{CentroidalMap, CentroidalMapRate, centroidal_map, centroidal_map_rate};
-pub use centroidal_derivatives::{CentroidalDerivatives, centroidal_derivatives};
-pub use cholesky::Cholesky;
+pub use calls::centroidal::{centroidal_map, centroidal_map_rate, compute_all_terms};
+pub use calls::constrained_dynamics::{
+    Constrained, ConstrainedDerivatives, ConstrainedEquations, constrained_dynamics, constrained_dynamics_derivatives,
+    constrained_dynamics_equations,
+};
+pub use calls::derivatives::{
+    AbaDerivatives, CoriolisDerivatives, RneaDerivatives, aba_derivatives, centroidal_derivatives,
+    coriolis_derivatives, energy_derivatives, rnea_derivatives, static_torque_derivative,
+};
+pub use calls::forward_dynamics::{aba, forward_dynamics};
+pub use calls::impulse_dynamics::{Impulse, ImpulseDerivatives, impulse_dynamics, impulse_dynamics_derivatives};
+pub use calls::inertia::{crba, minv};
+pub use calls::inverse_dynamics::{coriolis_matrix, gravity, nonlinear_effects, rnea, static_torque};
+pub use calls::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
+pub use calls::parameter_derivatives::Input;
+pub use calls::regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
+pub use calls::second_derivatives::{
+    AbaHessian, RneaHessian, RneaSecondDerivatives, aba_hessian, rnea_hessian, rnea_second_derivatives,
+};
+pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
+pub use condyle_model::{
+    Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, IntegrateArgument, Joint, JointOptions, Limits, Mimic,
+    MjcfOptions, Model, ModelBuilder, SdfOptions, UrdfOptions, WORLD, Warning, difference, difference_jacobian,
+    distance, inertial_parameters, integrate, integrate_jacobian, interpolate, neutral, normalize,
+    random_configuration, robots, transport,
+};
 pub use condyle_spatial::{
     Act, Constant, Cross, Force, Inertia, Mat3, Motion, Quaternion, Scalar, Se3, Sym3, Vec3, level, lie,
 };
-pub use configuration::{
-    DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
-    interpolate, neutral, normalize, random_configuration, transport,
-};
-pub use constrained_derivatives::{ConstrainedDerivatives, constrained_dynamics_derivatives};
-pub use constrained_dynamics::{Constrained, constrained_dynamics};
-pub use constrained_equations::{ConstrainedEquations, constrained_dynamics_equations};
-pub use constraint::{Constraint, ConstraintKind, Target};
-pub use constraint_set::{ConstraintSet, Proximal};
-pub use coriolis::coriolis_matrix;
-pub use crba::crba;
+pub use constraints::constraint::{Constraint, ConstraintKind, Target};
+pub use constraints::constraint_set::ConstraintSet;
+pub use constraints::plan::Proximal;
 pub use data::Data;
+pub use derivatives::centroidal_derivatives::CentroidalDerivatives;
 pub use differentiate::{LaneJacobian, StateFunction, gradient, hessian, jacobian};
 pub use divide_conquer::DivideConquer;
-pub use energy::{EnergyDerivatives, energy_derivatives};
-pub use error::Error;
-pub use forward_dynamics::{Method, forward_dynamics};
-pub use frames::{Accelerations, Placements, ReferenceFrame, Velocities};
-pub use impulse_dynamics::{Impulse, ImpulseDerivatives, impulse_dynamics, impulse_dynamics_derivatives};
-pub use inputs::Input;
-pub use joint::Joint;
-pub use kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
-pub use ltdl::Ltdl;
-pub use minv::minv;
-pub use mjcf::MjcfOptions;
-pub use model::{Body, Frame, FrameKind, Limits, Mimic, Model};
-pub use passive::{passive_torque, passive_torque_derivative};
-pub use regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
-pub use rnea::{gravity, nonlinear_effects, rnea};
-pub use rnea_derivatives::{CoriolisDerivatives, RneaDerivatives, coriolis_derivatives, rnea_derivatives};
-pub use rnea_hessian::{RneaHessian, RneaSecondDerivatives, rnea_hessian, rnea_second_derivatives};
-pub use sdf::SdfOptions;
-pub use soundness::Warning;
-pub use statics::{static_torque, static_torque_derivative};
-pub use urdf::UrdfOptions;
+pub use divide_conquer::assembly::AssemblySize;
+pub use passes::all_terms::AllTerms;
+pub use passes::centroidal::{CentroidalMap, CentroidalMapRate};
+pub use passes::energy::EnergyDerivatives;
+pub use passes::factored_dynamics::Method;
+pub use passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities};
+pub use passes::passive::{passive_torque, passive_torque_derivative};

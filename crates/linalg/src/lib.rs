@@ -1,1 +1,51 @@
 //! Dense kernels and factors for small matrices, and those with the zeros of a tree. It knows no robot.
+//!
+//! Matrices are column-major: entry (i, j) of a matrix with the stride `ld` is number j · ld + i. Kernels work in whole
+//! registers, and so touch up to [`SLACK`] numbers behind the last row of a matrix that has such slack; what they hold does
+//! not matter. Nothing allocates.
+//!
+//! Each dense kernel is compiled here, once for each [level](condyle_spatial::level) of vector instructions, and a call runs
+//! the one for the level in use. Work that has vector loops of its own is compiled for the level by [`at_level`].
+#![allow(non_snake_case)]
+
+#[doc(hidden)]
+pub mod axpy;
+mod cast;
+mod cholesky;
+mod compiled;
+mod copy;
+#[doc(hidden)]
+pub mod elimination_tree;
+mod factor;
+mod ltdl;
+mod outer;
+mod product;
+mod registers;
+#[doc(hidden)]
+pub mod sparsity;
+mod tile;
+#[doc(hidden)]
+pub mod tree_product;
+mod vectors;
+
+pub use cholesky::Cholesky;
+pub use copy::{copy_lower, copy_matrix, copy_symmetric, transpose, transpose_negated};
+pub use elimination_tree::ColumnTree;
+pub use factor::{eliminate, solve_right, solve_transposed};
+pub use ltdl::Ltdl;
+pub use outer::{OuterProducts, SparseRows, block, mask};
+pub use product::{
+    add_matrix, add_product, add_product_lower, add_transposed_product_lower, product, product_of_upper_lower,
+    product_with_upper, product_without_slack, subtract_product, sum_of_squares,
+};
+pub use registers::{Vector, Vectorized, at_level};
+pub use tile::{SLACK, View};
+pub use vectors::{add_scaled_product, copy, copy_scaled, dot, max_abs};
+
+/// Panics unless an argument has as many numbers as it must have.
+#[doc(hidden)]
+#[inline]
+#[track_caller]
+pub fn check(argument: &str, found: usize, expected: usize) {
+    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
+}

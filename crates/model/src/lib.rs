@@ -1,1 +1,49 @@
 //! Robot models: trees of bodies and joints, their files, and how algorithms walk them.
+//!
+//! A [`Model`] is made by a [`ModelBuilder`] or by a reader of URDF, MJCF or SDF, checked, and frozen:
+//!
+//! ```
+//! use condyle_model::{integrate, neutral, robots};
+//! let quadruped = robots::quadruped();
+//! let (q, mut moved) = (neutral(&quadruped), vec![0.0; 19]);
+//! integrate(&quadruped, &q, &[0.1; 18], &mut moved);
+//! assert!(moved[0] > 0.0); // the base has moved forwards
+//! ```
+//!
+//! What the crates of algorithms need beside it is hidden from the documentation: the verbs by which a pass sees a model
+//! (`layout`), the tree of its turned frames and columns (`tree`), the schedule of its limbs (`limbs`).
+#![allow(non_snake_case)]
+
+mod body;
+mod builder;
+mod compose;
+mod configuration;
+mod error;
+pub mod inertial_parameters;
+mod io;
+#[doc(hidden)]
+pub mod joint;
+#[doc(hidden)]
+pub mod layout;
+#[doc(hidden)]
+pub mod limbs;
+mod model;
+pub mod robots;
+#[doc(hidden)]
+pub mod tree;
+mod validate;
+mod variants;
+
+pub use body::{Body, Frame, FrameKind, Limits};
+pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+pub use condyle_spatial::{Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
+pub use configuration::{
+    DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
+    interpolate, neutral, normalize, random_configuration, transport,
+};
+pub use error::{Error, Warning};
+pub use io::mjcf::MjcfOptions;
+pub use io::sdf::SdfOptions;
+pub use io::urdf::UrdfOptions;
+pub use joint::{Joint, Mimic};
+pub use model::Model;

@@ -17,30 +17,22 @@
 //! ```
 #![allow(non_snake_case)]
 
-#[doc(hidden)]
-pub mod block;
-mod dual;
+mod algebra;
 #[doc(hidden)]
 pub mod finite;
-mod fused;
-mod inertia;
-#[doc(hidden)]
-pub mod lane_dual;
-#[doc(hidden)]
-pub mod lanes;
-pub mod level;
-pub mod lie;
-mod motion;
 mod scalar;
-mod se3;
-mod sin_cos;
-mod vector;
-
-pub use inertia::{ArticulatedInertia, Inertia};
 #[doc(hidden)]
-pub use lanes::moves;
-pub use lie::Quaternion;
-pub use motion::{Cross, Force, Motion};
+pub mod simd;
+
+pub use algebra::inertia::{ArticulatedInertia, Inertia};
+pub use algebra::lie;
+pub use algebra::motion::{Cross, Force, Motion};
+pub use algebra::quaternion::Quaternion;
+pub use algebra::se3::{Act, Se3};
+pub use algebra::vector::{Mat3, Sym3, Vec3};
 pub use scalar::{Constant, Scalar};
-pub use se3::{Act, Se3};
-pub use vector::{Mat3, Sym3, Vec3};
+#[doc(hidden)]
+pub use scalar::{elementary, lane_dual};
+pub use simd::level;
+#[doc(hidden)]
+pub use simd::{gate, lanes, lanes::moves, pack as block};

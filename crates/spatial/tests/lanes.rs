@@ -2,9 +2,10 @@
 
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real};
-use condyle_spatial::lanes::{Kernel, Lanes};
+use condyle_spatial::lanes::Lanes;
 use condyle_spatial::level::{Level, Unsupported};
 use condyle_spatial::moves::{Move, sum};
+use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
 /// A single number.

@@ -1,14 +1,13 @@
 //! How a batch computes: groups of states, a lane for each, spread over threads.
 
 use super::StateMatrix;
-use crate::aba::aba;
-use crate::aba_derivatives::aba_derivatives;
-use crate::crba::crba;
+use crate::calls::derivatives::{aba_derivatives, rnea_derivatives};
+use crate::calls::forward_dynamics::aba;
+use crate::calls::inertia::{crba, minv};
+use crate::calls::inverse_dynamics::{gravity, nonlinear_effects, rnea};
 use crate::data::Data;
-use crate::minv::minv;
-use crate::model::Model;
-use crate::rnea::{gravity, nonlinear_effects, rnea};
-use crate::rnea_derivatives::rnea_derivatives;
+use crate::workspace::{filled, zero_matrix};
+use condyle_model::Model;
 use condyle_spatial::Force;
 use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter};
 use core::mem::swap;
@@ -24,9 +23,13 @@ pub(super) struct Group<S: Block> {
 
 /// The matrices of a group of states, each nv × nv and each written by one pass alone, so that zeros stay zero.
 pub(super) const M: usize = 0;
+
 pub(super) const MINV: usize = 1;
+
 pub(super) const DTAU: [usize; 3] = [2, 3, 4];
+
 pub(super) const DA: [usize; 2] = [5, 6];
+
 const KINDS: usize = 7;
 
 /// One thread's scratch.
@@ -44,17 +47,17 @@ impl<S: Block> Worker<S> {
     fn new(model: &Model) -> Self {
         Self {
             data: Data::new(model),
-            q: vec![S::zero(); model.nq],
-            v: vec![S::zero(); model.nv],
-            x: vec![S::zero(); model.nv],
-            f_ext: Vec::with_capacity(model.nodes.len()),
+            q: filled(S::zero(), model.nq()),
+            v: filled(S::zero(), model.nv()),
+            x: filled(S::zero(), model.nv()),
+            f_ext: Vec::with_capacity(model.nodes().len()),
         }
     }
 }
 
 impl<S: Block> Group<S> {
     pub(super) fn new(model: &Model, states: usize, threads: usize) -> Self {
-        let square = || DMatrix::from_element(model.nv, model.nv, S::zero());
+        let square = || zero_matrix(model.nv(), model.nv());
         let matrices = |_| core::array::from_fn(|_| square());
         Self {
             workers: (0..threads).map(|_| Worker::new(model)).collect(),
@@ -174,6 +177,7 @@ macro_rules! vectors {
         }
     )*};
 }
+
 vectors! {
     Rnea: rnea(q, v, x, f_ext);
     NonlinearEffects: nonlinear_effects(q, v);
@@ -193,13 +197,14 @@ macro_rules! matrices {
                 $(swap(&mut w.data.$($place).*, &mut matrices[$kind]);)*
                 $function(model, &mut w.data $(, &w.$argument)*);
                 if !to.is_empty() {
-                    scatter(w.data.aba_derivatives.a(), n, to);
+                    scatter(&w.data.aba_derivatives.a, n, to);
                 }
                 $(swap(&mut w.data.$($place).*, &mut matrices[$kind]);)*
             }
         }
     )*};
 }
+
 matrices! {
     Crba: crba, (q), crba.M: M;
     Minv: minv, (q), minv.Minv: MINV;

@@ -1,9 +1,10 @@
 //! The semi-implicit (symplectic) Euler method.
 
 use super::{Input, Status, acceleration};
-use crate::configuration::integrate;
 use crate::data::Data;
-use crate::model::Model;
+use crate::workspace::filled;
+use condyle_model::Model;
+use condyle_model::integrate;
 use condyle_spatial::{Constant, Scalar};
 
 #[derive(Clone, Debug)]
@@ -16,7 +17,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        Self { effort: vec![S::zero(); model.nv], way: vec![S::zero(); model.nv] }
+        Self { effort: filled(S::zero(), model.nv()), way: filled(S::zero(), model.nv()) }
     }
 }
 

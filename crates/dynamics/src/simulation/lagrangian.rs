@@ -17,9 +17,10 @@
 //! ∂²L/∂q_d∂q_e = Ψ̇_e · ∂hᶜ/∂q_d − Ψ̈_e · Iᶜ S_d     ∂²L/∂q_e∂q_d = Ψ̇_e · ∂hᶜ/∂q_d − S_e · ∂Fᶜ/∂q_d
 //! ```
 
-use crate::kinematics::World;
-use crate::layout::Pairs;
-use crate::model::Model;
+use crate::passes::kinematics::World;
+use crate::workspace::filled;
+use condyle_model::Model;
+use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
 /// In the world's frame; matrices by columns.
@@ -51,19 +52,19 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let (bodies, columns, nv) = (model.nodes.len(), model.columns.len(), model.nv);
+        let (bodies, columns, nv) = (model.nodes().len(), model.columns().len(), model.nv());
         Self {
-            v: vec![Motion::zero(); bodies],
-            IC: vec![Inertia::zero(); bodies],
-            hC: vec![Force::zero(); bodies],
-            FC: vec![Force::zero(); bodies],
-            Psid: vec![Motion::zero(); columns],
-            Psidd: vec![Motion::zero(); columns],
-            p: vec![S::zero(); nv],
-            L_q: vec![S::zero(); nv],
-            M: vec![S::zero(); nv * nv],
-            p_q: vec![S::zero(); nv * nv],
-            L_qq: vec![S::zero(); nv * nv],
+            v: filled(Motion::zero(), bodies),
+            IC: filled(Inertia::zero(), bodies),
+            hC: filled(Force::zero(), bodies),
+            FC: filled(Force::zero(), bodies),
+            Psid: filled(Motion::zero(), columns),
+            Psidd: filled(Motion::zero(), columns),
+            p: filled(S::zero(), nv),
+            L_q: filled(S::zero(), nv),
+            M: filled(S::zero(), nv * nv),
+            p_q: filled(S::zero(), nv * nv),
+            L_qq: filled(S::zero(), nv * nv),
         }
     }
 }
@@ -79,8 +80,8 @@ pub(super) fn pass<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd
         let v_parent = l.parent(v, i);
         v[i] = v_parent;
         for k in 0..l.joint(i).nv() {
-            let c = l.slot(i) + k;
-            v[i] = S[c].scale_add(l.load(qd, i, k), v[i]); // v_i = v_λ + S q̇
+            let c = l.column(i) + k;
+            v[i] = S[c].scale_add(l.joint_velocity(qd, i, k), v[i]); // v_i = v_λ + S q̇
             Psid[c] = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
             Psidd[c] = minus_g.cross(S[c]); // Ψ̈ = −g × S
         }
@@ -101,34 +102,34 @@ pub(super) fn pass<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
         for k in 0..nv {
-            let s = l.slot(i) + k;
+            let s = l.column(i) + k;
             let column = own[k];
-            l.add(p, i, k, S[s].dot(hC[i])); // p_d = S_d · hᶜ
-            l.add(L_q, i, k, Psid[s].dot(hC[i]) - S[s].dot(FC[i])); // ∂L/∂q_d = Ψ̇_d · hᶜ − S_d · Fᶜ
+            l.add_joint_effort(p, i, k, S[s].dot(hC[i])); // p_d = S_d · hᶜ
+            l.add_joint_effort(L_q, i, k, Psid[s].dot(hC[i]) - S[s].dot(FC[i])); // ∂L/∂q_d = Ψ̇_d · hᶜ − S_d · Fᶜ
             let IS = IC[i] * S[s];
             let dh = S[s].cross(hC[i]) + IC[i] * Psid[s]; // ∂hᶜ/∂q_d
             let dF = S[s].cross(FC[i]) + IC[i] * Psidd[s]; // ∂Fᶜ/∂q_d
             for &e in before {
                 let (S_e, Psid_e, Psidd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e));
                 let (x, curvature) = (S_e.dot(IS), Psid_e.dot(dh));
-                l.add_at(M, column, e, x);
-                l.add_at(M, e, column, x);
-                l.add_at(p_q, column, e, Psid_e.dot(IS)); // ∂p_d/∂q_e
-                l.add_at(p_q, e, column, S_e.dot(dh)); // ∂p_e/∂q_d
-                l.add_at(L_qq, column, e, curvature - Psidd_e.dot(IS)); // ∂²L/∂q_d∂q_e
-                l.add_at(L_qq, e, column, curvature - S_e.dot(dF)); // ∂²L/∂q_e∂q_d
+                l.add_entry(M, column, e, x);
+                l.add_entry(M, e, column, x);
+                l.add_entry(p_q, column, e, Psid_e.dot(IS)); // ∂p_d/∂q_e
+                l.add_entry(p_q, e, column, S_e.dot(dh)); // ∂p_e/∂q_d
+                l.add_entry(L_qq, column, e, curvature - Psidd_e.dot(IS)); // ∂²L/∂q_d∂q_e
+                l.add_entry(L_qq, e, column, curvature - S_e.dot(dF)); // ∂²L/∂q_e∂q_d
             }
             for &e in own {
                 let (Psid_e, Psidd_e) = (l.at(Psid, e), l.at(Psidd, e));
-                l.add_at(M, column, e, l.at(S, e).dot(IS));
-                l.add_at(p_q, column, e, Psid_e.dot(IS));
-                l.add_at(L_qq, column, e, Psid_e.dot(dh) - Psidd_e.dot(IS));
+                l.add_entry(M, column, e, l.at(S, e).dot(IS));
+                l.add_entry(p_q, column, e, Psid_e.dot(IS));
+                l.add_entry(L_qq, column, e, Psid_e.dot(dh) - Psidd_e.dot(IS));
             }
         }
         let (IC_i, hC_i, FC_i) = (IC[i], hC[i], FC[i]);
-        l.push(IC, i, IC_i);
-        l.push(hC, i, hC_i);
-        l.push(FC, i, FC_i);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(hC, i, hC_i);
+        l.add_to_parent(FC, i, FC_i);
     }
     l.add_armature(M);
     l.add_armature_torque(qd, p);

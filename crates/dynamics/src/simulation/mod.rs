@@ -21,10 +21,11 @@ mod runge_kutta;
 mod tangent;
 mod variational;
 
-use crate::aba::aba;
-use crate::data::{Data, check, check_forces};
-use crate::model::Model;
-use crate::passive::passive_torque;
+use crate::calls::forward_dynamics::aba;
+use crate::data::{Data, check_forces};
+use crate::passes::passive::passive_torque;
+use condyle_linalg::check;
+use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 
 /// How a step is computed. τ and the external forces stay as they are during a step, forces in the body's frame;
@@ -125,7 +126,7 @@ struct Input<'a, S> {
 /// Several simulations run side by side on a scalar with lanes, and on dual numbers a simulation gives its own
 /// derivatives. Newton's method then iterates until all lanes have converged.
 #[derive(Clone, Debug)]
-pub struct Simulation<'m, S, R = f64> {
+pub struct Simulation<'m, S: Scalar, R = f64> {
     /// May be changed between steps.
     pub settings: Settings,
     model: &'m Model<R>,
@@ -148,7 +149,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     /// Allocates everything; the robot stands still at [`neutral`](crate::neutral), at time 0.
     pub fn new(model: &'m Model<R>, settings: Settings) -> Self {
         let q: Vec<S> = crate::neutral(model).into_iter().map(S::splat).collect();
-        let zero = vec![S::zero(); model.nv];
+        let zero = vec![S::zero(); model.nv()];
         Self {
             settings,
             model,
@@ -159,7 +160,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
             v: zero.clone(),
             v_next: zero.clone(),
             tau: zero,
-            f_ext: vec![Force::zero(); model.nodes.len()],
+            f_ext: vec![Force::zero(); model.nodes().len()],
             euler: euler::Workspace::new(model),
             runge_kutta: runge_kutta::Workspace::new(model),
             variational: variational::Workspace::new(model),
@@ -188,8 +189,8 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     /// # Panics
     /// If an argument has the wrong length.
     pub fn set_state(&mut self, q: &[S], v: &[S]) {
-        check("q", q.len(), self.model.nq);
-        check("v", v.len(), self.model.nv);
+        check("q", q.len(), self.model.nq());
+        check("v", v.len(), self.model.nv());
         self.q.copy_from_slice(q);
         self.v.copy_from_slice(v);
         self.time = 0.0;
@@ -212,8 +213,8 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     /// # Panics
     /// If an argument has the wrong length, or the smoothing of passive torques is not positive.
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
-        check("tau", tau.len(), self.model.nv);
-        check_forces(f_ext.len(), self.model.nodes.len());
+        check("tau", tau.len(), self.model.nv());
+        check_forces(f_ext.len(), self.model.nodes().len());
         let Settings { integrator, dt, passive, .. } = self.settings;
         let input = Input { h: S::splat(dt), tau, f_ext, passive };
         let (model, data, state) = (self.model, &mut self.data, (&self.q[..], &self.v[..]));

@@ -10,10 +10,11 @@
 //! is an ordinary differential equation in a vector space: what the classical method does to it has order 4.
 
 use super::{Input, Status, acceleration, tangent};
-use crate::configuration::integrate;
 use crate::data::Data;
-use crate::joint::GroupJacobian;
-use crate::model::Model;
+use crate::workspace::filled;
+use condyle_model::Model;
+use condyle_model::integrate;
+use condyle_model::joint::GroupJacobian;
 use condyle_spatial::{Constant, Scalar};
 
 #[derive(Clone, Debug)]
@@ -33,7 +34,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = vec![S::zero(); model.nv];
+        let zero = filled(S::zero(), model.nv());
         Self {
             effort: zero.clone(),
             xi: zero.clone(),

@@ -1,7 +1,7 @@
 //! Products with the block-diagonal Jacobians of the joints' groups, block by block.
 
-use crate::joint::{GroupJacobian, Joint};
-use crate::model::Model;
+use condyle_model::Model;
+use condyle_model::joint::{GroupJacobian, Joint};
 use condyle_spatial::{Constant, Cross, Force, Motion, Scalar};
 
 /// The largest block: a free body's.
@@ -11,7 +11,7 @@ const TERMS: i32 = 18;
 
 /// Each joint with coordinates of its own, and where they stand in v.
 fn joints<R>(model: &Model<R>) -> impl Iterator<Item = (Joint, usize)> + '_ {
-    model.nodes.iter().skip(1).filter(|n| n.mimic.is_none()).map(|n| (n.joint, n.idx_v))
+    model.nodes().iter().skip(1).filter(|n| n.mimic.is_none()).map(|n| (n.joint, n.idx_v))
 }
 
 /// The block of a joint at tangent vector y, column by column; `None` for the identity.
@@ -73,7 +73,7 @@ pub(super) fn multiply_transposed<S: Scalar, R>(
 
 /// A = A J(y), for a square matrix stored by columns.
 pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
-    let nv = model.nv;
+    let nv = model.nv();
     for (joint, at) in joints(model) {
         let n = joint.nv();
         if let Some(J) = block(joint, which, &y[at..at + n]) {
@@ -95,7 +95,7 @@ pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: Gr
     for (joint, at) in joints(model) {
         let n = joint.nv();
         if let Some(J) = block(joint, which, &y[at..at + n]) {
-            for column in A.chunks_exact_mut(model.nv) {
+            for column in A.chunks_exact_mut(model.nv()) {
                 let mut old = [S::zero(); SIX];
                 old[..n].copy_from_slice(&column[at..at + n]);
                 for k in 0..n {
@@ -108,8 +108,7 @@ pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: Gr
 
 /// The joints whose group is not commutative: along which unit twists they move, and where they stand in v.
 fn twists<R>(model: &Model<R>) -> impl Iterator<Item = (&'static [usize], usize)> + '_ {
-    let turning = |joint| matches!(joint, Joint::Spherical | Joint::Planar | Joint::FreeFlyer);
-    joints(model).filter(move |&(joint, _)| turning(joint)).map(|(joint, at)| (joint.axes(), at))
+    joints(model).filter(|(joint, _)| !joint.commutes()).map(|(joint, at)| (joint.axes(), at))
 }
 
 /// The coordinates of a joint among the six of a twist.
@@ -128,7 +127,7 @@ fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
 pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
-        let momentum = Force::from(embed(axes, |k| w[at + k] * model.armature[at + k].lift()));
+        let momentum = Force::from(embed(axes, |k| w[at + k] * model.armature()[at + k].lift()));
         let force = twist.cross(momentum).to_array();
         for (k, &axis) in axes.iter().enumerate() {
             f[at + k] += force[axis];
@@ -140,13 +139,13 @@ pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f
 pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], A: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
-        let momentum = Force::from(embed(axes, |k| w[at + k] * model.armature[at + k].lift()));
+        let momentum = Force::from(embed(axes, |k| w[at + k] * model.armature()[at + k].lift()));
         for j in 0..axes.len() {
             let unit = embed(axes, |k| if k == j { S::one() } else { S::zero() });
-            let turned = Force::from(unit).scale(model.armature[at + j].lift());
+            let turned = Force::from(unit).scale(model.armature()[at + j].lift());
             let column = (Motion::from(unit).cross(momentum) + twist.cross(turned)).to_array();
             for (i, &axis) in axes.iter().enumerate() {
-                A[(at + j) * model.nv + at + i] += column[axis];
+                A[(at + j) * model.nv() + at + i] += column[axis];
             }
         }
     }
@@ -172,7 +171,7 @@ pub(super) fn subtract_slope<S: Scalar, R>(model: &Model<R>, y: &[S], p: &[S], s
             }
             let sum = sum.to_array();
             for (i, &axis) in axes.iter().enumerate() {
-                A[(at + j) * model.nv + at + i] -= sum[axis] * s;
+                A[(at + j) * model.nv() + at + i] -= sum[axis] * s;
             }
         }
     }

@@ -21,15 +21,16 @@
 //! midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. In coordinates v = M(q)⁻¹ p.
 
 use super::{Input, Settings, Status, everywhere, lagrangian, lu, tangent};
-use crate::configuration::integrate;
-use crate::crba::crba;
+use crate::calls::inertia::crba;
 use crate::data::Data;
-use crate::joint::GroupJacobian::{Exp, Transport};
-use crate::kinematics::place;
-use crate::layout::Single;
-use crate::ltdl::Ltdl;
-use crate::model::Model;
-use crate::passive::{passive_torque, passive_torque_derivative};
+use crate::passes::kinematics::place;
+use crate::passes::passive::{passive_torque, passive_torque_derivative};
+use crate::workspace::filled;
+use condyle_linalg::Ltdl;
+use condyle_model::Model;
+use condyle_model::integrate;
+use condyle_model::joint::GroupJacobian::{Exp, Transport};
+use condyle_model::layout::Single;
 use condyle_spatial::{Constant, Scalar};
 
 /// Shape, where none is given: nv. Written by: `step`, where nothing else is said.
@@ -63,7 +64,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = vec![S::zero(); model.nv];
+        let zero = filled(S::zero(), model.nv());
         Self {
             p: zero.clone(),
             w: zero.clone(),
@@ -76,7 +77,7 @@ impl<S: Scalar> Workspace<S> {
             carried: zero.clone(),
             pushed: zero.clone(),
             residual: zero,
-            slope: vec![S::zero(); model.nv * model.nv],
+            slope: filled(S::zero(), model.nv() * model.nv()),
             lagrangian: lagrangian::Workspace::new(model),
             M: Ltdl::new(model),
         }
@@ -113,7 +114,7 @@ fn evaluate<S: Scalar, R: Constant<S>>(
             passive_torque_derivative(model, &d.w, smoothing, &mut d.passive_slope);
         }
     }
-    for k in 0..model.nv {
+    for k in 0..model.nv() {
         d.f[k] = d.lagrangian.L_q[k] + input.tau[k] + d.passive[k]; // f = ∂L/∂q + τ
     }
     tangent::add_rotors(model, &d.w, &mut d.f);
@@ -123,7 +124,7 @@ fn evaluate<S: Scalar, R: Constant<S>>(
 
 /// The slope of the equation in w; what `evaluate` has left of the derivatives is used up.
 fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S) {
-    let nv = model.nv;
+    let nv = model.nv();
     let half = h * S::splat(0.5);
     let lagrangian::Workspace { M, p_q, L_qq, .. } = &mut d.lagrangian;
     let A = &mut d.slope;
@@ -182,7 +183,7 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
         }
         iterations += 1;
         let (mut error, mut size) = (S::zero(), S::splat(STILL));
-        for k in 0..model.nv {
+        for k in 0..model.nv() {
             let (inside, outside) = (d.lagrangian.p[k], d.pushed[k].mul_add(half, d.carried[k]));
             d.residual[k] = inside - outside; // M w − J(−y)ᵀ p − h/2 J(−y/2)ᵀ f
             error += d.residual[k].abs();
@@ -191,7 +192,7 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
         // The step that follows squares the error, and completes the derivatives of dual numbers.
         converged = everywhere::<S>(error.lt(size * S::splat(settings.tolerance)));
         slope(model, d, h);
-        lu::factorize(&mut d.slope, model.nv);
+        lu::factorize(&mut d.slope, model.nv());
         lu::solve(&d.slope, &mut d.residual);
         for (w, &step) in d.w.iter_mut().zip(&d.residual) {
             *w -= step;
@@ -199,7 +200,7 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
     }
     tangent::multiply_transposed(model, Transport, &d.minus_y, &d.p, &mut d.carried);
     tangent::multiply_transposed(model, Transport, &d.minus_x, &d.f, &mut d.pushed);
-    for k in 0..model.nv {
+    for k in 0..model.nv() {
         v_next[k] = d.pushed[k].mul_add(h, d.carried[k]); // p' = Ad(y)ᵀ p + h Ad(y/2)ᵀ f
     }
     for (y, &minus_y) in d.x.iter_mut().zip(&d.minus_y) {
@@ -214,7 +215,18 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
 #[cfg(test)]
 mod tests {
     use super::{Input, Single, Workspace, evaluate, integrate, place, slope};
-    use crate::{Data, Force, Inertia, Joint, Mimic, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, lie};
+    use crate::Data;
+    use crate::Force;
+    use crate::Inertia;
+    use crate::Joint;
+    use crate::Mimic;
+    use crate::Model;
+    use crate::ModelBuilder;
+    use crate::Se3;
+    use crate::Sym3;
+    use crate::Vec3;
+    use crate::WORLD;
+    use crate::lie;
     use num_dual::Dual64;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 

@@ -51,7 +51,7 @@ impl<S: Scalar> Input<S> {
 }
 
 /// Where the functions of the table put what they return, and the scratch that is not in a `Data`.
-pub(crate) struct Output<'m, S> {
+pub(crate) struct Output<'m, S: Scalar> {
     pub(crate) numbers: Vec<S>,
     q: Vec<S>,
     v: Vec<S>,

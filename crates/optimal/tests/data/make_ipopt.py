@@ -12,7 +12,7 @@ import xml.etree.ElementTree
 
 import casadi
 
-ARM = pathlib.Path(__file__).parents[3] / "dynamics/models/arm7.urdf"
+ARM = pathlib.Path(__file__).parents[3] / "model/models/arm7.urdf"
 
 
 def unicycle(x, u, dt=0.1):

@@ -1,4 +1,4 @@
-//! The equations of a knot in contact, solved for what is not chosen: see [`implicit`](crate::implicit).
+//! The equations of a knot in contact, solved for what is not chosen: see [`Implicit`].
 //!
 //! Changes of accelerations a and forces f satisfy
 //!
@@ -14,12 +14,11 @@
 //! no pivot, and the knot stays explicit.
 #![allow(non_snake_case)] // J, M, T, U, D
 
-use crate::dense::{SLACK, copy_scaled, max_abs};
-use crate::implicit::{Implicit, Rows, block, mask};
+use crate::lq::Implicit;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
 use crate::robot::residuals::rows::Row;
-use crate::vector::{Dense, Vector, at_level};
+use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, block, copy_scaled, mask, max_abs};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
 const PREFERENCE: f64 = 1e-2;
@@ -62,7 +61,7 @@ pub(crate) struct KktElimination {
     /// Runs of columns that are unknowns: the first column, the first unknown, how many.
     runs: Vec<[usize; 3]>,
     /// The forces that are not unknowns, over (w, δv, δq).
-    forces: Rows,
+    forces: SparseRows,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +88,7 @@ impl KktElimination {
             pivots: Vec::with_capacity(rows + passive),
             place: vec![Place::Unknown(0); nv + rows],
             runs: Vec::with_capacity(nv + rows),
-            forces: Rows::default(),
+            forces: SparseRows::default(),
         }
     }
 
@@ -164,9 +163,9 @@ fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
     }
 }
 
-impl Dense for Run<'_> {
+impl Vectorized for Run<'_> {
     #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
+    fn run<V: Vector>(self) {
         let Self { elimination: e, T, dt, implicit, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
         let (solved, all) = (rows + e.passive, rows + nv);
@@ -277,7 +276,7 @@ pub(crate) struct Unknowns<'a> {
 
 impl Unknowns<'_> {
     /// g += c times row k of some rows.
-    fn add(&self, rows: &Rows, k: usize, c: f64, g: &mut Row<'_>) {
+    fn add(&self, rows: &SparseRows, k: usize, c: f64, g: &mut Row<'_>) {
         let row = &rows.numbers[k * self.implicit.stride..];
         let (u, x) = row.split_at(g.u.len());
         let (v, q) = x.split_at(g.v.len());

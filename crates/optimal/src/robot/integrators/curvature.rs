@@ -12,8 +12,8 @@
 
 use super::retraction::Retraction;
 use crate::lq::Hessian;
+use crate::lq::LARGEST_BLOCK;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted};
-use crate::structure::LARGEST_BLOCK;
 use core::ops::Range;
 
 /// The rows of a group of a column of a matrix, zeros after them.

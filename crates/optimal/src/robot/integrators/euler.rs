@@ -4,7 +4,7 @@
 use super::retraction::Retraction;
 use crate::lq::LqNode;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, limit_term};
-use crate::vector::{Dense, Vector, at_level};
+use condyle_linalg::{Vector, Vectorized, at_level};
 
 /// Writes the next state of a prepared one; returns the cost.
 pub(super) fn calc<M: ContinuousModel>(
@@ -58,9 +58,9 @@ pub(super) fn calc_diff<M: ContinuousModel>(
 /// Derivatives of accelerations, nv numbers a column, become those of steps: [a Δt²; a Δt].
 struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
 
-impl<const N: usize> Dense for Steps<'_, N> {
+impl<const N: usize> Vectorized for Steps<'_, N> {
     #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
+    fn run<V: Vector>(self) {
         let Self(parts, nv, dt) = self;
         for (from, to) in parts {
             for (column, a) in to.chunks_exact_mut(2 * nv).zip(from.chunks_exact(nv)) {

@@ -2,9 +2,10 @@
 //! but for a block for each group of positions that is no vector space.
 #![allow(non_snake_case)] // T, E
 
+use crate::EulerBlock;
+use crate::lq::LARGEST_BLOCK;
 use crate::robot::continuous::ContinuousModel;
-use crate::structure::{EulerBlock, LARGEST_BLOCK};
-use crate::vector::{Dense, Vector, at_level};
+use condyle_linalg::{Vector, Vectorized, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -80,9 +81,9 @@ struct Multiply<'a> {
     rows: usize,
 }
 
-impl Dense for Multiply<'_> {
+impl Vectorized for Multiply<'_> {
     #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
+    fn run<V: Vector>(self) {
         let Self { E, group, X, rows } = self;
         let (start, size) = (group.start, group.len());
         let mut block = [[0.0; 8]; LARGEST_BLOCK]; // column by column, with zeros up to a whole register

@@ -194,9 +194,6 @@ macro_rules! at_level {
                     $body
                 }
                 #[inline(always)]
-                fn run_fused(self) {
-                    self.run();
-                }
             }
             S::enter(Work($arguments));
         }

@@ -2,9 +2,8 @@
 //! written once, each entry of Q, S and R as a sum of outer products.
 #![allow(non_snake_case)] // the names of the literature
 
-use crate::dense::{SLACK, tile_rows};
 use crate::lq::LqNode;
-use crate::vector::{Dense, Vector, at_level};
+use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product_without_slack};
 use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
@@ -112,9 +111,9 @@ struct Write<'a> {
     node: &'a mut LqNode,
 }
 
-impl Dense for Write<'_> {
+impl Vectorized for Write<'_> {
     #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
+    fn run<V: Vector>(self) {
         let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, node } = self;
         let (m, nv, n, stride) = (*nu, *nv, 2 * *nv, *stride);
         let implicit = node.implicit.active;
@@ -149,17 +148,17 @@ impl Dense for Write<'_> {
             node.S.as_mut_slice().fill(0.0);
             node.R.as_mut_slice().fill(0.0);
         } else {
-            outer::<V, NR>(&mut Q[nv..], n, [nv, nv], [v, q], both, stride, some);
-            outer::<V, NR>(&mut Q[nv * n..], n, [nv, nv], [q, v], both, stride, some);
-            outer::<V, NR>(&mut Q[nv * n + nv..], n, [nv, nv], [v, v], both, stride, some);
+            outer(&mut Q[nv..], n, [nv, nv], [v, q], both, stride, some);
+            outer(&mut Q[nv * n..], n, [nv, nv], [q, v], both, stride, some);
+            outer(&mut Q[nv * n + nv..], n, [nv, nv], [v, v], both, stride, some);
             if m > 0 {
-                outer::<V, NR>(node.S.as_mut_slice(), n, [nv, m], [q, u], both, stride, some);
-                outer::<V, NR>(&mut node.S.as_mut_slice()[nv..], n, [nv, m], [v, u], both, stride, some);
-                outer::<V, NR>(node.R.as_mut_slice(), m, [m, m], [u, u], both, stride, some);
+                outer(node.S.as_mut_slice(), n, [nv, m], [q, u], both, stride, some);
+                outer(&mut node.S.as_mut_slice()[nv..], n, [nv, m], [v, u], both, stride, some);
+                outer(node.R.as_mut_slice(), m, [m, m], [u, u], both, stride, some);
             }
         }
         if all > 0 {
-            outer::<V, NR>(Q, n, [nv, nv], [q, q], both, stride, all);
+            outer(Q, n, [nv, nv], [q, q], both, stride, all);
         }
     }
 }
@@ -174,8 +173,7 @@ fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
 
 /// C = Σ left rightᵀ over the first `length` rows of both, for some rows and columns of C that stand from two places on in
 /// the rows of `left` and `right`. The sums are the same on both sides of the diagonal.
-#[inline(always)]
-fn outer<V: Vector, const NR: usize>(
+fn outer(
     C: &mut [f64],
     ldc: usize,
     [rows, columns]: [usize; 2],
@@ -184,46 +182,6 @@ fn outer<V: Vector, const NR: usize>(
     stride: usize,
     length: usize,
 ) {
-    let (left, right) = (&left[from[0]..], &right[from[1]..]);
-    let mut j = 0;
-    while j < columns {
-        let width = NR.min(columns - j);
-        let mut i = 0;
-        while i < rows {
-            if rows - i >= 2 * V::N {
-                let tile = tile_rows::<V, 2, NR>(left, stride, i, right, stride, j, length);
-                for jj in 0..NR {
-                    if jj < width {
-                        let to = &mut C[(j + jj) * ldc + i..][..2 * V::N];
-                        tile[jj][0].store(to);
-                        tile[jj][1].store(&mut to[V::N..]);
-                    }
-                }
-                i += 2 * V::N;
-                continue;
-            }
-            if rows >= V::N {
-                i = i.min(rows - V::N); // the last strip overlaps the one before
-            }
-            let tile = tile_rows::<V, 1, NR>(left, stride, i, right, stride, j, length);
-            for jj in 0..NR {
-                if jj < width {
-                    let to = &mut C[(j + jj) * ldc + i..];
-                    if rows >= V::N {
-                        tile[jj][0].store(to);
-                        continue;
-                    }
-                    let mut numbers = [0.0; SLACK];
-                    tile[jj][0].store(&mut numbers);
-                    for k in 0..V::N {
-                        if k < rows {
-                            to[k] = numbers[k]; // one by one: no function call
-                        }
-                    }
-                }
-            }
-            i += V::N;
-        }
-        j += NR;
-    }
+    let (left, right) = (View::new(&left[from[0]..], stride), View::new(&right[from[1]..], stride));
+    product_without_slack(C, ldc, [rows, columns, length], left, right);
 }

@@ -65,8 +65,4 @@ impl<S: Block<Number = f64>> Kernel for Subtract<'_, S> {
             x[i] -= y[i];
         }
     }
-    #[inline(always)]
-    fn run_fused(self) {
-        self.run();
-    }
 }

@@ -1,0 +1,117 @@
+//! The momentum of the whole robot about its centre of mass, and all terms of the equations of motion at once.
+
+use crate::data::Data;
+use crate::passes::all_terms::{self, AllTerms};
+use crate::passes::centroidal::{CentroidalMap, CentroidalMapRate, run_map, run_map_rate, shift_map, shift_rate};
+use crate::passes::frames::{Placements, Velocities};
+use crate::passes::kinematics::{positions, velocities};
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::{Constant, Scalar};
+
+/// Ag(q), the centroidal momentum matrix, with the centre of mass, its Jacobian and the inertia about it, in O(n).
+///
+/// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. Allocates
+/// nothing. Source: Orin, Goswami, Lee (2013).
+///
+/// ```
+/// use condyle_dynamics::{Data, centroidal_map, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let mut data = Data::new(&quadruped);
+/// let map = centroidal_map(&quadruped, &mut data, &neutral(&quadruped));
+/// assert!((map.Ag[(0, 0)] - quadruped.total_mass()).abs() < 1e-12); // pushed forwards, all goes forwards
+/// assert!((map.Jcom[(0, 0)] - 1.0).abs() < 1e-15);
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+#[inline(always)]
+pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+) -> CentroidalMap<'d, S> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    positions(model, &mut data.world, q);
+    run_map(model, &data.world, &mut data.centroidal);
+    shift_map(model, &mut data.centroidal)
+}
+
+/// Ag(q), dAg/dt along v, and the centroidal momentum hg = Ag v, with what [`centroidal_map`] gives, in O(n).
+///
+/// q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass.
+/// Allocates nothing. Source: Wensing and Orin (2016).
+///
+/// ```
+/// use condyle_dynamics::{Data, centroidal_map_rate, forward_accelerations, robots};
+/// use nalgebra::DVector;
+/// let arm = robots::arm7();
+/// let (mut data, q, v) = (Data::new(&arm), [0.3; 7], [0.5; 7]);
+/// let drift = centroidal_map_rate(&arm, &mut data, &q, &v).dAg * DVector::from_row_slice(&v);
+/// let rate = forward_accelerations(&arm, &mut data, &q, &v, &[0.0; 7]).centroidal_momentum_rate();
+/// assert!((drift - DVector::from_row_slice(&rate.to_array())).amax() < 1e-13);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> CentroidalMapRate<'d, S> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    run_map_rate(model, &data.world, &data.moving, &mut data.centroidal);
+    shift_rate(model, &mut data.centroidal)
+}
+
+/// M, h, Ag, dAg, hg, centre of mass, energies, and the Jacobians of all frames: what the equations of motion are made
+/// of, from one pass to the tips and one back, in O(n · depth).
+///
+/// q: nq numbers; v: nv. The numbers are those of [`crba`](crate::crba),
+/// [`nonlinear_effects`](crate::nonlinear_effects), [`centroidal_map_rate`](crate::centroidal_map_rate) and
+/// [`forward_velocities`](crate::forward_velocities), up to rounding. Allocates nothing. Source: Featherstone, *Rigid
+/// Body Dynamics Algorithms* (2008), tables 5.1 and 6.2; Wensing and Orin (2016).
+///
+/// ```
+/// use condyle_dynamics::{Data, ReferenceFrame, compute_all_terms, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let terms = compute_all_terms(&arm, &mut data, &[0.3; 7], &[0.1; 7]);
+/// let mut J = nalgebra::DMatrix::zeros(6, 7);
+/// terms.kinematics.frame_jacobian(arm.frame("tool")?, ReferenceFrame::Local, &mut J);
+/// assert!(terms.M[(0, 0)] > 0.0 && terms.h.len() == 7 && terms.kinetic_energy > 0.0);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> AllTerms<'d, S, R> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    all_terms::run(model, &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
+    let kinematics = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
+    let moment = data.centroidal.IC[0].mass_com;
+    AllTerms {
+        kinematics,
+        M: &data.all_terms.M,
+        h: &data.all_terms.h,
+        centroidal: shift_rate(model, &mut data.centroidal),
+        kinetic_energy: (data.all_terms.twice + kinematics.rotors()) * S::splat(0.5),
+        potential_energy: Single::<S, R>::new(model).minus_gravity().dot(moment),
+    }
+}

@@ -1,0 +1,286 @@
+//! Forward dynamics under constraints, its derivatives, and the equations differentiated.
+
+use super::limbs_constrained;
+use crate::constraints::constrained_derivatives::{invert, respond_to_q, respond_to_v};
+use crate::constraints::constrained_dynamics::{Inputs, constrain, equations, factorize, solve};
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::constraints::kkt_derivatives::{differentiate_motion, load, turn};
+use crate::data::{Data, check_forces};
+use crate::derivatives::rnea_derivatives;
+use crate::passes::kinematics::positions;
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Force, Scalar};
+use nalgebra::DMatrix;
+
+/// What [`constrained_dynamics`] gives.
+#[derive(Clone, Copy, Debug)]
+pub struct Constrained<'d, S> {
+    /// q̈, nv numbers (rad/s², m/s²).
+    pub a: &'d [S],
+    /// λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m); as many numbers as
+    /// there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied.
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding: they have no force of their own (in f64, J M⁻¹ Jᵀ +
+    /// μ 1 is singular to 13 digits). 0 says that the solution is the only one.
+    pub redundant: S,
+}
+
+/// q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that make J q̈ + γ = 0: forward dynamics under constraints.
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (N, N m), number 0 being the world's; or empty
+/// for none. Works on the tree's zeros: O(n d²) for a tree of depth d, O(d) for each pair of rows, O(rows³); of robots
+/// with limbs ([`Model::with_limbs`]) on the articulated bodies, in O(n) beside the rows. Allocates nothing.
+/// Constraints that contradict each other, or themselves at a singular posture, give finite numbers and a residual;
+/// [`Proximal`](crate::Proximal) settings decide how redundant ones share their forces. Source: Carpentier, Budhiraja,
+/// Mansard (2021), on the factorisation of Featherstone (2005); Wensing, Featherstone, Orin, *A reduced-order recursive
+/// algorithm for the computation of the operational-space inertia matrix* (2012).
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
+/// let mut stance = ConstraintSet::new(&quadruped, &feet.map(Constraint::point))?;
+/// let (mut data, mut q) = (Data::new(&quadruped), neutral(&quadruped));
+/// (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+/// let d = constrained_dynamics(&quadruped, &mut data, &mut stance, &q, &[0.0; 18], &[0.0; 18], &[]);
+/// assert!(d.residual < 1e-10 && d.redundant == 0.0); // the feet stay, in one way
+/// assert_eq!(d.lambda.len(), 12);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> Constrained<'d, S> {
+    let inputs = Inputs { q, v, tau, f_ext };
+    check_arguments(model, data, constraints, &inputs);
+    if !limbs_constrained::run(model, data, constraints, inputs) {
+        run(model, data, constraints, inputs);
+    }
+    Constrained {
+        a: &data.constrained_dynamics.qdd,
+        lambda: &constraints.lambda,
+        residual: constraints.residual(),
+        redundant: constraints.delassus.redundant,
+    }
+}
+
+/// Panics unless the arguments fit.
+#[inline]
+#[track_caller]
+fn check_arguments<S: Scalar, R>(
+    model: &Model<R>,
+    data: &Data<S>,
+    constraints: &ConstraintSet<S>,
+    inputs: &Inputs<'_, S>,
+) {
+    data.check(model);
+    constraints.check(model);
+    model.check_regular();
+    check("q", inputs.q.len(), model.nq());
+    check("v", inputs.v.len(), model.nv());
+    check("tau", inputs.tau.len(), model.nv());
+    check_forces(inputs.f_ext.len(), model.nodes().len());
+}
+
+/// The whole algorithm over the factor of M, for arguments that fit.
+pub(crate) fn run<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
+) {
+    positions(model, &mut data.world, q);
+    let (world, d) = (&data.world, &mut data.constrained_dynamics);
+    equations(model, world, d, v, tau, f_ext);
+    factorize(d);
+    constrain(world, d, constraints);
+    solve(constraints, &d.factor, &d.effort, &mut d.qdd);
+}
+
+/// What [`constrained_dynamics_equations`] gives; J is that of [`ConstraintSet::jacobian`].
+#[derive(Clone, Copy, Debug)]
+pub struct ConstrainedEquations<'d, S> {
+    /// q̈ itself, nv numbers.
+    pub a: &'d [S],
+    /// λ itself, as many numbers as there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J q̈ + γ (m/s², rad/s²).
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding.
+    pub redundant: S,
+    /// M, nv × nv, armature included.
+    pub M: &'d DMatrix<S>,
+    /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of τ when q moves to q ⊕ δ, per δ.
+    pub dtau_dq: &'d DMatrix<S>,
+    /// r_v = ∂h/∂v, nv × nv.
+    pub dtau_dv: &'d DMatrix<S>,
+    /// c_q = ∂(J q̈ + γ)/∂q in the tangent space, rows × nv.
+    pub dgamma_dq: &'d DMatrix<S>,
+    /// c_v = ∂γ/∂v, rows × nv.
+    pub dgamma_dv: &'d DMatrix<S>,
+}
+
+/// [`constrained_dynamics`](crate::constrained_dynamics()) and the linear equations between changes of q, v, τ and of the
+/// q̈ and λ that follow:
+///
+/// ```text
+/// M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,      J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
+/// ```
+///
+/// What [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives) solves, for those who would rather
+/// eliminate something else: nothing is inverted here, and all blocks keep the zeros of the tree.
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
+/// Targets of the constraints are fixed. In O(n · depth) beside the forward dynamics. Allocates nothing. Source: Carpentier
+/// and Mansard (2018).
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics_equations, crba, robots};
+/// let arm = robots::arm7();
+/// let touch = Constraint { kp: 100.0, kd: 20.0, ..Constraint::point(arm.frame("tool")?) };
+/// let (mut touch, mut data) = (ConstraintSet::new(&arm, &[touch])?, Data::new(&arm));
+/// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
+/// let M = constrained_dynamics_equations(&arm, &mut data, &mut touch, &q, &v, &tau, &[]).M.clone();
+/// assert!((M - crba(&arm, &mut data, &q)).amax() < 1e-13);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> ConstrainedEquations<'d, S> {
+    let inputs = Inputs { q, v, tau, f_ext };
+    check_arguments(model, data, constraints, &inputs);
+    differentiate(model, data, constraints, inputs);
+    ConstrainedEquations {
+        a: &data.constrained_dynamics.qdd,
+        lambda: &constraints.lambda,
+        residual: constraints.residual(),
+        redundant: constraints.delassus.redundant,
+        M: &data.rnea_derivatives.dtau_da,
+        dtau_dq: &data.constrained_derivatives.dtau_dq,
+        dtau_dv: &data.rnea_derivatives.dtau_dv,
+        dgamma_dq: &constraints.dgamma_dq,
+        dgamma_dv: &constraints.dgamma_dv,
+    }
+}
+
+/// The whole algorithm, for arguments that fit.
+pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    inputs: Inputs<'_, S>,
+) {
+    run(model, data, constraints, inputs);
+    let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
+    let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
+    load(model, constraints, world, inputs.f_ext, &mut d.forces);
+    rnea_derivatives::run(model, world, id, inputs.v, qdd, &d.forces, &[]);
+    turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
+    differentiate_motion(constraints, world, &id.bodies);
+}
+
+/// What [`constrained_dynamics_derivatives`] gives. The blocks of K⁻¹ are ∂q̈/∂τ, −∂λ/∂τ (transposed) and −Λ.
+#[derive(Clone, Copy, Debug)]
+pub struct ConstrainedDerivatives<'d, S> {
+    /// q̈ itself, nv numbers.
+    pub a: &'d [S],
+    /// λ itself, as many numbers as there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J q̈ + γ (m/s², rad/s²).
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding.
+    pub redundant: S,
+    /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ when q moves to q ⊕ δ, per δ.
+    pub da_dq: &'d DMatrix<S>,
+    /// ∂q̈/∂v, nv × nv.
+    pub da_dv: &'d DMatrix<S>,
+    /// ∂q̈/∂τ, nv × nv, symmetric.
+    pub da_dtau: &'d DMatrix<S>,
+    /// ∂λ/∂q in the tangent space, rows × nv.
+    pub dlambda_dq: &'d DMatrix<S>,
+    /// ∂λ/∂v, rows × nv.
+    pub dlambda_dv: &'d DMatrix<S>,
+    /// ∂λ/∂τ, rows × nv.
+    pub dlambda_dtau: &'d DMatrix<S>,
+    /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
+    pub inertia: &'d DMatrix<S>,
+}
+
+/// [`constrained_dynamics`](crate::constrained_dynamics()) and its derivatives with respect to q, v and τ, exact.
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
+/// Targets of the constraints are fixed. In O(n · depth) for what goes into them and O((n + rows)² n) for the products
+/// with K⁻¹, of which zeros of the tree are left out. Allocates nothing. Where constraints are redundant, the derivatives
+/// of q̈ are exact up to the residual; those of λ are the solution of the same kind (without μ: redundant rows without
+/// force; with μ: the smallest one) of the equations differentiated. Source: Carpentier and Mansard (2018).
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};
+/// use nalgebra::DMatrix;
+/// let arm = robots::arm7();
+/// let touch = Constraint { kp: 100.0, kd: 20.0, ..Constraint::point(arm.frame("tool")?) };
+/// let (mut touch, mut data) = (ConstraintSet::new(&arm, &[touch])?, Data::new(&arm));
+/// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
+/// let da_dtau = constrained_dynamics_derivatives(&arm, &mut data, &mut touch, &q, &v, &tau, &[]).da_dtau.clone();
+/// let mut J = DMatrix::<f64>::zeros(3, 7);
+/// touch.jacobian(&mut J);
+/// assert!((J * da_dtau).amax() < 1e-12); // no effort moves the point
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> ConstrainedDerivatives<'d, S> {
+    let inputs = Inputs { q, v, tau, f_ext };
+    check_arguments(model, data, constraints, &inputs);
+    differentiate(model, data, constraints, inputs);
+    let (d, id) = (&mut data.constrained_derivatives, &data.rnea_derivatives);
+    invert(constraints, &data.constrained_dynamics.factor, &mut d.P);
+    respond_to_q(constraints, &d.P, &d.dtau_dq, &mut d.da_dq);
+    respond_to_v(constraints, &d.P, &id.dtau_dv, &mut d.da_dv);
+    let (d, c) = (&data.constrained_derivatives, &*constraints);
+    ConstrainedDerivatives {
+        a: &data.constrained_dynamics.qdd,
+        lambda: &c.lambda,
+        residual: c.residual(),
+        redundant: c.delassus.redundant,
+        da_dq: &d.da_dq,
+        da_dv: &d.da_dv,
+        da_dtau: &d.P,
+        dlambda_dq: &c.dlambda_dq,
+        dlambda_dv: &c.dlambda_dv,
+        dlambda_dtau: &c.dlambda_dtau,
+        inertia: &c.delassus.inverse,
+    }
+}

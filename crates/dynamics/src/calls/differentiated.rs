@@ -1,0 +1,59 @@
+//! The state at which inverse dynamics has been differentiated, with all that its passes have left of the bodies.
+
+use crate::derivatives::rnea_derivatives::Workspace;
+use crate::lanes::limbs::LaneView;
+use crate::passes::frames::Placements;
+use crate::passes::kinematics::World;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Inertia, Motion, Scalar, Se3, Vec3};
+
+/// The state at which inverse dynamics has been differentiated.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State<'d, S, R> {
+    pub model: &'d Model<R>,
+    pub world: &'d World<S>,
+    pub pass: &'d Workspace<S>,
+    /// Where what there is of the bodies stands, if they were not computed one by one.
+    pub limbs: Option<LaneView<'d>>,
+}
+
+impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
+    /// oXb, in the body's public frame.
+    pub(crate) fn pose(&self, b: usize) -> Se3<S> {
+        if let Some(limbs) = self.limbs {
+            return limbs.pose(b) * Se3::new(self.model.nodes()[b].axis_rotation.transpose(), Vec3::zero()).lift();
+        }
+        Placements { model: self.model, world: self.world }.body(b)
+    }
+
+    /// S of column k of joint i.
+    pub(crate) fn column(&self, i: usize, k: usize) -> Motion<S> {
+        if let Some(limbs) = self.limbs {
+            return limbs.column(i, k);
+        }
+        self.world.S[self.model.nodes()[i].column + k]
+    }
+
+    /// Velocity, and acceleration with gravity as the world's.
+    pub(crate) fn moving(&self, b: usize) -> (Motion<S>, Motion<S>) {
+        if let Some(limbs) = self.limbs {
+            return limbs.moving(b);
+        }
+        (self.pass.bodies.v[b], self.pass.bodies.a[b])
+    }
+
+    /// Iᶜ.
+    pub(crate) fn carried(&self, i: usize) -> Inertia<S> {
+        if let Some(limbs) = self.limbs {
+            return limbs.carried(i);
+        }
+        self.pass.bodies.IC[i]
+    }
+
+    /// The columns of body b's joint and of all before it: of which body, and the how manieth.
+    pub(crate) fn columns(&self, b: usize) -> impl Iterator<Item = (usize, usize)> {
+        let nodes = &self.model.nodes();
+        let way = std::iter::successors(Some(b), |&i| Some(nodes[i].parent)).take_while(|&i| i > 0);
+        way.flat_map(|i| (0..nodes[i].joint.nv()).map(move |k| (i, k)))
+    }
+}

@@ -1,0 +1,142 @@
+//! Forward dynamics: how a robot accelerates under the efforts that it is given.
+
+use super::inertia::crba;
+use super::inverse_dynamics::rnea;
+use super::limbs::{Task, run as run_limbs};
+use crate::data::{Data, check_forces};
+use crate::passes::aba;
+use crate::passes::factored_dynamics::{Method, run_dense, run_sparse};
+use crate::passes::kinematics::positions;
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Force, Scalar};
+
+/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, in O(n).
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
+/// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
+/// Source: Featherstone (2008), table 7.1. Robots whose joints share a coordinate (mimic) go over a sparse factor
+/// of M, as [`forward_dynamics`] does with [`Method::Sparse`].
+///
+/// ```
+/// use condyle_dynamics::{Data, aba, robots, rnea};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
+/// let a = aba(&arm, &mut data, &q, &v, &tau, &[]).to_vec();
+/// let back = rnea(&arm, &mut data, &q, &v, &a, &[]);
+/// assert!(back.iter().all(|&tau| f64::abs(tau - 1.0) < 1e-10));
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn aba<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> &'d [S] {
+    check_arguments(model, data, q, v, tau, f_ext);
+    if !run_limbs(Task::Aba, model, data, q, v, tau, f_ext) {
+        one_by_one(model, data, q, v, tau, f_ext);
+    }
+    &data.aba.qdd
+}
+
+/// Panics unless the arguments of forward dynamics fit.
+#[inline]
+#[track_caller]
+pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) {
+    data.check(model);
+    model.check_regular();
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("tau", tau.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
+}
+
+/// Body by body, for arguments that fit; leaves what depends on q behind.
+pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) {
+    if model.has_mimic() {
+        by_factor(model, data, q, v, tau, f_ext, Method::Sparse);
+        data.aba.qdd.copy_from_slice(&data.forward_dynamics.qdd);
+        return;
+    }
+    positions(model, &mut data.world, q);
+    aba::run(model, &data.world, &mut data.aba, v, tau, f_ext);
+}
+
+/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, or by the [`fastest`](Method::fastest).
+///
+/// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
+/// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
+/// Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), chapters 6 and 7. If joints share a coordinate,
+/// [`Method::ArticulatedBody`] factorises M too, as [`aba`](crate::aba()) does.
+///
+/// ```
+/// use condyle_dynamics::{Data, Method, forward_dynamics, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
+/// let a = forward_dynamics(&arm, &mut data, &q, &v, &tau, &[], None).to_vec();
+/// let same = forward_dynamics(&arm, &mut data, &q, &v, &tau, &[], Some(Method::Sparse));
+/// assert!(a.iter().zip(same).all(|(a, b)| f64::abs(a - b) < 1e-9));
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+    method: Option<Method>,
+) -> &'d [S] {
+    data.check(model);
+    model.check_regular();
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("tau", tau.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
+    match method.unwrap_or(Method::fastest(model)) {
+        Method::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
+        method => {
+            by_factor(model, data, q, v, tau, f_ext, method);
+            &data.forward_dynamics.qdd
+        }
+    }
+}
+
+/// Over a factor of M.
+pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+    method: Method,
+) {
+    let zero = core::mem::take(&mut data.forward_dynamics.zero);
+    rnea(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
+    data.forward_dynamics.zero = zero;
+    crba(model, data, q);
+    let (d, h, M) = (&mut data.forward_dynamics, data.rnea.tau(), data.crba.matrix());
+    match method {
+        Method::Dense => run_dense(d, h, M, tau),
+        _ => run_sparse(d, h, M, tau),
+    }
+}

@@ -1,0 +1,177 @@
+//! Impacts: how velocities jump when constraints set in, and the derivatives.
+
+use crate::constraints::constrained_derivatives::{invert, respond_to_q};
+use crate::constraints::constrained_dynamics::{factorize, inertia, solve};
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::constraints::impulse_dynamics::{approach, differentiate_motion, respond_to_v_before};
+use crate::constraints::kkt_derivatives::{load, turn};
+use crate::data::Data;
+use crate::derivatives::rnea_derivatives;
+use crate::passes::kinematics::positions;
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+/// What [`impulse_dynamics`] gives.
+#[derive(Clone, Copy, Debug)]
+pub struct Impulse<'d, S> {
+    /// v⁺, the velocity after the impact, nv numbers (rad/s, m/s).
+    pub v: &'d [S],
+    /// Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s); as many
+    /// numbers as there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding.
+    pub redundant: S,
+}
+
+/// v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact.
+///
+/// q: nq numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy. Of the
+/// constraints, frames and reference frames count; gains and targets do not, but for where the other frame's point is.
+/// Works on the tree's zeros, as [`constrained_dynamics`](crate::constrained_dynamics()) does, with the same
+/// [`Proximal`](crate::Proximal) settings. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms*
+/// (2008), section 11.7.
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, impulse_dynamics, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let feet = ["LF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
+/// let mut touchdown = ConstraintSet::new(&quadruped, &feet.map(Constraint::point))?;
+/// let (mut data, q, mut v) = (Data::new(&quadruped), neutral(&quadruped), [0.0; 18]);
+/// v[2] = -1.0; // falling
+/// let after = impulse_dynamics(&quadruped, &mut data, &mut touchdown, &q, &v, 0.0);
+/// assert!(after.residual < 1e-12 && after.lambda[2] > 0.0); // the ground pushes upwards
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn impulse_dynamics<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    restitution: S,
+) -> Impulse<'d, S> {
+    checks(model, data, constraints, q, v);
+    run(model, data, constraints, q, v, restitution);
+    Impulse {
+        v: &data.impulse_dynamics.v_after,
+        lambda: &constraints.lambda,
+        residual: constraints.residual(),
+        redundant: constraints.delassus.redundant,
+    }
+}
+
+#[track_caller]
+fn checks<S, R>(model: &Model<R>, data: &Data<S>, constraints: &ConstraintSet<S>, q: &[S], v: &[S])
+where
+    S: Scalar,
+{
+    data.check(model);
+    constraints.check(model);
+    model.check_regular();
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+}
+
+/// The whole algorithm, for arguments that fit.
+fn run<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    restitution: S,
+) {
+    positions(model, &mut data.world, q);
+    let (world, d, out) = (&data.world, &mut data.constrained_dynamics, &mut data.impulse_dynamics);
+    inertia(model, world, d);
+    factorize(d);
+    approach(world, constraints, out, v, restitution);
+    solve(constraints, &d.factor, &out.zero, &mut d.qdd); // Δ
+    for k in 0..v.len() {
+        out.v_after[k] = v[k] + d.qdd[k];
+        out.w[k] = v[k].mul_add(restitution, out.v_after[k]);
+    }
+}
+
+/// What [`impulse_dynamics_derivatives`] gives.
+#[derive(Clone, Copy, Debug)]
+pub struct ImpulseDerivatives<'d, S> {
+    /// v⁺ itself, nv numbers.
+    pub v: &'d [S],
+    /// Λ itself, as many numbers as there are rows.
+    pub lambda: &'d [S],
+    /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
+    pub residual: S,
+    /// How many rows of J depend on rows before them, up to rounding.
+    pub redundant: S,
+    /// ∂v⁺/∂q in the tangent space, nv × nv: the change of v⁺ when q moves to q ⊕ δ, per δ.
+    pub dv_dq: &'d DMatrix<S>,
+    /// ∂v⁺/∂v, nv × nv.
+    pub dv_dv: &'d DMatrix<S>,
+    /// ∂Λ/∂q in the tangent space, rows × nv.
+    pub dlambda_dq: &'d DMatrix<S>,
+    /// ∂Λ/∂v, rows × nv.
+    pub dlambda_dv: &'d DMatrix<S>,
+    /// (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
+    pub inertia: &'d DMatrix<S>,
+}
+
+/// [`impulse_dynamics`] and its derivatives with respect to q and the velocity before the impact, exact.
+///
+/// q: nq numbers; v: nv; restitution: ε. As
+/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()) in cost, and in what it says of redundant
+/// constraints. Allocates nothing.
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, Data, impulse_dynamics_derivatives, robots};
+/// let arm = robots::arm7();
+/// let (mut hit, mut data) = (ConstraintSet::new(&arm, &[Constraint::point(arm.frame("tool")?)])?, Data::new(&arm));
+/// let d = impulse_dynamics_derivatives(&arm, &mut data, &mut hit, &[0.3; 7], &[0.1; 7], 0.0);
+/// let again = d.dv_dv * d.dv_dv; // an impact that sticks is a projection
+/// assert!((again - d.dv_dv).amax() < 1e-9);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    restitution: S,
+) -> ImpulseDerivatives<'d, S> {
+    checks(model, data, constraints, q, v);
+    run(model, data, constraints, q, v, restitution);
+    let (world, change) = (&data.world, &data.constrained_dynamics.qdd);
+    let (d, id, out) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives, &mut data.impulse_dynamics);
+    load(model, constraints, world, &[], &mut d.forces);
+    rnea_derivatives::run(model, world, id, &out.zero, change, &d.forces, &[Vec3::zero()]); // ∂(M Δ − Jᵀ Λ)/∂q
+    turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
+    differentiate_motion(model, world, out, constraints);
+    invert(constraints, &data.constrained_dynamics.factor, &mut d.P);
+    respond_to_q(constraints, &d.P, &d.dtau_dq, &mut d.da_dq);
+    respond_to_v_before(constraints, restitution, &mut d.da_dv);
+    let (d, c) = (&data.constrained_derivatives, &*constraints);
+    ImpulseDerivatives {
+        v: &data.impulse_dynamics.v_after,
+        lambda: &c.lambda,
+        residual: c.residual(),
+        redundant: c.delassus.redundant,
+        dv_dq: &d.da_dq,
+        dv_dv: &d.da_dv,
+        dlambda_dq: &c.dlambda_dq,
+        dlambda_dv: &c.dlambda_dv,
+        inertia: &c.delassus.inverse,
+    }
+}

@@ -1,0 +1,72 @@
+//! The joint-space inertia matrix and its inverse.
+
+use super::limbs::{Task, run as run_limbs};
+use crate::data::Data;
+use crate::passes::kinematics::positions;
+use crate::passes::{aba, crba, minv};
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Scalar};
+use nalgebra::DMatrix;
+
+/// M(q), the joint-space inertia matrix: τ = M a + h, kinetic energy ½ vᵀ M v. In O(n · depth).
+///
+/// q: nq numbers. Returns the full symmetric nv × nv matrix, armature included. Allocates nothing.
+/// Source: Featherstone (2008), table 6.2.
+///
+/// ```
+/// use condyle_dynamics::{Data, crba, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let M = crba(&arm, &mut data, &[0.3; 7]);
+/// assert_eq!(M[(0, 6)], M[(6, 0)]);
+/// assert!(M.clone().cholesky().is_some()); // positive definite
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    if run_limbs(Task::Crba, model, data, q, &[], &[], &[]) {
+        return &data.crba.M;
+    }
+    positions(model, &mut data.world, q);
+    crba::run(model, &data.world, &mut data.crba);
+    &data.crba.M
+}
+
+/// M(q)⁻¹, the accelerations for unit efforts, in O(n²).
+///
+/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018); on trees with
+/// short branches, and where joints share a coordinate (mimic), by the factor of Featherstone (2005) ([`Ltdl`](crate::Ltdl)).
+///
+/// ```
+/// use condyle_dynamics::{Data, crba, minv, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let M = crba(&arm, &mut data, &[0.3; 7]).clone();
+/// let identity = M * minv(&arm, &mut data, &[0.3; 7]);
+/// assert!((identity - nalgebra::DMatrix::identity(7, 7)).amax() < 1e-12);
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, `data` was made for a model of another tree, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+    data.check(model);
+    model.check_regular();
+    check("q", q.len(), model.nq());
+    if data.minv.by_factor() {
+        if run_limbs(Task::Minv, model, data, q, &[], &[], &[]) {
+            return &data.minv.Minv;
+        }
+        crba(model, data, q);
+        minv::from_matrix(&mut data.minv, data.crba.matrix());
+        return &data.minv.Minv;
+    }
+    positions(model, &mut data.world, q);
+    aba::factors(model, &data.world, &mut data.aba);
+    minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv);
+    &data.minv.Minv
+}

@@ -1,0 +1,164 @@
+//! Inverse dynamics: the efforts that make a robot move as it is told.
+
+use super::limbs::{Task, run as run_limbs};
+use crate::data::{Data, check_forces};
+use crate::passes::kinematics::{positions, velocities};
+use crate::passes::{coriolis, rnea, statics};
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Force, Scalar};
+use nalgebra::DMatrix;
+
+/// With the limbs side by side where there are some, else body by body.
+fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
+    if !run_limbs(Task::Rnea, model, data, q, v, a, f_ext) {
+        rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, f_ext);
+    }
+}
+
+/// τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n).
+///
+/// q: nq numbers; v, a: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
+/// frame, number 0 being the world's; or empty for none. Returns nv numbers (N m, N). Allocates nothing.
+/// Source: Luh, Walker, Paul (1980).
+///
+/// ```
+/// use condyle_dynamics::{Data, robots, rnea};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let tau = rnea(&arm, &mut data, &[0.3; 7], &[0.0; 7], &[0.0; 7], &[]);
+/// assert!(f64::abs(tau[0]) < 1e-9); // gravity does not turn a vertical axis
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn rnea<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+    f_ext: &[Force<S>],
+) -> &'d [S] {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
+    check_forces(f_ext.len(), model.nodes().len());
+    run(model, data, q, v, a, f_ext);
+    &data.rnea.tau
+}
+
+/// h(q, v) = C(q, v) v + g(q): the efforts that keep the velocity as it is, in O(n). It is [`rnea`] with a = 0.
+///
+/// q: nq numbers; v: nv. Returns nv numbers (N m, N). Allocates nothing.
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> &'d [S] {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    let zero = core::mem::take(&mut data.rnea.zero);
+    run(model, data, q, v, &zero, &[]);
+    data.rnea.zero = zero;
+    &data.rnea.tau
+}
+
+/// g(q): the efforts that hold the robot still, in O(n). It is [`rnea`] with v = a = 0.
+///
+/// q: nq numbers. Returns nv numbers (N m, N). Allocates nothing.
+///
+/// ```
+/// use condyle_dynamics::{Data, gravity, robots};
+/// let quadruped = robots::quadruped();
+/// let mut data = Data::new(&quadruped);
+/// let q = condyle_dynamics::neutral(&quadruped);
+/// let g = gravity(&quadruped, &mut data, &q);
+/// assert!((g[2] - 9.81 * quadruped.total_mass()).abs() < 1e-9); // the base carries the weight
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    let zero = core::mem::take(&mut data.rnea.zero);
+    run(model, data, q, &zero, &zero, &[]);
+    data.rnea.zero = zero;
+    &data.rnea.tau
+}
+
+/// τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, in O(n). It is
+/// [`rnea`](crate::rnea) with v = a = 0, at a lower price.
+///
+/// q: nq numbers; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its frame, number 0
+/// being the world's; or empty for none. Returns nv numbers (N m, N). Allocates nothing.
+/// Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 5.3.
+///
+/// ```
+/// use condyle_dynamics::{Data, Force, Vec3, robots, static_torque};
+/// let quadruped = robots::quadruped();
+/// let mut data = Data::new(&quadruped);
+/// let q = condyle_dynamics::neutral(&quadruped);
+/// let mut f_ext = vec![Force::zero(); quadruped.bodies().len()];
+/// f_ext[1].linear.z = 9.81 * quadruped.total_mass(); // hung up by its trunk
+/// let tau = static_torque(&quadruped, &mut data, &q, &f_ext);
+/// assert!(f64::abs(tau[2]) < 1e-9); // nothing else need carry it
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    f_ext: &[Force<S>],
+) -> &'d [S] {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check_forces(f_ext.len(), model.nodes().len());
+    positions(model, &mut data.world, q);
+    statics::run(model, &data.world, &mut data.statics, f_ext);
+    &data.statics.tau
+}
+
+/// C(q, v), the Coriolis matrix by Christoffel symbols: C v = h − g, Ṁ = C + Cᵀ, so that Ṁ − 2C is skew. In
+/// O(n · depth).
+///
+/// q: nq numbers; v: nv. Returns the full nv × nv matrix (N m s/rad, N s/m). Allocates nothing.
+/// Source: Echeandia and Wensing (2021), algorithm 1; see the head of the file.
+///
+/// ```
+/// use condyle_dynamics::{Data, coriolis_matrix, gravity, nonlinear_effects, robots};
+/// use nalgebra::DVector;
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v) = ([0.3; 7], [0.1; 7]);
+/// let forces = coriolis_matrix(&arm, &mut data, &q, &v) * DVector::from_row_slice(&v);
+/// let h = DVector::from_row_slice(nonlinear_effects(&arm, &mut data, &q, &v));
+/// let g = DVector::from_row_slice(gravity(&arm, &mut data, &q));
+/// assert!((forces - (h - g)).amax() < 1e-13);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> &'d DMatrix<S> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    coriolis::run(model, &data.world, &data.moving, &mut data.coriolis);
+    &data.coriolis.C
+}

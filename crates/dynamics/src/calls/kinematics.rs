@@ -1,0 +1,127 @@
+//! Where the bodies are and how they move.
+
+use super::limbs::spread;
+use crate::data::Data;
+use crate::passes::frames::{Accelerations, Placements, Velocities};
+use crate::passes::kinematics::{PlacementCache, accelerations, positions, velocities};
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Scalar};
+
+impl<S: Scalar> Data<S> {
+    /// The placements at the position of the last call on this data: they need not be computed again. There are none if it
+    /// did without them, as [`rnea`](crate::rnea()) does.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, aba, forward_kinematics, robots};
+    /// let arm = robots::arm7();
+    /// let (tool, mut data, q) = (arm.frame("tool")?, Data::new(&arm), [0.3; 7]);
+    /// aba(&arm, &mut data, &q, &[0.0; 7], &[0.0; 7], &[]);
+    /// let there = data.placements(&arm).unwrap().frame(tool);
+    /// assert_eq!(there, forward_kinematics(&arm, &mut data, &q).frame(tool));
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If this was made for a model of another tree.
+    pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
+        self.check(model);
+        if self.world.placed == PlacementCache::Limbs {
+            spread(model, self);
+        }
+        (self.world.placed == PlacementCache::Bodies).then_some(Placements { model, world: &self.world })
+    }
+}
+
+/// Places all bodies: oXi = oXλ λXi(q), in O(n).
+///
+/// q: nq numbers. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 4.1.
+///
+/// ```
+/// use condyle_dynamics::{Data, forward_kinematics, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let placements = forward_kinematics(&arm, &mut data, &[0.0; 7]);
+/// let tool = placements.frame(arm.frame("tool")?);
+/// assert!(tool.translation.z > 0.5); // stretched upwards
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+) -> Placements<'d, S, R> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    positions(model, &mut data.world, q);
+    Placements { model, world: &data.world }
+}
+
+/// Places all bodies and gives their velocities: v_i = v_λ + S q̇, in O(n).
+///
+/// q: nq numbers; v: nv. Allocates nothing. Source: Featherstone (2008), table 5.1; in the world's frame.
+///
+/// ```
+/// use condyle_dynamics::{Data, ReferenceFrame, forward_velocities, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let velocities = forward_velocities(&arm, &mut data, &[0.0; 7], &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// let tool = velocities.frame_velocity(arm.frame("tool")?, ReferenceFrame::World);
+/// assert_eq!(tool.to_array(), [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]); // all turns about the vertical
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> Velocities<'d, S, R> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
+}
+
+/// Places all bodies and gives their velocities and accelerations: a_i = a_λ + S q̈ + Ṡ q̇, in O(n).
+///
+/// q: nq numbers; v, a: nv. Gravity is not among the accelerations. Allocates nothing. Source: Featherstone (2008),
+/// table 5.1; in the world's frame.
+///
+/// ```
+/// use condyle_dynamics::{Data, ReferenceFrame, forward_accelerations, robots};
+/// let arm = robots::arm7();
+/// let (tool, mut data) = (arm.frame("tool")?, Data::new(&arm));
+/// let (q, v) = ([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// let motion = forward_accelerations(&arm, &mut data, &q, &v, &[0.0; 7]);
+/// let a = motion.frame_classical_acceleration(tool, ReferenceFrame::LocalWorldAligned);
+/// assert!(f64::abs(a.linear.x + 4.0 * motion.frame(tool).translation.x) < 1e-12); // −ω² r, towards the axis
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> Accelerations<'d, S, R> {
+    data.check(model);
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("a", a.len(), model.nv());
+    positions(model, &mut data.world, q);
+    velocities(model, &data.world, &mut data.moving, v);
+    accelerations(model, &data.world, &mut data.moving, a);
+    let velocities = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
+    Accelerations { velocities }
+}

@@ -1,0 +1,180 @@
+//! Calls with the limbs of a robot side by side.
+#![allow(unsafe_code)]
+
+use crate::data::Data;
+use crate::derivatives::rnea_derivatives;
+use crate::lanes::limbs::lanes::{Limbs, numbers};
+use crate::lanes::limbs::pass::{Arguments, Scratch, load, scatter};
+use crate::lanes::limbs::{LANES, Plan};
+use crate::passes::kinematics::{PlacementCache, World, place};
+use crate::passes::{aba, crba, rnea};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Layout, Single};
+use condyle_spatial::gate::{Fused, Level, is, level, renamed};
+use condyle_spatial::register_kernel;
+use condyle_spatial::{Constant, Force, Mat3, Motion, Scalar, Se3, Vec3};
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Task {
+    Rnea,
+    Aba,
+    Crba,
+    Minv,
+    RneaDerivatives,
+    AbaDerivatives,
+}
+
+register_kernel! {
+    /// τ by steps.
+    fn rnea_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, a: &[Fused], f_ext: bool, tau: &mut [Fused]) {
+        let l = Limbs::new(plan, model);
+        rnea::pass(&l, &mut s.world.sin_cos, &mut s.rnea, &s.q, &s.v, &s.x, given(f_ext, &s.f_ext));
+        scatter(plan, &s.rnea.tau, tau);
+        Single::<Fused, f64>::new(model).add_armature_torque(a, tau);
+    }
+}
+
+register_kernel! {
+    /// Arguments in lanes.
+    pub(super) fn load_steps<V>(plan: &Plan, s: &mut Scratch, arguments: Arguments<'_>) {
+        load(plan, s, arguments);
+    }
+}
+
+register_kernel! {
+    /// Placements and columns of all steps.
+    pub(super) fn place_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
+        let l = Limbs::new(plan, model);
+        place(&l, &mut s.world, &s.q);
+        l.broadcast(&mut s.world.S);
+    }
+}
+
+register_kernel! {
+    /// M by steps that are placed.
+    fn crba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, M: &mut [Fused]) {
+        crba::pass(&Limbs::new(plan, model), &s.world, &mut s.IC, M);
+    }
+}
+
+register_kernel! {
+    /// The factors of the articulated bodies, by steps that are placed.
+    fn factorize_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
+        aba::factorize(&Limbs::new(plan, model), &s.world, &mut s.aba);
+    }
+}
+
+register_kernel! {
+    /// q̈ by steps that are placed.
+    fn aba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool, qdd: &mut [Fused]) {
+        aba::pass(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, given(f_ext, &s.f_ext));
+        scatter(plan, &s.aba.qdd, qdd);
+    }
+}
+
+register_kernel! {
+    /// M⁻¹ from the factors of the articulated bodies.
+    fn inverse_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, Minv: &mut [Fused]) {
+        let l = Limbs::new(plan, model);
+        l.broadcast(&mut s.aba.D_inv);
+        s.inverted.inverse::<V>(&l, &s.world, &s.aba, &plan.columns.blocks, Minv);
+    }
+}
+
+register_kernel! {
+    /// ∂τ/∂q, ∂τ/∂v and M by steps that are placed, at the acceleration that was given or, `after_aba`, at that found.
+    fn rnea_derivatives_by_steps<V>(
+        model: &Model,
+        plan: &Plan,
+        s: &mut Scratch,
+        after_aba: bool,
+        f_ext: bool,
+        matrices: [&mut [Fused]; 3],
+    ) {
+        let l = Limbs::new(plan, model);
+        let a = if after_aba { &s.aba.qdd } else { &s.x };
+        let f_ext = given(f_ext, &s.f_ext);
+        rnea_derivatives::pass(&l, &s.world, (&mut s.bodies, matrices), &s.v, a, f_ext, l.minus_gravity(), false);
+    }
+}
+
+/// The forces on all steps, or none.
+#[inline(always)]
+fn given<T>(some: bool, f_ext: &[T]) -> &[T] {
+    if some { f_ext } else { &[] }
+}
+
+/// The plan, where this model and `data` have limbs side by side, and the processor can.
+#[inline]
+pub(crate) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
+    let (Some(plan), Some(scratch)) = (&model.limbs(), &data.limbs) else { return None };
+    (is::<(S, R), (f64, f64)>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
+}
+
+/// An algorithm with the limbs side by side, where this model and `data` have them; whether they have. Arguments that it
+/// does not take are empty.
+#[inline]
+pub(crate) fn run<S: Scalar, R: Constant<S>>(
+    task: Task,
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    x: &[S],
+    f_ext: &[Force<S>],
+) -> bool {
+    let Some(plan) = ready(model, data) else { return false };
+    if model.has_mimic() && !matches!(task, Task::Rnea) {
+        return false; // joints that share a coordinate
+    }
+    // SAFETY: S and R are f64.
+    unsafe { enter(task, renamed(model), plan, renamed(data), Arguments::new(q, v, x, f_ext)) }
+    true
+}
+
+/// A task on arguments that fit.
+fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments: Arguments<'_>) {
+    let Some(s) = data.limbs.as_deref_mut() else { return };
+    let f_ext = !arguments.f_ext.is_empty();
+    load_steps(plan, s, arguments);
+    if let Task::Rnea = task {
+        data.world.placed = PlacementCache::Nowhere;
+        return rnea_by_steps(model, plan, s, arguments.x, f_ext, Fused::of_mut(&mut data.rnea.tau));
+    }
+    place_steps(model, plan, s);
+    data.world.placed = PlacementCache::Limbs;
+    match task {
+        Task::Crba => crba_by_steps(model, plan, s, Fused::of_mut(data.crba.M.as_mut_slice())),
+        Task::Minv => factorize_by_steps(model, plan, s),
+        Task::Aba | Task::AbaDerivatives => aba_by_steps(model, plan, s, f_ext, Fused::of_mut(&mut data.aba.qdd)),
+        Task::Rnea | Task::RneaDerivatives => {}
+    }
+    if let Task::Minv | Task::AbaDerivatives = task {
+        inverse_by_steps(model, plan, s, Fused::of_mut(data.minv.Minv.as_mut_slice()));
+    }
+    if let Task::RneaDerivatives | Task::AbaDerivatives = task {
+        let matrices = data.rnea_derivatives.parts().1.map(Fused::of_mut);
+        rnea_derivatives_by_steps(model, plan, s, matches!(task, Task::AbaDerivatives), f_ext, matrices);
+    }
+}
+
+/// Takes the placements that a call left in lanes to where those of single bodies stand.
+pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
+    let Some(plan) = ready(model, data) else { return };
+    let Data { limbs: Some(scratch), world: World { oX, S: columns, placed, .. }, .. } = data else { return };
+    // SAFETY: poses and motions are made of vectors.
+    let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
+    for i in 1..oX.len() {
+        let ((step, lane), column) = (plan.place(i), model.nodes()[i].column);
+        let pose = |k: usize| S::splat(poses[(12 * step + k) * LANES + lane]);
+        let axis = |k: usize| Vec3::new(pose(k), pose(k + 1), pose(k + 2));
+        oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));
+        for k in 0..model.nodes()[i].joint.nv() {
+            let slot = plan.steps[step].idx_v + k;
+            let number = |r: usize| S::splat(motions[(6 * slot + r) * LANES + lane]);
+            columns[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));
+        }
+    }
+    *placed = PlacementCache::Bodies;
+}

@@ -1,0 +1,107 @@
+//! Dynamics under constraints with the limbs of a robot side by side.
+#![allow(unsafe_code)]
+
+use super::limbs::{load_steps, place_steps, ready};
+use crate::constraints::constrained_dynamics::Inputs;
+use crate::constraints::constraint_lanes::{ConstraintLanes, WIDE};
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::data::Data;
+use crate::lanes::limbs::Plan;
+use crate::lanes::limbs::forces::{Left, six};
+use crate::lanes::limbs::lanes::{Limbs, numbers, numbers_mut};
+use crate::lanes::limbs::pass::{Arguments, Scratch, scatter};
+use crate::passes::aba;
+use crate::passes::kinematics::PlacementCache;
+use condyle_model::Model;
+use condyle_spatial::gate::{Fused, renamed};
+use condyle_spatial::{Constant, Scalar};
+use condyle_spatial::{kernel, register_kernel};
+
+register_kernel! {
+    /// The articulated bodies, for steps that are placed.
+    fn articulate<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool) {
+        let f_ext = if f_ext { &s.f_ext[..] } else { &[] };
+        aba::inward(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, f_ext);
+    }
+}
+
+register_kernel! {
+    /// J, J M⁻¹ Jᵀ, and −(J q̈ + γ) for λ = 0 in place of λ.
+    fn carry_forces<V>(
+        model: &Model,
+        plan: &Plan,
+        s: &Scratch,
+        lanes: &mut ConstraintLanes,
+        set: &mut ConstraintSet<Fused>,
+    ) {
+        let left = Left::new(plan, model, &s.world, &s.aba);
+        if V::LANES == WIDE { lanes.carry::<V, 1>(left, set) } else { lanes.carry::<V, 2>(left, set) }
+        for r in 0..set.lambda.len() {
+            set.lambda[r] = Fused(-lanes.all.x[r]);
+        }
+    }
+}
+
+kernel! {
+    /// λ from J M⁻¹ Jᵀ.
+    fn decompose<S>(set: &mut ConstraintSet<S>) {
+        set.delassus.decompose(set.proximal, &mut set.lambda);
+    }
+}
+
+register_kernel! {
+    /// q̈ and J q̈ + γ for λ.
+    fn accelerate<V>(
+        model: &Model,
+        plan: &Plan,
+        s: &mut Scratch,
+        lanes: &mut ConstraintLanes,
+        set: &mut ConstraintSet<Fused>,
+        qdd: &mut [Fused],
+    ) {
+        for r in 0..set.lambda.len() {
+            lanes.all.x[r] = set.lambda[r].0;
+        }
+        // SAFETY: these are vectors.
+        lanes.push(plan, &set.plans, unsafe { numbers_mut(&mut s.aba.u) });
+        aba::outward(&Limbs::new(plan, model), &s.world, &mut s.aba);
+        scatter(plan, &s.aba.qdd, qdd);
+        // SAFETY: motions are made of vectors.
+        let a = unsafe { numbers(&s.aba.a) };
+        for (of, constraint) in lanes.rows.iter().zip(&set.plans) {
+            let [one, other] = constraint.bodies;
+            let error = of.error([six(a, plan.place(one)), six(a, plan.place(other))]);
+            for r in 0..constraint.rows() {
+                set.error[constraint.row + r] = Fused(error[r]);
+            }
+        }
+    }
+}
+
+/// Constrained dynamics with the limbs side by side, where this model, `data` and `constraints` have them; whether they
+/// have.
+#[inline]
+pub(crate) fn run<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
+) -> bool {
+    let Some(plan) = ready(model, data).filter(|_| constraints.limbs.is_some()) else { return false };
+    // SAFETY: S and R are f64, and `Fused` is the same.
+    unsafe { enter(renamed(model), plan, renamed(data), renamed(constraints), Arguments::new(q, v, tau, f_ext)) }
+    true
+}
+
+/// The call, for arguments that fit.
+fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintSet<Fused>, arguments: Arguments<'_>) {
+    let (Some(s), Some(mut lanes)) = (data.limbs.as_deref_mut(), set.limbs.take()) else { return };
+    load_steps(plan, s, arguments);
+    place_steps(model, plan, s);
+    data.world.placed = PlacementCache::Limbs;
+    articulate(model, plan, s, !arguments.f_ext.is_empty());
+    carry_forces(model, plan, s, &mut lanes, set);
+    decompose(set);
+    accelerate(model, plan, s, &mut lanes, set, Fused::of_mut(&mut data.constrained_dynamics.qdd));
+    set.limbs = Some(lanes);
+}

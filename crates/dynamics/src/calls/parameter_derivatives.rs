@@ -1,0 +1,159 @@
+//! The derivatives of inverse and forward dynamics with respect to everything beside q, v, a and τ.
+//!
+//! Inverse dynamics is linear in external forces, in inertial parameters, in armature, damping and friction, and in
+//! gravity, so each derivative is a matrix B that can be read off what the derivatives by q and v have computed anyway:
+//!
+//! ```text
+//! ∂τ/∂f_b = −J_bᵀ                        ∂τ_c/∂π_b = y(S_c, a_b) − y(v_b × S_c, v_b)     (regressor.rs)
+//! ∂τ_c/∂g = −(Iᶜ S_c)_linear             ∂τ/∂armature = diag(q̈)
+//! ∂τ/∂damping = diag(q̇)                  ∂τ/∂friction = diag(tanh(q̇/ε))                  (where passive efforts act)
+//! ```
+//!
+//! Of forward dynamics, M q̈ + h = τ gives ∂q̈/∂· = −M⁻¹ B.
+
+use super::derivatives::{AbaDerivatives, RneaDerivatives};
+use super::differentiated::State;
+use crate::passes::regressor::{PARAMETERS, effort};
+use condyle_model::Model;
+use condyle_spatial::elementary::tanh;
+use condyle_spatial::{Act, Constant, Scalar};
+use nalgebra::DMatrix;
+
+/// An input of the dynamics beside position, velocity, acceleration and effort.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Input {
+    /// The external force on a body, six numbers in the body's frame, linear first: as in `f_ext` (N, N m).
+    Force(usize),
+    /// The ten [inertial parameters](crate::inertial_parameters::from_inertia) of a body, in its frame.
+    Inertia(usize),
+    /// The acceleration of free fall, three numbers in the world's frame (m/s²).
+    Gravity,
+    /// The armature of each coordinate, nv numbers (kg m², kg).
+    Armature,
+    /// The viscous damping of each coordinate, nv numbers, where [`passive_torque`](crate::passive_torque) is added to τ
+    /// (N m s/rad, N s/m).
+    Damping,
+    /// The Coulomb friction of each coordinate, nv numbers, where [`passive_torque`](crate::passive_torque) is added to τ
+    /// (N m, N).
+    Friction {
+        /// ε of `passive_torque` (rad/s, m/s).
+        smoothing: f64,
+    },
+}
+
+impl Input {
+    /// How many numbers the input has, and so how many columns a derivative with respect to it.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Input, robots};
+    /// assert_eq!(Input::Inertia(3).len(&robots::arm7()), 10);
+    /// ```
+    #[allow(clippy::len_without_is_empty)] // never empty
+    pub fn len<R>(self, model: &Model<R>) -> usize {
+        match self {
+            Self::Force(_) => 6,
+            Self::Inertia(_) => PARAMETERS,
+            Self::Gravity => 3,
+            Self::Armature | Self::Damping | Self::Friction { .. } => model.nv(),
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
+    /// Gives each entry of B other than zero: to its coordinate (row), column, summand. An entry may be given in parts.
+    fn entries(&self, input: Input, mut give: impl FnMut(usize, usize, S)) {
+        let (model, pass) = (self.model, self.pass);
+        match input {
+            Input::Force(b) => {
+                let oXb = self.pose(b);
+                for (i, k) in self.columns(b) {
+                    let column = &model.columns()[model.nodes()[i].column + k];
+                    let S_b = oXb.act_inv(self.column(i, k)).scale(S::splat(-column.ratio)).to_array(); // −J_bᵀ
+                    (0..6).for_each(|k| give(column.coordinate, k, S_b[k]));
+                }
+            }
+            Input::Inertia(b) => {
+                assert!(b > 0, "input: the world has no inertia");
+                let (oXb, (v, a)) = (self.pose(b), self.moving(b));
+                let (v_b, a_b) = (oXb.act_inv(v), oXb.act_inv(a));
+                for (i, k) in self.columns(b) {
+                    let column = &model.columns()[model.nodes()[i].column + k];
+                    let y = effort(oXb.act_inv(self.column(i, k)).scale(S::splat(column.ratio)), v_b, a_b);
+                    (0..PARAMETERS).for_each(|k| give(column.coordinate, k, y[k]));
+                }
+            }
+            Input::Gravity => {
+                for i in 1..model.nodes().len() {
+                    for k in 0..model.nodes()[i].joint.nv() {
+                        let column = &model.columns()[model.nodes()[i].column + k];
+                        let weight = (self.carried(i) * self.column(i, k)).linear.scale(S::splat(-column.ratio));
+                        (weight.to_array().into_iter().enumerate()).for_each(|(k, x)| give(column.coordinate, k, x));
+                    }
+                }
+            }
+            Input::Armature => (0..model.nv()).for_each(|k| give(k, k, pass.qdd[k])),
+            Input::Damping => (0..model.nv()).for_each(|k| give(k, k, pass.qd[k])),
+            Input::Friction { smoothing } => {
+                assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");
+                (0..model.nv()).for_each(|k| give(k, k, tanh(pass.qd[k] * S::splat(1.0 / smoothing))));
+            }
+        }
+    }
+
+    /// Fills a derivative with zeros, if it has the right shape.
+    fn clear(&self, name: &str, out: &mut DMatrix<S>, input: Input) {
+        let shape = (self.model.nv(), input.len(self.model));
+        assert!(out.shape() == shape, "{name}: expected {} × {}, found {:?}", shape.0, shape.1, out.shape());
+        out.fill(S::zero());
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
+    /// ∂τ/∂(any other input), nv × [`Input::len`], in at most O(n) operations a column. dtau is overwritten.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, Input, rnea, rnea_derivatives, robots};
+    /// use nalgebra::{DMatrix, dvector};
+    /// let arm = robots::arm7();
+    /// let mut data = Data::new(&arm);
+    /// let (q, o) = ([0.3; 7], [0.0; 7]);
+    /// let mut dtau_dg = DMatrix::zeros(7, 3);
+    /// rnea_derivatives(&arm, &mut data, &q, &o, &o, &[]).with_respect_to(Input::Gravity, &mut dtau_dg);
+    /// let weight = rnea(&arm, &mut data, &q, &o, &o, &[])[1];
+    /// assert!(f64::abs((dtau_dg * dvector![0.0, 0.0, -9.81])[1] - weight) < 1e-12); // τ is linear in g
+    /// ```
+    ///
+    /// # Panics
+    /// If `dtau` has not that shape, or the input names no moving body or a smoothing that is not positive.
+    pub fn with_respect_to(&self, input: Input, dtau: &mut DMatrix<S>) {
+        self.state.clear("dtau", dtau, input);
+        self.state.entries(input, |row, column, x| dtau[(row, column)] += x);
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
+    /// ∂q̈/∂(any other input), nv × [`Input::len`], in at most O(n²) operations a column. da is overwritten.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, Input, aba_derivatives, neutral, robots};
+    /// use nalgebra::DMatrix;
+    /// let quadruped = robots::quadruped();
+    /// let (mut data, o) = (Data::new(&quadruped), [0.0; 18]);
+    /// let mut da_df = DMatrix::zeros(18, 6);
+    /// let d = aba_derivatives(&quadruped, &mut data, &neutral(&quadruped), &o, &o, &[]);
+    /// d.with_respect_to(Input::Force(1), &mut da_df);
+    /// assert!((da_df - d.da_dtau.columns(0, 6)).amax() < 1e-12); // a force on the trunk is an effort of its joint
+    /// ```
+    ///
+    /// # Panics
+    /// If `da` has not that shape, or the input names no moving body or a smoothing that is not positive.
+    pub fn with_respect_to(&self, input: Input, da: &mut DMatrix<S>) {
+        self.state.clear("da", da, input);
+        self.state.entries(input, |row, column, x| {
+            for i in 0..self.a.len() {
+                da[(i, column)] -= self.da_dtau[(i, row)] * x; // −M⁻¹ B
+            }
+        });
+    }
+}

@@ -1,0 +1,128 @@
+//! Dynamics and energies as linear functions of the inertial parameters.
+
+use super::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
+use crate::data::Data;
+use crate::passes::frames::Placements;
+use crate::passes::regressor::{PARAMETERS, effort, pairing};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Layout, Single};
+use condyle_spatial::{Act, Constant, Motion, Scalar};
+use nalgebra::DMatrix;
+
+/// The rows of body i's ten parameters in a vector of all.
+#[inline(always)]
+fn of_body<S>(parameters: &mut [S], i: usize) -> &mut [S] {
+    &mut parameters[PARAMETERS * (i - 1)..PARAMETERS * i]
+}
+
+/// Y(q, v, a) with τ = Y π, in O(n · depth): inverse dynamics as a linear function of the inertias, armature apart.
+///
+/// q: nq numbers; v, a: nv. Returns the nv × 10 (bodies − 1) matrix whose columns 10 (i − 1) … 10 i − 1 belong to body i,
+/// in the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). With the
+/// rotors it reads τ = Y π + armature a. Allocates nothing. Source: Atkeson, An, Hollerbach (1986).
+///
+/// ```
+/// use condyle_dynamics::{Data, inertial_parameters, joint_torque_regressor, rnea, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, a) = ([0.3; 7], [0.1; 7], [0.2; 7]);
+/// let pi: Vec<f64> = arm.bodies()[1..].iter().flat_map(|b| inertial_parameters::from_inertia(b.inertia)).collect();
+/// let tau = joint_torque_regressor(&arm, &mut data, &q, &v, &a) * nalgebra::DVector::from(pi);
+/// for (found, expected) in tau.iter().zip(rnea(&arm, &mut data, &q, &v, &a, &[])) {
+///     assert!((found - expected).abs() < 1e-12);
+/// }
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> &'d DMatrix<S> {
+    forward_accelerations(model, data, q, v, a);
+    let l = Single::new(model);
+    let minus_g = l.minus_gravity();
+    let Y = data.regressor.torque.as_mut_slice();
+    Y.fill(S::zero());
+    for i in l.bodies() {
+        let oXb = Placements { model, world: &data.world }.body(i);
+        let a_i = Motion { linear: data.moving.a[i].linear + minus_g, ..data.moving.a[i] };
+        let (v_b, a_b) = (oXb.act_inv(data.moving.v[i]), oXb.act_inv(a_i));
+        for &c in l.support(i) {
+            let column = &model.columns()[c];
+            let S_b = oXb.act_inv(data.world.S[c]).scale(S::splat(column.ratio));
+            for (k, y) in effort(S_b, v_b, a_b).into_iter().enumerate() {
+                Y[column.coordinate + model.nv() * (PARAMETERS * (i - 1) + k)] += y; // τ_S = (y(S, a) − y(v × S, v)) · π_i
+            }
+        }
+    }
+    &data.regressor.torque
+}
+
+/// The kinetic energy's regressor y(q, v), T = y · π, in O(n): the rotors' ½ armature v² apart.
+///
+/// q: nq numbers; v: nv. Returns 10 (bodies − 1) numbers, ½ y(v_i, v_i) of body after body, in the order and frame of
+/// [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates nothing. Source: Gautier
+/// and Khalil, *Direct calculation of minimum set of inertial parameters of serial robots* (1990).
+///
+/// ```
+/// use condyle_dynamics::{Data, kinetic_energy_regressor, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let mut v = [0.0; 18];
+/// v[1] = 2.0; // all bodies move with 2 m/s
+/// let y = kinetic_energy_regressor(&quadruped, &mut Data::new(&quadruped), &neutral(&quadruped), &v).to_vec();
+/// assert!((0..12).all(|body| f64::abs(y[10 * body] - 0.5 * 2.0 * 2.0) < 1e-12)); // ½ v² of each mass
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+) -> &'d [S] {
+    forward_velocities(model, data, q, v);
+    for i in 1..model.nodes().len() {
+        let v_b = Placements { model, world: &data.world }.body(i).act_inv(data.moving.v[i]);
+        of_body(&mut data.regressor.kinetic, i).copy_from_slice(&pairing(v_b.scale(S::splat(0.5)), v_b)); // ½ y(v, v)
+    }
+    &data.regressor.kinetic
+}
+
+/// The potential energy's regressor y(q), V = y · π, zero at the world's origin, in O(n).
+///
+/// q: nq numbers. Returns 10 (bodies − 1) numbers, \[−g · p_i, −R_iᵀ g, 0\] of body after body at the pose (R_i, p_i),
+/// in the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates
+/// nothing. Source: V_i = −g · (m p_i + R_i m c); Gautier and Khalil (1990).
+///
+/// ```
+/// use condyle_dynamics::{Data, neutral, potential_energy_regressor, robots};
+/// let quadruped = robots::quadruped();
+/// let mut q = neutral(&quadruped);
+/// q[2] = 3.0;
+/// let y = potential_energy_regressor(&quadruped, &mut Data::new(&quadruped), &q).to_vec();
+/// assert_eq!(y[0], 9.81 * 3.0); // of each kilogram of the trunk
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+pub fn potential_energy_regressor<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+) -> &'d [S] {
+    forward_kinematics(model, data, q);
+    let minus_g = Single::<S, R>::new(model).minus_gravity();
+    for i in 1..model.nodes().len() {
+        let oXb = Placements { model, world: &data.world }.body(i);
+        let first = oXb.rotation.transpose_mul(minus_g);
+        let o = S::zero();
+        let row = [minus_g.dot(oXb.translation), first.x, first.y, first.z, o, o, o, o, o, o];
+        of_body(&mut data.regressor.potential, i).copy_from_slice(&row); // V_i = −g · p m − Rᵀ g · m c
+    }
+    &data.regressor.potential
+}

@@ -1,0 +1,193 @@
+//! Second derivatives of inverse and forward dynamics, contracted with a vector or as tensors.
+
+use super::derivatives::{AbaDerivatives, RneaDerivatives, in_turn, one_by_one, view, view_of_aba};
+use super::forward_dynamics::check_arguments;
+use crate::data::Data;
+use crate::derivatives::{aba_hessian as aba, rnea_hessian as rnea};
+use crate::workspace::{filled, zero_matrix};
+use condyle_linalg::check;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Force, Scalar};
+use nalgebra::DMatrix;
+
+/// The second derivatives of φ = λᵀ rnea(q, v, a), each a full nv × nv matrix; those by v and a, and by a twice, are zero.
+///
+/// They are the Hessian of φ(q ⊕ δ, v + …, a + …) at δ = 0.
+#[derive(Clone, Copy, Debug)]
+pub struct RneaHessian<'d, S, R = f64> {
+    /// ∂²φ/∂q∂q, symmetric.
+    pub dqdq: &'d DMatrix<S>,
+    /// ∂²φ/∂v∂q: entry (j, k) is ∂²φ/∂v_j∂q_k.
+    pub dvdq: &'d DMatrix<S>,
+    /// ∂²φ/∂v∂v, symmetric.
+    pub dvdv: &'d DMatrix<S>,
+    /// ∂²φ/∂a∂q: entry (j, k) is ∂²φ/∂a_j∂q_k, the derivative of M λ by q.
+    pub dadq: &'d DMatrix<S>,
+    /// The first derivatives of τ, which come with them.
+    pub first: RneaDerivatives<'d, S, R>,
+}
+
+/// The second derivatives of [`rnea`](crate::rnea), contracted with a vector λ: the Hessian of φ = λᵀ τ(q, v, a), exact,
+/// in O(n · depth).
+///
+/// q: nq numbers; v, a, lambda: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
+/// Returns four nv × nv matrices (in units of λᵀ τ by those of q, v and a), and the first derivatives of τ. Allocates
+/// nothing. Source: see the head of the file.
+///
+/// ```
+/// use condyle_dynamics::{Data, rnea_hessian, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, a, lambda) = ([0.3; 7], [0.1; 7], [0.2; 7], [1.0; 7]);
+/// let hessian = rnea_hessian(&arm, &mut data, &q, &v, &a, &[], &lambda);
+/// // φ is quadratic in v: λᵀ (τ(v) + τ(−v) − 2 τ(0)) = vᵀ ∂²φ/∂v² v
+/// let v = nalgebra::DVector::from_row_slice(&v);
+/// let quadratic = v.dot(&(hessian.dvdv * &v));
+/// let mut effort = |s: f64| condyle_dynamics::rnea(&arm, &mut data, &q, (&v * s).as_slice(), &a, &[]).iter().sum::<f64>();
+/// assert!((effort(1.0) + effort(-1.0) - 2.0 * effort(0.0) - quadratic).abs() < 1e-12);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` was made for a model of another tree.
+pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+    f_ext: &[Force<S>],
+    lambda: &[S],
+) -> RneaHessian<'d, S, R> {
+    check("lambda", lambda.len(), model.nv());
+    one_by_one(model, data, q, v, a, f_ext);
+    rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
+    let first = view(model, data);
+    let rnea::Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
+    RneaHessian { dqdq, dvdq, dvdv, dadq, first }
+}
+
+/// The second derivatives of τ = rnea(q, v, a): one Hessian for each effort, 4 nv³ numbers.
+#[derive(Clone, Debug)]
+pub struct RneaSecondDerivatives<S> {
+    /// ∂²τ_i/∂q∂q for each i, symmetric.
+    pub dqdq: Vec<DMatrix<S>>,
+    /// ∂²τ_i/∂v∂q for each i: entry (j, k) is ∂²τ_i/∂v_j∂q_k.
+    pub dvdq: Vec<DMatrix<S>>,
+    /// ∂²τ_i/∂v∂v for each i, symmetric.
+    pub dvdv: Vec<DMatrix<S>>,
+    /// ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
+    pub dadq: Vec<DMatrix<S>>,
+    /// The unit vectors. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
+    lambda: Vec<S>,
+}
+
+impl<S: Scalar> RneaSecondDerivatives<S> {
+    /// Memory for the tensors of a model.
+    pub fn new<R>(model: &Model<R>) -> Self {
+        let zeros = || vec![zero_matrix(model.nv(), model.nv()); model.nv()];
+        let lambda = filled(S::zero(), model.nv());
+        Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
+    }
+}
+
+/// The second derivatives of [`rnea`](crate::rnea) as full tensors, in O(n² · depth).
+///
+/// q: nq numbers; v, a: nv; f_ext: a force on each body in its frame, or empty for none; out is overwritten. Allocates
+/// nothing. A solver wants them contracted: [`rnea_hessian`], which this calls for each unit vector.
+///
+/// ```
+/// use condyle_dynamics::{Data, RneaSecondDerivatives, rnea_second_derivatives, robots};
+/// let arm = robots::arm7();
+/// let mut tensors = RneaSecondDerivatives::new(&arm);
+/// let (q, o) = ([0.3; 7], [0.0; 7]);
+/// rnea_second_derivatives(&arm, &mut Data::new(&arm), &q, &o, &o, &[], &mut tensors);
+/// let (dM_01, dM_10) = (tensors.dadq[0].row(1), tensors.dadq[1].row(0));
+/// assert!((dM_01 - dM_10).amax() < 1e-14); // M is symmetric wherever q goes
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, or `data` or `out` was made for a model of another tree.
+pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+    f_ext: &[Force<S>],
+    out: &mut RneaSecondDerivatives<S>,
+) {
+    check("out", out.lambda.len(), model.nv());
+    one_by_one(model, data, q, v, a, f_ext);
+    for i in 0..model.nv() {
+        out.lambda[i] = S::one();
+        rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &out.lambda);
+        out.lambda[i] = S::zero();
+        let rnea::Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
+        out.dqdq[i].copy_from(dqdq);
+        out.dvdq[i].copy_from(dvdq);
+        out.dvdv[i].copy_from(dvdv);
+        out.dadq[i].copy_from(dadq);
+    }
+}
+
+/// The second derivatives of ψ = λᵀ aba(q, v, τ), each a full nv × nv matrix; all others are zero.
+///
+/// They are the Hessian of ψ(q ⊕ δ, v + …, τ + …) at δ = 0.
+#[derive(Clone, Copy, Debug)]
+pub struct AbaHessian<'d, S, R = f64> {
+    /// ∂²ψ/∂q∂q, symmetric.
+    pub dqdq: &'d DMatrix<S>,
+    /// ∂²ψ/∂v∂q: entry (j, k) is ∂²ψ/∂v_j∂q_k.
+    pub dvdq: &'d DMatrix<S>,
+    /// ∂²ψ/∂v∂v, symmetric.
+    pub dvdv: &'d DMatrix<S>,
+    /// ∂²ψ/∂τ∂q: entry (j, k) is ∂²ψ/∂τ_j∂q_k, the derivative of M⁻¹ λ by q.
+    pub dtaudq: &'d DMatrix<S>,
+    /// q̈ and its first derivatives, which come with them.
+    pub first: AbaDerivatives<'d, S, R>,
+}
+
+/// The second derivatives of [`aba`](crate::aba), contracted with a vector λ: the Hessian of ψ = λᵀ q̈(q, v, τ), exact.
+///
+/// q: nq numbers; v, tau, lambda: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for
+/// none. Returns four nv × nv matrices (in units of λᵀ q̈ by those of q, v and τ), q̈ and its first derivatives: O(n · depth)
+/// for what goes into them, and three sparse products of O(n²) columns. Allocates nothing. Source: Nganga and Wensing
+/// (2021); see the head of the file.
+///
+/// ```
+/// use condyle_dynamics::{Data, aba_hessian, robots};
+/// let arm = robots::arm7();
+/// let mut data = Data::new(&arm);
+/// let (q, v, tau, lambda) = ([0.3; 7], [0.1; 7], [0.2; 7], [1.0; 7]);
+/// let hessian = aba_hessian(&arm, &mut data, &q, &v, &tau, &[], &lambda);
+/// assert!((hessian.dqdq - hessian.dqdq.transpose()).amax() < 1e-9);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// ([`Model::singular_joints`]).
+pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
+    model: &'d Model<R>,
+    data: &'d mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+    lambda: &[S],
+) -> AbaHessian<'d, S, R> {
+    check("lambda", lambda.len(), model.nv());
+    check_arguments(model, data, q, v, tau, f_ext);
+    in_turn(model, data, q, v, tau, f_ext);
+    let mut mu = core::mem::take(&mut data.aba_hessian.mu);
+    for (i, mu) in mu.iter_mut().enumerate() {
+        let row = data.minv.matrix().column(i); // symmetric: a row is a column
+        *mu = row.iter().zip(lambda).fold(S::zero(), |sum, (&x, &l)| x.mul_add(l, sum)); // μ = M⁻¹ λ
+    }
+    rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &mu);
+    data.aba_hessian.mu = mu;
+    let (first, Minv) = (&data.aba_derivatives, data.minv.matrix());
+    aba::run(model.nonzero_rows(), first, Minv, &data.rnea_hessian, &mut data.aba_hessian);
+    let first = view_of_aba(model, data);
+    let aba::Workspace { dqdq, dvdq, dvdv, dtaudq, .. } = &data.aba_hessian;
+    AbaHessian { dqdq, dvdq, dvdv, dtaudq, first }
+}

@@ -1,0 +1,235 @@
+//! Forward dynamics under constraints.
+//!
+//! Gauss's principle: of all accelerations that satisfy J q̈ + γ = 0, the robot takes the one that is nearest to its free
+//! acceleration in the metric of M. With the forces λ of the constraints,
+//!
+//! ```text
+//! [ M   Jᵀ ] [  q̈ ]   [ τ − h ]         J M⁻¹ Jᵀ λ = −(γ + J M⁻¹ (τ − h)),
+//! [ J   0  ] [ −λ ] = [ −γ    ],        q̈ = M⁻¹ (τ − h + Jᵀ λ)
+//! ```
+//!
+//! Source: Udwadia and Kalaba, *A new perspective on constrained motion* (1992); Carpentier, Budhiraja, Mansard, *Proximal
+//! and sparse resolution of constrained dynamic equations* (2021).
+
+use crate::constraints::constraint_motion::FramePair;
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::passes::crba;
+use crate::passes::kinematics::World;
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::Ltdl;
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Pairs, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+/// In the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Velocity. Shape: bodies. Written by: `bias`.
+    pub v: Vec<Motion<S>>,
+    /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `bias`.
+    pub a: Vec<Motion<S>>,
+    /// Iᶜ. Shape: bodies. Written by: `bias`, `inertia`.
+    pub IC: Vec<Inertia<S>>,
+    /// Force through the joint for q̈ = 0. Shape: bodies. Written by: `bias`.
+    pub F: Vec<Force<S>>,
+    /// Shape: nv × nv. Written by: `bias`, `inertia`.
+    pub M: DMatrix<S>,
+    /// Its factor. Written by: `constrained_dynamics`, `impulse_dynamics`.
+    pub factor: Ltdl<S>,
+    /// τ − h. Shape: nv. Written by: `bias`, `constrained_dynamics`.
+    pub effort: Vec<S>,
+    /// The acceleration, or the change of velocity. Shape: nv. Written by: `constrained_dynamics`, `impulse_dynamics`.
+    pub qdd: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
+        Self {
+            v: filled(Motion::zero(), size.bodies),
+            a: filled(Motion::zero(), size.bodies),
+            IC: filled(Inertia::zero(), size.bodies),
+            F: filled(Force::zero(), size.bodies),
+            M: zero_matrix(size.nv, size.nv),
+            factor: Ltdl::new(model),
+            effort: filled(S::zero(), size.nv),
+            qdd: filled(S::zero(), size.nv),
+        }
+    }
+}
+
+/// M, h and the bodies' motion for q̈ = 0, for bodies that are placed: the Newton–Euler and the composite-rigid-body
+/// algorithm in one pass to the tips and one back.
+#[inline(always)]
+fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
+    let Workspace { v, a, IC, F, M, effort, .. } = d;
+    a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
+    for i in l.bodies() {
+        let mut vJ = Motion::zero();
+        for k in 0..l.joint(i).nv() {
+            vJ = w.S[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
+        }
+        v[i] = l.parent(v, i) + vJ; // v_i = v_λ + v_J
+        a[i] = l.parent(a, i) + v[i].cross(vJ); // a_i = a_λ + v_i × v_J
+        IC[i] = w.oX[i].act(l.inertia(i));
+        F[i] = IC[i] * a[i] + v[i].cross(IC[i] * v[i]); // F_i = I a_i + v_i ×* I v_i
+        if let Some(external) = l.force(f_ext, i) {
+            F[i] -= w.oX[i].act(external);
+        }
+    }
+    effort.fill(L::S::zero());
+    for i in l.bodies().rev() {
+        for k in 0..l.joint(i).nv() {
+            l.add_joint_effort(effort, i, k, w.S[l.column(i) + k].dot(F[i])); // h = Sᵀ F
+        }
+        let F_i = F[i];
+        l.add_to_parent(F, i, F_i); // F_λ += F_i
+    }
+    crba::carry(l, w, IC, M.as_mut_slice());
+}
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// y = J x + y.
+    #[inline(always)]
+    pub(crate) fn add_motion(&self, x: &[S], y: &mut [S]) {
+        for plan in &self.plans {
+            for r in 0..plan.rows() {
+                let (row, mut sum) = (&self.J[plan.range(r)], y[plan.row + r]);
+                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                    sum = row[k].mul_add(x[coordinate], sum);
+                }
+                y[plan.row + r] = sum;
+            }
+        }
+    }
+
+    /// y = Jᵀ λ + y.
+    #[inline(always)]
+    pub(crate) fn add_effort(&self, y: &mut [S]) {
+        for plan in &self.plans {
+            for r in 0..plan.rows() {
+                let (row, x) = (&self.J[plan.range(r)], self.lambda[plan.row + r]);
+                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                    y[coordinate] = row[k].mul_add(x, y[coordinate]);
+                }
+            }
+        }
+    }
+
+    /// λ and the acceleration x for an effort, so that J x + γ = 0; for M that is factorised.
+    #[inline(always)]
+    fn solve(&mut self, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
+        x.copy_from_slice(effort);
+        factor.solve(x); // M⁻¹ (τ − h)
+        let mut b = core::mem::take(&mut self.error);
+        b.copy_from_slice(&self.gamma);
+        self.add_motion(x, &mut b);
+        for r in 0..b.len() {
+            self.lambda[r] = -b[r]; // −(γ + J M⁻¹ (τ − h))
+        }
+        self.delassus.multiply(&self.plans, &self.J, factor);
+        self.delassus.decompose(self.proximal, &mut self.lambda);
+        x.copy_from_slice(effort);
+        self.add_effort(x);
+        factor.solve(x); // q̈ = M⁻¹ (τ − h + Jᵀ λ)
+        b.copy_from_slice(&self.gamma);
+        self.add_motion(x, &mut b);
+        self.error = b; // J q̈ + γ
+    }
+
+    /// The largest |J q̈ + γ|.
+    pub(crate) fn residual(&self) -> S {
+        let mut residual = S::zero();
+        largest(&self.error, &mut residual);
+        residual
+    }
+
+    /// The force of constraint k as the last call left it, at the origin of its frame, along the axes of its rows; of a
+    /// point without moment. It acts on the body of the frame, its opposite on the other body or the world.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    pub fn force(&self, k: usize) -> Force<S> {
+        let mut f = [S::zero(); 6];
+        let range = self.range(k);
+        f[..range.len()].copy_from_slice(&self.lambda[range]);
+        f.into()
+    }
+}
+
+kernel! {
+    /// M and τ − h, for bodies that are placed.
+    pub(crate) fn equations<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        d: &mut Workspace<S>,
+        v: &[S],
+        tau: &[S],
+        f_ext: &[Force<S>],
+    ) {
+        bias(&Single::new(model), world, d, v, f_ext);
+        for k in 0..tau.len() {
+            d.effort[k] = tau[k] - d.effort[k]; // τ − h
+        }
+    }
+}
+
+kernel! {
+    /// M alone, for bodies that are placed.
+    pub(crate) fn inertia<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        let l = Single::new(model);
+        for i in l.bodies() {
+            d.IC[i] = world.oX[i].act(l.inertia(i));
+        }
+        crba::carry(&l, world, &mut d.IC, d.M.as_mut_slice());
+    }
+}
+
+kernel! {
+    /// The factor of M.
+    pub(crate) fn factorize<S>(d: &mut Workspace<S>) {
+        d.factor.factorize(&d.M);
+    }
+}
+
+kernel! {
+    /// J and γ, for bodies whose motion is known.
+    pub(crate) fn constrain<S>(world: &World<S>, d: &Workspace<S>, set: &mut ConstraintSet<S>) {
+        for (i, plan) in set.plans.iter().enumerate() {
+            let target = &set.targets[i];
+            let ends = FramePair::new(plan, target, world, &d.v, &d.a);
+            ends.jacobian(plan, &world.S, &mut set.J);
+            let gamma = ends.acceleration(plan, target).to_array();
+            for r in 0..plan.rows() {
+                set.gamma[plan.row + r] = gamma[r];
+            }
+        }
+    }
+}
+
+kernel! {
+    /// λ and the acceleration x for an effort.
+    pub(crate) fn solve<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
+        set.solve(factor, effort, x);
+    }
+}
+
+kernel! {
+    /// The largest absolute value of some numbers.
+    pub(crate) fn largest<S>(of: &[S], largest: &mut S) {
+        for &x in of {
+            *largest = S::select(largest.lt(x.abs()), x.abs(), *largest);
+        }
+    }
+}
+
+/// What dynamics under constraints read.
+#[derive(Clone, Copy)]
+pub(crate) struct Inputs<'a, S> {
+    pub q: &'a [S],
+    pub v: &'a [S],
+    pub tau: &'a [S],
+    pub f_ext: &'a [Force<S>],
+}

@@ -1,0 +1,148 @@
+//! What constraints are: frames that touch the world, and frames of two bodies that are held together.
+
+use crate::passes::frames::ReferenceFrame;
+use condyle_model::Error;
+use condyle_model::Model;
+use condyle_spatial::{Constant, Motion, Scalar, Se3};
+use serde::{Deserialize, Serialize};
+
+/// What a constraint holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ConstraintKind {
+    /// The origin of a frame: three rows, a force.
+    Point,
+    /// A frame: six rows, a force and a moment, linear first.
+    Rigid,
+}
+
+impl ConstraintKind {
+    /// 3 or 6.
+    pub fn rows(self) -> usize {
+        match self {
+            Self::Point => 3,
+            Self::Rigid => 6,
+        }
+    }
+}
+
+/// Where a constraint wants its frame to be and how it should move there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
+pub struct Target<S> {
+    /// The wanted pose of the frame in the other frame (the world for a contact); of a point, the translation alone.
+    pub placement: Se3<S>,
+    /// The wanted velocity relative to the other frame, in the reference frame (m/s, rad/s).
+    pub velocity: Motion<S>,
+    /// The wanted acceleration relative to the other frame, in the reference frame (m/s², rad/s²).
+    pub acceleration: Motion<S>,
+}
+
+impl<S: Scalar> Target<S> {
+    /// Both frames in one place, at rest.
+    pub fn identity() -> Self {
+        Self { placement: Se3::identity(), velocity: Motion::zero(), acceleration: Motion::zero() }
+    }
+
+    /// The same target on another scalar.
+    pub fn lift<T: Scalar>(self) -> Target<T>
+    where
+        S: Constant<T>,
+    {
+        Target {
+            placement: self.placement.lift(),
+            velocity: self.velocity.lift(),
+            acceleration: self.acceleration.lift(),
+        }
+    }
+}
+
+/// A contact of a frame with the world, or a loop that two frames close.
+///
+/// With the frame's pose X = ₂X₁ in the other frame moved to the target, its velocity v and acceleration a relative to
+/// the other body, the constraint asks for
+///
+/// ```text
+/// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), the axes of frame 1 applied to p₁ − p₂ (point)
+/// ```
+///
+/// which is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0. All is expressed
+/// along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the world
+/// ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)), at the frame's origin, and so is the force λ with which
+/// the constraint acts on the body of `frame`; on the other body, or the world, acts −λ.
+///
+/// A point's acceleration is the classical one, a rigid frame's the spatial one; a rigid loop in `Local` takes the rate
+/// of v's six numbers, in `LocalWorldAligned` the difference of the spatial accelerations, which is the same where v = 0.
+/// Signs, gains and axes are those of Pinocchio's `RigidConstraintModel` (whose second placement is the other frame's
+/// times the target) and, for contacts, of Crocoddyl's `ContactModel3D` and `ContactModel6D`.
+///
+/// Source: Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems* (1972).
+///
+/// ```
+/// use condyle_dynamics::{Constraint, robots};
+/// let quadruped = robots::quadruped();
+/// let foot = quadruped.frame("LF_foot")?;
+/// let contact = Constraint { kd: 50.0, ..Constraint::point(foot) };
+/// assert_eq!(contact.kind.rows(), 3);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Constraint {
+    /// The number of the frame that is held.
+    pub frame: usize,
+    /// The number of the frame that it is held to; the world if there is none.
+    pub other: Option<usize>,
+    /// A point or the whole frame.
+    pub kind: ConstraintKind,
+    /// Along which axes the rows and λ are: `Local` or `LocalWorldAligned`.
+    pub reference: ReferenceFrame,
+    /// How fast an error of position decays (1/s²).
+    pub kp: f64,
+    /// How fast an error of velocity decays (1/s).
+    pub kd: f64,
+    /// Where and how; can be changed later ([`ConstraintSet::target_mut`](crate::ConstraintSet::target_mut)).
+    pub target: Target<f64>,
+}
+
+impl Constraint {
+    /// A point contact of a frame's origin with the world, in `Local`, without stabilisation.
+    pub fn point(frame: usize) -> Self {
+        let reference = ReferenceFrame::Local;
+        let target = Target::identity();
+        Self { frame, other: None, kind: ConstraintKind::Point, reference, kp: 0.0, kd: 0.0, target }
+    }
+
+    /// A rigid contact of a frame with the world, in `Local`, without stabilisation.
+    pub fn rigid(frame: usize) -> Self {
+        Self { kind: ConstraintKind::Rigid, ..Self::point(frame) }
+    }
+
+    /// The bodies of both frames, unless something is wrong with this constraint or with it beside the ones before.
+    pub(crate) fn bodies<R>(&self, model: &Model<R>, before: &[Self]) -> Result<[usize; 2], Error> {
+        let wrong = |what| Err(Error::Constraint { constraint: before.len(), what });
+        let frames = model.frames().len();
+        if let Some(frame) = [Some(self.frame), self.other].into_iter().flatten().find(|&f| f >= frames) {
+            return wrong(format!("there is no frame {frame}: the model has {frames}"));
+        }
+        let frame = &model.frames()[self.frame];
+        let bodies = [frame.body, self.other.map_or(0, |other| model.frames()[other].body)];
+        if bodies[0] == bodies[1] {
+            let other = self.other.map_or("world", |other| &model.frames()[other].name);
+            return wrong(format!("frames `{}` and `{other}` do not move relative to each other", frame.name));
+        }
+        if self.reference == ReferenceFrame::World {
+            return wrong("its reference frame must be Local or LocalWorldAligned, found World".to_owned());
+        }
+        for (name, gain) in [("kp", self.kp), ("kd", self.kd)] {
+            if !(gain.is_finite() && gain >= 0.0) {
+                return wrong(format!("{name} must be a number of at least 0, found {gain}"));
+            }
+        }
+        let same = |c: &Self| (c.frame, c.other) == (self.frame, self.other) && c.kind == self.kind;
+        if let Some(twin) = before.iter().position(same) {
+            return wrong(format!("it holds frame `{}` as constraint {twin} does already", frame.name));
+        }
+        Ok(bodies)
+    }
+}

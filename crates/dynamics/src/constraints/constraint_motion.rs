@@ -1,0 +1,353 @@
+//! How the frames of a constraint move relative to each other: J, the acceleration γ for q̈ = 0, and their derivatives.
+//!
+//! In the world's frame, where body 1 carries frame 1 at ₀X₁ and body 2 the target, with Δv = v₁ − v₂, the acceleration
+//! that shall vanish is
+//!
+//! ```text
+//! rigid   ₀X₁⁻¹ (a₁ − a₂ + Δv × v₂ + kd Δv) + kp log(₂X₁) − (a* + kd v*)       (without Δv × v₂ along the world's axes)
+//! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)            u, α: velocity, acceleration of points
+//! ```
+//!
+//! When coordinate e moves a body, ∂v and ∂a are those in the head of `rnea_derivatives.rs`; a point p of the body with
+//! s = S_e at p and Ψ̇, Ψ̈ taken there too then has
+//!
+//! ```text
+//! ∂u/∂q_e = s_ω × u + Ψ̇     ∂α/∂q_e = s_ω × α + Ψ̈ + 2 Ψ̇_ω × u     ∂α/∂q̇_e = Ψ̇ + Ṡ + 2 s_ω × u
+//! ```
+//!
+//! and what is expressed in frame 1, ₀X₁⁻¹ m, changes by ₀X₁⁻¹ (∂m − S_e × m) if e moves frame 1. Gravity, which is the
+//! world's acceleration here, leaves all differences.
+
+use crate::constraints::constraint::{ConstraintKind, Target};
+use crate::constraints::plan::Plan;
+use crate::passes::kinematics::World;
+use condyle_spatial::lie::{Quaternion, jlog6, log6};
+use condyle_spatial::{Act, Cross, Motion, Scalar, Se3, Vec3};
+use nalgebra::DMatrix;
+
+/// Where the two frames of a constraint are and how their bodies move, in the world's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FramePair<S> {
+    /// ₀X₁: the frame.
+    pub x1: Se3<S>,
+    /// ₀X₂: the target in the other frame.
+    pub x2: Se3<S>,
+    pub v: [Motion<S>; 2],
+    pub a: [Motion<S>; 2],
+}
+
+/// The columns of the motion of all joints, in the world's frame, as in `rnea_derivatives.rs`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Columns<'w, S> {
+    pub S: &'w [Motion<S>],
+    pub Psid: &'w [Motion<S>],
+    pub Psidd: &'w [Motion<S>],
+    pub PsidSd: &'w [Motion<S>],
+}
+
+/// What a rigid motion does to the point p: v + ω × p.
+#[inline(always)]
+fn at<S: Scalar>(m: Motion<S>, p: Vec3<S>) -> Vec3<S> {
+    m.linear + m.angular.cross(p)
+}
+
+/// x − y, of those that are there.
+#[inline(always)]
+fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Motion<S> {
+    match (first, second) {
+        (true, true) => x - y,
+        (true, false) => x,
+        (false, true) => -y,
+        (false, false) => Motion::zero(),
+    }
+}
+
+/// Turns both parts of a motion by ω.
+#[inline(always)]
+fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
+    Motion::new(w.cross(m.linear), w.cross(m.angular))
+}
+
+impl<S: Scalar> FramePair<S> {
+    /// Of bodies in these poses, at rest.
+    #[inline(always)]
+    pub(crate) fn between(plan: &Plan, target: &Target<S>, [one, other]: [Se3<S>; 2]) -> Self {
+        let x1 = one * plan.turned[0].lift();
+        let x2 = other * plan.turned[1].lift() * target.placement;
+        Self { x1, x2, v: [Motion::zero(); 2], a: [Motion::zero(); 2] }
+    }
+
+    /// Of bodies that are placed and at rest.
+    #[inline(always)]
+    pub(crate) fn at_rest(plan: &Plan, target: &Target<S>, World { oX, .. }: &World<S>) -> Self {
+        let [i, j] = plan.bodies;
+        Self::between(plan, target, [oX[i], oX[j]])
+    }
+
+    /// Of bodies that move.
+    #[inline(always)]
+    pub(crate) fn new(plan: &Plan, target: &Target<S>, w: &World<S>, v: &[Motion<S>], a: &[Motion<S>]) -> Self {
+        let [i, j] = plan.bodies;
+        Self { v: [v[i], v[j]], a: [a[i], a[j]], ..Self::at_rest(plan, target, w) }
+    }
+
+    /// A motion in the world's frame as the constraint's rows express it.
+    #[inline(always)]
+    fn express(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
+        if plan.aligned() { Motion::new(at(m, self.x1.translation), m.angular) } else { self.x1.act_inv(m) }
+    }
+
+    /// A vector along the world's axes as the constraint's rows express it.
+    #[inline(always)]
+    fn along(&self, plan: &Plan, x: Vec3<S>) -> Vec3<S> {
+        if plan.aligned() { x } else { self.x1.rotation.transpose_mul(x) }
+    }
+
+    /// What is along the axes of frame 1 as the constraint's rows express it.
+    #[inline(always)]
+    pub(crate) fn outward(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
+        let R = self.x1.rotation;
+        if plan.aligned() { Motion::new(R * m.linear, R * m.angular) } else { m }
+    }
+
+    /// ₂X₁ as a twist.
+    #[inline(always)]
+    fn error(&self) -> Motion<S> {
+        let x = self.x2.inverse() * self.x1;
+        log6(Quaternion::from_rotation(x.rotation), x.translation)
+    }
+
+    /// A column of J: the velocity when the joint moves with the column s, which carries the frames as told.
+    #[inline(always)]
+    fn column(&self, plan: &Plan, s: Motion<S>, first: bool, second: bool) -> Motion<S> {
+        match plan.kind {
+            ConstraintKind::Rigid if first == second => Motion::zero(),
+            ConstraintKind::Rigid => self.express(plan, if first { s } else { -s }),
+            ConstraintKind::Point => {
+                let (s1, s2) = (at(s, self.x1.translation), at(s, self.x2.translation));
+                let linear = match (first, second) {
+                    (true, true) => s1 - s2,
+                    (true, false) => s1,
+                    (false, _) => -s2,
+                };
+                Motion::new(self.along(plan, linear), Vec3::zero())
+            }
+        }
+    }
+
+    /// The constraint's rows of J, on its places.
+    #[inline(always)]
+    pub(crate) fn jacobian(&self, plan: &Plan, columns: &[Motion<S>], J: &mut [S]) {
+        let (rows, n) = (plan.rows(), plan.places.len());
+        let J = &mut J[plan.start..plan.start + rows * n];
+        J.fill(S::zero());
+        for touch in &plan.touches {
+            let s = self.column(plan, columns[touch.column], touch.first, touch.second);
+            let s = s.scale(S::splat(touch.ratio)).to_array();
+            for r in 0..rows {
+                J[r * n + touch.at] += s[r];
+            }
+        }
+    }
+
+    /// The acceleration that shall vanish, with the corrections, for the accelerations of the bodies.
+    #[inline(always)]
+    pub(crate) fn acceleration(&self, plan: &Plan, target: &Target<S>) -> Motion<S> {
+        let (kp, kd) = (S::splat(plan.kp), S::splat(plan.kd));
+        let wanted = target.velocity.scale_add(kd, target.acceleration);
+        let value = match plan.kind {
+            ConstraintKind::Rigid => {
+                let m = self.express(plan, self.rigid(plan, kd));
+                // Without kp no logarithm, which is not smooth at half turns.
+                if plan.kp > 0.0 { m + self.outward(plan, self.error().scale(kp)) } else { m }
+            }
+            ConstraintKind::Point => Motion::new(self.along(plan, self.point(kp, kd)), Vec3::zero()),
+        };
+        value - wanted
+    }
+
+    /// a₁ − a₂ + Δv × v₂ + kd Δv.
+    #[inline(always)]
+    fn rigid(&self, plan: &Plan, kd: S) -> Motion<S> {
+        let [v1, v2] = self.v;
+        let m = (v1 - v2).scale_add(kd, self.a[0] - self.a[1]);
+        if plan.aligned() { m } else { m + (v1 - v2).cross(v2) }
+    }
+
+    /// The points' velocities u and accelerations α = a + ω × u.
+    #[inline(always)]
+    fn points(&self) -> [[Vec3<S>; 2]; 2] {
+        let (p1, p2) = (self.x1.translation, self.x2.translation);
+        let (u1, u2) = (at(self.v[0], p1), at(self.v[1], p2));
+        let alpha1 = at(self.a[0], p1) + self.v[0].angular.cross(u1);
+        let alpha2 = at(self.a[1], p2) + self.v[1].angular.cross(u2);
+        [[u1, alpha1], [u2, alpha2]]
+    }
+
+    /// α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂).
+    #[inline(always)]
+    fn point(&self, kp: S, kd: S) -> Vec3<S> {
+        let [[u1, alpha1], [u2, alpha2]] = self.points();
+        let velocity = (u1 - u2).scale_add(kd, alpha1 - alpha2);
+        (self.x1.translation - self.x2.translation).scale_add(kp, velocity)
+    }
+
+    /// The derivatives of `acceleration` with respect to q and v, for the bodies' accelerations at a fixed q̈: added to
+    /// the constraint's rows of dq and dv. `error` is its value there.
+    #[inline(always)]
+    pub(crate) fn acceleration_derivatives(
+        &self,
+        plan: &Plan,
+        target: &Target<S>,
+        w: Columns<'_, S>,
+        error: &[S],
+        dq: &mut DMatrix<S>,
+        dv: &mut DMatrix<S>,
+    ) {
+        match plan.kind {
+            ConstraintKind::Rigid => self.rigid_derivatives(plan, target, w, error, dq, dv),
+            ConstraintKind::Point => self.point_derivatives(plan, w, dq, dv),
+        }
+    }
+
+    #[inline(always)]
+    fn rigid_derivatives(
+        &self,
+        plan: &Plan,
+        target: &Target<S>,
+        w: Columns<'_, S>,
+        error: &[S],
+        dq: &mut DMatrix<S>,
+        dv: &mut DMatrix<S>,
+    ) {
+        let (kp, kd) = (S::splat(plan.kp), S::splat(plan.kd));
+        let [v1, v2] = self.v;
+        let [a1, a2] = self.a;
+        let m = self.rigid(plan, kd);
+        let Jlog = if plan.kp > 0.0 { Some(jlog6(self.error())) } else { None };
+        let error: [S; 6] = core::array::from_fn(|r| error[r]);
+        let turned = Motion::from(error) + target.velocity.scale_add(kd, target.acceleration);
+        for touch in &plan.touches {
+            let (first, second) = (touch.first, touch.second);
+            let (s, Psid) = (w.S[touch.column], w.Psid[touch.column]);
+            let (Psidd, PsidSd) = (w.Psidd[touch.column], w.PsidSd[touch.column]);
+            let (dv1, dv2) = (s.cross(v1) + Psid, s.cross(v2) + Psid); // ∂v = S × v + Ψ̇
+            let da1 = s.cross(a1) + Psidd + Psid.cross(v1); // ∂a = S × a + Ψ̈ + Ψ̇ × v
+            let da2 = s.cross(a2) + Psidd + Psid.cross(v2);
+            let (change, rate) = (minus(first, dv1, second, dv2), minus(first, s, second, s));
+            let mut by_q = change.scale_add(kd, minus(first, da1, second, da2));
+            let mut by_v = rate.scale_add(kd, minus(first, PsidSd + s.cross(v1), second, PsidSd + s.cross(v2)));
+            if !plan.aligned() {
+                by_q += change.cross(v2); // ∂(Δv × v₂)
+                by_v += rate.cross(v2);
+                if second {
+                    by_q += (v1 - v2).cross(dv2);
+                    by_v += (v1 - v2).cross(s);
+                }
+            }
+            if first {
+                by_q -= s.cross(m);
+            }
+            let mut by_q = self.express(plan, by_q);
+            if let Some(Jlog) = Jlog.filter(|_| first != second) {
+                by_q += self.outward(plan, (Jlog * self.x1.act_inv(rate)).scale(kp)); // ∂ log X = Jlog ₀X₁⁻¹ S
+            }
+            if plan.aligned() && first {
+                by_q += turn(s.angular, turned); // the frame's axes turn what is expressed along the world's
+            }
+            let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
+            let (by_q, by_v) = (by_q.to_array(), self.express(plan, by_v).to_array());
+            for r in 0..6 {
+                dq[(row + r, column)] += by_q[r] * ratio;
+                dv[(row + r, column)] += by_v[r] * ratio;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn point_derivatives(&self, plan: &Plan, w: Columns<'_, S>, dq: &mut DMatrix<S>, dv: &mut DMatrix<S>) {
+        let (kp, kd, two) = (S::splat(plan.kp), S::splat(plan.kd), S::splat(2.0));
+        let points = self.points();
+        let held = self.point(kp, kd);
+        for touch in &plan.touches {
+            let (s, Psid) = (w.S[touch.column], w.Psid[touch.column]);
+            let (Psidd, PsidSd) = (w.Psidd[touch.column], w.PsidSd[touch.column]);
+            let (mut by_q, mut by_v) = (Vec3::zero(), Vec3::zero());
+            for end in 0..2 {
+                let (p, [u, alpha]) = ([self.x1, self.x2][end].translation, points[end]);
+                // ∂(α + kd u + kp p) = s_ω × (α + kd u) + Ψ̈ + 2 Ψ̇_ω × u + kd Ψ̇ + kp s
+                let turned = s.angular.cross(u.scale_add(kd, alpha)) + Psid.angular.cross(u).scale(two);
+                let moved = at(s, p).scale_add(kp, at(Psid, p).scale_add(kd, at(Psidd, p)));
+                // Ψ̇ + Ṡ + 2 s_ω × u + kd s
+                let faster = at(s, p).scale_add(kd, at(PsidSd, p)) + s.angular.cross(u).scale(two);
+                if end == 0 && touch.first {
+                    by_q += turned + moved;
+                    by_v += faster;
+                } else if end == 1 && touch.second {
+                    by_q -= turned + moved;
+                    by_v -= faster;
+                }
+            }
+            if !plan.aligned() && touch.first {
+                by_q -= s.angular.cross(held);
+            }
+            let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
+            let (by_q, by_v) = (self.along(plan, by_q).to_array(), self.along(plan, by_v).to_array());
+            for r in 0..3 {
+                dq[(row + r, column)] += by_q[r] * ratio;
+                dv[(row + r, column)] += by_v[r] * ratio;
+            }
+        }
+    }
+
+    /// The derivative of the relative velocity J w with respect to q for a fixed w, added to the constraint's rows of dq:
+    /// the ends and Ψ̇ are those of w, `value` is J w.
+    #[inline(always)]
+    pub(crate) fn velocity_derivative(
+        &self,
+        plan: &Plan,
+        S: &[Motion<S>],
+        Psid: &[Motion<S>],
+        value: &[S],
+        dq: &mut DMatrix<S>,
+    ) {
+        let [v1, v2] = self.v;
+        let (p1, p2) = (self.x1.translation, self.x2.translation);
+        for touch in &plan.touches {
+            let (first, second) = (touch.first, touch.second);
+            let (s, Psid) = (S[touch.column], Psid[touch.column]);
+            let change = match plan.kind {
+                ConstraintKind::Rigid => {
+                    let mut m = minus(first, s.cross(v1) + Psid, second, s.cross(v2) + Psid); // ∂v = S × v + Ψ̇
+                    if first {
+                        m -= s.cross(v1 - v2);
+                    }
+                    let mut m = self.express(plan, m);
+                    if plan.aligned() && first {
+                        let value: [S; 6] = core::array::from_fn(|r| value[r]);
+                        m += turn(s.angular, value.into());
+                    }
+                    m
+                }
+                ConstraintKind::Point => {
+                    let (u1, u2) = (at(v1, p1), at(v2, p2));
+                    let mut u = Vec3::zero();
+                    if first {
+                        u += s.angular.cross(u1) + at(Psid, p1); // ∂u = s_ω × u + Ψ̇
+                    }
+                    if second {
+                        u -= s.angular.cross(u2) + at(Psid, p2);
+                    }
+                    if first && !plan.aligned() {
+                        u -= s.angular.cross(u1 - u2);
+                    }
+                    Motion::new(self.along(plan, u), Vec3::zero())
+                }
+            };
+            let change = change.scale(S::splat(touch.ratio)).to_array();
+            for r in 0..plan.rows() {
+                dq[(plan.row + r, touch.coordinate)] += change[r];
+            }
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! Constraints of one model, planned: which coordinates each of them touches, and memory for all that they need.
+//!
+//! The coordinates that move a constraint's frames lie on the ways from the frames to the root of the tree of M's factor.
+//! Sorted, they are what both ways share, then the rest of one way, then the rest of the other: three runs at most. Rows
+//! of J are stored on these coordinates alone.
+
+use crate::constraints::constraint::{Constraint, Target};
+use crate::constraints::constraint_lanes::ConstraintLanes;
+use crate::constraints::delassus::Delassus;
+use crate::constraints::plan::{Plan, Proximal, SupportColumn, common};
+use condyle_linalg::Ltdl;
+use condyle_linalg::elimination_tree::NONE;
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_model::Error;
+use condyle_model::Model;
+use condyle_spatial::{Scalar, Se3, Vec3};
+use core::ops::Range;
+use nalgebra::DMatrix;
+use std::collections::BTreeSet;
+
+/// Constraints of one model: contacts and loops, and the scratch and results of [`constrained_dynamics`] and its like.
+///
+/// All memory is allocated here. Make one set for each combination of contacts, and change where they shall be through
+/// [`target_mut`](Self::target_mut); the [`Data`](crate::Data) can be the same for all sets.
+///
+/// ```
+/// use condyle_dynamics::{Constraint, ConstraintSet, robots};
+/// let quadruped = robots::quadruped();
+/// let feet = ["LF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
+/// let trot = ConstraintSet::<f64>::new(&quadruped, &feet.map(Constraint::point))?;
+/// assert_eq!((trot.rows(), trot.range(1)), (6, 3..6));
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// [`constrained_dynamics`]: crate::constrained_dynamics()
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub struct ConstraintSet<S> {
+    /// How redundant constraints share their forces; may be changed between calls.
+    pub proximal: Proximal,
+    pub(crate) plans: Vec<Plan>,
+    pub(crate) targets: Vec<Target<S>>,
+    pub(crate) nv: usize,
+    /// Of the tree that it was made for.
+    tree: u64,
+    /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
+    pub(crate) nonzero_rows: Vec<NonzeroRows>,
+    /// For each coordinate, the rows of J in which it may differ from zero.
+    pub(crate) touching: Vec<Vec<usize>>,
+    /// J on the places of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
+    pub(crate) J: Vec<S>,
+    /// γ: the constraints' accelerations for q̈ = 0, with all corrections. Shape: rows. Written by: `constraint_motion`.
+    pub(crate) gamma: Vec<S>,
+    pub(crate) delassus: Delassus<S>,
+    /// The forces, or impulses. Shape: rows. Written by: the algorithms.
+    pub(crate) lambda: Vec<S>,
+    /// J q̈ + γ. Shape: rows. Written by: the algorithms.
+    pub(crate) error: Vec<S>,
+    /// Of the constraints' accelerations (velocities). Shape: rows × nv. Written by: the algorithms' derivatives.
+    pub(crate) dgamma_dq: DMatrix<S>,
+    pub(crate) dgamma_dv: DMatrix<S>,
+    /// M⁻¹ Jᵀ, and M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
+    pub(crate) U: DMatrix<S>,
+    pub(crate) Jbar: DMatrix<S>,
+    /// Of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
+    pub(crate) dlambda_dq: DMatrix<S>,
+    pub(crate) dlambda_dv: DMatrix<S>,
+    pub(crate) dlambda_dtau: DMatrix<S>,
+    /// Of single calls on robots with limbs.
+    pub(crate) limbs: Option<Box<ConstraintLanes>>,
+}
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// Plans constraints of a model and allocates everything.
+    ///
+    /// # Errors
+    /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
+    /// is `World`, a gain is negative or not finite, or two constraints are the same.
+    pub fn new<R>(model: &Model<R>, constraints: &[Constraint]) -> Result<Self, Error> {
+        let factor = Ltdl::<S>::new(model);
+        let tree = factor.tree();
+        let mut place = vec![0; model.nv()];
+        for (k, &coordinate) in tree.order.iter().enumerate() {
+            place[coordinate] = k;
+        }
+        let support = |body: usize| model.support(&model.nodes()[body]);
+        let mut plans: Vec<Plan> = Vec::new();
+        let (mut row, mut start) = (0, 0);
+        for (i, constraint) in constraints.iter().enumerate() {
+            let bodies = constraint.bodies(model, &constraints[..i])?;
+            let ways = bodies.map(|body| {
+                let mut way = BTreeSet::new(); // with all places before, to the root
+                for &c in support(body) {
+                    let mut k = place[model.columns()[c].coordinate];
+                    while k != NONE && way.insert(k) {
+                        k = tree.parent[k];
+                    }
+                }
+                way
+            });
+            let places: Vec<usize> = ways[0].union(&ways[1]).copied().collect();
+            let shared = ways[0].intersection(&ways[1]).count();
+            let branch = |k: &usize| ways[0].contains(k) && !ways[1].contains(k);
+            let second = (shared + 1..places.len()).find(|&j| branch(&places[j]) != branch(&places[j - 1]));
+            let columns: BTreeSet<usize> = bodies.iter().flat_map(|&body| support(body)).copied().collect();
+            let touch = |column: usize| {
+                let c = &model.columns()[column];
+                SupportColumn {
+                    column,
+                    at: places.binary_search(&place[c.coordinate]).expect("its place is on the way"),
+                    coordinate: c.coordinate,
+                    ratio: c.ratio,
+                    first: support(bodies[0]).contains(&column),
+                    second: support(bodies[1]).contains(&column),
+                }
+            };
+            let placement = |frame: usize| model.frames()[frame].placement;
+            let placements = [placement(constraint.frame), constraint.other.map_or(Se3::identity(), placement)];
+            let turn =
+                |k: usize| Se3::new(model.nodes()[bodies[k]].axis_rotation.transpose(), Vec3::zero()) * placements[k];
+            let mut plan = Plan {
+                kind: constraint.kind,
+                reference: constraint.reference,
+                kp: constraint.kp,
+                kd: constraint.kd,
+                bodies,
+                placements,
+                turned: [turn(0), turn(1)],
+                row,
+                coordinates: places.iter().map(|&k| tree.order[k]).collect(),
+                shared,
+                second: second.unwrap_or(places.len()),
+                touches: columns.into_iter().map(touch).collect(),
+                places,
+                start,
+                common: Vec::new(),
+            };
+            plan.common = plans.iter().chain([&plan]).map(|other| common(&plan.places, &other.places)).collect();
+            row += plan.rows();
+            start += plan.rows() * plan.places.len();
+            plans.push(plan);
+        }
+        let (rows, entries, nv) = (row, start, model.nv());
+        let touching = |k: usize| {
+            let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
+            touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
+        };
+        let nonzero_rows = |k: usize| {
+            // what carries a frame moves the force on the other one
+            let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
+            let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
+            model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
+        };
+        let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
+        Ok(Self {
+            proximal: Proximal::default(),
+            targets: constraints.iter().map(|c| c.target.lift()).collect(),
+            nv,
+            tree: model.tree_hash(),
+            nonzero_rows: NonzeroRows::of_columns((0..nv).map(nonzero_rows).collect()),
+            touching: (0..nv).map(touching).collect(),
+            J: vec![o; entries],
+            gamma: vec![o; rows],
+            delassus: Delassus::new(rows, entries),
+            lambda: vec![o; rows],
+            error: vec![o; rows],
+            dgamma_dq: wide.clone(),
+            dgamma_dv: wide.clone(),
+            U: DMatrix::from_element(tall.0, tall.1, o),
+            Jbar: DMatrix::from_element(tall.0, tall.1, o),
+            dlambda_dq: wide.clone(),
+            dlambda_dv: wide.clone(),
+            dlambda_dtau: wide,
+            limbs: ConstraintLanes::new::<S, R>(model, &plans),
+            plans,
+        })
+    }
+
+    /// How many constraints there are.
+    pub fn len(&self) -> usize {
+        self.plans.len()
+    }
+
+    /// Whether there is no constraint.
+    pub fn is_empty(&self) -> bool {
+        self.plans.is_empty()
+    }
+
+    /// How many rows J has, and λ numbers.
+    pub fn rows(&self) -> usize {
+        self.lambda.len()
+    }
+
+    /// The rows of constraint k.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    pub fn range(&self, k: usize) -> Range<usize> {
+        self.plans[k].row..self.plans[k].row + self.plans[k].rows()
+    }
+
+    /// Where constraint k wants its frame to be: to be changed between calls, in each lane by itself.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    pub fn target_mut(&mut self, k: usize) -> &mut Target<S> {
+        &mut self.targets[k]
+    }
+
+    /// J, rows × nv, as the last call left it: J is overwritten.
+    ///
+    /// # Panics
+    /// If `J` is not rows × nv.
+    pub fn jacobian(&self, J: &mut DMatrix<S>) {
+        let shape = (self.rows(), self.nv);
+        assert!(J.shape() == shape, "J: expected {} × {}, found {:?}", shape.0, shape.1, J.shape());
+        J.fill(S::zero());
+        for plan in &self.plans {
+            for r in 0..plan.rows() {
+                let row = &self.J[plan.range(r)];
+                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                    J[(plan.row + r, coordinate)] = row[k];
+                }
+            }
+        }
+    }
+
+    /// Panics unless this was made for a model of the same tree.
+    #[inline]
+    #[track_caller]
+    pub(crate) fn check<R>(&self, model: &Model<R>) {
+        assert!(self.tree == model.tree_hash(), "constraints: made for another model than `{}`", model.name());
+    }
+}

@@ -1,0 +1,252 @@
+//! J M⁻¹ Jᵀ and its inverse Λ, the inertia that a robot shows to its constraints.
+//!
+//! With M = Lᵀ D L, the rows of Y = J L⁻¹ have entries only where J's have, or nearer to the root, and J M⁻¹ Jᵀ = Y D⁻¹ Yᵀ
+//! needs what two constraints share and nothing else. It is factorised as C E Cᵀ with C unit lower triangular. A row that
+//! depends on rows before it has no pivot but rounding; its force is set to zero. Source: Featherstone, *Exploiting
+//! sparsity in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
+
+use crate::constraints::plan::{Plan, Proximal};
+use condyle_linalg::Ltdl;
+use condyle_linalg::axpy::{axpy, dot};
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+
+/// A pivot smaller than this many roundings of its diagonal entry is none.
+const ROUNDINGS: f64 = 1e3;
+
+/// Columns are stored in steps of this many numbers, so that loops over them have no remainder. What stands above the
+/// diagonal, or behind the last row, has no meaning.
+const fn step<S: Scalar>() -> usize {
+    if S::LANES == 1 { STEP } else { 1 }
+}
+
+/// Of single numbers.
+const STEP: usize = 8;
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Delassus<S> {
+    /// J L⁻¹, and that times D⁻¹, on the places of each constraint. Shape: entries of all rows. Written by: `multiply`.
+    Y: Vec<S>,
+    Z: Vec<S>,
+    /// From column to column of `CE`, from row to row of `rows`: room for a row more, in whole steps.
+    pub stride: usize,
+    /// J M⁻¹ Jᵀ from the diagonal on, column by column; then C E. Shape: stride × rows, and a step. Written by: `multiply`,
+    /// or in lanes by `limbs`; then by `decompose`.
+    pub CE: Vec<S>,
+    /// C E row by row, up to the diagonal. Shape: as `CE`. Written by: `decompose`.
+    rows: Vec<S>,
+    /// 1/E; 0 where there is no pivot. Shape: rows. Written by: `decompose`.
+    E_inv: Vec<S>,
+    /// How many rows have no pivot. Written by: `decompose`.
+    pub redundant: S,
+    /// What is being solved for, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
+    x: Vec<S>,
+    /// C⁻¹ b. Shape: rows. Written by: `substitute`.
+    y: Vec<S>,
+    /// Λ. Shape: rows × rows. Written by: `invert`.
+    pub inverse: DMatrix<S>,
+}
+
+/// The smallest number that changes 1 when added to it.
+#[inline(always)]
+fn epsilon<S: Scalar>() -> S {
+    let third = S::splat(4.0) / S::splat(3.0) - S::one();
+    (third + third + third - S::one()).abs()
+}
+
+impl<S: Scalar> Delassus<S> {
+    pub(crate) fn new(rows: usize, entries: usize) -> Self {
+        let (o, stride) = (S::zero(), (rows + 1).next_multiple_of(step::<S>()));
+        let square = vec![o; stride * rows + step::<S>()];
+        Self {
+            Y: vec![o; entries],
+            Z: vec![o; entries],
+            stride,
+            CE: square.clone(),
+            rows: square,
+            E_inv: vec![o; rows],
+            redundant: o,
+            x: vec![o; stride],
+            y: vec![o; rows],
+            inverse: DMatrix::from_element(rows, rows, o),
+        }
+    }
+
+    /// J M⁻¹ Jᵀ, for the rows of J on their places.
+    #[inline(always)]
+    pub(crate) fn multiply(&mut self, plans: &[Plan], J: &[S], M: &Ltdl<S>) {
+        let D_inv = M.inverse_diagonal();
+        self.Y.copy_from_slice(J);
+        let (G, stride) = (&mut self.CE, self.stride);
+        G.fill(S::zero());
+        for (i, plan) in plans.iter().enumerate() {
+            let Plan { places, shared, second, .. } = plan;
+            for r in 0..plan.rows() {
+                let (y, z) = (&mut self.Y[plan.range(r)], &mut self.Z[plan.range(r)]);
+                for (j, &k) in places.iter().enumerate().rev() {
+                    let (x, row) = (-y[j], M.row_from_root(k));
+                    if j < *second {
+                        axpy(x, row, &mut y[..j]); // y_e −= L_ke y_k on the places e between k and the root
+                    } else {
+                        axpy(x, &row[..*shared], &mut y[..*shared]);
+                        axpy(x, &row[*shared..], &mut y[*second..j]);
+                    }
+                    z[j] = y[j] * D_inv[k];
+                }
+            }
+            for (other, runs) in plans[..=i].iter().zip(&plan.common) {
+                for r in 0..plan.rows() {
+                    let z = &self.Z[plan.range(r)];
+                    for c in 0..if other.row == plan.row { r + 1 } else { other.rows() } {
+                        let y = &self.Y[other.range(c)];
+                        let mut sum = S::zero();
+                        for &[here, there, n] in runs {
+                            sum += dot(&z[here..here + n], &y[there..there + n]);
+                        }
+                        G[(other.row + c) * stride + plan.row + r] = sum; // z_r · y_c
+                    }
+                }
+            }
+        }
+    }
+
+    /// J M⁻¹ Jᵀ + μ 1 = C E Cᵀ, for J M⁻¹ Jᵀ in place of C E, and λ in place of b, as `solve` gives it: b goes along as one
+    /// more row.
+    #[inline(always)]
+    pub(crate) fn decompose(&mut self, proximal: Proximal, lambda: &mut [S]) {
+        let Self { CE, rows, E_inv, stride, .. } = self;
+        let (n, stride) = (E_inv.len(), *stride);
+        let smallest = epsilon::<S>() * S::splat(ROUNDINGS);
+        for j in 0..n {
+            CE[j * (stride + 1)] += S::splat(proximal.mu);
+            CE[j * stride + n] = lambda[j];
+        }
+        self.redundant = S::zero();
+        for j in 0..n {
+            let (left, column) = CE.split_at_mut(j * stride);
+            let (first, row) = (j - j % step::<S>(), &mut rows[j * stride..(j + 1) * stride]);
+            let column = &mut column[first..stride];
+            let diagonal = column[j - first];
+            for k in 0..j {
+                row[k] = left[k * stride + j];
+            }
+            subtract(left, stride, first, &row[..j], E_inv, column); // G_ij − Σ C_ik E_k C_jk
+            let pivot = column[j - first];
+            let kept = (diagonal * smallest).lt(pivot);
+            E_inv[j] = S::select(kept, S::select(kept, pivot, S::one()).recip(), S::zero());
+            self.redundant += S::select(kept, S::zero(), S::one());
+            self.x[j] = column[n - first]; // y = C⁻¹ b
+        }
+        self.back_substitute();
+        self.repeat(proximal, lambda);
+    }
+
+    /// λ in place of b: J M⁻¹ Jᵀ λ = b, by proximal iterations if there are any.
+    #[inline(always)]
+    pub(crate) fn solve(&mut self, proximal: Proximal, lambda: &mut [S]) {
+        self.x[..lambda.len()].copy_from_slice(lambda);
+        self.substitute(0);
+        self.back_substitute();
+        self.repeat(proximal, lambda);
+    }
+
+    /// λ in place of b, for what comes first in place of x.
+    #[inline(always)]
+    fn repeat(&mut self, proximal: Proximal, lambda: &mut [S]) {
+        let (n, mu) = (lambda.len(), S::splat(proximal.mu));
+        for _ in 1..rounds(proximal) {
+            for r in 0..n {
+                self.x[r] = self.x[r].mul_add(mu, lambda[r]); // b + μ λ'
+            }
+            self.substitute(0);
+            self.back_substitute();
+        }
+        lambda.copy_from_slice(&self.x[..n]);
+    }
+
+    /// Λ: the map from b to λ.
+    #[inline(always)]
+    pub(crate) fn invert(&mut self, proximal: Proximal) {
+        let (n, mu) = (self.E_inv.len(), S::splat(proximal.mu));
+        for j in 0..n {
+            self.x.fill(S::zero());
+            self.x[j] = S::one();
+            self.substitute(j);
+            self.back_substitute();
+            for _ in 1..rounds(proximal) {
+                for x in &mut self.x {
+                    *x = *x * mu;
+                }
+                self.x[j] += S::one();
+                self.substitute(0);
+                self.back_substitute(); // Λ = (G + μ)⁻¹ (1 + μ Λ')
+            }
+            self.inverse.as_mut_slice()[j * n..(j + 1) * n].copy_from_slice(&self.x[..n]);
+        }
+    }
+
+    /// y = C⁻¹ b in place of x, for b that is zero before `start`.
+    #[inline(always)]
+    fn substitute(&mut self, start: usize) {
+        let Self { CE, E_inv, x, y, stride, .. } = self;
+        let n = E_inv.len();
+        y[..start].fill(S::zero());
+        for j in start..n {
+            let first = j - j % step::<S>();
+            y[j] = x[j];
+            update(-(x[j] * E_inv[j]), &CE[j * *stride + first..], &mut x[first..]); // b_i − C_ij y_j
+        }
+        x[..n].copy_from_slice(&y[..n]);
+    }
+
+    /// C⁻ᵀ E⁻¹ y in place of x, for y in place of x.
+    #[inline(always)]
+    fn back_substitute(&mut self) {
+        let Self { rows, E_inv, x, stride, .. } = self;
+        for j in (0..E_inv.len()).rev() {
+            let x_j = x[j] * E_inv[j];
+            update(-x_j, &rows[j * *stride..], &mut x[..j.next_multiple_of(step::<S>())]); // y_k − E_k C_jk x_j
+            x[j] = x_j;
+        }
+    }
+}
+
+/// y += x s, in whole steps.
+#[inline(always)]
+fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
+    if step::<S>() == 1 {
+        return axpy(s, x, y);
+    }
+    for (x, y) in x.as_chunks::<STEP>().0.iter().zip(y.as_chunks_mut::<STEP>().0) {
+        for j in 0..STEP {
+            y[j] = x[j].mul_add(s, y[j]);
+        }
+    }
+}
+
+/// y − Σ xₖ sₖ Eₖ⁻¹ in place of y, for the columns x of a matrix, from a row on; in whole steps.
+#[inline(always)]
+fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_inv: &[S], y: &mut [S]) {
+    if step::<S>() == 1 {
+        for k in 0..s.len() {
+            axpy(-(s[k] * E_inv[k]), &columns[k * stride + first..], y);
+        }
+        return;
+    }
+    for (i, y) in y.as_chunks_mut::<STEP>().0.iter_mut().enumerate() {
+        let mut sum = *y;
+        for k in 0..s.len() {
+            let (x, s) = (&columns[k * stride + first + i * STEP..][..STEP], -(s[k] * E_inv[k]));
+            for j in 0..STEP {
+                sum[j] = x[j].mul_add(s, sum[j]);
+            }
+        }
+        *y = sum;
+    }
+}
+
+/// How often to solve: without μ, once is exact.
+fn rounds(proximal: Proximal) -> usize {
+    if proximal.mu > 0.0 { proximal.iterations.max(1) } else { 1 }
+}

@@ -1,0 +1,138 @@
+//! Impacts: how velocities jump when constraints set in, and the derivatives, by hand.
+//!
+//! An impulse Λ of the constraints, in no time, so that nothing else acts and no body moves, makes them part again with
+//! the restitution ε, 0 (they stick) to 1 (nothing is lost):
+//!
+//! ```text
+//! M (v⁺ − v) = Jᵀ Λ,   J v⁺ = −ε J v          (A Newtonian restitution: Featherstone 2008, section 11.7)
+//! ```
+//!
+//! These are the equations of constrained dynamics for Δ = v⁺ − v in place of q̈, τ − h = 0 and γ = (1 + ε) J v, and so
+//! are their derivatives, with r = ∂(M Δ − Jᵀ Λ)/∂q (inverse dynamics of a robot at rest, weightless, that accelerates
+//! with Δ) and c = ∂(J w)/∂q, w = v⁺ + ε v:
+//!
+//! ```text
+//! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
+//! ```
+
+use crate::constraints::constraint_motion::FramePair;
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::passes::kinematics::World;
+use crate::workspace::{Size, filled};
+use condyle_linalg::axpy::axpy;
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Cross, Motion, Scalar};
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// v⁺. Shape: nv. Written by: `pass`.
+    pub v_after: Vec<S>,
+    /// w = v⁺ + ε v. Shape: nv. Written by: `pass`.
+    pub w: Vec<S>,
+    /// The bodies' velocities for w, in the world's frame. Shape: bodies. Written by: `spread`.
+    pub velocity: Vec<Motion<S>>,
+    /// Ψ̇ for w. Shape: columns. Written by: `spread`.
+    pub Psid: Vec<Motion<S>>,
+    /// Zeros. Shape: nv. Written by: nobody.
+    pub zero: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            v_after: filled(S::zero(), size.nv),
+            w: filled(S::zero(), size.nv),
+            velocity: filled(Motion::zero(), size.bodies),
+            Psid: filled(Motion::zero(), size.columns),
+            zero: filled(S::zero(), size.nv),
+        }
+    }
+}
+
+kernel! {
+    /// J and γ = (1 + ε) J v, for bodies that are placed.
+    pub(crate) fn approach<S>(world: &World<S>, set: &mut ConstraintSet<S>, d: &mut Workspace<S>, v: &[S], restitution: S) {
+        for (i, plan) in set.plans.iter().enumerate() {
+            FramePair::at_rest(plan, &set.targets[i], world).jacobian(plan, &world.S, &mut set.J);
+        }
+        for k in 0..v.len() {
+            d.w[k] = v[k].mul_add(restitution, v[k]); // (1 + ε) v
+        }
+        let mut gamma = core::mem::take(&mut set.gamma);
+        gamma.fill(S::zero());
+        set.add_motion(&d.w, &mut gamma);
+        set.gamma = gamma;
+    }
+}
+
+kernel! {
+    /// c, for bodies that are placed.
+    pub(crate) fn differentiate_motion<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        d: &mut Workspace<S>,
+        set: &mut ConstraintSet<S>,
+    ) {
+        spread(&Single::new(model), world, d);
+        set.dgamma_dq.as_mut_slice().fill(S::zero());
+        for (plan, target) in set.plans.iter().zip(&set.targets) {
+            let ends = FramePair::new(plan, target, world, &d.velocity, &d.velocity);
+            let value = &set.error[plan.row..plan.row + plan.rows()];
+            ends.velocity_derivative(plan, &world.S, &d.Psid, value, &mut set.dgamma_dq);
+        }
+    }
+}
+
+kernel! {
+    /// The derivatives with respect to the velocity before the impact.
+    pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut DMatrix<S>) {
+        set.respond_to_v_before(restitution, dv);
+    }
+}
+
+/// The velocities of all bodies for w and Ψ̇ = v_λ × S, for bodies that are placed.
+#[inline(always)]
+fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { w, velocity, Psid, .. } = d;
+    for i in l.bodies() {
+        let v_parent = l.parent(velocity, i);
+        let mut v_i = v_parent;
+        for k in 0..l.joint(i).nv() {
+            let c = l.column(i) + k;
+            Psid[c] = v_parent.cross(S[c]);
+            v_i = S[c].scale_add(l.joint_velocity(w, i, k), v_i);
+        }
+        velocity[i] = v_i;
+    }
+}
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
+    #[inline(always)]
+    fn respond_to_v_before(&mut self, restitution: S, dv: &mut DMatrix<S>) {
+        let (n, rows) = (self.nv, self.lambda.len());
+        let (Jbar, inertia) = (self.Jbar.as_slice(), self.delassus.inverse.as_slice());
+        let (dv, dlambda) = (dv.as_mut_slice(), self.dlambda_dv.as_mut_slice());
+        let scale = -(S::one() + restitution);
+        dv.fill(S::zero());
+        dlambda.fill(S::zero());
+        for k in 0..n {
+            dv[k * (n + 1)] = S::one();
+        }
+        for plan in &self.plans {
+            for r in 0..plan.rows() {
+                let (J, row) = (&self.J[plan.range(r)], plan.row + r);
+                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                    let x = J[k] * scale;
+                    axpy(x, &Jbar[row * n..(row + 1) * n], &mut dv[coordinate * n..(coordinate + 1) * n]);
+                    let column = &mut dlambda[coordinate * rows..(coordinate + 1) * rows];
+                    axpy(x, &inertia[row * rows..(row + 1) * rows], column);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The equations of motion under constraints, differentiated.
+//!
+//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. So small changes of them satisfy
+//!
+//! ```text
+//! M δq̈ − Jᵀ δλ + r_q δq + r_v δv = δτ,        r = ∂(M q̈ + h − Jᵀ λ)   at q̈ and λ as they are
+//! J δq̈         + c_q δq + c_v δv = 0,         c = ∂(J q̈ + γ)
+//! ```
+//!
+//! r comes from the derivatives of inverse dynamics with the forces of the constraints as external ones, each fixed in
+//! its body, and what is different: along the world's axes λ does not turn with frame 1, and the force on the other
+//! body is carried by frame 1 (a point's force: turned by frame 1, its point carried by body 2). Source: Carpentier and
+//! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
+
+use crate::constraints::constraint::ConstraintKind;
+use crate::constraints::constraint_motion::{Columns, FramePair};
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::derivatives::rnea_derivatives;
+use crate::passes::frames::Placements;
+use crate::passes::kinematics::World;
+use condyle_model::Model;
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
+use nalgebra::DMatrix;
+
+impl<S: Scalar> ConstraintSet<S> {
+    /// The force λ of constraint i along the axes of its frame.
+    #[inline(always)]
+    fn local_force(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
+        let f = self.force(i);
+        if self.plans[i].aligned() {
+            let R = ends.x1.rotation;
+            return Force::new(R.transpose_mul(f.linear), R.transpose_mul(f.angular));
+        }
+        f
+    }
+
+    /// The force on the other body, its sign turned, in the world's frame.
+    #[inline(always)]
+    fn reaction(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
+        let f = self.local_force(i, ends);
+        match self.plans[i].kind {
+            ConstraintKind::Rigid => ends.x1.act(f),
+            ConstraintKind::Point => {
+                let linear = ends.x1.rotation * f.linear;
+                Force::new(linear, ends.x2.translation.cross(linear))
+            }
+        }
+    }
+
+    /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
+    #[inline(always)]
+    fn load<R: Constant<S>>(&self, model: &Model<R>, world: &World<S>, f_ext: &[Force<S>], forces: &mut [Force<S>]) {
+        forces.fill(Force::zero());
+        forces[..f_ext.len()].copy_from_slice(f_ext);
+        for (i, plan) in self.plans.iter().enumerate() {
+            let ends = FramePair::at_rest(plan, &self.targets[i], world);
+            forces[plan.bodies[0]] += plan.placements[0].lift().act(self.local_force(i, &ends));
+            let oXb = Placements { model, world }.body(plan.bodies[1]);
+            forces[plan.bodies[1]] -= oXb.act_inv(self.reaction(i, &ends));
+        }
+    }
+
+    /// Adds to r = ∂(M q̈ + h − Jᵀ λ)/∂q what is different from forces that are fixed in their bodies.
+    #[inline(always)]
+    fn add_turning(&self, world: &World<S>, r: &mut DMatrix<S>) {
+        for (i, plan) in self.plans.iter().enumerate() {
+            if plan.bodies[1] > 0 {
+                let ends = FramePair::at_rest(plan, &self.targets[i], world);
+                let f = self.reaction(i, &ends);
+                for e in &plan.touches {
+                    if e.first == e.second {
+                        continue;
+                    }
+                    let s = world.S[e.column];
+                    let change = match plan.kind {
+                        ConstraintKind::Rigid => s.cross(f),
+                        ConstraintKind::Point => {
+                            let linear = s.angular.cross(f.linear);
+                            Force::new(linear, ends.x2.translation.cross(linear))
+                        }
+                    };
+                    let change = change.scale(S::splat(if e.first { e.ratio } else { -e.ratio }));
+                    for j in &plan.touches {
+                        if j.second {
+                            let x = world.S[j.column].dot(change);
+                            r[(j.coordinate, e.coordinate)] += x * S::splat(j.ratio);
+                        }
+                    }
+                }
+            }
+            if plan.aligned() {
+                let f = self.force(i);
+                for e in &plan.touches {
+                    if !e.first {
+                        continue;
+                    }
+                    let w = world.S[e.column].angular.scale(S::splat(e.ratio));
+                    let turned = Motion::new(w.cross(f.linear), w.cross(f.angular)).to_array(); // ω × λ
+                    for k in 0..plan.rows() {
+                        let J = &self.J[plan.range(k)];
+                        for (at, &coordinate) in plan.coordinates.iter().enumerate() {
+                            r[(coordinate, e.coordinate)] += J[at] * turned[k]; // Jᵀ (ω × λ)
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+kernel! {
+    /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
+    pub(crate) fn load<S, R>(
+        model: &Model<R>,
+        set: &ConstraintSet<S>,
+        world: &World<S>,
+        f_ext: &[Force<S>],
+        forces: &mut [Force<S>],
+    ) {
+        set.load(model, world, f_ext, forces);
+    }
+}
+
+kernel! {
+    /// r_q, from the derivative for forces that are fixed in their bodies.
+    pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &DMatrix<S>, r: &mut DMatrix<S>) {
+        r.as_mut_slice().copy_from_slice(fixed.as_slice());
+        set.add_turning(world, r);
+    }
+}
+
+kernel! {
+    /// c_q and c_v, for bodies whose motion is known.
+    pub(crate) fn differentiate_motion<S>(set: &mut ConstraintSet<S>, world: &World<S>, bodies: &rnea_derivatives::Bodies<S>) {
+        let rnea_derivatives::Bodies { v, a, Psid, Psidd, PsidSd, .. } = bodies;
+        let columns = Columns { S: &world.S, Psid, Psidd, PsidSd };
+        let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = set;
+        dgamma_dq.as_mut_slice().fill(S::zero());
+        dgamma_dv.as_mut_slice().fill(S::zero());
+        for (plan, target) in plans.iter().zip(targets.iter()) {
+            let ends = FramePair::new(plan, target, world, v, a);
+            let error = &error[plan.row..plan.row + plan.rows()];
+            ends.acceleration_derivatives(plan, target, columns, error, dgamma_dq, dgamma_dv);
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! Constraints: contacts and loops, how they are planned for a model, and the passes of dynamics under them.
+
+pub(crate) mod constrained_derivatives;
+pub(crate) mod constrained_dynamics;
+pub(crate) mod constraint;
+pub(crate) mod constraint_lanes;
+pub(crate) mod constraint_motion;
+pub(crate) mod constraint_set;
+mod delassus;
+pub(crate) mod impulse_dynamics;
+pub(crate) mod kkt_derivatives;
+pub(crate) mod plan;

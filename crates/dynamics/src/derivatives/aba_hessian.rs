@@ -1,0 +1,97 @@
+//! The second derivatives of forward dynamics, contracted with a vector, by hand.
+//!
+//! τ(q, v, q̈(q, v, τ)) = τ holds for every q, v and τ. Differentiated twice and multiplied by μᵀ = λᵀ M⁻¹, with the Hessian
+//! of φ = μᵀ rnea(q, v, a) at a = q̈ (`rnea_hessian.rs`) and G = ∂²φ/∂a∂q,
+//!
+//! ```text
+//! λᵀ ∂²q̈/∂q∂q = −∂²φ/∂q∂q − (∂q̈/∂q)ᵀ G − Gᵀ ∂q̈/∂q     λᵀ ∂²q̈/∂v∂q = −∂²φ/∂v∂q − (∂q̈/∂v)ᵀ G
+//! λᵀ ∂²q̈/∂v∂v = −∂²φ/∂v∂v                                λᵀ ∂²q̈/∂τ∂q = −M⁻¹ G
+//! ```
+//!
+//! and nothing else, since τ is linear in a and does not mix v with a. Source: Nganga and Wensing, *Accelerating
+//! second-order differential dynamic programming for rigid-body systems* (2021).
+
+use crate::derivatives::aba_derivatives::{self};
+use crate::derivatives::rnea_hessian;
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_linalg::tree_product::minus_product;
+use condyle_spatial::Scalar;
+use condyle_spatial::kernel;
+use nalgebra::DMatrix;
+
+/// Bᵀ, of a square matrix.
+#[inline(always)]
+fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
+    for j in 0..n {
+        for i in 0..n {
+            out[j + n * i] = B[i + n * j];
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// μ = M⁻¹ λ. Shape: nv. Written by: `aba_hessian`.
+    pub mu: Vec<S>,
+    /// A transpose. Shape: nv × nv. Written by: `run`.
+    pub transpose: Vec<S>,
+    /// A product. Shape: nv × nv. Written by: `run`.
+    pub product: Vec<S>,
+    /// Shape: nv × nv. Written by: `run`.
+    pub dqdq: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `run`.
+    pub dvdq: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `run`.
+    pub dvdv: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `run`.
+    pub dtaudq: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let square = || zero_matrix(size.nv, size.nv);
+        Self {
+            mu: filled(S::zero(), size.nv),
+            transpose: filled(S::zero(), size.nv * size.nv),
+            product: filled(S::zero(), size.nv * size.nv),
+            dqdq: square(),
+            dvdq: square(),
+            dvdv: square(),
+            dtaudq: square(),
+        }
+    }
+}
+
+kernel! {
+    /// After `aba_derivatives` and the Hessian of φ.
+    pub(crate) fn run<S>(
+        coupled: &[NonzeroRows],
+        first: &aba_derivatives::Workspace<S>,
+        Minv: &DMatrix<S>,
+        phi: &rnea_hessian::Workspace<S>,
+        d: &mut Workspace<S>,
+    ) {
+        let Workspace { transpose, product, dqdq, dvdq, dvdv, dtaudq, .. } = d;
+        let (n, G) = (coupled.len(), phi.dadq.as_slice());
+        let product = product.as_mut_slice();
+        transpose_to(first.da_dq.as_slice(), transpose, n);
+        minus_product(transpose, G, product, coupled); // −(∂q̈/∂q)ᵀ G
+        let (qq, vv) = (dqdq.as_mut_slice(), dvdv.as_mut_slice());
+        let (phi_qq, phi_vv) = (phi.dqdq.as_slice(), phi.dvdv.as_slice());
+        for j in 0..n {
+            for i in 0..n {
+                qq[i + n * j] = product[i + n * j] + product[j + n * i] - phi_qq[i + n * j];
+                vv[i + n * j] = -phi_vv[i + n * j];
+            }
+        }
+        transpose_to(first.da_dv.as_slice(), transpose, n);
+        let (vq, phi_vq) = (dvdq.as_mut_slice(), phi.dvdq.as_slice());
+        minus_product(transpose, G, vq, coupled); // −(∂q̈/∂v)ᵀ G
+        for k in 0..n * n {
+            vq[k] -= phi_vq[k];
+        }
+        minus_product(Minv.as_slice(), G, dtaudq.as_mut_slice(), coupled); // −M⁻¹ G
+    }
+}

@@ -1,0 +1,181 @@
+//! How the centre of mass, the centroidal momentum and its rate change with position, velocity and acceleration.
+//!
+//! About the world's origin, momentum h = Σ I v and rate F = Σ I a + v ×* I v change with coordinate e by what its joint
+//! carries (Ψ̇, Ψ̈, B of `rnea_derivatives.rs`, Y = Ψ̇ + Ṡ):
+//!
+//! ```text
+//! ∂h/∂q_e = S ×* hᶜ + Iᶜ Ψ̇     ∂F/∂q_e = S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇     ∂F/∂q̇_e = Iᶜ Y + 2Bᶜ S     ∂F/∂q̈_e = Iᶜ S
+//! ```
+//!
+//! Shifted to the centre of mass, f becomes [f; n − c × f], and its derivative gains −∂c × f. The linear rows over the mass
+//! are the derivatives of ċ and c̈.
+//!
+//! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the root.
+
+use crate::passes::centroidal::{about, add};
+use crate::passes::coriolis::Coriolis;
+use crate::passes::kinematics::{Moving, World};
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+/// The derivatives of a column, about the world's origin.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+struct Column<S> {
+    h_q: Force<S>,
+    F_q: Force<S>,
+    F_v: Force<S>,
+    F_a: Force<S>,
+}
+
+/// In the world's frame, but for what is said to be about the centre of mass.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `pass`.
+    pub IC: Vec<Inertia<S>>,
+    /// hᶜ and 2Bᶜ, likewise. Shape: bodies. Written by: `pass`.
+    pub BC: Vec<Coriolis<S>>,
+    /// Fᶜ, likewise. Shape: bodies. Written by: `pass`.
+    pub F: Vec<Force<S>>,
+    /// Shape: columns. Written by: `pass`.
+    columns: Vec<Column<S>>,
+    /// About the centre of mass. Shape: 6 × nv. Written by: `shift`.
+    pub dh_dq: DMatrix<S>,
+    pub drate_dq: DMatrix<S>,
+    pub drate_dv: DMatrix<S>,
+    pub drate_da: DMatrix<S>,
+    /// Shape: 3 × nv. Written by: `shift`.
+    pub dcom_dq: DMatrix<S>,
+    pub dvcom_dq: DMatrix<S>,
+    pub dacom_dq: DMatrix<S>,
+    pub dacom_dv: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let rows = |n| zero_matrix(n, size.nv);
+        let (six, three, o) = (rows(6), rows(3), Force::zero());
+        Self {
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
+            F: vec![o; size.bodies],
+            columns: vec![Column { h_q: o, F_q: o, F_v: o, F_a: o }; size.columns],
+            dh_dq: six.clone(),
+            drate_dq: six.clone(),
+            drate_dv: six.clone(),
+            drate_da: six,
+            dcom_dq: three.clone(),
+            dvcom_dq: three.clone(),
+            dacom_dq: three.clone(),
+            dacom_dv: three,
+        }
+    }
+}
+
+/// The derivatives about the world's origin, for bodies whose velocities and accelerations are known.
+#[inline(always)]
+fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, BC, F, columns, .. } = d;
+    (IC[0], BC[0], F[0]) = (Inertia::zero(), Coriolis::zero(), Force::zero());
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+        BC[i] = Coriolis::of(IC[i], m.v[i]);
+        F[i] = IC[i] * m.a[i] + m.v[i].cross(BC[i].momentum); // F = I a + v ×* I v
+    }
+    for i in l.bodies().rev() {
+        let (v_parent, a_parent): (Motion<_>, Motion<_>) = (l.parent(&m.v, i), l.parent(&m.a, i));
+        for k in 0..l.joint(i).nv() {
+            let c = l.column(i) + k;
+            let Psid = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
+            let Psidd = a_parent.cross(S[c]) + v_parent.cross(Psid); // Ψ̈ = a_λ × S + v_λ × Ψ̇
+            columns[c] = Column {
+                h_q: S[c].cross(BC[i].momentum) + IC[i] * Psid, // S ×* hᶜ + Iᶜ Ψ̇
+                F_q: S[c].cross(F[i]) + IC[i] * Psidd + BC[i].apply(Psid), // S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇
+                F_v: IC[i] * (Psid + m.dS[c]) + BC[i].apply(S[c]), // Iᶜ Y + 2Bᶜ S
+                F_a: IC[i] * S[c],
+            };
+        }
+        let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
+        l.add_to_parent(F, i, F_i);
+    }
+}
+
+/// −∂c × f, what a force's moment changes by with the point that it is about.
+#[inline(always)]
+fn moved<S: Scalar>(dcom: Vec3<S>, f: Vec3<S>) -> Force<S> {
+    Force::new(Vec3::zero(), -dcom.cross(f))
+}
+
+/// The derivatives about the centre of mass, after `pass`.
+#[inline(always)]
+pub(crate) fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalDerivatives<'d, S> {
+    let per_mass = d.IC[0].mass.recip();
+    let com = d.IC[0].mass_com.scale(per_mass);
+    let (p, f) = (d.BC[0].momentum.linear, d.F[0].linear);
+    for matrix in [&mut d.dh_dq, &mut d.drate_dq, &mut d.drate_dv, &mut d.drate_da] {
+        matrix.as_mut_slice().fill(S::zero());
+    }
+    for (c, &Column { h_q, F_q, F_v, F_a }) in d.columns.iter().enumerate() {
+        let dcom = F_a.linear.scale(per_mass); // m ∂c/∂q_e is the linear momentum of S_e
+        add(model, &mut d.dh_dq, c, about(com, h_q) + moved(dcom, p));
+        add(model, &mut d.drate_dq, c, about(com, F_q) + moved(dcom, f));
+        add(model, &mut d.drate_dv, c, about(com, F_v));
+        add(model, &mut d.drate_da, c, about(com, F_a));
+    }
+    let of = [&d.drate_da, &d.dh_dq, &d.drate_dq, &d.drate_dv];
+    for (to, from) in [&mut d.dcom_dq, &mut d.dvcom_dq, &mut d.dacom_dq, &mut d.dacom_dv].into_iter().zip(of) {
+        for j in 0..model.nv() {
+            for i in 0..3 {
+                to[(i, j)] = from[(i, j)] * per_mass;
+            }
+        }
+    }
+    CentroidalDerivatives {
+        dh_dq: &d.dh_dq,
+        dh_dv: &d.drate_da,
+        drate_dq: &d.drate_dq,
+        drate_dv: &d.drate_dv,
+        drate_da: &d.drate_da,
+        dcom_dq: &d.dcom_dq,
+        dvcom_dq: &d.dvcom_dq,
+        dacom_dq: &d.dacom_dq,
+        dacom_dv: &d.dacom_dv,
+    }
+}
+
+/// The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c. The axes are the world's.
+#[derive(Clone, Copy, Debug)]
+pub struct CentroidalDerivatives<'d, S> {
+    /// ∂hg/∂q, 6 × nv, linear rows first.
+    pub dh_dq: &'d DMatrix<S>,
+    /// ∂hg/∂v = Ag, 6 × nv.
+    pub dh_dv: &'d DMatrix<S>,
+    /// ∂dhg/∂q, 6 × nv.
+    pub drate_dq: &'d DMatrix<S>,
+    /// ∂dhg/∂v, 6 × nv.
+    pub drate_dv: &'d DMatrix<S>,
+    /// ∂dhg/∂a = Ag, 6 × nv.
+    pub drate_da: &'d DMatrix<S>,
+    /// ∂c/∂q = ∂ċ/∂v = ∂c̈/∂a, the Jacobian of the centre of mass, 3 × nv.
+    pub dcom_dq: &'d DMatrix<S>,
+    /// ∂ċ/∂q, 3 × nv.
+    pub dvcom_dq: &'d DMatrix<S>,
+    /// ∂c̈/∂q, 3 × nv.
+    pub dacom_dq: &'d DMatrix<S>,
+    /// ∂c̈/∂v, 3 × nv.
+    pub dacom_dv: &'d DMatrix<S>,
+}
+
+kernel! {
+    /// For bodies whose accelerations are known.
+    pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        pass(&Single::new(model), world, moving, d);
+    }
+}

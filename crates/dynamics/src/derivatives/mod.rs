@@ -1,0 +1,9 @@
+//! Derivatives of the passes, by hand: one algorithm a file, written as passes are.
+
+pub(crate) mod aba_derivatives;
+pub(crate) mod aba_hessian;
+pub(crate) mod centroidal_derivatives;
+mod frame_derivatives;
+pub(crate) mod rnea_derivatives;
+pub(crate) mod rnea_hessian;
+pub(crate) mod tree_solve;

@@ -1,0 +1,225 @@
+//! The derivatives of inverse dynamics, by hand.
+//!
+//! Source: Singh, Russell, Wensing, *Efficient analytical derivatives of rigid-body dynamics using spatial vector
+//! algebra* (2022), in the world's frame. When coordinate e of joint j changes, all that joint j carries turns rigidly
+//! about S_e, and beside that the velocities and accelerations there change by
+//!
+//! ```text
+//! Ψ̇_e = v_λ × S_e,   Ψ̈_e = a_λ × S_e + v_λ × Ψ̇_e          (λ: the parent of joint j)
+//! ∂v_i/∂q_e = S_e × v_i + Ψ̇_e,   ∂a_i/∂q_e = S_e × a_i + Ψ̈_e + Ψ̇_e × v_i
+//! ∂v_i/∂q̇_e = S_e,              ∂a_i/∂q̇_e = Ψ̇_e + Ṡ_e + S_e × v_i       (Ṡ_e = v_j × S_e)
+//! ```
+//!
+//! so that with composite quantities (sums over all that a joint carries: inertia Iᶜ, force F, and the matrix B of
+//! 2 B m = v ×* I m − I (v × m) + m ×* I v) each pair of a column d and a column e before it costs a few products:
+//!
+//! ```text
+//! ∂τ_d/∂q_e = S_dᵀ (Iᶜ Ψ̈_e + 2B Ψ̇_e)               ∂τ_d/∂q̇_e = S_dᵀ (Iᶜ (Ψ̇_e + Ṡ_e) + 2B S_e)
+//! ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F)     ∂τ_e/∂q̇_d = S_eᵀ (Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d)
+//! ```
+//!
+//! (Iᶜ, B, F of the joint of d).
+
+mod vectorized;
+
+use crate::passes::coriolis::Coriolis;
+use crate::passes::kinematics::World;
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+use vectorized::Rows;
+
+/// What is computed of the bodies and of the columns of their joints, in the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Bodies<S> {
+    /// Velocity. Shape: bodies. Written by: `pass`.
+    pub v: Vec<Motion<S>>,
+    /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
+    pub a: Vec<Motion<S>>,
+    /// Iᶜ. Shape: bodies. Written by: `pass`.
+    pub IC: Vec<Inertia<S>>,
+    /// 2Bᶜ. Shape: bodies. Written by: `pass`.
+    pub BC: Vec<Coriolis<S>>,
+    /// F. Shape: bodies. Written by: `pass`.
+    pub F: Vec<Force<S>>,
+    /// Ψ̇. Shape: columns. Written by: `pass`.
+    pub Psid: Vec<Motion<S>>,
+    /// Ψ̈. Shape: columns. Written by: `pass`.
+    pub Psidd: Vec<Motion<S>>,
+    /// Ψ̇ + Ṡ. Shape: columns. Written by: `pass`.
+    pub PsidSd: Vec<Motion<S>>,
+    /// Written by: `pass`, for `vectorized`.
+    pub rows: Rows<S>,
+}
+
+impl<S: Scalar> Bodies<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            v: filled(Motion::zero(), size.bodies),
+            a: filled(Motion::zero(), size.bodies),
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
+            F: filled(Force::zero(), size.bodies),
+            Psid: filled(Motion::zero(), size.columns),
+            Psidd: filled(Motion::zero(), size.columns),
+            PsidSd: filled(Motion::zero(), size.columns),
+            rows: Rows::new(size.columns),
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    pub bodies: Bodies<S>,
+    /// The velocity and acceleration coordinates. Shape: nv. Written by: `rnea_derivatives`.
+    pub qd: Vec<S>,
+    pub qdd: Vec<S>,
+    /// No acceleration. Shape: nv. Written by: `new`.
+    pub still: Vec<S>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub dtau_dq: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub dtau_dv: DMatrix<S>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub dtau_da: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let square = zero_matrix(size.nv, size.nv);
+        Self {
+            bodies: Bodies::new(size),
+            qd: filled(S::zero(), size.nv),
+            qdd: filled(S::zero(), size.nv),
+            still: filled(S::zero(), size.nv),
+            dtau_dq: square.clone(),
+            dtau_dv: square.clone(),
+            dtau_da: square,
+        }
+    }
+}
+
+impl<S> Workspace<S> {
+    /// What `pass` writes: of the bodies, and the three matrices.
+    #[inline(always)]
+    pub(crate) fn parts(&mut self) -> (&mut Bodies<S>, [&mut [S]; 3]) {
+        let Self { bodies, dtau_dq, dtau_dv, dtau_da, .. } = self;
+        (bodies, [dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice(), dtau_da.as_mut_slice()])
+    }
+}
+
+/// The whole algorithm, for bodies that are placed.
+#[inline(always)]
+pub(crate) fn pass<L: Columns>(
+    l: &L,
+    w: &World<L::S>,
+    (d, [dq, dv, da]): (&mut Bodies<L::S>, [&mut [L::Number]; 3]),
+    qd: &[L::S],
+    qdd: &[L::S],
+    f_ext: &[Force<L::S>],
+    minus_gravity: Vec3<L::S>,
+    by_rows: bool,
+) {
+    let (oX, S) = (&w.oX, &w.S);
+    let Bodies { v, a, IC, BC, F, Psid, Psidd, PsidSd, rows } = d;
+    a[0] = Motion::new(minus_gravity, Vec3::zero());
+    for i in l.bodies() {
+        let (v_parent, a_parent) = (l.parent(v, i), l.parent(a, i));
+        let (mut vJ, mut aJ) = (Motion::zero(), Motion::zero());
+        for k in 0..l.joint(i).nv() {
+            let c = l.column(i) + k;
+            vJ = S[c].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
+            aJ = S[c].scale_add(l.joint_velocity(qdd, i, k), aJ); // S q̈
+        }
+        v[i] = v_parent + vJ; // v_i = v_λ + v_J
+        a[i] = a_parent + aJ + v[i].cross(vJ); // a_i = a_λ + S q̈ + v_i × v_J
+        for k in 0..l.joint(i).nv() {
+            let c = l.column(i) + k;
+            Psid[c] = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
+            Psidd[c] = a_parent.cross(S[c]) + v_parent.cross(Psid[c]); // Ψ̈ = a_λ × S + v_λ × Ψ̇
+            PsidSd[c] = Psid[c] + v[i].cross(S[c]); // Ψ̇ + Ṡ
+        }
+        IC[i] = oX[i].act(l.inertia(i));
+        BC[i] = Coriolis::of(IC[i], v[i]);
+        F[i] = IC[i] * a[i] + v[i].cross(BC[i].momentum); // F = I a + v ×* I v
+        if let Some(external) = l.force(f_ext, i) {
+            F[i] -= oX[i].act(external);
+        }
+    }
+    l.broadcast(Psid);
+    l.broadcast(Psidd);
+    l.broadcast(PsidSd);
+    l.clear(dq);
+    l.clear(dv);
+    l.clear(da);
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        let (before, own) = support.split_at(support.len() - nv);
+        l.sum_lanes_at(IC, i);
+        l.sum_lanes_at(BC, i);
+        l.sum_lanes_at(F, i);
+        for k in 0..nv {
+            let (s, column) = (l.column(i) + k, l.own_column(i, k));
+            let IS = IC[i] * S[s]; // Iᶜ S_d
+            let BS = BC[i].apply_transpose(S[s]); // 2Bᵀ S_d
+            let by_q = IC[i] * Psidd[s] + BC[i].apply(Psid[s]) + S[s].cross(F[i]); // Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F
+            let by_v = IC[i] * PsidSd[s] + BC[i].apply(S[s]); // Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d
+            if by_rows {
+                rows.keep(s, IS, BS, by_q, by_v);
+            }
+            for &e in if by_rows { &[] } else { before } {
+                let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
+                let dq_de = Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)); // ∂τ_d/∂q_e
+                let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)); // ∂τ_d/∂q̇_e
+                let (dq_ed, dv_ed) = (S_e.dot(by_q), S_e.dot(by_v)); // ∂τ_e/∂q_d, ∂τ_e/∂q̇_d
+                let M_de = S_e.dot(IS);
+                l.set_row(dq, column, e, dq_de); // all stores after all products, which may stay in registers
+                l.set_row(dv, column, e, dv_de);
+                l.set_column(dq, column, e, dq_ed);
+                l.set_column(dv, column, e, dv_ed);
+                l.set_row(da, column, e, M_de);
+                l.set_column(da, column, e, M_de);
+            }
+            for &e in own {
+                let (S_e, Psid_e, Psidd_e, PsidSd_e) = (l.at(S, e), l.at(Psid, e), l.at(Psidd, e), l.at(PsidSd, e));
+                l.set_row(dq, column, e, Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)));
+                l.set_row(dv, column, e, S_e.angular.dot_add(BS, PsidSd_e.dot(IS)));
+                l.set_row(da, column, e, S_e.dot(IS));
+            }
+        }
+        let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
+        l.add_to_parent(F, i, F_i);
+    }
+    l.add_armature(da);
+}
+
+kernel! {
+    /// For bodies that are placed, under the model's gravity if no other acceleration of the world is given.
+    pub(crate) fn run<S, R>(
+        model: &Model<R>,
+        w: &World<S>,
+        d: &mut Workspace<S>,
+        v: &[S],
+        a: &[S],
+        f_ext: &[Force<S>],
+        world: &[Vec3<S>],
+    ) {
+        let l = Single::new(model);
+        let minus_gravity = if world.is_empty() { l.minus_gravity() } else { world[0] };
+        let by_rows = vectorized::pays::<S, R>(model);
+        d.qd.copy_from_slice(v);
+        d.qdd.copy_from_slice(a);
+        pass(&l, w, d.parts(), v, a, f_ext, minus_gravity, by_rows);
+        if by_rows {
+            vectorized::pairs(model, w, d);
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! ∂τ of robots with long branches, four columns side by side.
+//!
+//! Source: the pairs of `rnea_derivatives.rs`. The columns d that a column e carries stand one after the other, so their
+//! part of a pair does, too, each of its numbers in a row of its own, and four entries below one another in column e of a
+//! matrix are had at once. They are had with the same operations as one, so the bits are the same.
+
+use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
+use crate::passes::kinematics::World;
+use condyle_model::Model;
+use condyle_spatial::gate::Fused;
+use condyle_spatial::{Force, Scalar, Vec3};
+use core::any::{Any, TypeId};
+
+/// How many columns go together.
+const SIDE: usize = 4;
+
+/// How many numbers a column has: Iᶜ S, 2Bᵀ S, `by_q` and `by_v`.
+const NUMBERS: usize = 6 + 3 + 6 + 6;
+
+/// How long a way to the root must be, in the mean, for this to be faster than pair by pair: measured by
+/// `benches/peers/dynamics.py`.
+const LONG: usize = 4;
+
+/// What each column brings to its pairs with the columns before it. Shape: columns / `SIDE`, rounded up, each `NUMBERS` ×
+/// `SIDE`.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Rows<S> {
+    sides: Vec<[[S; SIDE]; NUMBERS]>,
+}
+
+impl<S: Scalar> Rows<S> {
+    pub(crate) fn new(columns: usize) -> Self {
+        Self { sides: vec![[[S::zero(); SIDE]; NUMBERS]; columns.div_ceil(SIDE)] }
+    }
+
+    /// Keeps what a column brings.
+    #[inline(always)]
+    pub(crate) fn keep(&mut self, column: usize, IS: Force<S>, BS: Vec3<S>, by_q: Force<S>, by_v: Force<S>) {
+        let (side, at) = (&mut self.sides[column / SIDE], column % SIDE);
+        let (IS, BS, by_q, by_v) = (IS.to_array(), BS.to_array(), by_q.to_array(), by_v.to_array());
+        for k in 0..6 {
+            (side[k][at], side[9 + k][at], side[15 + k][at]) = (IS[k], by_q[k], by_v[k]);
+        }
+        for k in 0..3 {
+            side[6 + k][at] = BS[k];
+        }
+    }
+}
+
+/// Whether this is the way to take: for single numbers in vector registers, where branches are long and no joint follows
+/// another one.
+#[inline(always)]
+pub(crate) fn pays<S: Scalar, R>(model: &Model<R>) -> bool {
+    let single = TypeId::of::<S>() == TypeId::of::<Fused>();
+    single && !model.has_mimic() && model.support_len() > LONG * model.columns().len()
+}
+
+/// All pairs of columns of different joints, from what `Rows` has kept.
+#[inline(always)]
+pub(crate) fn pairs<S: Scalar, R>(model: &Model<R>, w: &World<S>, d: &mut Workspace<S>) {
+    let w = (w as &dyn Any).downcast_ref::<World<Fused>>();
+    let d = (d as &mut dyn Any).downcast_mut::<Workspace<Fused>>();
+    if let (Some(w), Some(d)) = (w, d) {
+        vectors::pairs(model, w, d);
+    }
+}
+
+mod vectors {
+    use super::*;
+    use condyle_spatial::Motion;
+    use condyle_spatial::lanes::Lanes;
+
+    type Four = Lanes<f64, SIDE>;
+
+    #[inline(always)]
+    pub(super) fn pairs<R>(model: &Model<R>, w: &World<Fused>, d: &mut Workspace<Fused>) {
+        let n = model.nv();
+        let (Bodies { rows, Psid, Psidd, PsidSd, .. }, [dq, dv, da]) = d.parts();
+        for node in &model.nodes()[1..] {
+            let nv = node.joint.nv();
+            let (first, end) = (node.column + nv, model.columns()[node.column].end);
+            for e in node.column..node.column + nv {
+                let (S_e, Psid_e, Psidd_e, PsidSd_e) = (all(w.S[e]), all(Psid[e]), all(Psidd[e]), all(PsidSd[e]));
+                for c in first / SIDE..end.div_ceil(SIDE) {
+                    let side = &rows.sides[c];
+                    let (IS, BS) = (force(side, 0), vector(side, 6));
+                    let dq_de = Psid_e.angular.dot_add(BS, Psidd_e.dot(IS)).to_fused(); // ∂τ_d/∂q_e
+                    let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)).to_fused(); // ∂τ_d/∂q̇_e
+                    let dq_ed = S_e.dot(force(side, 9)).to_fused(); // ∂τ_e/∂q_d
+                    let dv_ed = S_e.dot(force(side, 15)).to_fused(); // ∂τ_e/∂q̇_d
+                    let M_de = S_e.dot(IS).to_fused();
+                    let below = e * n + c * SIDE;
+                    if first <= c * SIDE && c * SIDE + SIDE <= end {
+                        dq[below..below + SIDE].copy_from_slice(&dq_de);
+                        dv[below..below + SIDE].copy_from_slice(&dv_de);
+                        da[below..below + SIDE].copy_from_slice(&M_de);
+                        for k in 0..SIDE {
+                            let right = (c * SIDE + k) * n + e;
+                            (dq[right], dv[right], da[right]) = (dq_ed[k], dv_ed[k], M_de[k]);
+                        }
+                    } else {
+                        for d in first.max(c * SIDE)..end.min(c * SIDE + SIDE) {
+                            let (k, below, right) = (d % SIDE, e * n + d, d * n + e);
+                            (dq[below], dv[below], da[below]) = (dq_de[k], dv_de[k], M_de[k]);
+                            (dq[right], dv[right], da[right]) = (dq_ed[k], dv_ed[k], M_de[k]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Four vectors of which the numbers begin at the k-th.
+    #[inline(always)]
+    fn vector(side: &[[Fused; SIDE]; NUMBERS], k: usize) -> Vec3<Four> {
+        Vec3::new(Four::from_fused(&side[k]), Four::from_fused(&side[k + 1]), Four::from_fused(&side[k + 2]))
+    }
+
+    /// Four forces of which the numbers begin at the k-th.
+    #[inline(always)]
+    fn force(side: &[[Fused; SIDE]; NUMBERS], k: usize) -> Force<Four> {
+        Force::new(vector(side, k), vector(side, k + 3))
+    }
+
+    /// A vector in all lanes.
+    #[inline(always)]
+    fn all3(v: Vec3<Fused>) -> Vec3<Four> {
+        Vec3::new(Four::splat(v.x.0), Four::splat(v.y.0), Four::splat(v.z.0))
+    }
+
+    /// A motion in all lanes.
+    #[inline(always)]
+    fn all(m: Motion<Fused>) -> Motion<Four> {
+        Motion::new(all3(m.linear), all3(m.angular))
+    }
+}

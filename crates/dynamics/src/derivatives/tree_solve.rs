@@ -1,0 +1,204 @@
+//! −M⁻¹ B for matrices B, without M: on long chains faster than a product with M⁻¹.
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity, whose
+//! joints B gives the efforts of; in the world's frame, by the factors of the articulated bodies, each in O(n) for a column
+//! of B, where the product costs O(n) for each row. Columns go together, side by side.
+
+use crate::passes::aba;
+use crate::passes::kinematics::World;
+use crate::workspace::filled;
+use condyle_model::tree::Column;
+use condyle_spatial::Scalar;
+
+/// How many columns of B go together.
+const SIDE: usize = 16;
+
+/// The same for a scalar that has several numbers already.
+const SIDE_OF_LANES: usize = 2;
+
+/// How long a way to the root must be, in the mean, for this to be faster than the product: measured by
+/// `benches/peers/dynamics.py` on chains.
+const LONG: usize = 24;
+
+/// Columns of which each but the last has one child, the next. What a path adds up it keeps in a place, which the last path
+/// that hangs on it takes over.
+#[derive(Clone, Copy, Debug)]
+struct Path {
+    start: usize,
+    /// One past its last column.
+    end: usize,
+    /// The place of the path that it hangs on.
+    from: usize,
+    place: usize,
+    /// Nothing hangs on it.
+    tip: bool,
+}
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Empty where this is not the way to take. Written by: `new`.
+    paths: Vec<Path>,
+    /// Efforts, then accelerations. Shape: columns × `SIDE`. Written by: `minus_solve`.
+    pub x: Vec<S>,
+    /// Bias forces. Shape: places × 6 × `SIDE`. Written by: `minus_solve`.
+    pub P: Vec<S>,
+    /// Accelerations. Shape: places × 6 × `SIDE`. Written by: `minus_solve`.
+    pub A: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(columns: &[Column], nv: usize) -> Self {
+        let depths: usize = columns.iter().map(|c| c.depth).sum();
+        let shared = columns.len() != nv;
+        let paths = if shared || depths < LONG * nv { Vec::new() } else { paths(columns) };
+        let places = paths.iter().map(|path| path.place + 1).max().unwrap_or(0);
+        let zeros = |n: usize| filled(S::zero(), n * SIDE);
+        let x = zeros(if paths.is_empty() { 0 } else { nv });
+        Self { x, P: zeros(6 * places), A: zeros(6 * places), paths }
+    }
+
+    /// Whether this is the way to take.
+    pub(crate) fn pays(&self) -> bool {
+        !self.paths.is_empty()
+    }
+}
+
+fn paths(columns: &[Column]) -> Vec<Path> {
+    let n = columns.len();
+    let parent = |c: usize| columns[c].parent.unwrap_or(n); // n stands for the world
+    let mut children = vec![Vec::new(); n + 1];
+    (0..n).for_each(|c| children[parent(c)].push(c));
+    let mut places = vec![0; n + 1];
+    let mut paths: Vec<Path> = Vec::new();
+    for c in 0..n {
+        let (from, siblings) = (places[parent(c)], &children[parent(c)]);
+        places[c] = if siblings.last() == Some(&c) { from } else { from + 1 };
+        let tip = children[c].is_empty();
+        match paths.last_mut() {
+            Some(path) if siblings.len() == 1 && parent(c) < n => (path.end, path.tip) = (c + 1, tip),
+            _ => paths.push(Path { start: c, end: c + 1, from, place: places[c], tip }),
+        }
+    }
+    paths
+}
+
+/// X = −M⁻¹ B for each of two square matrices B, after `aba::factorize`.
+#[inline(always)]
+pub(crate) fn minus_solve<S: Scalar>(
+    w: &World<S>,
+    f: &aba::Workspace<S>,
+    d: &mut Workspace<S>,
+    B: [&[S]; 2],
+    X: [&mut [S]; 2],
+) {
+    if S::LANES == 1 {
+        by_sides::<S, SIDE>(w, f, d, B, X);
+    } else {
+        by_sides::<S, SIDE_OF_LANES>(w, f, d, B, X);
+    }
+}
+
+#[inline(always)]
+fn by_sides<S: Scalar, const N: usize>(
+    w: &World<S>,
+    f: &aba::Workspace<S>,
+    d: &mut Workspace<S>,
+    B: [&[S]; 2],
+    [X0, X1]: [&mut [S]; 2],
+) {
+    let Workspace { paths, x, P, A } = d;
+    let n = x.len() / SIDE;
+    let x = &mut x.as_chunks_mut::<N>().0[..n];
+    let mut j = 0;
+    while j < 2 * n {
+        let many = N.min(2 * n - j);
+        for k in 0..many {
+            let b = if j + k < n { &B[0][(j + k) * n..][..n] } else { &B[1][(j + k - n) * n..][..n] };
+            for c in 0..n {
+                x[c][k] = -b[c];
+            }
+        }
+        sweep(paths, w, f, x, P.as_chunks_mut().0, A.as_chunks_mut().0);
+        for k in 0..many {
+            let y = if j + k < n { &mut X0[(j + k) * n..][..n] } else { &mut X1[(j + k - n) * n..][..n] };
+            for c in 0..n {
+                y[c] = x[c][k];
+            }
+        }
+        j += N;
+    }
+}
+
+/// Accelerations in place of efforts.
+#[inline(always)]
+fn sweep<S: Scalar, const N: usize>(
+    paths: &[Path],
+    w: &World<S>,
+    f: &aba::Workspace<S>,
+    x: &mut [[S; N]],
+    P: &mut [[S; N]],
+    A: &mut [[S; N]],
+) {
+    let (P, A) = (P.as_chunks_mut::<6>().0, A.as_chunks_mut::<6>().0);
+    for &Path { start, end, from, place, tip } in paths.iter().rev() {
+        let mut p = [[S::zero(); N]; 6]; // in registers along the path
+        if !tip {
+            copy(&P[place], &mut p);
+        }
+        for c in (start..end).rev() {
+            let (S, U, D_inv) = (w.S[c].scale(f.D_inv[c]).to_array(), f.U[c].to_array(), f.D_inv[c]);
+            let mut u = [S::zero(); N];
+            for k in 0..N {
+                let linear = p[0][k].mul_add(S[0], p[1][k].mul_add(S[1], p[2][k] * S[2]));
+                let angular = p[3][k].mul_add(S[3], p[4][k].mul_add(S[4], p[5][k] * S[5]));
+                u[k] = x[c][k] * D_inv - (linear + angular); // u = D⁻¹ (τ − Sᵀ P)
+            }
+            for r in 0..6 {
+                for k in 0..N {
+                    p[r][k] = u[k].mul_add(U[r], p[r][k]); // P_λ = P + U u
+                }
+            }
+            x[c] = u;
+        }
+        if from != place {
+            for r in 0..6 {
+                for k in 0..N {
+                    P[from][r][k] += p[r][k];
+                }
+            }
+        } else {
+            copy(&p, &mut P[place]);
+        }
+    }
+    A[0] = [[S::zero(); N]; 6];
+    for &Path { start, end, from, place, .. } in paths {
+        let mut a = [[S::zero(); N]; 6];
+        copy(&A[from], &mut a);
+        for c in start..end {
+            let (S, U) = (w.S[c].to_array(), f.U[c].scale(f.D_inv[c]).to_array());
+            let mut qdd = [S::zero(); N];
+            for k in 0..N {
+                let linear = a[0][k].mul_add(U[0], a[1][k].mul_add(U[1], a[2][k] * U[2]));
+                let angular = a[3][k].mul_add(U[3], a[4][k].mul_add(U[4], a[5][k] * U[5]));
+                qdd[k] = x[c][k] - (linear + angular); // q̈ = u − D⁻¹ Uᵀ A_λ
+            }
+            for r in 0..6 {
+                for k in 0..N {
+                    a[r][k] = qdd[k].mul_add(S[r], a[r][k]); // A = A_λ + S q̈
+                }
+            }
+            x[c] = qdd;
+        }
+        copy(&a, &mut A[place]);
+    }
+}
+
+#[inline(always)]
+fn copy<S: Scalar, const N: usize>(from: &[[S; N]; 6], to: &mut [[S; N]; 6]) {
+    for r in 0..6 {
+        for k in 0..N {
+            to[r][k] = from[r][k];
+        }
+    }
+}

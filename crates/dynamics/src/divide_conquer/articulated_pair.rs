@@ -1,0 +1,303 @@
+//! A piece of a robot as it feels at two handles: the body on which it hangs, and its own last body.
+//!
+//! Source: Featherstone (1999), part 1, describes an articulated body with two handles by its inverse inertias, so that
+//! accelerations follow from forces. Here the handle above is given by its acceleration a (of the body on which the
+//! piece's first joint sits) and the one below by the force f that acts on it:
+//!
+//! ```text
+//! f' = K a + p − Lᵀ f      what the joint above must transmit: K and p are Iᵃ and pᵃ of the articulated-body algorithm
+//! a' = L a + b + Y f       how the body below accelerates
+//! ```
+//!
+//! which needs no inverse of an inertia, only those of the articulated-body algorithm: bodies may be without mass. (In
+//! scattering theory two such pieces are joined by Redheffer's star product.) With the second piece on the last body of
+//! the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f): the first piece is, for the second, a
+//! joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric G = E Y₁,
+//!
+//! ```text
+//! a₂ = N a + e + G L₂ᵀ f,      N = E L₁,              e = E (b₁ − Y₁ p₂)
+//! K = K₁ + L₁ᵀ K₂ N,           p = p₁ + L₁ᵀ (p₂ + K₂ e)
+//! L = L₂ N,                    b = b₂ + L₂ e,         Y = Y₂ + L₂ G L₂ᵀ
+//! ```
+//!
+//! 1 + Y₁ K₂ has no eigenvalue below 1, since Y₁ and K₂ have none below 0. It is eliminated as it stands: a root of Y₁
+//! would make a symmetric matrix of it, but Y₁ is of the rank of its piece's degrees of freedom, and what rounding leaves
+//! of a pivot that should be zero can be anything.
+//!
+//! Each handle is described in a frame along the world's axes, at its own origin: Y has rotations and translations of
+//! a body of this size in it, not of its distance from the world's origin.
+
+use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
+
+/// A 6 × 6 matrix by its columns, each with its linear part first.
+type Matrix<S> = [[S; 6]; 6];
+
+/// 1 + Y₁ K₂, L₁, b₁ − Y₁ p₂ and Y₁ side by side.
+const WIDTH: usize = 6 + 6 + 1 + 6;
+
+/// A piece between two handles.
+#[derive(Clone, Debug)]
+pub(crate) struct ArticulatedPair<S> {
+    /// The body below in the frame of the body above.
+    pub X: Se3<S>,
+    /// The velocity of the body below relative to the body above, in that frame.
+    pub w: Motion<S>,
+    /// Force above per acceleration above.
+    pub K: ArticulatedInertia<S>,
+    /// Force above with the handle above at rest.
+    pub p: Force<S>,
+    /// Acceleration below per acceleration above.
+    L: Matrix<S>,
+    /// Acceleration below per force below.
+    Y: Matrix<S>,
+    /// Acceleration below with the handle above at rest.
+    b: Motion<S>,
+    /// Acceleration between the two pieces of which it is made, per acceleration above.
+    N: Matrix<S>,
+    /// The same per force between them.
+    G: Matrix<S>,
+    /// The same with the handle above at rest.
+    e: Motion<S>,
+}
+
+impl<S: Scalar> ArticulatedPair<S> {
+    /// Nothing between two handles that are the same body.
+    pub(crate) fn nothing() -> Self {
+        Self {
+            X: Se3::identity(),
+            w: Motion::zero(),
+            K: ArticulatedInertia::zero(),
+            p: Force::zero(),
+            L: identity(),
+            Y: zero(),
+            b: Motion::zero(),
+            N: zero(),
+            G: zero(),
+            e: Motion::zero(),
+        }
+    }
+
+    /// No joint yet between the handles: Y = 0, b = 0, and L moves the origin to the handle below, at r.
+    #[inline(always)]
+    pub(crate) fn begin(&mut self, r: Vec3<S>) {
+        let skew = r.skew(); // a' = [v + ω × r; ω]
+        self.L = identity();
+        for (j, column) in skew.columns().into_iter().enumerate() {
+            self.L[3 + j][..3].copy_from_slice(&(-column).to_array());
+        }
+        self.Y = zero();
+        self.b = Motion::zero();
+    }
+
+    /// One more degree of freedom above: S, U = Iᴬ S, 1/D, and its acceleration x = u/D with the handle above at rest.
+    #[inline(always)]
+    pub(crate) fn extend(&mut self, axis: Motion<S>, U: Force<S>, D_inv: S, x: S) {
+        let s = times(&self.L, &axis.to_array()); // s = L S
+        let U = U.scale(-D_inv).to_array();
+        for j in 0..6 {
+            add(&mut self.L[j], U[j], &s); // L ← L (1 − S D⁻¹ Uᵀ)
+            add(&mut self.Y[j], D_inv * s[j], &s); // Y ← Y + s D⁻¹ sᵀ
+        }
+        self.b = Motion::from(s).scale_add(x, self.b); // b ← b + s x
+    }
+
+    /// The handle above moves on with the velocity-dependent acceleration c of its joint.
+    #[inline(always)]
+    pub(crate) fn shift(&mut self, c: Motion<S>) {
+        self.b += Motion::from(times(&self.L, &c.to_array())); // b ← b + L c
+    }
+
+    /// `upper` and, on its last body, `lower`; with what is needed below only if it is `open`.
+    #[inline(always)]
+    pub(crate) fn join(&mut self, upper: &Self, lower: &Self, open: bool) {
+        let (L1, Y1, K2, p2) = (&upper.L, &upper.Y, full(lower.K), lower.p);
+        let x = (upper.b - Motion::from(times(Y1, &p2.to_array()))).to_array();
+        let mut A = product(Y1, &K2);
+        for j in 0..6 {
+            A[j][j] += S::one();
+        }
+        let mut rows = [[S::zero(); WIDTH]; 6]; // [1 + Y₁ K₂, L₁, b₁ − Y₁ p₂, Y₁]
+        for i in 0..6 {
+            for j in 0..6 {
+                (rows[i][j], rows[i][6 + j], rows[i][13 + j]) = (A[j][i], L1[j][i], Y1[j][i]);
+            }
+            rows[i][12] = x[i];
+        }
+        eliminate(&mut rows); // E = (1 + Y₁ K₂)⁻¹
+        let (mut e, mut G) = (x, zero());
+        for i in 0..6 {
+            for j in 0..6 {
+                (self.N[j][i], G[j][i]) = (rows[i][6 + j], rows[i][13 + j]); // N = E L₁, G = E Y₁
+            }
+            e[i] = rows[i][12]; // e = E (b₁ − Y₁ p₂)
+        }
+        self.e = e.into();
+        self.K = upper.K + symmetric(&transpose_product(L1, &product(&K2, &self.N))); // K = K₁ + L₁ᵀ K₂ N
+        let push = (p2 + lower.K * self.e).to_array();
+        self.p = upper.p + Force::from(transpose_times(L1, &push)); // p = p₁ + L₁ᵀ (p₂ + K₂ e)
+        if open {
+            self.L = product(&lower.L, &self.N); // L = L₂ N
+            self.b = lower.b + Motion::from(times(&lower.L, &self.e.to_array())); // b = b₂ + L₂ e
+            self.Y = lower.Y; // Y = Y₂ + L₂ G L₂ᵀ
+            let L2G = product(&lower.L, &G);
+            for k in 0..6 {
+                for j in 0..6 {
+                    add(&mut self.Y[j], lower.L[k][j], &L2G[k]);
+                }
+            }
+        }
+        self.G = G;
+    }
+
+    /// The acceleration a₂ between the two pieces of which this is made, and the force f₁ on the upper one there.
+    #[inline(always)]
+    pub(crate) fn between(&self, lower: &Self, a: Motion<S>, f: Option<Force<S>>) -> (Motion<S>, Force<S>) {
+        let mut a2 = self.e + Motion::from(times(&self.N, &a.to_array()));
+        let mut p2 = lower.p;
+        if let Some(f) = f {
+            let push = transpose_times(&lower.L, &f.to_array());
+            a2 += times(&self.G, &push).into(); // a₂ = N a + e + G L₂ᵀ f
+            p2 -= push.into();
+        }
+        (a2, -(lower.K * a2 + p2)) // f₁ = −(K₂ a₂ + p₂ − L₂ᵀ f)
+    }
+}
+
+/// Turns the rows of [A, B] into those of [·, A⁻¹ B], by Gaussian elimination: of the rows left, the one with the largest
+/// pivot goes first.
+#[inline(always)]
+fn eliminate<S: Scalar>(rows: &mut [[S; WIDTH]; 6]) {
+    for k in 0..6 {
+        let mut pivot = rows[k];
+        for i in k + 1..6 {
+            let larger = pivot[k].abs().lt(rows[i][k].abs());
+            for j in k..WIDTH {
+                let (a, b) = (pivot[j], rows[i][j]);
+                (pivot[j], rows[i][j]) = (S::select(larger, b, a), S::select(larger, a, b));
+            }
+        }
+        let r = pivot[k].recip();
+        for j in k + 1..WIDTH {
+            pivot[j] = pivot[j] * r;
+        }
+        for i in k + 1..6 {
+            let factor = -rows[i][k];
+            for j in k + 1..WIDTH {
+                rows[i][j] = pivot[j].mul_add(factor, rows[i][j]);
+            }
+        }
+        rows[k] = pivot;
+    }
+    for k in (1..6).rev() {
+        let solved = rows[k];
+        for i in 0..k {
+            let factor = -rows[i][k];
+            for j in 6..WIDTH {
+                rows[i][j] = solved[j].mul_add(factor, rows[i][j]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn zero<S: Scalar>() -> Matrix<S> {
+    [[S::zero(); 6]; 6]
+}
+
+#[inline(always)]
+fn identity<S: Scalar>() -> Matrix<S> {
+    let mut one = zero();
+    for j in 0..6 {
+        one[j][j] = S::one();
+    }
+    one
+}
+
+/// y += x s.
+#[inline(always)]
+fn add<S: Scalar>(y: &mut [S; 6], s: S, x: &[S; 6]) {
+    for i in 0..6 {
+        y[i] = x[i].mul_add(s, y[i]);
+    }
+}
+
+/// A x.
+#[inline(always)]
+fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
+    let mut y = [S::zero(); 6];
+    for j in 0..6 {
+        add(&mut y, x[j], &A[j]);
+    }
+    y
+}
+
+/// Aᵀ x.
+#[inline(always)]
+fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
+    let mut y = [S::zero(); 6];
+    for j in 0..6 {
+        for i in 0..6 {
+            y[j] = A[j][i].mul_add(x[i], y[j]);
+        }
+    }
+    y
+}
+
+/// A B.
+#[inline(always)]
+fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
+    let mut C = zero();
+    for j in 0..6 {
+        C[j] = times(A, &B[j]);
+    }
+    C
+}
+
+/// Aᵀ B.
+#[inline(always)]
+fn transpose_product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
+    let mut T = zero();
+    for j in 0..6 {
+        for i in 0..6 {
+            T[j][i] = A[i][j];
+        }
+    }
+    product(&T, B)
+}
+
+/// An articulated inertia as a matrix.
+#[inline(always)]
+fn full<S: Scalar>(K: ArticulatedInertia<S>) -> Matrix<S> {
+    let (linear, coupling, rotational) = (K.linear.full(), K.coupling, K.rotational.full());
+    let column = |a: Vec3<S>, b: Vec3<S>| Force::new(a, b).to_array();
+    let across = coupling.transpose();
+    [
+        column(linear.x, across.x),
+        column(linear.y, across.y),
+        column(linear.z, across.z),
+        column(coupling.x, rotational.x),
+        column(coupling.y, rotational.y),
+        column(coupling.z, rotational.z),
+    ]
+}
+
+/// The symmetric part of a matrix.
+#[inline(always)]
+fn symmetric<S: Scalar>(A: &Matrix<S>) -> ArticulatedInertia<S> {
+    let half = S::splat(0.5);
+    let at = |i: usize, j: usize| (A[j][i] + A[i][j]) * half;
+    let block = |o: usize| Sym3 {
+        xx: at(o, o),
+        xy: at(o, o + 1),
+        yy: at(o + 1, o + 1),
+        xz: at(o, o + 2),
+        yz: at(o + 1, o + 2),
+        zz: at(o + 2, o + 2),
+    };
+    let column = |j: usize| Vec3::new(at(0, j), at(1, j), at(2, j));
+    ArticulatedInertia {
+        linear: block(0),
+        coupling: Mat3 { x: column(3), y: column(4), z: column(5) },
+        rotational: block(3),
+    }
+}

@@ -1,0 +1,195 @@
+//! Joints that share a coordinate (mimic), tied together again: how a robot accelerates, from how it would if all of its
+//! joints were free.
+//!
+//! On Z, the joints that share coordinates, be G the map from the shared coordinates y (1 for a leader, the ratio for a
+//! joint that follows), w the efforts at Z that tie them, and σ a rotor that each has in the free robot only. With M_σ
+//! the free robot's inertia matrix, A = (M_σ⁻¹)_ZZ, and a its accelerations without w:
+//!
+//! ```text
+//! a_Z + A w = G ÿ                          joints that share a coordinate move as it says
+//! Gᵀ (w − σ G ÿ) = 0                       what ties them, but for what turns the rotors, does no work
+//! (Gᵀ A⁻¹ G − Gᵀ σ G) ÿ = Gᵀ A⁻¹ a_Z       hence
+//! q̈ = a + (M_σ⁻¹)_Z w,    w = A⁻¹ (G ÿ − a_Z)
+//! ```
+//!
+//! The columns of M_σ⁻¹ are the accelerations, at rest and without gravity, under a unit of effort at one joint of Z.
+//! With the rotors M_σ is regular wherever the tied robot's M is: what M_σ does not resist is at rest in Z, so M would not
+//! resist it either. Without them that is not so: what follows may have no inertia of its own.
+
+use crate::calls::inertia::crba;
+use crate::data::Data;
+use crate::divide_conquer::assembly::Link;
+use crate::divide_conquer::scratch::Dof;
+use condyle_linalg::Cholesky;
+use condyle_linalg::axpy::{axpy, dot};
+use condyle_model::Model;
+use condyle_model::random_configuration;
+use condyle_spatial::{Constant, Scalar};
+use nalgebra::DMatrix;
+use rand::{SeedableRng, rngs::StdRng};
+
+/// A joint that shares its coordinate with others.
+#[derive(Clone, Debug)]
+struct Member {
+    body: usize,
+    /// Its degree of freedom, in the order of the assembly.
+    dof: usize,
+    /// Which of the shared coordinates it has.
+    shared: usize,
+}
+
+/// The shared coordinates of a robot, and what ties the joints that share them.
+#[derive(Clone, Debug)]
+pub(crate) struct Ties<S> {
+    /// Z, in the order of the assembly.
+    members: Vec<Member>,
+    /// σ. Shape: Z. Written by: `choose_rotors`.
+    rotors: Vec<S>,
+    /// Shape: Z × y. Written by: `prepare`.
+    G: DMatrix<S>,
+    /// a. Shape: degrees of freedom. Written by: `keep_free` and `solve`.
+    free: Vec<S>,
+    /// (M_σ⁻¹)_Z, by columns. Shape: degrees of freedom × Z. Written by: `keep_response`.
+    response: DMatrix<S>,
+    /// Shape: Z × Z. Written by: `solve`.
+    A: DMatrix<S>,
+    /// A⁻¹ G. Shape: Z × y. Written by: `solve`.
+    X: DMatrix<S>,
+    /// Gᵀ A⁻¹ G − Gᵀ σ G. Shape: y × y. Written by: `solve`.
+    H: DMatrix<S>,
+    factor_A: Cholesky<S>,
+    factor_H: Cholesky<S>,
+    /// Shape: y. Written by: `solve`.
+    ydd: Vec<S>,
+    /// G ÿ − a_Z, then w. Shape: Z. Written by: `solve`.
+    w: Vec<S>,
+}
+
+impl<S: Scalar> Ties<S> {
+    /// Those of a model, whose degrees of freedom are in the order of `links`.
+    pub(crate) fn new<R: Constant<S>>(model: &Model<R>, links: &[Link]) -> Self {
+        let mut joints = vec![0; model.nv()];
+        model.columns().iter().for_each(|column| joints[column.coordinate] += 1);
+        let shared: Vec<usize> = (0..model.nv()).filter(|&k| joints[k] > 1).collect();
+        let (mut members, mut dofs) = (Vec::new(), 0);
+        for &Link { body, .. } in links {
+            let node = &model.nodes()[body];
+            if let Ok(shared) = shared.binary_search(&node.idx_v) {
+                members.push(Member { body, dof: dofs, shared });
+            }
+            dofs += node.joint.nv();
+        }
+        let (z, y, zeros) =
+            (members.len(), shared.len(), |rows, columns| DMatrix::from_element(rows, columns, S::zero()));
+        let mut ties = Self {
+            members,
+            rotors: vec![S::zero(); z],
+            G: zeros(z, y),
+            free: vec![S::zero(); dofs],
+            response: zeros(dofs, z),
+            A: zeros(z, z),
+            X: zeros(z, y),
+            H: zeros(y, y),
+            factor_A: Cholesky::new(z),
+            factor_H: Cholesky::new(y),
+            ydd: vec![S::zero(); y],
+            w: vec![S::zero(); z],
+        };
+        ties.choose_rotors(model, &shared);
+        ties
+    }
+
+    /// Makes the rotors as heavy as what they turn, so that neither hides the other: Gᵀ σ G is the diagonal of M at a
+    /// position that is in no way special.
+    fn choose_rotors<R: Constant<S>>(&mut self, model: &Model<R>, shared: &[usize]) {
+        if shared.is_empty() {
+            return;
+        }
+        self.prepare(model);
+        let q = random_configuration(model, &mut StdRng::seed_from_u64(0));
+        let q: Vec<S> = q.into_iter().map(S::splat).collect();
+        let mut data = Data::new(model);
+        let M = crba(model, &mut data, &q);
+        for (rotor, member) in self.rotors.iter_mut().zip(&self.members) {
+            let (k, G) = (shared[member.shared], self.G.column(member.shared));
+            *rotor = M[(k, k)] / dot(G.as_slice(), G.as_slice());
+        }
+    }
+
+    /// Reads the ratios.
+    pub(crate) fn prepare<R>(&mut self, model: &Model<R>) {
+        for (z, member) in self.members.iter().enumerate() {
+            let ratio = model.nodes()[member.body].mimic.map_or(1.0, |mimic| mimic.ratio);
+            self.G[(z, member.shared)] = S::splat(ratio);
+        }
+    }
+
+    /// How many joints share a coordinate with others.
+    pub(crate) fn len(&self) -> usize {
+        self.members.len()
+    }
+
+    /// The place of one of these joints among the degrees of freedom.
+    pub(crate) fn dof(&self, z: usize) -> usize {
+        self.members[z].dof
+    }
+
+    /// Puts the rotors on the joints.
+    pub(crate) fn add_rotors(&self, dofs: &mut [Dof<S>]) {
+        for (member, &rotor) in self.members.iter().zip(&self.rotors) {
+            dofs[member.dof].rotor += rotor;
+        }
+    }
+
+    /// Keeps the accelerations of the free robot.
+    pub(crate) fn keep_free(&mut self, dofs: &[Dof<S>]) {
+        self.free.iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
+    }
+
+    /// Keeps the accelerations under a unit of effort at one of the joints.
+    pub(crate) fn keep_response(&mut self, z: usize, dofs: &[Dof<S>]) {
+        self.response.column_mut(z).iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
+    }
+
+    /// Gives each degree of freedom its acceleration in the tied robot.
+    pub(crate) fn solve(&mut self, dofs: &mut [Dof<S>]) {
+        let Self { members, rotors, G, free, response, A, X, H, factor_A, factor_H, ydd, w } = self;
+        let (z, y) = G.shape();
+        for i in 0..z {
+            for j in 0..z {
+                A[(i, j)] = response[(members[i].dof, j)];
+            }
+        }
+        factor_A.factorize(A);
+        X.copy_from(G);
+        factor_A.solve_matrix(X); // A⁻¹ G
+        for j in 0..y {
+            let X = &X.as_slice()[j * z..][..z];
+            for i in 0..y {
+                H[(i, j)] = S::zero();
+            }
+            ydd[j] = S::zero();
+            for (k, member) in members.iter().enumerate() {
+                let g = G[(k, member.shared)];
+                H[(member.shared, j)] += g * X[k]; // Gᵀ A⁻¹ G
+                ydd[j] += X[k] * free[member.dof]; // Gᵀ A⁻¹ a_Z
+                if member.shared == j {
+                    H[(j, j)] -= g * rotors[k] * g; // − Gᵀ σ G
+                }
+            }
+        }
+        factor_H.factorize(H);
+        factor_H.solve(ydd);
+        for (k, member) in members.iter().enumerate() {
+            w[k] = G[(k, member.shared)] * ydd[member.shared] - free[member.dof]; // G ÿ − a_Z
+        }
+        factor_A.solve(w);
+        for (k, response) in response.as_slice().chunks_exact(free.len()).enumerate() {
+            axpy(w[k], response, free); // q̈ = a + (M_σ⁻¹)_Z w
+        }
+        free.iter().zip(&mut *dofs).for_each(|(&a, dof)| dof.qdd = a);
+        for (k, member) in members.iter().enumerate() {
+            dofs[member.dof].qdd = G[(k, member.shared)] * ydd[member.shared]; // to the last bit
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The scratch of the divide-and-conquer algorithm, in the order of the assembly, so that a piece is a slice of it and two
+//! pieces are two slices, which two threads may have.
+
+use crate::divide_conquer::articulated_pair::ArticulatedPair;
+use crate::divide_conquer::assembly::{Kind, Link, Piece};
+use condyle_spatial::{ArticulatedInertia, Force, Motion, Se3};
+
+/// What is computed of a body; along the world's axes, at the origin of the piece.
+#[derive(Clone, Debug)]
+pub(crate) struct Body<S> {
+    /// λXi. Written by: `relate`.
+    pub X: Se3<S>,
+    /// oXi. Written by: `place`.
+    pub oX: Se3<S>,
+    /// Velocity. Written by: `place`.
+    pub v: Motion<S>,
+    /// v × v_J. Written by: `place`.
+    pub c: Motion<S>,
+    /// Iᴬ. Written by: `place` and its children.
+    pub IA: ArticulatedInertia<S>,
+    /// pᴬ. Written by: `place` and its children.
+    pub pA: Force<S>,
+    /// Acceleration. Written by: `accelerate`.
+    pub a: Motion<S>,
+}
+
+/// What is computed of a degree of freedom; along the world's axes, at the origin of the piece.
+#[derive(Clone, Debug)]
+pub(crate) struct Dof<S> {
+    /// Effort. Written by: `aba` and `run`.
+    pub tau: S,
+    /// Armature, and in a robot whose joints were set free the rotor of `mimic.rs`. Written by: `aba` and `add_rotors`.
+    pub rotor: S,
+    /// Written by: `place`.
+    pub S: Motion<S>,
+    /// U = Iᴬ S. Written by: `eliminate`.
+    pub U: Force<S>,
+    /// 1/D, D = Sᵀ U + armature. Written by: `eliminate`.
+    pub D_inv: S,
+    /// τ − Sᵀ pᴬ. Written by: `eliminate`.
+    pub u: S,
+    /// Joint acceleration. Written by: `accelerate`.
+    pub qdd: S,
+}
+
+/// A piece with all of which it is made.
+pub(crate) struct Part<'d, S> {
+    pub pieces: &'d [Piece],
+    pub links: &'d [Link],
+    pub bodies: &'d mut [Body<S>],
+    pub dofs: &'d mut [Dof<S>],
+    pub handles: &'d mut [ArticulatedPair<S>],
+}
+
+impl<'d, S> Part<'d, S> {
+    /// The same once more.
+    #[inline(always)]
+    pub(crate) fn again(&mut self) -> Part<'_, S> {
+        let Self { pieces, links, bodies, dofs, handles } = self;
+        Part { pieces, links, bodies, dofs, handles }
+    }
+
+    /// The piece itself, and all of which it is made.
+    #[inline(always)]
+    pub(crate) fn open(self) -> (Own<'d, S>, Self) {
+        let Piece { kind, open, .. } = self.pieces[0];
+        let (n, dofs) = match kind {
+            Kind::Run => (self.links.len(), self.dofs.len()),
+            Kind::Hub => (1, self.dofs.len() - self.pieces[1].dofs),
+            Kind::Join | Kind::Gather => (0, 0),
+        };
+        let (bodies, dofs) = (self.bodies.split_at_mut(n), self.dofs.split_at_mut(dofs));
+        let (handle, handles) = self.handles.split_first_mut().expect("a part has a piece");
+        let own = Own { kind, open, links: &self.links[..n], bodies: bodies.0, dofs: dofs.0, handle };
+        (own, Self { pieces: &self.pieces[1..], links: &self.links[n..], bodies: bodies.1, dofs: dofs.1, handles })
+    }
+
+    /// The first of some pieces with all of which it is made, and the others.
+    #[inline(always)]
+    pub(crate) fn split(self) -> (Self, Self) {
+        let Piece { links: n, dofs, pieces, .. } = self.pieces[0];
+        let (bodies, dofs, handles) =
+            (self.bodies.split_at_mut(n), self.dofs.split_at_mut(dofs), self.handles.split_at_mut(pieces));
+        let (pieces, links) = (self.pieces.split_at(pieces), self.links.split_at(n));
+        (
+            Self { pieces: pieces.0, links: links.0, bodies: bodies.0, dofs: dofs.0, handles: handles.0 },
+            Self { pieces: pieces.1, links: links.1, bodies: bodies.1, dofs: dofs.1, handles: handles.1 },
+        )
+    }
+}
+
+/// A piece, without those of which it is made.
+pub(crate) struct Own<'d, S> {
+    pub kind: Kind,
+    pub open: bool,
+    pub links: &'d [Link],
+    pub bodies: &'d mut [Body<S>],
+    pub dofs: &'d mut [Dof<S>],
+    pub handle: &'d mut ArticulatedPair<S>,
+}

@@ -1,0 +1,104 @@
+//! Dynamics under constraints of a robot with limbs, without M.
+//!
+//! Source: Wensing, Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the operational-space
+//! inertia matrix* (2012), on Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. With U = Iᴬ S and D of the
+//! articulated bodies, a force f on a body is felt at column d of its joint as Y_d = S_dᵀ f, and beyond it remains
+//! f − U_d D_d⁻¹ Y_d. Taken to the root so, the unit forces of the rows of J give
+//!
+//! ```text
+//! J M⁻¹ Jᵀ = Σ Y_d D_d⁻¹ Y_dᵀ,           J q̈ + γ = Σ Y_d D_d⁻¹ u_d + Σ f_iᵀ c_i + f₀ᵀ a₀ + γ'       for λ = 0,
+//! ```
+//!
+//! u and c being those of the articulated-body algorithm, f_i what remains beyond body i, a₀ the world's acceleration, and γ'
+//! what in γ is not the acceleration of a body. That algorithm's last pass then gives q̈ = M⁻¹ (τ − h + Jᵀ λ) with
+//! u + Yᵀ λ in place of u. It has limbs in its lanes; the forces have rows: those of one constraint as far as the root, from
+//! there on all of them.
+#![allow(unsafe_code)]
+
+use super::forces::Left;
+use super::lanes::Four;
+use super::{LANES, Plan};
+use crate::constraints::constraint::ConstraintKind;
+use crate::constraints::constraint_lanes::{All, ConstraintLanes, WIDE};
+use crate::constraints::constraint_motion::FramePair;
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::constraints::plan::Plan as Constraint;
+use condyle_spatial::block::Block;
+use condyle_spatial::gate::Fused;
+use condyle_spatial::gate::renamed;
+use condyle_spatial::{Scalar, moves};
+
+/// xᵀ y of N vectors, in every lane.
+#[inline(always)]
+fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
+    let mut sum = Four::load(x) * Four::load(y);
+    for n in 1..N {
+        sum = Four::load(&x[n * LANES..]).mul_add(Four::load(&y[n * LANES..]), sum);
+    }
+    moves::sum(sum)
+}
+
+impl ConstraintLanes {
+    /// J, J M⁻¹ Jᵀ, and J q̈ + γ for λ = 0.
+    #[inline(always)]
+    pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
+        &mut self,
+        left: Left<'_>,
+        set: &mut ConstraintSet<Fused>,
+    ) {
+        let Self { rows, Y, YD, all } = self;
+        all.end::<V, N>(set.lambda.len());
+        for (k, of) in rows.iter_mut().enumerate() {
+            let (plan, target) = (&set.plans[k], &set.targets[k]);
+            let [one, other] = plan.bodies;
+            let mut ends = FramePair::between(plan, target, [left.pose(one), left.pose(other)]);
+            ends.v = [left.velocity(one), left.velocity(other)];
+            of.begin(plan, &ends, ends.acceleration(plan, target).to_array());
+            match plan.kind {
+                ConstraintKind::Point => of.carry::<Four, 1>(plan, left, [Y, YD], all, &mut set.J),
+                ConstraintKind::Rigid => of.carry::<V, N>(plan, left, [Y, YD], all, &mut set.J),
+            }
+        }
+        all.carry_on::<V, N>(&set.plans, left, &mut set.J);
+        // SAFETY: `Fused` is a transparent wrapper of `f64`.
+        let (G, stride): (&mut [f64], _) = (unsafe { renamed(&mut set.delassus.CE[..]) }, set.delassus.stride);
+        all.multiply::<V, N>(set.lambda.len(), G, stride);
+        for (of, plan) in rows.iter().zip(&set.plans) {
+            for (j, runs) in &of.beside {
+                let other = &set.plans[*j];
+                for r in (0..other.rows()).step_by(3) {
+                    let (columns, G) = ((&rows[*j], r), &mut G[(other.row + r) * stride + plan.row..]);
+                    match plan.kind {
+                        ConstraintKind::Point => of.multiply::<Four, 1>(columns, runs, [Y, YD], G, stride),
+                        ConstraintKind::Rigid => of.multiply::<V, N>(columns, runs, [Y, YD], G, stride),
+                    }
+                }
+            }
+        }
+    }
+
+    /// u + Yᵀ λ in place of u.
+    #[inline(always)]
+    pub(crate) fn push(&self, plan: &Plan, constraints: &[Constraint], u: &mut [f64]) {
+        let All { root, nv, stride, Y, x: lambda, .. } = &self.all;
+        for (of, constraint) in self.rows.iter().zip(constraints) {
+            let lambda = &lambda[constraint.row..];
+            for link in of.ways.iter().flatten() {
+                let (step, lane) = plan.place(link.body);
+                for k in 0..link.nv {
+                    let Y = &self.Y[of.start + (link.at + k) * of.wide..];
+                    let sum = if of.wide == LANES { product::<1>(Y, lambda) } else { product::<2>(Y, lambda) };
+                    u[(plan.steps[step].idx_v + k) * LANES + lane] += sum.to_array()[0];
+                }
+            }
+        }
+        for k in 0..*nv {
+            let u = &mut u[(plan.steps[plan.place(*root).0].idx_v + k) * LANES..]; // in all lanes
+            let mut sum = Four::load(u);
+            for first in (0..stride - WIDE).step_by(WIDE) {
+                sum += product::<2>(&Y[k * stride + first..], &lambda[first..]);
+            }
+            sum.store(u);
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! M⁻¹ of a robot with limbs, without M.
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. With U = Iᴬ S and D = Sᵀ U of the articulated
+//! bodies, a unit acceleration of column e that no other joint resists is felt on the way out as T, first T = S_e, and
+//! turns column d by Z_de = −D_d⁻¹ U_dᵀ T, beyond which T + S_d Z_de is felt. That is Z = L⁻¹ of M = Lᵀ D L: with the zeros of
+//! the tree, and ones on its diagonal. So
+//!
+//! ```text
+//! M⁻¹ = Z D⁻¹ Zᵀ
+//! ```
+//!
+//! takes one product for each pair of columns and each column that carries both, and none of these waits for another.
+
+use super::lanes::{Four, Limbs};
+use super::{LANES, Plan};
+use crate::passes::aba;
+use crate::passes::kinematics::World;
+use condyle_model::layout::Layout;
+use condyle_model::limbs::column_map::{ColumnBlock, Sizes};
+use condyle_spatial::block::Block;
+use condyle_spatial::gate::Fused;
+use condyle_spatial::{Motion, Scalar};
+
+/// How many vectors of each row are summed up at once.
+const SIDE: usize = 3;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Scratch {
+    sizes: Sizes,
+    /// T. Shape: the support of all steps. Written by: `carry`.
+    T: Vec<Motion<Four>>,
+    /// Z D⁻¹, row by row, the columns from the root on. Shape: `Sizes`, and one. Written by: `carry`.
+    ZD: Vec<f64>,
+    /// Zᵀ, row by row, with its zeros and ones. Shape: `Sizes`, and one. Written by: `carry`, `new`.
+    Zt: Vec<f64>,
+    /// M⁻¹, each row up to the diagonal. Shape: as Zt. Written by: `multiply`.
+    rows: Vec<f64>,
+}
+
+impl Scratch {
+    pub(crate) fn new(nv: usize, plan: &Plan) -> Self {
+        let sizes = plan.columns.sizes;
+        let mut Zt = vec![0.0; sizes.end_of_Zt() + 1];
+        (0..nv).for_each(|k| Zt[k * (sizes.Zt + 1)] = 1.0);
+        Self {
+            sizes,
+            T: vec![Motion::zero(); plan.columns.support.len()],
+            ZD: vec![0.0; sizes.end_of_ZD() + 1],
+            Zt,
+            rows: vec![0.0; sizes.end_of_Zt()],
+        }
+    }
+
+    /// Whether it was made for this plan, or one of the same shape.
+    pub(crate) fn fits(&self, plan: &Plan) -> bool {
+        self.T.len() == plan.columns.support.len()
+    }
+
+    /// M⁻¹, after `aba::factorize` or `aba::pass`, for columns that are shared.
+    #[inline(always)]
+    pub(crate) fn inverse<V: Block<Number = f64>>(
+        &mut self,
+        l: &Limbs<'_>,
+        w: &World<Four>,
+        aba: &aba::Workspace<Four>,
+        blocks: &[ColumnBlock],
+        Minv: &mut [Fused],
+    ) {
+        self.carry(l, w, aba);
+        for block in blocks {
+            match block.count {
+                1 => self.multiply::<V, 1>(block),
+                2 => self.multiply::<V, 2>(block),
+                3 => self.multiply::<V, 3>(block),
+                _ => self.multiply::<V, 4>(block),
+            }
+        }
+        mirror(&self.rows, self.sizes, Minv);
+    }
+
+    /// Z, from the root to the tips.
+    #[inline(always)]
+    fn carry(&mut self, l: &Limbs<'_>, w: &World<Four>, aba: &aba::Workspace<Four>) {
+        let Self { T, ZD, Zt, .. } = self;
+        for i in l.bodies() {
+            let (first, end) = l.steps[i].support;
+            let nv = l.joint(i).nv();
+            for k in 0..nv {
+                let (s, own) = (l.column(i) + k, end - nv + k);
+                let (S, U) = (w.S[s], -aba.U[s].scale(aba.D_inv[s]));
+                for entry in first..own {
+                    let felt = if k == 0 { l.predecessor(T, entry) } else { T[entry] };
+                    let e = l.support[entry];
+                    let Z = felt.dot(U); // Z_de = −D_d⁻¹ U_dᵀ T
+                    let pair = l.pair(e, k);
+                    put(Zt, &pair.in_Zt, Z);
+                    put(ZD, &pair.in_ZD, Z * aba.D_inv[e.column]);
+                    if !l.steps[i].tip || nv > 1 {
+                        T[entry] = S.scale_add(Z, felt); // T + S_d Z_de
+                    }
+                }
+                T[own] = S;
+                put(ZD, &l.pair(l.support[own], k).in_ZD, aba.D_inv[s]);
+            }
+        }
+    }
+
+    /// M rows of M⁻¹, up to the diagonal and somewhat beyond.
+    #[inline(always)]
+    fn multiply<V: Block<Number = f64>, const M: usize>(&mut self, block: &ColumnBlock) {
+        let (mut start, end) = (0, block.first + M);
+        while start < end {
+            let many = (end - start).div_ceil(V::LANES);
+            match many {
+                1 => self.part::<V, M, 1>(block, start),
+                2 => self.part::<V, M, 2>(block, start),
+                _ => self.part::<V, M, SIDE>(block, start),
+            }
+            start += many.min(SIDE) * V::LANES;
+        }
+    }
+
+    /// N vectors of each of M rows, from a column on.
+    #[inline(always)]
+    fn part<V: Block<Number = f64>, const M: usize, const N: usize>(&mut self, block: &ColumnBlock, start: usize) {
+        let Self { ZD, Zt, rows, sizes: Sizes { ZD: depth, Zt: width, .. }, .. } = self;
+        let (depth, width, many) = (*depth, *width, N * V::LANES);
+        let mut ZD_of = [&ZD[..0]; M];
+        for m in 0..M {
+            ZD_of[m] = &ZD[(block.first + m) * depth..][..depth];
+        }
+        let mut sums = [[V::zero(); N]; M];
+        for (p, &e) in block.path[..depth.min(block.path.len())].iter().enumerate() {
+            if e >= start + many {
+                break; // what e carries stands further on
+            }
+            let Zt = &Zt[e * width + start..][..many];
+            let mut Z = [V::zero(); N];
+            for x in 0..N {
+                Z[x] = V::load(&Zt[x * V::LANES..]);
+            }
+            for m in 0..M {
+                let s = V::splat(ZD_of[m][p]);
+                for x in 0..N {
+                    sums[m][x] = Z[x].mul_add(s, sums[m][x]); // M⁻¹_dj = Σ Z_de D_e⁻¹ Z_je
+                }
+            }
+        }
+        for m in 0..M {
+            let row = &mut rows[(block.first + m) * width + start..][..many];
+            for x in 0..N {
+                sums[m][x].store(&mut row[x * V::LANES..]);
+            }
+        }
+    }
+}
+
+/// Writes the number of each lane to its place.
+#[inline(always)]
+fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
+    let x = x.to_array();
+    for lane in 0..LANES {
+        to[at[lane] as usize] = x[lane];
+    }
+}
+
+/// A symmetric matrix from its rows up to the diagonal.
+#[inline(always)]
+fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [Fused]) {
+    let whole = n - n % LANES;
+    for k in (0..whole).step_by(LANES) {
+        for j in (0..k).step_by(LANES) {
+            let mut block = [Four::zero(); LANES];
+            for r in 0..LANES {
+                block[r] = Four::load(&rows[(k + r) * width + j..]);
+                X[(k + r) * n + j..][..LANES].copy_from_slice(&block[r].to_fused());
+            }
+            Four::transpose(&mut block);
+            for r in 0..LANES {
+                X[(j + r) * n + k..][..LANES].copy_from_slice(&block[r].to_fused());
+            }
+        }
+        corner(rows, width, n, k, k..k + LANES, X);
+    }
+    corner(rows, width, n, 0, whole..n, X);
+}
+
+/// Some rows from a column on, and what is equal to them by symmetry.
+#[inline(always)]
+fn corner(rows: &[f64], width: usize, n: usize, from: usize, of: core::ops::Range<usize>, X: &mut [Fused]) {
+    for r in of {
+        for j in from..=r {
+            let x = Fused(rows[r * width + j]);
+            (X[r * n + j], X[j * n + r]) = (x, x);
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! Steps in place of bodies, lanes in place of numbers.
+#![allow(unsafe_code)]
+
+use super::{LANES, Plan};
+use condyle_model::Model;
+use condyle_model::joint::Joint;
+use condyle_model::layout::{Columns, Layout};
+use condyle_model::limbs::column_map::{ColumnMap, LaneColumn, Pair, Predecessor};
+use condyle_model::limbs::steps::{Parents, Source, Step};
+use condyle_spatial::lanes::Lanes;
+use condyle_spatial::moves::{Move, sum};
+use condyle_spatial::simd::Fused;
+use condyle_spatial::{Act, Force, Inertia, Se3, Vec3};
+use core::ops::{AddAssign, Range};
+
+pub(crate) type Four = Lanes<f64, LANES>;
+
+/// Steps in place of bodies, lanes in place of numbers.
+pub(crate) struct Limbs<'a> {
+    pub(crate) steps: &'a [Step],
+    pub(crate) support: &'a [LaneColumn],
+    pairs: &'a [Pair],
+    copies: &'a [Vec<(usize, Move)>],
+    predecessors: &'a [Predecessor],
+    closed: &'a [usize],
+    coordinates: &'a [Source],
+    pub armature: &'a [f64],
+    pub gravity: Vec3<f64>,
+}
+
+/// The vectors that something is made of.
+///
+/// # Safety
+/// `T` is made of nothing else: a struct of spatial algebra or of kinematics, all `repr(C)`.
+#[inline(always)]
+unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
+    // SAFETY: by the caller.
+    unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(x).cast(), size_of::<T>() / size_of::<Four>()) }
+}
+
+/// The numbers of structs, those of a vector side by side.
+///
+/// # Safety
+/// As for `vectors`.
+#[inline(always)]
+pub(crate) unsafe fn numbers<T>(of: &[T]) -> &[f64] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
+    // SAFETY: by the caller; a vector is its numbers.
+    unsafe { core::slice::from_raw_parts(of.as_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
+}
+
+/// The same, to be written.
+///
+/// # Safety
+/// As for `vectors`.
+#[inline(always)]
+pub(crate) unsafe fn numbers_mut<T>(of: &mut [T]) -> &mut [f64] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
+    // SAFETY: by the caller; a vector is its numbers.
+    unsafe { core::slice::from_raw_parts_mut(of.as_mut_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
+}
+
+#[inline(always)]
+fn moved<T: Copy>(mut x: T, by: &Move) -> T {
+    // SAFETY: passes keep structs of vectors.
+    let numbers = unsafe { vectors(&mut x) };
+    for k in 0..numbers.len() {
+        numbers[k] = by.apply(numbers[k]);
+    }
+    x
+}
+
+/// What comes from some steps or slots, each number into its lane.
+#[inline(always)]
+fn gathered<T: Copy>(of: &[T], from: &[(usize, Move)]) -> T {
+    let mut x = moved(of[from[0].0], &from[0].1);
+    for (at, by) in &from[1..] {
+        let mut y = moved(of[*at], by);
+        // SAFETY: passes keep structs of vectors.
+        let (x, y) = unsafe { (vectors(&mut x), vectors(&mut y)) };
+        for k in 0..x.len() {
+            x[k] += y[k];
+        }
+    }
+    x
+}
+
+impl Layout for Limbs<'_> {
+    type S = Four;
+
+    #[inline(always)]
+    fn bodies(&self) -> Range<usize> {
+        1..self.steps.len()
+    }
+    #[inline(always)]
+    fn joint(&self, i: usize) -> Joint {
+        self.steps[i].joint
+    }
+    #[inline(always)]
+    fn placement(&self, i: usize) -> Se3<Four> {
+        self.steps[i].placement.lift()
+    }
+    #[inline(always)]
+    fn inertia(&self, i: usize) -> Inertia<Four> {
+        self.steps[i].inertia.lift()
+    }
+    #[inline(always)]
+    fn minus_gravity(&self) -> Vec3<Four> {
+        -self.gravity.lift()
+    }
+    #[inline(always)]
+    fn armature(&self, i: usize, k: usize) -> Four {
+        let mut armature = [1.0; LANES]; // of a lane without a joint: nothing is divided by 0
+        let from = self.coordinates[self.steps[i].idx_v + k].from;
+        for lane in 0..LANES {
+            if from[lane] < self.armature.len() {
+                armature[lane] = self.armature[from[lane]];
+            }
+        }
+        Four::from_array(armature)
+    }
+    #[inline(always)]
+    fn force(&self, f_ext: &[Force<Four>], i: usize) -> Option<Force<Four>> {
+        let &f = f_ext.get(i)?; // not by `map`, which would not be inlined
+        Some(Se3::new(self.steps[i].axis_rotation.lift(), Vec3::zero()).act_inv(f))
+    }
+
+    #[inline(always)]
+    fn parent<T: Copy>(&self, of: &[T], i: usize) -> T {
+        match &self.steps[i].parents {
+            Parents::InPlace(step) => of[*step],
+            Parents::Moved { from, .. } => gathered(of, from),
+        }
+    }
+    #[inline(always)]
+    fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        match &self.steps[i].parents {
+            Parents::InPlace(step) => onto[*step] += x,
+            Parents::Moved { to, .. } => {
+                for (step, by) in to {
+                    onto[*step] += moved(x, by);
+                }
+            }
+        }
+    }
+    #[inline(always)]
+    fn stack_index(&self, i: usize) -> usize {
+        i
+    }
+    /// All of them, when the pass has gone down to the last.
+    #[inline(always)]
+    fn closed_by(&self, i: usize) -> &[usize] {
+        if i + 1 == self.steps.len() { self.closed } else { &[] }
+    }
+    #[inline(always)]
+    fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T {
+        self.parent(of, i)
+    }
+    #[inline(always)]
+    fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        self.add_to_parent(onto, i, x);
+    }
+    #[inline(always)]
+    fn sum_lanes<T: Copy>(&self, i: usize, mut x: T) -> T {
+        let [first, others @ ..] = &self.steps[i].bodies;
+        if others.iter().all(|other| other == first) {
+            // SAFETY: passes keep structs of vectors.
+            let numbers = unsafe { vectors(&mut x) };
+            for k in 0..numbers.len() {
+                numbers[k] = sum(numbers[k]);
+            }
+        }
+        x
+    }
+
+    #[inline(always)]
+    fn position(&self, q: &[Four], i: usize, k: usize) -> Four {
+        q[self.steps[i].idx_q + k]
+    }
+    #[inline(always)]
+    fn joint_velocity(&self, x: &[Four], i: usize, k: usize) -> Four {
+        x[self.steps[i].idx_v + k]
+    }
+    #[inline(always)]
+    fn add_joint_effort(&self, x: &mut [Four], i: usize, k: usize, value: Four) {
+        x[self.steps[i].idx_v + k] += value;
+    }
+    #[inline(always)]
+    fn column(&self, i: usize) -> usize {
+        self.steps[i].idx_v
+    }
+    /// That is done where the lanes' efforts are put together.
+    #[inline(always)]
+    fn add_armature_torque(&self, _: &[Four], _: &mut [Four]) {}
+}
+
+impl<'a> Limbs<'a> {
+    #[inline(always)]
+    pub(crate) fn new(plan: &'a Plan, model: &'a Model) -> Self {
+        let Plan { steps, closed, state, columns, .. } = plan;
+        let ColumnMap { support, pairs, copies, predecessors, .. } = columns;
+        let (armature, gravity) = (model.armature(), *model.gravity());
+        let coordinates = &state.coordinates;
+        Self { steps, support, pairs, copies, predecessors, closed, coordinates, armature, gravity }
+    }
+
+    /// What stands at the predecessor of an entry of the support.
+    #[inline(always)]
+    pub(crate) fn predecessor<T: Copy>(&self, of: &[T], entry: usize) -> T {
+        match &self.predecessors[entry] {
+            Predecessor::InPlace(before) => of[*before],
+            Predecessor::Moved(from) => gathered(of, from),
+        }
+    }
+
+    /// The places of a pair.
+    #[inline(always)]
+    pub(crate) fn pair(&self, e: LaneColumn, k: usize) -> &Pair {
+        debug_assert!(e.pair + k < self.pairs.len());
+        // SAFETY: the plan has a pair for each entry of a step's support and each column k of its joints.
+        unsafe { self.pairs.get_unchecked(e.pair + k) }
+    }
+
+    /// Sets the entries of a pair in each lane, the first lane's last.
+    #[inline(always)]
+    fn put(matrix: &mut [Fused], at: &[u32; LANES], value: Four) {
+        let value = value.to_fused();
+        for lane in (0..LANES).rev() {
+            debug_assert!((at[lane] as usize) < matrix.len());
+            // SAFETY: a plan's pairs are entries of nv × nv matrices, which all matrices here are: see `clear`.
+            unsafe { *matrix.get_unchecked_mut(at[lane] as usize) = value[lane] };
+        }
+    }
+}
+
+impl Columns for Limbs<'_> {
+    type Column = LaneColumn;
+    /// The how manieth of its joint.
+    type OwnColumn = usize;
+    type Number = Fused;
+
+    #[inline(always)]
+    fn support(&self, i: usize) -> &[LaneColumn] {
+        let (first, end) = self.steps[i].support;
+        &self.support[first..end]
+    }
+    #[inline(always)]
+    fn own_column(&self, _: usize, k: usize) -> usize {
+        k
+    }
+    #[inline(always)]
+    fn at<T: Copy>(&self, of: &[T], column: LaneColumn) -> T {
+        of[column.column]
+    }
+    #[inline(always)]
+    fn broadcast<T: Copy>(&self, of: &mut [T]) {
+        for (k, from) in self.copies.iter().enumerate() {
+            of[self.coordinates.len() + k] = gathered(of, from);
+        }
+    }
+    #[inline(always)]
+    fn clear(&self, matrix: &mut [Fused]) {
+        assert!(matrix.len() == self.armature.len() * self.armature.len());
+    }
+    #[inline(always)]
+    fn set_row(&self, matrix: &mut [Fused], k: usize, e: LaneColumn, value: Four) {
+        Self::put(matrix, &self.pair(e, k).in_row, value);
+    }
+    #[inline(always)]
+    fn set_column(&self, matrix: &mut [Fused], k: usize, e: LaneColumn, value: Four) {
+        Self::put(matrix, &self.pair(e, k).in_column, value);
+    }
+    #[inline(always)]
+    fn add_armature(&self, matrix: &mut [Fused]) {
+        for (k, &armature) in self.armature.iter().enumerate() {
+            matrix[k * (self.armature.len() + 1)] += Fused(armature);
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! A pass over steps of four bodies.
+#![allow(unsafe_code)]
+
+use super::lanes::Four;
+use super::{LANES, Plan, inverse};
+use crate::derivatives::rnea_derivatives;
+use crate::passes::aba;
+use crate::passes::kinematics::World;
+use crate::passes::rnea;
+use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::limbs::steps::Source;
+use condyle_spatial::block::lanes;
+use condyle_spatial::gate::Fused;
+use condyle_spatial::gate::{is, renamed};
+use condyle_spatial::level::{Level, level};
+use condyle_spatial::{Force, Inertia, Scalar};
+
+/// What passes in lanes write.
+#[derive(Clone, Debug)]
+pub(crate) struct Scratch {
+    /// The arguments. Shape: positions, coordinates, coordinates, steps of the plan. Written by: `load`.
+    pub q: Vec<Four>,
+    pub v: Vec<Four>,
+    pub x: Vec<Four>,
+    pub f_ext: Vec<Force<Four>>,
+    /// An argument, with a 0 for the lanes that have no joint. Shape: the larger of nq and nv, + 1.
+    /// Written by: `gather`.
+    padded: Vec<Fused>,
+    pub world: World<Four>,
+    pub rnea: rnea::Workspace<Four>,
+    pub aba: aba::Workspace<Four>,
+    /// Composite inertias. Shape: steps. Written by: `crba::pass`.
+    pub IC: Vec<Inertia<Four>>,
+    pub bodies: rnea_derivatives::Bodies<Four>,
+    pub inverted: inverse::Scratch,
+}
+
+impl Scratch {
+    /// For a model with limbs, on a processor that can.
+    pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
+        let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
+        let (steps, nv) = (plan.steps.len(), plan.state.coordinates.len());
+        let size = Size { bodies: steps, columns: nv + plan.columns.copies.len(), depth: 0, levels: steps, nv };
+        let zeros = filled(Four::zero(), nv);
+        Some(Box::new(Self {
+            q: filled(Four::zero(), plan.state.positions.len()),
+            v: zeros.clone(),
+            x: zeros,
+            f_ext: filled(Force::zero(), steps),
+            padded: vec![Fused(0.0); model.nq().max(model.nv()) + 1],
+            world: World::new(size),
+            rnea: rnea::Workspace::new(size),
+            aba: aba::Workspace::new(size),
+            IC: filled(Inertia::zero(), steps),
+            bodies: rnea_derivatives::Bodies::new(size),
+            inverted: inverse::Scratch::new(model.nv(), plan),
+        }))
+    }
+
+    /// Whether it was made for this plan, or one of the same shape.
+    pub(crate) fn fits(&self, plan: &Plan) -> bool {
+        (self.q.len(), self.v.len(), self.f_ext.len(), self.world.S.len())
+            == (
+                plan.state.positions.len(),
+                plan.state.coordinates.len(),
+                plan.steps.len(),
+                self.v.len() + plan.columns.copies.len(),
+            )
+            && self.inverted.fits(plan)
+    }
+}
+
+/// What a call is given.
+#[derive(Clone, Copy)]
+pub(crate) struct Arguments<'a> {
+    pub q: &'a [Fused],
+    pub v: &'a [Fused],
+    /// An acceleration or an effort.
+    pub x: &'a [Fused],
+    pub f_ext: &'a [Force<Fused>],
+}
+
+impl<'a> Arguments<'a> {
+    /// The arguments of a call.
+    ///
+    /// # Safety
+    /// `S` is `f64`.
+    pub(crate) unsafe fn new<S>(q: &'a [S], v: &'a [S], x: &'a [S], f_ext: &'a [Force<S>]) -> Self {
+        // SAFETY: `Fused` is a transparent wrapper, and a force is `repr(C)`.
+        unsafe { Self { q: renamed(q), v: renamed(v), x: renamed(x), f_ext: renamed(f_ext) } }
+    }
+}
+
+/// Brings the arguments into lanes.
+#[inline(always)]
+pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
+    gather(&plan.state.positions, &mut to.padded, from.q, &mut to.q);
+    if !from.v.is_empty() {
+        gather(&plan.state.coordinates, &mut to.padded, from.v, &mut to.v);
+        gather(&plan.state.coordinates, &mut to.padded, from.x, &mut to.x);
+    }
+    if from.f_ext.is_empty() {
+        return;
+    }
+    for (s, step) in plan.steps.iter().enumerate() {
+        let mut numbers = [[0.0; LANES]; 6];
+        for lane in 0..if plan.in_all_lanes(s) { 1 } else { LANES } {
+            if step.bodies[lane] > 0 {
+                let f = from.f_ext[step.bodies[lane]].to_array();
+                for r in 0..6 {
+                    numbers[r][lane] = f[r].0;
+                }
+            }
+        }
+        let mut six = [Four::zero(); 6];
+        for r in 0..6 {
+            six[r] = Four::from_array(numbers[r]);
+        }
+        to.f_ext[s] = six.into();
+    }
+}
+
+/// A vector of the robot's, lane by lane.
+#[inline(always)]
+fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]) {
+    padded[..x.len()].copy_from_slice(x);
+    padded[x.len()] = Fused(0.0);
+    for (Source { from: [i, j, k, l], ratio, offset }, to) in sources.iter().zip(to) {
+        let x = Four::from_array([padded[*i].0, padded[*j].0, padded[*k].0, padded[*l].0]);
+        *to = x.mul_add(Four::from_array(*ratio), Four::from_array(*offset));
+    }
+}
+
+/// Takes a vector in coordinates out of the lanes: the transpose of `gather`.
+#[inline(always)]
+pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
+    let numbers = lanes(from);
+    for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
+        *to = Fused(numbers[at]);
+    }
+    for &(k, at, ratio) in &plan.state.followers {
+        to[k] += Fused(numbers[at] * ratio);
+    }
+}

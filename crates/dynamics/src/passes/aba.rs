@@ -1,0 +1,172 @@
+//! Forward dynamics by the articulated-body algorithm.
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1; in the world's frame, where children are
+//! added to their parent without a change of coordinates. A joint of several degrees of freedom is a chain of joints
+//! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
+//! matrix is inverted.
+
+use crate::passes::kinematics::World;
+use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3};
+
+/// In the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Articulated inertia. Shape: levels. Written by: `factorize`, `inward`.
+    pub IA: Vec<ArticulatedInertia<S>>,
+    /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`, `inward`.
+    pub U: Vec<Force<S>>,
+    /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`, `inward`.
+    pub D_inv: Vec<S>,
+    /// Velocity; the world's stays 0. Shape: levels. Written by: `inward`.
+    pub v: Vec<Motion<S>>,
+    /// Acceleration, with gravity as the world's. Shape: levels. Written by: `outward`.
+    pub a: Vec<Motion<S>>,
+    /// v × v_J. Shape: bodies. Written by: `inward`.
+    pub c: Vec<Motion<S>>,
+    /// Articulated bias force. Shape: levels. Written by: `inward`.
+    pub pA: Vec<Force<S>>,
+    /// τ − Sᵀ pᴬ. Shape: columns. Written by: `inward`.
+    pub u: Vec<S>,
+    /// Joint accelerations. Shape: nv. Written by: `outward`.
+    pub qdd: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            IA: filled(ArticulatedInertia::zero(), size.levels),
+            U: filled(Force::zero(), size.columns),
+            D_inv: filled(S::zero(), size.columns),
+            v: filled(Motion::zero(), size.levels),
+            a: filled(Motion::zero(), size.levels),
+            c: filled(Motion::zero(), size.bodies),
+            pA: filled(Force::zero(), size.levels),
+            u: filled(S::zero(), size.columns),
+            qdd: filled(S::zero(), size.nv),
+        }
+    }
+}
+
+/// Eliminates the degrees of freedom of joint i: of Iᴬ remains Iᵃ, what the parent feels.
+#[inline(always)]
+fn eliminate<L: Layout>(
+    l: &L,
+    S: &[Motion<L::S>],
+    U: &mut [Force<L::S>],
+    D_inv: &mut [L::S],
+    i: usize,
+    mut Ia: ArticulatedInertia<L::S>,
+) -> ArticulatedInertia<L::S> {
+    for k in (0..l.joint(i).nv()).rev() {
+        let c = l.column(i) + k;
+        U[c] = Ia * S[c]; // U = Iᴬ S
+        D_inv[c] = (S[c].dot(U[c]) + l.armature(i, k)).recip(); // D = Sᵀ U
+        Ia = Ia.minus_outer(U[c], D_inv[c]); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
+    }
+    Ia
+}
+
+/// U and D⁻¹ of all columns, which depend on q alone, for bodies that are placed.
+#[inline(always)]
+pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IA, U, D_inv, .. } = d;
+    for i in l.bodies() {
+        IA[l.stack_index(i)] = ArticulatedInertia::from(w.oX[i].act(l.inertia(i)));
+        for &j in l.closed_by(i) {
+            let Ia = eliminate(l, &w.S, U, D_inv, j, l.sum_lanes(j, IA[l.stack_index(j)]));
+            l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
+        }
+    }
+}
+
+/// The whole algorithm.
+#[inline(always)]
+pub(crate) fn pass<L: Layout>(
+    l: &L,
+    w: &World<L::S>,
+    d: &mut Workspace<L::S>,
+    qd: &[L::S],
+    tau: &[L::S],
+    f_ext: &[Force<L::S>],
+) {
+    inward(l, w, d, qd, tau, f_ext);
+    outward(l, w, d);
+}
+
+/// What each joint feels of all that it carries: down and up each branch in turn.
+#[inline(always)]
+pub(crate) fn inward<L: Layout>(
+    l: &L,
+    w: &World<L::S>,
+    d: &mut Workspace<L::S>,
+    qd: &[L::S],
+    tau: &[L::S],
+    f_ext: &[Force<L::S>],
+) {
+    let Workspace { IA, U, D_inv, v, c, pA, u, .. } = d;
+    let (oX, S) = (&w.oX, &w.S);
+    for i in l.bodies() {
+        let mut vJ = Motion::zero();
+        for k in 0..l.joint(i).nv() {
+            vJ = S[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
+        }
+        let vi = l.parent_on_stack(v, i) + vJ; // v_i = v_λ + v_J
+        let I = oX[i].act(l.inertia(i));
+        let mut pi = vi.cross(I * vi); // p_i = v_i ×* I_i v_i
+        if let Some(external) = l.force(f_ext, i) {
+            pi -= oX[i].act(external);
+        }
+        let here = l.stack_index(i);
+        (v[here], IA[here], pA[here]) = (vi, ArticulatedInertia::from(I), pi);
+        c[i] = vi.cross(vJ); // c_i = v_i × v_J
+        for &j in l.closed_by(i) {
+            let here = l.stack_index(j);
+            let Ia = eliminate(l, S, U, D_inv, j, l.sum_lanes(j, IA[here]));
+            let mut pa = l.sum_lanes(j, pA[here]);
+            for k in (0..l.joint(j).nv()).rev() {
+                let s = l.column(j) + k;
+                u[s] = l.joint_velocity(tau, j, k) - S[s].dot(pa); // u = τ − Sᵀ pᴬ
+                pa = U[s].scale_add(D_inv[s] * u[s], pa);
+            }
+            l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
+            l.add_to_parent_on_stack(pA, j, pa + Ia * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
+        }
+    }
+}
+
+/// The accelerations: down once more.
+#[inline(always)]
+pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
+    let (Workspace { U, D_inv, a, c, u, qdd, .. }, S) = (d, &w.S);
+    a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
+    qdd.fill(L::S::zero());
+    for i in l.bodies() {
+        let mut ai = l.parent_on_stack(a, i) + c[i]; // a' = a_λ + c
+        for k in 0..l.joint(i).nv() {
+            let s = l.column(i) + k;
+            let x = D_inv[s] * (u[s] - ai.dot(U[s])); // q̈ = D⁻¹ (u − Uᵀ a')
+            l.add_joint_effort(qdd, i, k, x);
+            ai = S[s].scale_add(x, ai); // a = a' + S q̈
+        }
+        a[l.stack_index(i)] = ai;
+    }
+}
+
+kernel! {
+    /// Body by body, for bodies that are placed.
+    pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, v: &[S], tau: &[S], f_ext: &[Force<S>]) {
+        pass(&Single::new(model), world, d, v, tau, f_ext);
+    }
+}
+
+kernel! {
+    /// The factors alone, for bodies that are placed.
+    pub(crate) fn factors<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        factorize(&Single::new(model), world, d);
+    }
+}

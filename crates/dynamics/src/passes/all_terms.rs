@@ -1,0 +1,126 @@
+//! All that the equations of motion are made of, from one pass to the tips and one back.
+//!
+//! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects share placements,
+//! velocities, the bodies' inertias in the world's frame and the columns Iᶜ S.
+
+use crate::passes::centroidal::{self, CentroidalMapRate};
+use crate::passes::coriolis::Coriolis;
+use crate::passes::frames::Velocities;
+use crate::passes::kinematics::{Moving, World};
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use nalgebra::DMatrix;
+
+/// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `pass`.
+    pub a: Vec<Motion<S>>,
+    /// Force through the joint for q̈ = 0. Shape: bodies. Written by: `pass`.
+    pub f: Vec<Force<S>>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub M: DMatrix<S>,
+    /// Shape: nv. Written by: `pass`.
+    pub h: Vec<S>,
+    /// Twice the kinetic energy of the bodies. Written by: `pass`.
+    pub twice: S,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            a: filled(Motion::zero(), size.bodies),
+            f: filled(Force::zero(), size.bodies),
+            M: zero_matrix(size.nv, size.nv),
+            h: filled(S::zero(), size.nv),
+            twice: S::zero(),
+        }
+    }
+}
+
+/// The whole algorithm, for bodies whose velocities are known.
+#[inline(always)]
+fn pass<L: Pairs>(
+    l: &L,
+    World { oX, S, .. }: &World<L::S>,
+    Moving { v, dS, qd, .. }: &Moving<L::S>,
+    centroidal::Workspace { IC, BC, F, dF, .. }: &mut centroidal::Workspace<L::S>,
+    Workspace { a, f, M, h, twice }: &mut Workspace<L::S>,
+) {
+    (IC[0], BC[0]) = (Inertia::zero(), Coriolis::zero());
+    a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
+    *twice = L::S::zero();
+    for i in l.bodies() {
+        let mut a_i = l.parent(a, i);
+        for k in 0..l.joint(i).nv() {
+            a_i = dS[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), a_i); // a_i = a_λ + Ṡ q̇
+        }
+        let I = oX[i].act(l.inertia(i));
+        a[i] = a_i;
+        IC[i] = I;
+        BC[i] = Coriolis::of(I, v[i]); // I v and İ
+        f[i] = I * a_i + v[i].cross(BC[i].momentum); // f_i = I a_i + v_i ×* I v_i
+        *twice += v[i].dot(BC[i].momentum); // 2T = Σ v_iᵀ I v_i
+    }
+    let M = M.as_mut_slice();
+    l.clear(M);
+    h.fill(L::S::zero());
+    for i in l.bodies().rev() {
+        let dIC = BC[i].inertia_rate();
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        for k in 0..nv {
+            let (c, own) = (l.column(i) + k, support.len() - nv + k);
+            let F_c = IC[i] * S[c]; // Iᶜ S
+            F[c] = F_c;
+            dF[c] = dIC * S[c] + IC[i] * dS[c]; // İᶜ S + Iᶜ Ṡ
+            l.add_joint_effort(h, i, k, S[c].dot(f[i])); // h = Sᵀ f
+            for &e in &support[..own] {
+                let x = l.at(S, e).dot(F_c); // M_ej = S_eᵀ Iᶜ S_j for every ancestor e
+                l.set_entry(M, e, support[own], x);
+                l.set_entry(M, support[own], e, x);
+            }
+            l.set_entry(M, support[own], support[own], S[c].dot(F_c));
+        }
+        let (IC_i, BC_i, f_i) = (IC[i], BC[i], f[i]);
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(BC, i, BC_i);
+        l.add_to_parent(f, i, f_i); // f_λ += f_i
+    }
+    l.add_armature(M);
+}
+
+/// The results of [`compute_all_terms`](crate::compute_all_terms()).
+#[derive(Clone, Copy, Debug)]
+pub struct AllTerms<'d, S, R = f64> {
+    /// Placements and velocities of bodies and frames, and their Jacobians J and dJ/dt, on demand.
+    pub kinematics: Velocities<'d, S, R>,
+    /// M(q), the full symmetric nv × nv matrix, as of [`crba`](crate::crba).
+    pub M: &'d DMatrix<S>,
+    /// h(q, v), nv numbers (N m, N), as of [`nonlinear_effects`](crate::nonlinear_effects).
+    pub h: &'d [S],
+    /// Momentum, its map and the map's rate, centre of mass and its Jacobian, as of
+    /// [`centroidal_map_rate`](crate::centroidal_map_rate).
+    pub centroidal: CentroidalMapRate<'d, S>,
+    /// T = ½ vᵀ M v (J).
+    pub kinetic_energy: S,
+    /// V = −m gᵀ c (J).
+    pub potential_energy: S,
+}
+
+kernel! {
+    /// For bodies whose velocities are known.
+    pub(crate) fn run<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        moving: &Moving<S>,
+        centroidal: &mut centroidal::Workspace<S>,
+        d: &mut Workspace<S>,
+    ) {
+        pass(&Single::new(model), world, moving, centroidal, d);
+    }
+}

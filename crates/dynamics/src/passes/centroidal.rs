@@ -1,0 +1,224 @@
+//! The momentum of the whole robot about its centre of mass, and the matrices that give it.
+//!
+//! About the world's origin the momentum is Σ I_i v_i = Σ Iᶜ_k S_k q̇_k, where Iᶜ_k is the inertia of all that joint k
+//! carries: column k of the map is Iᶜ S, and its rate is İᶜ S + Iᶜ Ṡ. Then all is shifted to the centre of mass.
+//!
+//! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved computation
+//! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
+
+use crate::passes::coriolis::Coriolis;
+use crate::passes::frames::{Accelerations, Velocities};
+use crate::passes::kinematics::{Moving, World};
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Scalar, Se3, Vec3};
+use nalgebra::DMatrix;
+
+/// In the world's frame, but for what is said to be about the centre of mass.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `map`, `map_rate`, all terms.
+    pub IC: Vec<Inertia<S>>,
+    /// Iᶜ v and İᶜ, likewise. Shape: bodies. Written by: `map_rate`, all terms.
+    pub BC: Vec<Coriolis<S>>,
+    /// Iᶜ S. Shape: columns. Written by: `map`, `map_rate`, all terms.
+    pub F: Vec<Force<S>>,
+    /// İᶜ S + Iᶜ Ṡ. Shape: columns. Written by: `map_rate`, all terms.
+    pub dF: Vec<Force<S>>,
+    /// About the centre of mass. Shape: 6 × nv. Written by: `shift_map`.
+    pub Ag: DMatrix<S>,
+    /// About the centre of mass. Shape: 6 × nv. Written by: `shift_rate`.
+    pub dAg: DMatrix<S>,
+    /// Shape: 3 × nv. Written by: `shift_map`.
+    pub Jcom: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
+            F: filled(Force::zero(), size.columns),
+            dF: filled(Force::zero(), size.columns),
+            Ag: zero_matrix(6, size.nv),
+            dAg: zero_matrix(6, size.nv),
+            Jcom: zero_matrix(3, size.nv),
+        }
+    }
+}
+
+/// Iᶜ S of all columns, for bodies that are placed.
+#[inline(always)]
+fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, F, .. } = d;
+    IC[0] = Inertia::zero();
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+    }
+    for i in l.bodies().rev() {
+        for k in 0..l.joint(i).nv() {
+            let c = l.column(i) + k;
+            F[c] = IC[i] * S[c]; // Iᶜ S
+        }
+        let IC_i = IC[i];
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+    }
+}
+
+/// Iᶜ S and its rate of all columns, for bodies whose velocities are known.
+#[inline(always)]
+fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, BC, F, dF, .. } = d;
+    (IC[0], BC[0]) = (Inertia::zero(), Coriolis::zero());
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+        BC[i] = Coriolis::of(IC[i], m.v[i]);
+    }
+    for i in l.bodies().rev() {
+        let dIC = BC[i].inertia_rate();
+        for k in 0..l.joint(i).nv() {
+            let c = l.column(i) + k;
+            F[c] = IC[i] * S[c]; // Iᶜ S
+            dF[c] = dIC * S[c] + IC[i] * m.dS[c]; // İᶜ S + Iᶜ Ṡ
+        }
+        let (IC_i, BC_i) = (IC[i], BC[i]);
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        l.add_to_parent(BC, i, BC_i);
+    }
+}
+
+/// Adds a column to the coordinate that it follows.
+#[inline(always)]
+pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: Force<S>) {
+    let column = &model.columns()[c];
+    let (f, at) = (f.scale(S::splat(column.ratio)).to_array(), 6 * column.coordinate);
+    for (entry, &f) in matrix.as_mut_slice()[at..at + 6].iter_mut().zip(&f) {
+        *entry += f;
+    }
+}
+
+/// f about the point c: [f; n − c × f].
+#[inline(always)]
+pub(crate) fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
+    Force::new(f.linear, f.angular - c.cross(f.linear))
+}
+
+/// Shifts the map to the centre of mass, after `map` or `map_rate`.
+#[inline(always)]
+pub(crate) fn shift_map<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalMap<'d, S> {
+    let I = d.IC[0];
+    let per_mass = I.mass.recip();
+    let com = I.mass_com.scale(per_mass);
+    d.Ag.as_mut_slice().fill(S::zero());
+    for (c, &F) in d.F.iter().enumerate() {
+        add(model, &mut d.Ag, c, about(com, F));
+    }
+    for (J, A) in d.Jcom.as_mut_slice().chunks_exact_mut(3).zip(d.Ag.as_slice().chunks_exact(6)) {
+        for k in 0..3 {
+            J[k] = A[k] * per_mass; // m ċ is the linear momentum
+        }
+    }
+    let Ig = Se3::new(condyle_spatial::Mat3::identity(), -com).act(I);
+    let Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero but for rounding
+    CentroidalMap { Ag: &d.Ag, Ig, com, Jcom: &d.Jcom }
+}
+
+/// Shifts the map and its rate to the centre of mass, after `map_rate`.
+#[inline(always)]
+pub(crate) fn shift_rate<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalMapRate<'d, S> {
+    let (I, momentum) = (d.IC[0], d.BC[0].momentum);
+    let per_mass = I.mass.recip();
+    let (com, com_velocity) = (I.mass_com.scale(per_mass), momentum.linear.scale(per_mass));
+    d.dAg.as_mut_slice().fill(S::zero());
+    for (c, (&F, &dF)) in d.F.iter().zip(&d.dF).enumerate() {
+        let mut dA = about(com, dF); // d/dt [f; n − c × f] = [ḟ; ṅ − c × ḟ − ċ × f]
+        dA.angular -= com_velocity.cross(F.linear);
+        add(model, &mut d.dAg, c, dA);
+    }
+    let CentroidalMap { Ig, .. } = shift_map(model, d);
+    let hg = about(com, momentum);
+    CentroidalMapRate { Ag: &d.Ag, dAg: &d.dAg, hg, Ig, com, com_velocity, Jcom: &d.Jcom }
+}
+
+/// What depends on the position in hg = Ag(q) v. The axes are the world's.
+#[derive(Clone, Copy, Debug)]
+pub struct CentroidalMap<'d, S> {
+    /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
+    pub Ag: &'d DMatrix<S>,
+    /// The inertia of all moving bodies about their centre of mass, as if they were one.
+    pub Ig: Inertia<S>,
+    /// c, the centre of mass in the world's frame (m).
+    pub com: Vec3<S>,
+    /// The Jacobian of c, 3 × nv: ċ = Jcom v.
+    pub Jcom: &'d DMatrix<S>,
+}
+
+/// hg = Ag(q) v, and what its rate dhg = Ag a + dAg v depends on. The axes are the world's.
+#[derive(Clone, Copy, Debug)]
+pub struct CentroidalMapRate<'d, S> {
+    /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
+    pub Ag: &'d DMatrix<S>,
+    /// dAg/dt, 6 × nv, along the velocity v.
+    pub dAg: &'d DMatrix<S>,
+    /// The momentum about the centre of mass (kg m/s, kg m²/s).
+    pub hg: Force<S>,
+    /// The inertia of all moving bodies about their centre of mass, as if they were one.
+    pub Ig: Inertia<S>,
+    /// c, the centre of mass in the world's frame (m).
+    pub com: Vec3<S>,
+    /// ċ, its velocity (m/s).
+    pub com_velocity: Vec3<S>,
+    /// The Jacobian of c, 3 × nv: ċ = Jcom v.
+    pub Jcom: &'d DMatrix<S>,
+}
+
+kernel! {
+    /// For bodies that are placed.
+    pub(crate) fn run_map<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        map(&Single::new(model), world, d);
+    }
+}
+
+kernel! {
+    /// For bodies whose velocities are known.
+    pub(crate) fn run_map_rate<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        map_rate(&Single::new(model), world, moving, d);
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
+    /// hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, along the world's axes (kg m/s,
+    /// kg m²/s), in O(n).
+    ///
+    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    #[inline(always)]
+    pub fn centroidal_momentum(&self) -> Force<S> {
+        let l = Single::<S, R>::new(self.model);
+        let mut momentum = Force::zero();
+        for i in l.bodies() {
+            let oX = &self.world.oX[i];
+            momentum += oX.act(l.inertia(i) * oX.act_inv(self.moving.v[i])); // I v
+        }
+        about(self.com(), momentum)
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
+    /// dhg = Σ I_i a_i + v_i ×* I_i v_i, the rate of the centroidal momentum, along the world's axes (N, N m), in O(n):
+    /// the weight and the external forces, about the centre of mass.
+    ///
+    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    pub fn centroidal_momentum_rate(&self) -> Force<S> {
+        let l = Single::<S, R>::new(self.model);
+        let mut rate = Force::zero();
+        for i in l.bodies() {
+            let (oX, I) = (&self.world.oX[i], l.inertia(i));
+            let (v, a) = (oX.act_inv(self.moving.v[i]), oX.act_inv(self.moving.a[i]));
+            rate += oX.act(I * a + v.cross(I * v)); // I a + v ×* I v
+        }
+        about(self.com(), rate) // ċ × m ċ = 0
+    }
+}

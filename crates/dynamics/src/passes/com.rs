@@ -1,0 +1,87 @@
+//! The centre of mass and how it moves: sums over the moving bodies.
+//!
+//! In the world's frame, with the mass m of a body and its first moment h = m c, from the world's origin,
+//!
+//! ```text
+//! m ċ = m v + ω × h     m c̈ = m a + α × h + ω × (m v + ω × h)
+//! ```
+//!
+//! where (v, ω) and (a, α) are its spatial velocity and acceleration. What is fixed to the world does not count. The
+//! Jacobian is part of [`centroidal_map`](crate::centroidal_map).
+
+use crate::passes::frames::{Accelerations, Placements, Velocities};
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::{Constant, Scalar, Vec3};
+
+impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
+    /// m and h = m c of a body, from the world's origin.
+    #[inline(always)]
+    fn first_moment(&self, l: &Single<'_, S, R>, i: usize) -> (S, Vec3<S>) {
+        let (I, oX) = (l.inertia(i), &self.world.oX[i]);
+        (I.mass, oX.translation.scale_add(I.mass, oX.rotation * I.mass_com))
+    }
+
+    /// Σ m and Σ m c over the moving bodies.
+    #[inline(always)]
+    pub(crate) fn mass_and_moment(&self) -> (S, Vec3<S>) {
+        let l = Single::<S, R>::new(self.model);
+        let (mut mass, mut moment) = (S::zero(), Vec3::zero());
+        for i in l.bodies() {
+            let (m, h) = self.first_moment(&l, i);
+            mass += m;
+            moment += h;
+        }
+        (mass, moment)
+    }
+
+    /// c = Σ m_i c_i / Σ m_i, the centre of mass of the moving bodies in the world's frame (m), in O(n).
+    ///
+    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, forward_kinematics, neutral, robots};
+    /// let quadruped = robots::quadruped();
+    /// let mut data = Data::new(&quadruped);
+    /// let com = forward_kinematics(&quadruped, &mut data, &neutral(&quadruped)).com();
+    /// assert!(f64::abs(com.y) < 1e-12); // left and right weigh the same
+    /// ```
+    #[inline(always)]
+    pub fn com(&self) -> Vec3<S> {
+        let (mass, moment) = self.mass_and_moment();
+        moment.scale(mass.recip())
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
+    /// ċ, the velocity of the centre of mass of the moving bodies in the world's frame (m/s), in O(n).
+    ///
+    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    pub fn com_velocity(&self) -> Vec3<S> {
+        let l = Single::<S, R>::new(self.model);
+        let (mut mass, mut momentum) = (S::zero(), Vec3::zero());
+        for i in l.bodies() {
+            let ((m, h), v) = (self.first_moment(&l, i), self.moving.v[i]);
+            mass += m;
+            momentum += v.linear.scale_add(m, v.angular.cross(h)); // m ċ = m v + ω × h
+        }
+        momentum.scale(mass.recip())
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
+    /// c̈, the acceleration of the centre of mass of the moving bodies in the world's frame (m/s²), without gravity, in
+    /// O(n).
+    ///
+    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    pub fn com_acceleration(&self) -> Vec3<S> {
+        let l = Single::<S, R>::new(self.model);
+        let (mut mass, mut force) = (S::zero(), Vec3::zero());
+        for i in l.bodies() {
+            let ((m, h), v, a) = (self.first_moment(&l, i), self.moving.v[i], self.moving.a[i]);
+            let momentum = v.linear.scale_add(m, v.angular.cross(h));
+            mass += m;
+            force += a.linear.scale_add(m, a.angular.cross(h)) + v.angular.cross(momentum); // m a + α × h + ω × m ċ
+        }
+        force.scale(mass.recip())
+    }
+}

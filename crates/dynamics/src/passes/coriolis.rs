@@ -1,0 +1,146 @@
+//! The Coriolis matrix.
+//!
+//! Source: Echeandia and Wensing, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for
+//! rigid-body systems* (2021), algorithm 1, in the world's frame. With Iᶜ and Bᶜ of all that the joint of column d
+//! carries (2B m = v ×* I m − I (v × m) + m ×* I v), and e a column before it or of the same joint,
+//!
+//! ```text
+//! C_de = S_dᵀ (Iᶜ Ṡ_e + Bᶜ S_e)     C_ed = S_eᵀ (Iᶜ Ṡ_d + Bᶜ S_d)
+//! ```
+//!
+//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 numbers other than zero, given by the momentum
+//! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
+
+use crate::passes::kinematics::{Moving, World};
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::layout::{Pairs, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Force, Inertia, Motion, Scalar, Sym3, Vec3};
+use nalgebra::DMatrix;
+
+/// The matrix 2B of a body or of all that a joint carries.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Coriolis<S> {
+    /// I v.
+    pub momentum: Force<S>,
+    /// Σ = dĪ/dt.
+    pub rate: Sym3<S>,
+}
+
+impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        self.momentum += o.momentum;
+        self.rate += o.rate;
+    }
+}
+
+impl<S: Scalar> Coriolis<S> {
+    /// Of a body at rest.
+    pub(crate) fn zero() -> Self {
+        Self { momentum: Force::zero(), rate: Sym3::zero() }
+    }
+
+    /// Of a body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
+    #[inline(always)]
+    pub(crate) fn of(I: Inertia<S>, v: Motion<S>) -> Self {
+        let turning = v.angular.skew() * I.rotational.full();
+        let (x, y, z) = (turning.x, turning.y, turning.z);
+        let two = S::splat(2.0);
+        let turning = Sym3 { xx: two * x.x, xy: x.y + y.x, yy: two * y.y, xz: x.z + z.x, yz: y.z + z.y, zz: two * z.z };
+        let shifting = Sym3::outer_sum(I.mass_com, v.linear);
+        let rate = (turning - shifting).add_diagonal(two * v.linear.dot(I.mass_com));
+        Self { momentum: I * v, rate }
+    }
+
+    /// 2B m.
+    #[inline(always)]
+    pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
+        let (p, l) = (self.momentum.linear, self.momentum.angular);
+        Force {
+            linear: m.angular.cross(p).scale(S::splat(2.0)),
+            angular: self.rate.mul_add(m.angular, m.angular.cross(l)),
+        }
+    }
+
+    /// 2Bᵀ m, of which only the angular part is not zero.
+    #[inline(always)]
+    pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
+        let (p, l) = (self.momentum.linear, self.momentum.angular);
+        self.rate.mul_add(m.angular, l.cross_add(m.angular, p.cross(m.linear).scale(S::splat(2.0))))
+    }
+
+    /// The rate of the inertia, İ m = v ×* I m − I (v × m): of the mass 0, of m c the linear momentum.
+    #[inline(always)]
+    pub(crate) fn inertia_rate(self) -> Inertia<S> {
+        Inertia { mass: S::zero(), mass_com: self.momentum.linear, rotational: self.rate }
+    }
+}
+
+/// In the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Iᶜ. Shape: bodies. Written by: `pass`.
+    pub IC: Vec<Inertia<S>>,
+    /// 2Bᶜ. Shape: bodies. Written by: `pass`.
+    pub BC: Vec<Coriolis<S>>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub C: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            IC: filled(Inertia::zero(), size.bodies),
+            BC: filled(Coriolis::zero(), size.bodies),
+            C: zero_matrix(size.nv, size.nv),
+        }
+    }
+}
+
+/// The whole algorithm, for bodies whose velocities are known.
+#[inline(always)]
+fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+    let (S, dS, half) = (&w.S, &m.dS, L::S::splat(0.5));
+    let Workspace { IC, BC, C } = d;
+    for i in l.bodies() {
+        IC[i] = w.oX[i].act(l.inertia(i));
+        BC[i] = Coriolis::of(IC[i], m.v[i]);
+    }
+    let C = C.as_mut_slice();
+    l.clear(C);
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        let (before, own) = support.split_at(support.len() - nv);
+        for k in 0..nv {
+            let s = l.column(i) + k;
+            let column = own[k];
+            let IS = IC[i] * S[s]; // Iᶜ S_d
+            let BS = BC[i].apply_transpose(S[s]).scale(half); // Bᵀ S_d
+            let F = IC[i] * dS[s] + BC[i].apply(S[s]).scale(half); // Iᶜ Ṡ_d + B S_d
+            for &e in before {
+                let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
+                l.set_entry(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS)); // C_de
+                l.set_entry(C, e, column, S_e.dot(F)); // C_ed
+            }
+            for &e in own {
+                let (S_e, dS_e) = (l.at(S, e), l.at(dS, e));
+                l.set_entry(C, column, e, dS_e.dot(IS) + S_e.angular.dot(BS));
+            }
+        }
+        let (IC_i, BC_i) = (IC[i], BC[i]);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(BC, i, BC_i);
+    }
+}
+
+kernel! {
+    /// For bodies whose velocities are known.
+    pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        pass(&Single::new(model), world, moving, d);
+    }
+}

@@ -1,0 +1,74 @@
+//! The joint-space inertia matrix by the composite-rigid-body algorithm.
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2; in the world's frame, where a composite is
+//! a plain sum.
+
+use crate::passes::kinematics::World;
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Inertia, Scalar};
+use nalgebra::DMatrix;
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Inertia of the body and all that it carries, in the world's frame. Shape: bodies. Written by: `pass`.
+    pub IC: Vec<Inertia<S>>,
+    /// Shape: nv × nv. Written by: `pass`.
+    pub M: DMatrix<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self { IC: filled(Inertia::zero(), size.bodies), M: zero_matrix(size.nv, size.nv) }
+    }
+}
+
+impl<S> Workspace<S> {
+    pub(crate) fn matrix(&self) -> &DMatrix<S> {
+        &self.M
+    }
+}
+
+/// The whole algorithm, for bodies that are placed.
+#[inline(always)]
+pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
+    for i in l.bodies() {
+        IC[i] = w.oX[i].act(l.inertia(i));
+    }
+    carry(l, w, IC, M);
+}
+
+/// M, for the inertias of the bodies, which become those of all that the joints carry.
+#[inline(always)]
+pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
+    l.clear(M);
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        let nv = l.joint(i).nv();
+        l.sum_lanes_at(IC, i);
+        for k in 0..nv {
+            let F = IC[i] * S[l.column(i) + k]; // F = Iᶜ S
+            let (own, column) = (support.len() - nv + k, l.own_column(i, k));
+            for &e in &support[..own] {
+                let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
+                l.set_column(M, column, e, x);
+                l.set_row(M, column, e, x);
+            }
+            l.set_row(M, column, support[own], l.at(S, support[own]).dot(F));
+        }
+        let IC_i = IC[i];
+        l.add_to_parent(IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+    }
+    l.add_armature(M);
+}
+
+kernel! {
+    /// Body by body, for bodies that are placed.
+    pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        let Workspace { IC, M } = d;
+        pass(&Single::new(model), world, IC, M.as_mut_slice());
+    }
+}

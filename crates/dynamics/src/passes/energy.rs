@@ -1,0 +1,144 @@
+//! Kinetic and potential energy, and their derivatives: sums over the moving bodies.
+
+use crate::passes::frames::{Placements, Velocities};
+use crate::passes::kinematics::{Moving, World};
+use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
+
+impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
+    /// V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), 0 at the world's
+    /// origin, in O(n).
+    ///
+    /// Allocates nothing.
+    pub fn potential_energy(&self) -> S {
+        let (_, moment) = self.mass_and_moment();
+        Single::<S, R>::new(self.model).minus_gravity().dot(moment) // −gᵀ Σ m c
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
+    /// T = ½ Σ v_iᵀ I_i v_i + ½ Σ armature q̇², the kinetic energy of the moving bodies and the rotors (J), in O(n). It
+    /// is ½ q̇ᵀ M q̇.
+    ///
+    /// Allocates nothing.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, crba, robots};
+    /// use nalgebra::DVector;
+    /// let arm = robots::arm7();
+    /// let (mut data, v) = (Data::new(&arm), DVector::from_element(7, 0.5));
+    /// let energy = forward_velocities(&arm, &mut data, &[0.3; 7], v.as_slice()).kinetic_energy();
+    /// let M = crba(&arm, &mut data, &[0.3; 7]);
+    /// assert!(f64::abs(energy - 0.5 * v.dot(&(M * &v))) < 1e-14);
+    /// ```
+    pub fn kinetic_energy(&self) -> S {
+        let l = Single::<S, R>::new(self.model);
+        let mut twice = self.rotors();
+        for i in l.bodies() {
+            let v = self.world.oX[i].act_inv(self.moving.v[i]); // in the body
+            twice += v.dot(l.inertia(i) * v);
+        }
+        twice * S::splat(0.5)
+    }
+
+    /// Σ armature q̇², twice the kinetic energy of the rotors.
+    #[inline(always)]
+    pub(crate) fn rotors(&self) -> S {
+        let mut twice = S::zero();
+        for (&armature, &qd) in self.model.armature().iter().zip(&self.moving.qd) {
+            twice += armature.lift() * qd * qd;
+        }
+        twice
+    }
+
+    /// E = T + V, the mechanical energy (J), in O(n): its rate is the power of the efforts and the external forces.
+    ///
+    /// Allocates nothing.
+    pub fn mechanical_energy(&self) -> S {
+        self.kinetic_energy() + self.potential_energy()
+    }
+}
+
+/// In the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Inertia of all that a joint carries. Shape: bodies. Written by: `derivatives`.
+    pub IC: Vec<Inertia<S>>,
+    /// Momentum of all that a joint carries. Shape: bodies. Written by: `derivatives`.
+    pub h: Vec<Force<S>>,
+    /// Shape: nv. Written by: `derivatives`.
+    pub dT_dq: Vec<S>,
+    /// Shape: nv. Written by: `derivatives`.
+    pub dT_dv: Vec<S>,
+    /// Shape: nv. Written by: `derivatives`.
+    pub dV_dq: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let zeros = || filled(S::zero(), size.nv);
+        Self {
+            IC: filled(Inertia::zero(), size.bodies),
+            h: filled(Force::zero(), size.bodies),
+            dT_dq: zeros(),
+            dT_dv: zeros(),
+            dV_dq: zeros(),
+        }
+    }
+}
+
+impl<S> Workspace<S> {
+    pub(crate) fn view(&self) -> EnergyDerivatives<'_, S> {
+        let Self { dT_dq, dT_dv, dV_dq, .. } = self;
+        EnergyDerivatives { dT_dq, dT_dv, dV_dq }
+    }
+}
+
+/// The derivatives, for bodies whose velocities are known.
+#[inline(always)]
+fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
+    let Workspace { IC, h, dT_dq, dT_dv, dV_dq } = d;
+    for i in l.bodies() {
+        IC[i] = oX[i].act(l.inertia(i));
+        h[i] = IC[i] * m.v[i];
+    }
+    for out in [&mut *dT_dq, &mut *dT_dv, &mut *dV_dq] {
+        out.fill(L::S::zero());
+    }
+    for i in l.bodies().rev() {
+        let v_parent: Motion<_> = l.parent(&m.v, i);
+        for k in 0..l.joint(i).nv() {
+            let S = S[l.column(i) + k];
+            l.add_joint_effort(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
+            l.add_joint_effort(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
+            let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com)); // ∂(m c)/∂q = m S_v + S_ω × m c
+            l.add_joint_effort(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
+        }
+        let (IC_i, h_i) = (IC[i], h[i]);
+        l.add_to_parent(IC, i, IC_i);
+        l.add_to_parent(h, i, h_i);
+    }
+    l.add_armature_torque(&m.qd, dT_dv);
+}
+
+/// The derivatives of the energies, nv numbers each.
+#[derive(Clone, Copy, Debug)]
+pub struct EnergyDerivatives<'d, S> {
+    /// ∂T/∂q of the kinetic energy.
+    pub dT_dq: &'d [S],
+    /// ∂T/∂v = M v, the generalised momentum.
+    pub dT_dv: &'d [S],
+    /// ∂V/∂q = g(q) of the potential energy.
+    pub dV_dq: &'d [S],
+}
+
+kernel! {
+    /// For bodies whose velocities are known.
+    pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        derivatives(&Single::new(model), world, moving, d);
+    }
+}

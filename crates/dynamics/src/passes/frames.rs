@@ -1,0 +1,264 @@
+//! What can be asked of bodies and frames once they are placed: pose, velocity, acceleration, Jacobian and its rate.
+//!
+//! Everything is known in the world's frame. To express it in a frame r, at oXr and itself moving with v_r,
+//!
+//! ```text
+//! J = oXr⁻¹ S     dJ/dt = oXr⁻¹ (Ṡ − v_r × S)     v = oXr⁻¹ v_i     a = oXr⁻¹ a_i
+//! ```
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), sections 2.10 (differentiation) and 2.11
+//! (acceleration). Each question about one body or frame costs O(1), a Jacobian O(depth + nv); nothing allocates.
+
+use crate::passes::kinematics::{Moving, World};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Single};
+use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3};
+use core::ops::Deref;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// In which frame what is asked about a frame (or a body, whose frame is then meant) is expressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReferenceFrame {
+    /// In the frame itself.
+    Local,
+    /// In the world's frame: the velocity of the body's point at the world's origin.
+    World,
+    /// Of the frame's origin, along the axes of the world.
+    LocalWorldAligned,
+}
+
+impl ReferenceFrame {
+    /// oXr: its pose, for a frame at oXf.
+    #[inline(always)]
+    pub(crate) fn pose<S: Scalar>(self, oXf: Se3<S>) -> Se3<S> {
+        match self {
+            Self::Local => oXf,
+            Self::World => Se3::identity(),
+            Self::LocalWorldAligned => Se3::new(Mat3::identity(), oXf.translation),
+        }
+    }
+
+    /// v_r: its own velocity in the world's frame, for a frame at oXf on a body that moves with v.
+    #[inline(always)]
+    pub(crate) fn velocity<S: Scalar>(self, oXf: Se3<S>, v: Motion<S>) -> Motion<S> {
+        match self {
+            Self::Local => v,
+            Self::World => Motion::zero(),
+            Self::LocalWorldAligned => Motion::new(v.linear + v.angular.cross(oXf.translation), Vec3::zero()),
+        }
+    }
+}
+
+/// The placements of a robot at one position, as [`forward_kinematics`](crate::forward_kinematics) left them.
+#[derive(Clone, Copy, Debug)]
+pub struct Placements<'d, S, R = f64> {
+    pub(crate) model: &'d Model<R>,
+    pub(crate) world: &'d World<S>,
+}
+
+/// The placements and velocities of a robot, as [`forward_velocities`](crate::forward_velocities) left them. It is a [`Placements`] too.
+#[derive(Clone, Copy, Debug)]
+pub struct Velocities<'d, S, R = f64> {
+    pub(crate) placements: Placements<'d, S, R>,
+    pub(crate) moving: &'d Moving<S>,
+}
+
+/// The placements, velocities and accelerations of a robot, as [`forward_accelerations`](crate::forward_accelerations) left them. It is a
+/// [`Velocities`] and a [`Placements`] too.
+#[derive(Clone, Copy, Debug)]
+pub struct Accelerations<'d, S, R = f64> {
+    pub(crate) velocities: Velocities<'d, S, R>,
+}
+
+impl<'d, S, R> Deref for Velocities<'d, S, R> {
+    type Target = Placements<'d, S, R>;
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.placements
+    }
+}
+
+impl<'d, S, R> Deref for Accelerations<'d, S, R> {
+    type Target = Velocities<'d, S, R>;
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.velocities
+    }
+}
+
+/// Adds a column of a Jacobian to the coordinate that it follows.
+#[inline(always)]
+pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, s: Motion<S>) {
+    let column = &model.columns()[c];
+    let s = s.scale(S::splat(column.ratio)).to_array();
+    for (row, &s) in s.iter().enumerate() {
+        J[(row, column.coordinate)] += s;
+    }
+}
+
+/// Fills a Jacobian with zeros, if it is 6 × nv.
+#[inline(always)]
+pub(crate) fn clear<S: Scalar>(name: &str, J: &mut DMatrix<S>, nv: usize) {
+    assert!(J.shape() == (6, nv), "{name}: expected 6 × {nv}, found {:?}", J.shape());
+    J.as_mut_slice().fill(S::zero());
+}
+
+impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
+    /// oXb: the pose of a body in the world, in the frame that the URDF gives it.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    #[inline(always)]
+    pub fn body(&self, body: usize) -> Se3<S> {
+        let zXb = Se3::new(self.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
+        self.world.oX[body] * zXb.lift()
+    }
+
+    /// oXf: the pose of a frame in the world.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    #[inline(always)]
+    pub fn frame(&self, frame: usize) -> Se3<S> {
+        let frame = &self.model.frames()[frame];
+        self.body(frame.body) * frame.placement.lift()
+    }
+
+    /// The Jacobian J of a body, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
+    ///
+    /// # Panics
+    /// If there is no such body, or `J` is not 6 × nv.
+    pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
+        self.jacobian(body, self.body(body), reference, J);
+    }
+
+    /// The Jacobian J of a frame, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
+    ///
+    /// # Panics
+    /// If there is no such frame, or `J` is not 6 × nv.
+    #[inline(always)]
+    pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
+        self.jacobian(self.model.frames()[frame].body, self.frame(frame), reference, J);
+    }
+
+    #[inline(always)]
+    fn jacobian(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, J: &mut DMatrix<S>) {
+        clear("J", J, self.model.nv());
+        let oXr = reference.pose(oXf);
+        for &c in Single::<S, R>::new(self.model).support(body) {
+            add(self.model, J, c, oXr.act_inv(self.world.S[c])); // J = oXr⁻¹ S
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
+    /// The spatial velocity of a body: of its point at the origin of the reference frame (m/s), and of its rotation
+    /// (rad/s).
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn body_velocity(&self, body: usize, reference: ReferenceFrame) -> Motion<S> {
+        reference.pose(self.body(body)).act_inv(self.moving.v[body])
+    }
+
+    /// The spatial velocity of a frame: of its body's point at the origin of the reference frame (m/s), and of its
+    /// rotation (rad/s).
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    #[inline(always)]
+    pub fn frame_velocity(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
+        reference.pose(self.frame(frame)).act_inv(self.moving.v[self.model.frames()[frame].body])
+    }
+
+    /// The rate dJ/dt of a body's Jacobian, 6 × nv, as for [`frame_jacobian_rate`](Self::frame_jacobian_rate). dJ is
+    /// overwritten.
+    ///
+    /// # Panics
+    /// If there is no such body, or `dJ` is not 6 × nv.
+    pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
+        self.jacobian_rate(body, self.body(body), reference, dJ);
+    }
+
+    /// The rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. dJ is overwritten.
+    ///
+    /// dJ v + J a is the derivative of the velocity's six numbers: the spatial acceleration in `Local` and `World`, the
+    /// classical acceleration in `LocalWorldAligned`, whose origin moves with the frame.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, forward_accelerations, robots};
+    /// use nalgebra::{DMatrix, DVector};
+    /// let arm = robots::arm7();
+    /// let (tool, mut data) = (arm.frame("tool")?, Data::new(&arm));
+    /// let motion = forward_accelerations(&arm, &mut data, &[0.3; 7], &[0.5; 7], &[0.0; 7]);
+    /// let mut dJ = DMatrix::zeros(6, 7);
+    /// motion.frame_jacobian_rate(tool, LocalWorldAligned, &mut dJ);
+    /// let drift = dJ * DVector::from_element(7, 0.5);
+    /// let expected = motion.frame_classical_acceleration(tool, LocalWorldAligned).to_array();
+    /// assert!((drift - DVector::from_row_slice(&expected)).amax() < 1e-14);
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If there is no such frame, or `dJ` is not 6 × nv.
+    pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
+        self.jacobian_rate(self.model.frames()[frame].body, self.frame(frame), reference, dJ);
+    }
+
+    #[inline(always)]
+    fn jacobian_rate(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
+        clear("dJ", dJ, self.model.nv());
+        let (oXr, v_r) = (reference.pose(oXf), reference.velocity(oXf, self.moving.v[body]));
+        for &c in Single::<S, R>::new(self.model).support(body) {
+            let s = self.moving.dS[c] - v_r.cross(self.world.S[c]);
+            add(self.model, dJ, c, oXr.act_inv(s)); // dJ/dt = oXr⁻¹ (Ṡ − v_r × S)
+        }
+    }
+}
+
+/// The classical acceleration of the point at a frame's origin: v̇ + ω × v, of its spatial acceleration and velocity.
+#[inline(always)]
+fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
+    Motion::new(a.linear + v.angular.cross(v.linear), a.angular)
+}
+
+impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
+    /// The spatial acceleration of a body (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
+    /// the world, expressed in the reference frame.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn body_acceleration(&self, body: usize, reference: ReferenceFrame) -> Motion<S> {
+        reference.pose(self.body(body)).act_inv(self.moving.a[body])
+    }
+
+    /// The spatial acceleration of a frame (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
+    /// the world, expressed in the reference frame.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn frame_acceleration(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
+        reference.pose(self.frame(frame)).act_inv(self.moving.a[self.model.frames()[frame].body])
+    }
+
+    /// The classical acceleration of a body's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
+    /// rotation (rad/s²).
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn body_classical_acceleration(&self, body: usize, reference: ReferenceFrame) -> Motion<S> {
+        classical(self.body_acceleration(body, reference), self.body_velocity(body, reference))
+    }
+
+    /// The classical acceleration of a frame's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
+    /// rotation (rad/s²). In `LocalWorldAligned` it is p̈ of the frame's origin. Source: Featherstone (2008), section
+    /// 2.11.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn frame_classical_acceleration(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
+        classical(self.frame_acceleration(frame, reference), self.frame_velocity(frame, reference))
+    }
+}

@@ -1,0 +1,137 @@
+//! Where the bodies are and how they move: one pass from the root to the tips for all bodies. What can then be asked is
+//! in `frames.rs`.
+
+use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::joint::Joint;
+use condyle_model::joint::kinematics::JointSinCos;
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Cross, Motion, Scalar, Se3};
+
+/// What depends on the position alone, in the world's frame.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct World<S> {
+    /// Written by: `place`, and by `rnea`.
+    pub sin_cos: JointSinCos<S>,
+    /// oXi: the body's turned frame in the world. Shape: bodies. Written by: `place`.
+    pub oX: Vec<Se3<S>>,
+    /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
+    pub S: Vec<Motion<S>>,
+    /// Where the last call has placed the bodies. Written by: `place`, by `rnea`, and by limbs.
+    pub placed: PlacementCache,
+}
+
+/// Where the bodies' placements stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PlacementCache {
+    /// They were not computed.
+    Nowhere,
+    /// Body by body.
+    Bodies,
+    /// In the steps of limbs side by side.
+    Limbs,
+}
+
+impl<S: Scalar> World<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            sin_cos: JointSinCos::new(size.bodies),
+            oX: filled(Se3::identity(), size.bodies),
+            S: filled(Motion::zero(), size.columns),
+            placed: PlacementCache::Nowhere,
+        }
+    }
+}
+
+/// oXi = oXλ λXi, and the columns of S, for all bodies.
+#[inline(always)]
+pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
+    *placed = PlacementCache::Bodies;
+    Joint::sin_cos(l, q, sin_cos);
+    for i in l.bodies() {
+        oX[i] = l.parent(oX, i) * Joint::placement_with(l, i, q, sin_cos.sin[i], sin_cos.cos[i]); // oXi = oXλ λXi
+        let joint = l.joint(i);
+        for k in 0..joint.nv() {
+            S[l.column(i) + k] = joint.column(&oX[i], k); // oXi S, in the world
+        }
+    }
+}
+
+/// How the bodies move, in the world's frame: what depends on the velocity and the acceleration too.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Moving<S> {
+    /// Velocity of the body; the world's stays 0. Shape: bodies. Written by: `advance`.
+    pub v: Vec<Motion<S>>,
+    /// Ṡ = v × S: how fast each column of S turns with its body. Shape: columns. Written by: `advance`.
+    pub dS: Vec<Motion<S>>,
+    /// The velocity coordinates. Shape: nv. Written by: `advance`.
+    pub qd: Vec<S>,
+    /// Spatial acceleration of the body, without gravity; the world's stays 0. Shape: bodies. Written by: `accelerate`.
+    pub a: Vec<Motion<S>>,
+}
+
+impl<S: Scalar> Moving<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        Self {
+            v: filled(Motion::zero(), size.bodies),
+            dS: filled(Motion::zero(), size.columns),
+            qd: filled(S::zero(), size.nv),
+            a: filled(Motion::zero(), size.bodies),
+        }
+    }
+}
+
+/// v_i and the columns of Ṡ, for bodies that are placed.
+#[inline(always)]
+fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qd: &[L::S]) {
+    let Moving { v, dS, .. } = m;
+    m.qd.copy_from_slice(qd);
+    for i in l.bodies() {
+        let mut v_i = l.parent(v, i);
+        for k in 0..l.joint(i).nv() {
+            v_i = S[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), v_i); // v_i = v_λ + S q̇
+        }
+        v[i] = v_i;
+        for k in 0..l.joint(i).nv() {
+            dS[l.column(i) + k] = v_i.cross(S[l.column(i) + k]); // Ṡ = v_i × S: S is fixed in the body
+        }
+    }
+}
+
+/// a_i, for bodies whose velocities are known.
+#[inline(always)]
+fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qdd: &[L::S]) {
+    let Moving { dS, qd, a, .. } = m;
+    for i in l.bodies() {
+        let mut a_i = l.parent(a, i);
+        for k in 0..l.joint(i).nv() {
+            let c = l.column(i) + k;
+            a_i = S[c].scale_add(l.joint_velocity(qdd, i, k), dS[c].scale_add(l.joint_velocity(qd, i, k), a_i)); // a_i = a_λ + S q̈ + Ṡ q̇
+        }
+        a[i] = a_i;
+    }
+}
+
+kernel! {
+    /// Places all bodies.
+    pub(crate) fn positions<S, R>(model: &Model<R>, world: &mut World<S>, q: &[S]) {
+        place(&Single::new(model), world, q);
+    }
+}
+
+kernel! {
+    /// The velocities of bodies that are placed.
+    pub(crate) fn velocities<S, R>(model: &Model<R>, world: &World<S>, moving: &mut Moving<S>, v: &[S]) {
+        advance(&Single::new(model), world, moving, v);
+    }
+}
+
+kernel! {
+    /// The accelerations of bodies whose velocities are known.
+    pub(crate) fn accelerations<S, R>(model: &Model<R>, world: &World<S>, moving: &mut Moving<S>, a: &[S]) {
+        accelerate(&Single::new(model), world, moving, a);
+    }
+}

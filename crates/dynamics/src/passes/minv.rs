@@ -1,0 +1,127 @@
+//! The inverse of the joint-space inertia matrix, in one of two ways.
+//!
+//! From M by its sparse factor ([`Ltdl`]), in O(n d) operations a column, where the rows of the factor are short; else,
+//! and without M, by Carpentier, *Analytical inverse of the joint space inertia matrix* (2018): the articulated-body
+//! algorithm for all unit efforts at once, of which only those in the subtree of a joint reach it, in O(n) a column. In
+//! the world's frame one array of bias forces serves all bodies.
+
+use crate::passes::aba;
+use crate::passes::kinematics::World;
+use crate::workspace::{Size, filled, zero_matrix};
+use condyle_linalg::Ltdl;
+use condyle_linalg::axpy::axpy;
+use condyle_model::Model;
+use condyle_model::tree::Column;
+use condyle_spatial::Scalar;
+use condyle_spatial::kernel;
+use nalgebra::DMatrix;
+
+/// How long the factor's rows may be, in the mean, for the factor to be the faster way: measured by
+/// `benches/factorisation.rs`, equal at 12.5 on a chain of 24; the humanoid has 9.7, the arm 4.
+const SHORT_ROWS: usize = 12;
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
+    pub P: Vec<S>,
+    /// Acceleration for each unit effort: of the world, zero, then at each depth of the tree. Shape: (1 + depth) × 6 ×
+    /// columns. Written by: `sweep`.
+    pub A: Vec<S>,
+    /// Shape: nv × nv. Written by: `minv`.
+    pub Minv: DMatrix<S>,
+    /// A factor of M. Written by: `from_matrix`.
+    pub factor: Ltdl<S>,
+    /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
+    pub by_factor: bool,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
+        let factor = Ltdl::new(model);
+        Self {
+            by_factor: model.has_mimic() || factor.nonzeros() <= SHORT_ROWS * size.nv,
+            factor,
+            P: filled(S::zero(), 6 * size.columns),
+            A: filled(S::zero(), (1 + size.depth) * 6 * size.columns),
+            Minv: zero_matrix(size.nv, size.nv),
+        }
+    }
+}
+
+impl<S> Workspace<S> {
+    /// Whether M⁻¹ is best had from M.
+    pub(crate) fn by_factor(&self) -> bool {
+        self.by_factor
+    }
+
+    pub(crate) fn matrix(&self) -> &DMatrix<S> {
+        &self.Minv
+    }
+}
+
+/// y −= Σ sᵣ xᵣ, entry by entry, for six rows xᵣ of n numbers, from column `from` on.
+#[inline(always)]
+fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S]) {
+    let to = from + y.len();
+    let (x0, x1, x2) = (&x[from..to], &x[n + from..n + to], &x[2 * n + from..2 * n + to]);
+    let (x3, x4, x5) = (&x[3 * n + from..3 * n + to], &x[4 * n + from..4 * n + to], &x[5 * n + from..5 * n + to]);
+    for j in 0..y.len() {
+        let linear = x0[j].mul_add(s[0], x1[j].mul_add(s[1], x2[j] * s[2]));
+        let angular = x3[j].mul_add(s[3], x4[j].mul_add(s[4], x5[j] * s[5]));
+        y[j] -= linear + angular;
+    }
+}
+
+/// M⁻¹, row c for the efforts j ≥ c first; the factors of the articulated bodies are those of `aba::factorize`.
+#[inline(always)]
+fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
+    let n = columns.len();
+    let Workspace { P, A, Minv, .. } = d;
+    // Row c of M⁻¹ is stored as column c: they are the same, and a column is contiguous.
+    let rows = Minv.as_mut_slice();
+    P.fill(S::zero());
+    for c in (0..n).rev() {
+        let (U, end) = (f.U[c].to_array(), columns[c].end);
+        let row = &mut rows[c * n..(c + 1) * n];
+        row.fill(S::zero());
+        row[c] = f.D_inv[c];
+        subtract_six(w.S[c].scale(f.D_inv[c]).to_array(), P, n, c + 1, &mut row[c + 1..end]); // −D⁻¹ Sᵀ P
+        for r in 0..6 {
+            axpy(U[r], &row[c..end], &mut P[r * n + c..r * n + end]); // P += U u/D
+        }
+    }
+    for c in 0..n {
+        let S_c = w.S[c].to_array();
+        let row = &mut rows[c * n + c..(c + 1) * n];
+        let (above, here) = A.split_at_mut((columns[c].depth + 1) * 6 * n);
+        let above = &above[columns[c].depth * 6 * n..]; // zeros for a column on the world
+        subtract_six(f.U[c].scale(f.D_inv[c]).to_array(), above, n, c, row); // −D⁻¹ Uᵀ A_λ
+        for r in 0..6 {
+            let (A_parent, A) = (&above[r * n + c..(r + 1) * n], &mut here[r * n + c..(r + 1) * n]);
+            for j in 0..row.len() {
+                A[j] = row[j].mul_add(S_c[r], A_parent[j]); // A = A_λ + S q̈
+            }
+        }
+    }
+    for c in 0..n {
+        for j in 0..c {
+            rows[c * n + j] = rows[j * n + c];
+        }
+    }
+}
+
+kernel! {
+    /// M⁻¹ from M.
+    pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &DMatrix<S>) {
+        d.factor.factorize(M);
+        d.factor.inverse(&mut d.Minv);
+    }
+}
+
+kernel! {
+    /// M⁻¹ from the factors of the articulated bodies.
+    pub(crate) fn from_factors<S>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
+        sweep(columns, w, f, d);
+    }
+}

@@ -1,0 +1,20 @@
+//! Passes: one recursion over the bodies a file.
+//!
+//! A pass knows its [`Layout`](condyle_model::layout::Layout) and its workspace, and nothing of what stands around it: data,
+//! checks, limbs or batches. Its kernels run it on one body after the other.
+
+pub(crate) mod aba;
+pub(crate) mod all_terms;
+pub(crate) mod centroidal;
+mod com;
+pub(crate) mod coriolis;
+pub(crate) mod crba;
+pub(crate) mod energy;
+pub(crate) mod factored_dynamics;
+pub(crate) mod frames;
+pub(crate) mod kinematics;
+pub(crate) mod minv;
+pub(crate) mod passive;
+pub(crate) mod regressor;
+pub(crate) mod rnea;
+pub(crate) mod statics;

@@ -1,0 +1,125 @@
+//! Inverse dynamics by the recursive Newton–Euler algorithm.
+//!
+//! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980); in the bodies' own
+//! frames. It is Featherstone's (*Rigid Body Dynamics Algorithms*, 2008, table 5.1) with the classical acceleration of each
+//! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
+//! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
+
+use crate::passes::kinematics::{PlacementCache, World};
+use crate::workspace::{Size, filled};
+use condyle_model::Model;
+use condyle_model::joint::kinematics::JointSinCos;
+use condyle_model::joint::{ClassicalMotion, Joint};
+use condyle_model::layout::{Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Force, Inertia, Mat3, Scalar, Se3, Vec3};
+
+/// In the bodies' turned frames.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(crate) struct Workspace<S> {
+    /// λXi. Shape: levels. Written by: `pass`.
+    pub X: Vec<Se3<S>>,
+    /// How the body turns and its origin accelerates, with gravity as the world's. Shape: levels. Written by: `pass`.
+    pub motion: Vec<ClassicalMotion<S>>,
+    /// K; the world's stays 0. Shape: levels. Written by: `pass`.
+    pub K: Vec<Mat3<S>>,
+    /// Force through the joint. Shape: levels. Written by: `pass`.
+    pub f: Vec<Force<S>>,
+    /// Joint efforts. Shape: nv. Written by: `pass`.
+    pub tau: Vec<S>,
+    /// Zeros, for the accelerations and velocities that are not given. Shape: nv. Written by: nobody.
+    pub zero: Vec<S>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    pub(crate) fn new(size: Size) -> Self {
+        let still = ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() };
+        Self {
+            X: filled(Se3::identity(), size.levels),
+            motion: filled(still, size.levels),
+            K: filled(Mat3::zero(), size.levels),
+            f: filled(Force::zero(), size.levels),
+            tau: filled(S::zero(), size.nv),
+            zero: filled(S::zero(), size.nv),
+        }
+    }
+}
+
+impl<S> Workspace<S> {
+    pub(crate) fn tau(&self) -> &[S] {
+        &self.tau
+    }
+}
+
+/// K = ω̇× + ω× ω×.
+#[inline(always)]
+fn centripetal<S: Scalar>(w: Vec3<S>, dw: Vec3<S>) -> Mat3<S> {
+    let minus = -w;
+    let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
+    let (xx, yy) = (minus.x * w.x, minus.y * w.y);
+    Mat3 {
+        x: Vec3::new(minus.z.mul_add(w.z, yy), xy + dw.z, xz - dw.y),
+        y: Vec3::new(xy - dw.z, minus.z.mul_add(w.z, xx), yz + dw.x),
+        z: Vec3::new(xz + dw.y, yz - dw.x, xx + yy),
+    }
+}
+
+/// The whole algorithm, down and up each branch in turn.
+#[inline(always)]
+pub(crate) fn pass<L: Layout>(
+    l: &L,
+    sin_cos: &mut JointSinCos<L::S>,
+    d: &mut Workspace<L::S>,
+    q: &[L::S],
+    qd: &[L::S],
+    qdd: &[L::S],
+    f_ext: &[Force<L::S>],
+) {
+    let Workspace { X, motion, K, f, tau, .. } = d;
+    Joint::sin_cos(l, q, sin_cos);
+    motion[0].a = l.minus_gravity();
+    tau.fill(L::S::zero());
+    for i in l.bodies() {
+        let vJ = Joint::motion(l, i, qd); // v_J = S q̇
+        let aJ = Joint::motion(l, i, qdd); // S q̈
+        let Inertia { mass, mass_com, rotational } = l.inertia(i);
+        let Xi = Joint::placement_with(l, i, q, sin_cos.sin[i], sin_cos.cos[i]); // λXi = X_T X_J
+        let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
+        let a = l.parent_on_stack(K, i).mul_add(Xi.translation, parent.a); // a_λ + K_λ p
+        let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
+        let m = vJ.added_to(aJ, m);
+        let Ki = centripetal(m.w, m.dw);
+        // Newton: f = m a + K h.  Euler: n = I ω̇ + ω × I ω + h × a
+        let n = mass_com.cross_add(m.a, m.w.cross_add(rotational * m.w, rotational * m.dw));
+        let mut fi = Force::new(Ki.mul_add(mass_com, m.a.scale(mass)), n);
+        if let Some(external) = l.force(f_ext, i) {
+            fi -= external;
+        }
+        let here = l.stack_index(i);
+        (X[here], motion[here], K[here], f[here]) = (Xi, m, Ki, fi);
+        for &j in l.closed_by(i) {
+            let here = l.stack_index(j);
+            let fj = l.sum_lanes(j, f[here]);
+            Joint::project(l, j, fj, tau); // τ_j = Sᵀ f_j
+            l.add_to_parent_on_stack(f, j, X[here].act(fj)); // f_λ += λXj f_j
+        }
+    }
+    l.add_armature_torque(qdd, tau);
+}
+
+kernel! {
+    /// Body by body.
+    pub(crate) fn run<S, R>(
+        model: &Model<R>,
+        world: &mut World<S>,
+        d: &mut Workspace<S>,
+        q: &[S],
+        v: &[S],
+        a: &[S],
+        f_ext: &[Force<S>],
+    ) {
+        world.placed = PlacementCache::Nowhere;
+        pass(&Single::new(model), &mut world.sin_cos, d, q, v, a, f_ext);
+    }
+}

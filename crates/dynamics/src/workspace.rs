@@ -1,0 +1,47 @@
+//! What the workspaces of passes are made of.
+//!
+//! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer.
+
+use condyle_model::Model;
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+
+/// How large the arrays of a workspace are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Size {
+    /// Bodies, the world included.
+    pub bodies: usize,
+    /// Degrees of freedom of all joints.
+    pub columns: usize,
+    /// Columns on the longest way from the root.
+    pub depth: usize,
+    /// Bodies on the longest way from the root, the world included.
+    pub levels: usize,
+    /// Coordinates.
+    pub nv: usize,
+}
+
+impl Size {
+    /// The sizes for a model.
+    pub(crate) fn new<R>(model: &Model<R>) -> Self {
+        Self {
+            bodies: model.nodes().len(),
+            columns: model.columns().len(),
+            depth: model.columns().iter().map(|c| c.depth + 1).max().unwrap_or(0),
+            levels: model.nodes().iter().map(|n| n.level + 1).max().unwrap_or(1),
+            nv: model.nv(),
+        }
+    }
+}
+
+/// An array of n equal entries. It is not inlined: a workspace has dozens of them.
+#[inline(never)]
+pub(crate) fn filled<T: Copy>(entry: T, n: usize) -> Vec<T> {
+    vec![entry; n]
+}
+
+/// A matrix of zeros.
+#[inline(never)]
+pub(crate) fn zero_matrix<S: Scalar>(rows: usize, columns: usize) -> DMatrix<S> {
+    DMatrix::from_element(rows, columns, S::zero())
+}

@@ -1,0 +1,214 @@
+//! The Cholesky factor of part of a symmetric matrix, and solves with it.
+#![allow(non_snake_case)] // L, X, B
+
+use crate::compiled::compiled;
+use crate::registers::Vector;
+use crate::tile::{SLACK, Store, View, column_block};
+
+compiled! {
+    /// Eliminates the first m of the columns of a symmetric H, of which the lower triangle is given, for `shape` = [rows,
+    /// columns, m]; rows below the square are right-hand sides. H = [Hᵤᵤ ·; Hₓᵤ Hₓₓ] becomes [L ·; X Hₓₓ − X Xᵀ] with
+    /// L Lᵀ = Hᵤᵤ and X = Hₓᵤ L⁻ᵀ. H has slack rows.
+    ///
+    /// # Errors
+    /// The first column whose pivot is not positive, or not finite, and the pivot.
+    pub fn eliminate<V, COLUMNS>(h: &mut [f64], stride: usize, shape: [usize; 3]) -> Result<(), (usize, f64)> {
+        let ([rows, size, m], mut j0) = (shape, 0);
+        while j0 < m {
+            let width = COLUMNS.min(m - j0);
+            subtract_outer::<V, COLUMNS>(h, stride, rows, j0, width, j0);
+            for j in j0..j0 + width {
+                let (done, column) = h.split_at_mut(j * stride);
+                let column = &mut column[j..];
+                let done = View { data: done, stride };
+                subtract_multiples::<V>(column, rows - j, j0..j, done, j, done, j);
+                let pivot = column[0];
+                if !(pivot > 0.0 && pivot.is_finite()) {
+                    return Err((j, pivot));
+                }
+                scale::<V>(column, rows - j, pivot.sqrt().recip());
+            }
+            j0 += COLUMNS;
+        }
+        let mut j = m;
+        while j < size {
+            subtract_outer::<V, COLUMNS>(h, stride, rows, j, COLUMNS.min(size - j), m);
+            j += COLUMNS;
+        }
+        Ok(())
+    }
+
+    /// X ← X L⁻ᵀ for the L of an H of which m columns were eliminated; X has m columns, `rows` rows and slack rows.
+    pub fn solve_transposed<V, COLUMNS>(x: &mut [f64], ldx: usize, rows: usize, h: View<'_>, m: usize) {
+        let mut j0 = 0;
+        while j0 < m {
+            let width = COLUMNS.min(m - j0);
+            let (done, columns) = x.split_at_mut(j0 * ldx);
+            let (a, b) = (View { data: done, stride: ldx }, View { data: &h.data[j0..], ..h });
+            if j0 > 0 {
+                column_block::<V, COLUMNS>(columns, ldx, 0..rows, 0, width, a, b, j0, Store::Subtract);
+            }
+            for j in 0..width {
+                let (done, column) = columns.split_at_mut(j * ldx);
+                let (done, L) = (View { data: done, stride: ldx }, View { data: &h.data[j0 * h.stride..], ..h });
+                subtract_multiples::<V>(column, rows, 0..j, done, 0, L, j0 + j);
+                scale::<V>(column, rows, h.data[(j0 + j) * h.stride + j0 + j].recip());
+            }
+            j0 += COLUMNS;
+        }
+    }
+
+    /// X ← X L⁻¹, for the X in the rows `first`..`rows` of H's first m columns and the L in the lower triangle above them;
+    /// `shape` = [first, rows, m]. H has slack rows.
+    ///
+    /// `upper` (m + [`SLACK`] rows, m columns) is scratch for Lᵀ.
+    pub fn solve_right<V, COLUMNS>(h: &mut [f64], stride: usize, shape: [usize; 3], upper: &mut [f64]) {
+        let [first, rows, m] = shape;
+        let ldu = m + SLACK;
+        for j in 0..m {
+            for i in j..m {
+                upper[i * ldu + j] = h[j * stride + i];
+            }
+        }
+        // From the last columns to the first: X[:, j] ← (X[:, j] − Σ_{p > j} X[:, p] L[p, j]) / L[j, j].
+        let mut block = m.div_ceil(COLUMNS);
+        while block > 0 {
+            block -= 1;
+            let (j0, end) = (block * COLUMNS, m.min(block * COLUMNS + COLUMNS));
+            if end < m {
+                let (columns, later) = h.split_at_mut(end * stride);
+                let (columns, width) = (&mut columns[j0 * stride..], end - j0);
+                let a = View { data: later, stride };
+                let b = View { data: &upper[end * ldu + j0..], stride: ldu };
+                column_block::<V, COLUMNS>(columns, stride, first..rows, 0, width, a, b, m - end, Store::Subtract);
+            }
+            for j in (j0..end).rev() {
+                let (left, right) = h.split_at_mut((j + 1) * stride);
+                let column = &mut left[j * stride + first..];
+                let (right, Lt) = (View { data: right, stride }, View { data: &upper[(j + 1) * ldu..], stride: ldu });
+                subtract_multiples::<V>(column, rows - first, 0..end - j - 1, right, first, Lt, j);
+                scale::<V>(column, rows - first, upper[j * ldu + j].recip());
+            }
+        }
+    }
+}
+
+/// H[i, j] −= Σ_{p < length} H[i, p] H[j, p] for i ≥ j, on `width` ≤ COLUMNS columns from j ≥ `length` on.
+#[inline(always)]
+fn subtract_outer<V: Vector, const COLUMNS: usize>(
+    h: &mut [f64],
+    stride: usize,
+    rows: usize,
+    j: usize,
+    width: usize,
+    length: usize,
+) {
+    if length == 0 {
+        return;
+    }
+    let (done, columns) = h.split_at_mut(j * stride);
+    let factor = View { data: done, stride };
+    let b = View { data: &done[j..], stride };
+    column_block::<V, COLUMNS>(columns, stride, j..rows, 0, width, factor, b, length, Store::Subtract);
+}
+
+/// y −= Σ X[i.., p] B[j, p] over the columns p on `rows` rows, in whole registers: what follows them is slack.
+#[inline(always)]
+fn subtract_multiples<V: Vector>(
+    y: &mut [f64],
+    rows: usize,
+    columns: core::ops::Range<usize>,
+    X: View<'_>,
+    i: usize,
+    B: View<'_>,
+    j: usize,
+) {
+    let mut k = 0;
+    while k < rows {
+        let mut sum = V::load(&y[k..]);
+        for p in columns.start..columns.end {
+            let factor = V::splat(-B.data[p * B.stride + j]);
+            sum = V::load(&X.data[p * X.stride + i + k..]).mul_add(factor, sum);
+        }
+        sum.store(&mut y[k..]);
+        k += V::N;
+    }
+}
+
+/// y ← factor · y on `rows` rows, in whole registers.
+#[inline(always)]
+fn scale<V: Vector>(y: &mut [f64], rows: usize, factor: f64) {
+    let (factor, mut k) = (V::splat(factor), 0);
+    while k < rows {
+        V::load(&y[k..]).mul(factor).store(&mut y[k..]);
+        k += V::N;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registers::tests::at_each_level;
+    use nalgebra::DMatrix;
+
+    /// Entries of size one, sums of 30 of them: 1e-12 leaves room for rounding and nothing else.
+    const TOLERANCE: f64 = 1e-12;
+
+    fn entry(i: usize, j: usize) -> f64 {
+        ((i * 31 + j * 17 + 5) % 23) as f64 / 23.0 - 0.4
+    }
+
+    #[test]
+    fn elimination_and_solves_match_nalgebra_for_every_edge() {
+        at_each_level(|| {
+            for m in 0..19 {
+                for n in 1..19 {
+                    let (size, rows) = (m + n, m + n + 1); // one row is a right-hand side
+                    let root = DMatrix::from_fn(rows, size, entry);
+                    let full = &root * root.transpose() + DMatrix::identity(rows, rows) * 2.0;
+                    let stride = rows + SLACK;
+                    let mut h = vec![0.0; stride * size];
+                    for j in 0..size {
+                        h[j * stride..][..rows].copy_from_slice(full.column(j).as_slice());
+                    }
+                    let before = h.clone();
+                    eliminate(&mut h, stride, [rows, size, m]).unwrap();
+
+                    // X L⁻ᵀ of the rows below is what `eliminate` leaves
+                    let (below, ldx) = (n + 1, n + 1 + SLACK);
+                    let mut x = vec![0.0; ldx * m];
+                    for (to, from) in x.chunks_exact_mut(ldx).zip(before.chunks_exact(stride)) {
+                        to[..below].copy_from_slice(&from[m..rows]);
+                    }
+                    solve_transposed(&mut x, ldx, below, View::new(&h, stride), m);
+                    for (x, h) in x.chunks_exact(ldx).zip(h.chunks_exact(stride)) {
+                        assert!(x[..below].iter().zip(&h[m..rows]).all(|(x, h)| (x - h).abs() < TOLERANCE));
+                    }
+
+                    let (mut gains, mut upper) = (h.clone(), vec![0.0; (m + SLACK) * m]);
+                    solve_right(&mut gains, stride, [m, rows, m], &mut upper);
+                    let uu = full.view((0, 0), (m, m)).into_owned();
+                    let xu = full.view((m, 0), (n + 1, m)).into_owned();
+                    let gain = &xu * uu.clone().try_inverse().unwrap();
+                    let schur = full.view((m, m), (n + 1, n + 1)) - &gain * xu.transpose();
+                    for (i, j) in (0..n + 1).flat_map(|i| (0..n.min(i + 1)).map(move |j| (i, j))) {
+                        assert!((h[(m + j) * stride + m + i] - schur[(i, j)]).abs() < TOLERANCE * size as f64);
+                    }
+                    for (i, j) in (0..n + 1).flat_map(|i| (0..m).map(move |j| (i, j))) {
+                        assert!((gains[j * stride + m + i] - gain[(i, j)]).abs() < TOLERANCE * size as f64);
+                    }
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn elimination_names_the_pivot_that_is_not_positive() {
+        let stride = 5 + SLACK;
+        let mut h = vec![0.0; stride * 4];
+        for (j, x) in [1.0, 2.0, -3.0, 4.0].into_iter().enumerate() {
+            h[j * stride + j] = x;
+        }
+        assert_eq!(eliminate(&mut h, stride, [5, 4, 3]), Err((2, -3.0)));
+    }
+}

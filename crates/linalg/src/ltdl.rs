@@ -1,0 +1,321 @@
+//! The sparse factorisation M = Lᵀ D L of the joint-space inertia matrix, without fill-in.
+//!
+//! Source: Featherstone, *Efficient factorization of the joint-space inertia matrix for branched kinematic trees* (2005).
+//! Mᵢⱼ is zero unless one of the coordinates i, j carries the other. Eliminated from the tips to the root, the matrix
+//! keeps its zeros: row k of L has entries at the coordinates between k and the root and nowhere else.
+//!
+//! Where joints share a coordinate (mimic), the tree is that of `elimination_tree.rs`.
+
+use crate::axpy::{axpy, dot};
+use crate::check;
+use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+
+/// Rows are stored in steps of this many numbers, so that the innermost loop has no remainder. What stands behind a
+/// row's end has no meaning.
+const fn step<S: Scalar>() -> usize {
+    if S::LANES == 1 { 4 } else { 1 }
+}
+
+/// y += Σ xₖ sₖ for some x, so that y is loaded and stored once; in whole steps.
+#[inline(always)]
+fn update<S: Scalar, const N: usize>(s: [S; N], x: [&[S]; N], y: &mut [S]) {
+    if step::<S>() == 1 {
+        for j in 0..y.len() {
+            for k in 0..N {
+                y[j] = x[k][j].mul_add(s[k], y[j]);
+            }
+        }
+        return;
+    }
+    let y = y.as_chunks_mut::<4>().0;
+    let x = x.map(|x| &x.as_chunks::<4>().0[..y.len()]);
+    for (i, y) in y.iter_mut().enumerate() {
+        let mut sum = *y;
+        for k in 0..N {
+            for j in 0..4 {
+                sum[j] = x[k][i][j].mul_add(s[k], sum[j]);
+            }
+        }
+        *y = sum;
+    }
+}
+
+/// Eliminates N consecutive places of a run; returns N.
+#[inline(always)]
+fn eliminate<S: Scalar, const N: usize>(
+    tree: &EliminationTree,
+    rows: &mut [S],
+    D_inv: &mut [S],
+    start: usize,
+) -> usize {
+    let EliminationTree { parent, depth, first, .. } = tree;
+    let (above, block) = rows.split_at_mut(first[start]);
+    let at = |k: usize| first[k] - first[start];
+    for k in (start..start + N).rev() {
+        let (before, row) = block.split_at_mut(at(k));
+        D_inv[k] = row[depth[k]].recip();
+        for e in start..k {
+            let p = depth[e];
+            update([-(row[p] * D_inv[k])], [row], &mut before[at(e)..at(e + 1)]); // H_e −= (H_ke / D_k) H_k
+        }
+    }
+    let own: [&[S]; N] = core::array::from_fn(|i| &block[at(start + i)..at(start + i + 1)]);
+    let mut e = parent[start];
+    for p in (0..depth[start]).rev() {
+        let mut scale = [S::zero(); N];
+        for i in 0..N {
+            scale[i] = -(own[i][p] * D_inv[start + i]); // not by `from_fn`, which would not be inlined in lanes
+        }
+        update(scale, own, &mut above[first[e]..first[e + 1]]);
+        e = parent[e];
+    }
+    for k in start..start + N {
+        for x in &mut block[at(k)..at(k) + depth[k]] {
+            *x = *x * D_inv[k]; // L_ke = H_ke / D_k
+        }
+    }
+    N
+}
+
+/// M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+///
+/// With depth d of the tree (columns on the way to the root) and n = nv, [`factorize`](Self::factorize) costs O(n d²),
+/// [`solve`](Self::solve) O(n d), [`inverse`](Self::inverse) O(n² d); a chain has d = n. All memory is allocated by
+/// [`new`](Self::new). Source: Featherstone (2005). [`Cholesky`](crate::Cholesky) has the same verbs
+/// for any positive definite matrix.
+///
+/// ```
+/// use condyle_linalg::Ltdl;
+/// use nalgebra::dmatrix;
+/// let tree = [None, Some(0), Some(0)]; // a trunk with two branches; a robot's model has such a tree
+/// let mut factor = Ltdl::new(&tree[..]);
+/// factor.factorize(&dmatrix![3.0, 1.0, 1.0; 1.0, 1.0, 0.0; 1.0, 0.0, 1.0]);
+/// let mut x = [5.0, 2.0, 2.0];
+/// factor.solve(&mut x); // M x = b
+/// assert_eq!(x, [1.0, 1.0, 1.0]);
+/// assert_eq!(factor.nonzeros(), 5); // not 6
+/// ```
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub struct Ltdl<S> {
+    tree: EliminationTree,
+    /// Each place's row of L from the root on, then its D. Shape: nonzeros, each row in whole steps. Written by:
+    /// `factorize`.
+    rows: Vec<S>,
+    /// 1/D. Shape: nv. Written by: `factorize`.
+    D_inv: Vec<S>,
+}
+
+impl<S: Scalar> Ltdl<S> {
+    /// Finds the zeros of the matrices with the zeros of a tree, as a robot's model is one, and allocates the factor.
+    pub fn new(tree: &(impl ColumnTree + ?Sized)) -> Self {
+        let tree = EliminationTree::new(tree, step::<S>());
+        let n = tree.order.len();
+        Self { rows: vec![S::zero(); tree.first[n]], D_inv: vec![S::zero(); n], tree }
+    }
+
+    /// The order and the tree of the places.
+    #[doc(hidden)]
+    pub fn tree(&self) -> &EliminationTree {
+        &self.tree
+    }
+
+    /// Row k of L from the root on, without its diagonal.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn row_from_root(&self, k: usize) -> &[S] {
+        &self.rows[self.tree.first[k]..][..self.tree.depth[k]]
+    }
+
+    /// 1/D, in the order of the places.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn inverse_diagonal(&self) -> &[S] {
+        &self.D_inv
+    }
+
+    /// How many entries of L and D may differ from zero, the ones on L's diagonal not counted.
+    pub fn nonzeros(&self) -> usize {
+        self.tree.depth.iter().map(|d| d + 1).sum()
+    }
+
+    /// The coordinates in their order from the root to the tips: they are eliminated last to first.
+    ///
+    /// It is 0, 1, 2, … unless joints share coordinates.
+    pub fn order(&self) -> &[usize] {
+        &self.tree.order
+    }
+
+    /// Row k of L in the [`order`](Self::order), entry by entry from the diagonal's left to the root: (place, value).
+    ///
+    /// # Panics
+    /// If k is not less than nv.
+    pub fn row(&self, k: usize) -> impl Iterator<Item = (usize, S)> {
+        let above = |k: usize| Some(self.tree.parent[k]).filter(|&p| p != NONE);
+        let row = &self.rows[self.tree.first[k]..][..self.tree.depth[k]];
+        core::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
+    }
+
+    /// D, in the [`order`](Self::order) of the places.
+    pub fn diagonal(&self) -> impl Iterator<Item = S> {
+        self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
+    }
+
+    /// M = Lᵀ D L, in O(n d²). Of two entries that are equal by symmetry, one is read: that of the lower triangle in the
+    /// [`order`](Self::order).
+    ///
+    /// M: nv × nv, symmetric, positive definite (as `crba` gives it); if it is not, some D are not
+    /// positive. Allocates nothing. Source: Featherstone (2005).
+    ///
+    /// # Panics
+    /// If `M` is not nv × nv.
+    #[inline(always)]
+    pub fn factorize(&mut self, M: &DMatrix<S>) {
+        let nv = self.D_inv.len();
+        assert!(M.shape() == (nv, nv), "M: expected {nv} × {nv}, found {:?}", M.shape());
+        let Self { tree, rows, D_inv } = self;
+        let EliminationTree { order, parent, depth, run, first, .. } = &*tree;
+        let M = M.as_slice();
+        for k in 0..nv {
+            let (row, rest) = rows[first[k]..first[k + 1]].split_at_mut(depth[k] + 1);
+            rest.fill(S::zero());
+            let mut e = k;
+            for x in row.iter_mut().rev() {
+                *x = M[order[e] * nv + order[k]];
+                e = parent[e];
+            }
+        }
+        let mut end = nv; // the rows from here on are done
+        while end > 0 {
+            // Several places of a run at a time where there are as many: rows above are loaded and stored once for all.
+            end -= match end - run[end - 1] {
+                4.. => eliminate::<S, 4>(tree, rows, D_inv, end - 4),
+                2.. => eliminate::<S, 2>(tree, rows, D_inv, end - 2),
+                _ => eliminate::<S, 1>(tree, rows, D_inv, end - 1),
+            };
+        }
+    }
+
+    /// x = M⁻¹ b in place of b, in O(n d): Lᵀ y = b, then L x = D⁻¹ y.
+    ///
+    /// b: nv numbers. Allocates nothing. Source: Featherstone (2005).
+    ///
+    /// # Panics
+    /// If `b` has not nv numbers.
+    #[inline(always)]
+    pub fn solve(&self, b: &mut [S]) {
+        check("b", b.len(), self.D_inv.len());
+        let EliminationTree { swaps, parent, depth, run, first, .. } = &self.tree;
+        for &(i, k) in swaps {
+            b.swap(i, k);
+        }
+        for k in (0..b.len()).rev() {
+            let row = &self.rows[first[k]..];
+            let (x, mut lo, mut hi) = (-b[k], run[k], k);
+            loop {
+                axpy(x, &row[depth[lo]..], &mut b[lo..hi]); // b_e −= L_ke b_k on all places e above
+                if parent[lo] == NONE {
+                    break;
+                }
+                hi = parent[lo] + 1;
+                lo = run[hi - 1];
+            }
+            b[k] = b[k] * self.D_inv[k];
+        }
+        for k in 0..b.len() {
+            let row = &self.rows[first[k]..];
+            let (mut x, mut lo, mut hi) = (b[k], run[k], k);
+            loop {
+                x -= dot(&b[lo..hi], &row[depth[lo]..]); // x_k = y_k − Σ L_ke x_e
+                if parent[lo] == NONE {
+                    break;
+                }
+                hi = parent[lo] + 1;
+                lo = run[hi - 1];
+            }
+            b[k] = x;
+        }
+        for &(i, k) in swaps.iter().rev() {
+            b.swap(i, k);
+        }
+    }
+
+    /// X = M⁻¹ B in place of B, column by column, each in O(n d).
+    ///
+    /// B: nv rows, any number of columns. Allocates nothing.
+    ///
+    /// ```
+    /// use condyle_linalg::Ltdl;
+    /// use nalgebra::{DMatrix, dmatrix};
+    /// let M = dmatrix![2.0, 1.0; 1.0, 3.0];
+    /// let mut factor = Ltdl::new(&[None, Some(0)][..]);
+    /// factor.factorize(&M);
+    /// let mut B = M.clone();
+    /// factor.solve_matrix(&mut B);
+    /// assert!((B - DMatrix::<f64>::identity(2, 2)).amax() < 1e-15);
+    /// ```
+    ///
+    /// # Panics
+    /// If `B` has not nv rows.
+    #[inline(always)]
+    pub fn solve_matrix(&self, B: &mut DMatrix<S>) {
+        check("B", B.nrows(), self.D_inv.len());
+        for column in B.as_mut_slice().chunks_exact_mut(self.D_inv.len().max(1)) {
+            self.solve(column);
+        }
+    }
+
+    /// X = M⁻¹, the full symmetric matrix, in O(n² d).
+    ///
+    /// L X = D⁻¹ L⁻ᵀ has an upper triangle on its right, so row k of X follows from the rows above:
+    /// X_kj = −Σ L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `X` is not nv × nv.
+    #[inline(always)]
+    pub fn inverse(&self, X: &mut DMatrix<S>) {
+        let nv = self.D_inv.len();
+        assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());
+        let EliminationTree { swaps, parent, depth, first, .. } = &self.tree;
+        let rows = X.as_mut_slice(); // row k is column k: X is symmetric
+        for k in 0..nv {
+            let L = &self.rows[first[k]..first[k] + depth[k]];
+            let (above, rest) = rows.split_at_mut(k * nv);
+            let row = &mut rest[..k];
+            row.fill(S::zero());
+            let (mut e, mut p) = (parent[k], depth[k]);
+            while p >= 4 {
+                let mut x = [&[][..]; 4];
+                for x in &mut x {
+                    *x = &above[e * nv..][..k];
+                    e = parent[e];
+                }
+                let s = [-L[p - 1], -L[p - 2], -L[p - 3], -L[p - 4]];
+                for j in 0..k {
+                    row[j] = x[0][j]
+                        .mul_add(s[0], x[1][j].mul_add(s[1], x[2][j].mul_add(s[2], x[3][j].mul_add(s[3], row[j]))));
+                }
+                p -= 4;
+            }
+            while p > 0 {
+                axpy(-L[p - 1], &above[e * nv..], row);
+                (e, p) = (parent[e], p - 1);
+            }
+            let (mut diagonal, mut e) = (self.D_inv[k], parent[k]);
+            for &L in L.iter().rev() {
+                diagonal = (-L).mul_add(row[e], diagonal);
+                e = parent[e];
+            }
+            rest[k] = diagonal;
+            for (j, &x) in rest[..k].iter().enumerate() {
+                above[j * nv + k] = x;
+            }
+        }
+        for &(i, k) in swaps.iter().rev() {
+            X.swap_rows(i, k);
+            X.swap_columns(i, k);
+        }
+    }
+}

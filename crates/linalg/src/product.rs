@@ -1,0 +1,299 @@
+//! Products and sums of matrices.
+
+use crate::compiled::compiled;
+use crate::registers::Vector;
+use crate::tile::{SLACK, Store, View, column_block, tile_rows};
+
+compiled! {
+    /// C = A Bᵀ, for `shape` = [rows of A, rows of B, columns of both]. C has slack rows.
+    pub fn product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
+        whole::<V, COLUMNS>(c, ldc, shape, a, b, Store::Set);
+    }
+
+    /// C += A Bᵀ, for a shape as of [`product`]. C has slack rows.
+    pub fn add_product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
+        whole::<V, COLUMNS>(c, ldc, shape, a, b, Store::Add);
+    }
+
+    /// C −= A Bᵀ, for a shape as of [`product`]. C has slack rows.
+    pub fn subtract_product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
+        whole::<V, COLUMNS>(c, ldc, shape, a, b, Store::Subtract);
+    }
+
+    /// The lower triangle (with some of the upper one) of C += A Bᵀ, for a shape as of [`product`]. C has slack rows.
+    pub fn add_product_lower<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
+        let ([rows, columns, length], mut j) = (shape, 0);
+        while j < columns {
+            let width = COLUMNS.min(columns - j);
+            column_block::<V, COLUMNS>(c, ldc, j..rows, j, width, a, b, length, Store::Add);
+            j += COLUMNS;
+        }
+    }
+
+    /// The lower triangle of C += (A Bᵀ)ᵀ for square A and B of `size` rows, by way of the upper triangle of A Bᵀ, which is
+    /// left in `scratch` (stride `lds`, `size` columns, slack rows).
+    pub fn add_transposed_product_lower<V, COLUMNS>(
+        c: &mut [f64],
+        ldc: usize,
+        size: usize,
+        a: View<'_>,
+        b: View<'_>,
+        scratch: &mut [f64],
+        lds: usize,
+    ) {
+        let mut j = 0;
+        while j < size {
+            let width = COLUMNS.min(size - j);
+            column_block::<V, COLUMNS>(scratch, lds, 0..j + width, j, width, a, b, size, Store::Set);
+            j += COLUMNS;
+        }
+        for j in 0..size {
+            for i in j..size {
+                c[j * ldc + i] += scratch[i * lds + j];
+            }
+        }
+    }
+
+    /// C = A Bᵀ for an upper triangular B with n rows, and an A with `rows` rows. C has slack rows.
+    pub fn product_with_upper<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 2], a: View<'_>, b: View<'_>) {
+        let [rows, n] = shape;
+        from_diagonal::<V, COLUMNS, false>(c, ldc, [rows, n], a, b);
+    }
+
+    /// The lower triangle (with some of the upper one) of C = A Bᵀ for an upper triangular A, both with n rows and n columns.
+    /// C has slack rows.
+    pub fn product_of_upper_lower<V, COLUMNS>(c: &mut [f64], ldc: usize, n: usize, a: View<'_>, b: View<'_>) {
+        from_diagonal::<V, COLUMNS, true>(c, ldc, [n, n], a, b);
+    }
+
+    /// C = A Bᵀ, for a shape as of [`product`] and a C without slack rows. Where rows of A are rows of B, C has the same
+    /// bits on both sides of the diagonal.
+    pub fn product_without_slack<V, COLUMNS>(
+        c: &mut [f64],
+        ldc: usize,
+        shape: [usize; 3],
+        a: View<'_>,
+        b: View<'_>,
+    ) {
+        let ([rows, columns, length], mut j) = (shape, 0);
+        while j < columns {
+            let (width, mut i) = (COLUMNS.min(columns - j), 0);
+            while i < rows {
+                if rows - i >= 2 * V::N {
+                    let tile = tile_rows::<V, 2, COLUMNS>(a, i, b, j, length);
+                    for jj in 0..COLUMNS {
+                        if jj < width {
+                            let to = &mut c[(j + jj) * ldc + i..][..2 * V::N];
+                            tile[jj][0].store(to);
+                            tile[jj][1].store(&mut to[V::N..]);
+                        }
+                    }
+                    i += 2 * V::N;
+                    continue;
+                }
+                if rows >= V::N {
+                    i = i.min(rows - V::N); // the last strip overlaps the one before
+                }
+                let tile = tile_rows::<V, 1, COLUMNS>(a, i, b, j, length);
+                for jj in 0..COLUMNS {
+                    if jj < width {
+                        let to = &mut c[(j + jj) * ldc + i..];
+                        if rows >= V::N {
+                            tile[jj][0].store(to);
+                            continue;
+                        }
+                        let mut numbers = [0.0; SLACK];
+                        tile[jj][0].store(&mut numbers);
+                        for k in 0..V::N {
+                            if k < rows {
+                                to[k] = numbers[k]; // one by one: no function call
+                            }
+                        }
+                    }
+                }
+                i += V::N;
+            }
+            j += COLUMNS;
+        }
+    }
+
+    /// C += A, on `rows` rows and `columns` columns, in whole registers: C and A have slack rows, and those of C change.
+    pub fn add_matrix<V, COLUMNS>(c: &mut [f64], ldc: usize, a: View<'_>, shape: [usize; 2]) {
+        let [rows, columns] = shape;
+        for j in 0..columns {
+            let (c, a, mut i) = (&mut c[j * ldc..], &a.data[j * a.stride..], 0);
+            while i < rows {
+                V::load(&c[i..]).add(V::load(&a[i..])).store(&mut c[i..]);
+                i += V::N;
+            }
+        }
+    }
+
+    /// Σ aᵢⱼ² of `rows` rows and `columns` columns, where some entries may count more than once (at most 8 times): enough
+    /// to see whether one has diverged.
+    pub fn sum_of_squares<V, COLUMNS>(a: View<'_>, shape: [usize; 2]) -> f64 {
+        let ([rows, columns], mut sums) = (shape, [V::splat(0.0); 2]);
+        for j in 0..columns {
+            let x = &a.data[j * a.stride..][..rows];
+            if rows < V::N {
+                for x in x {
+                    sums[0] = V::splat(*x).mul_add(V::splat(*x), sums[0]);
+                }
+                continue;
+            }
+            let (last, mut i) = (rows - V::N, 0);
+            while i < last {
+                for sum in &mut sums {
+                    let x = V::load(&x[i.min(last)..]);
+                    *sum = x.mul_add(x, *sum);
+                    i += V::N;
+                }
+            }
+            let x = V::load(&x[last..]);
+            sums[0] = x.mul_add(x, sums[0]);
+        }
+        let mut numbers = [0.0; SLACK];
+        sums[0].add(sums[1]).store(&mut numbers);
+        numbers.iter().sum()
+    }
+}
+
+/// C ← A Bᵀ in blocks of columns.
+#[inline(always)]
+fn whole<V: Vector, const COLUMNS: usize>(
+    c: &mut [f64],
+    ldc: usize,
+    [rows, columns, length]: [usize; 3],
+    a: View<'_>,
+    b: View<'_>,
+    how: Store,
+) {
+    let mut j = 0;
+    while j < columns {
+        column_block::<V, COLUMNS>(c, ldc, 0..rows, j, COLUMNS.min(columns - j), a, b, length, how);
+        j += COLUMNS;
+    }
+}
+
+/// C ← A Bᵀ of which the sums for column j of C begin with product j: all rows of C, or those from the diagonal on.
+#[inline(always)]
+fn from_diagonal<V: Vector, const COLUMNS: usize, const LOWER: bool>(
+    c: &mut [f64],
+    ldc: usize,
+    [rows, n]: [usize; 2],
+    a: View<'_>,
+    b: View<'_>,
+) {
+    let mut j = 0;
+    while j < n {
+        let (first, width) = (if LOWER { j } else { 0 }, COLUMNS.min(n - j));
+        let (a, b) = (View { data: &a.data[j * a.stride..], ..a }, View { data: &b.data[j * b.stride..], ..b });
+        column_block::<V, COLUMNS>(c, ldc, first..rows, j, width, a, b, n - j, Store::Set);
+        j += COLUMNS;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registers::tests::at_each_level;
+    use nalgebra::DMatrix;
+
+    /// Entries of size one, sums of 30 of them: 1e-12 leaves room for rounding and nothing else.
+    const TOLERANCE: f64 = 1e-12;
+
+    fn entry(i: usize, j: usize) -> f64 {
+        ((i * 31 + j * 17 + 5) % 23) as f64 / 23.0 - 0.4
+    }
+
+    /// A copy with slack rows.
+    fn padded(a: &DMatrix<f64>) -> (Vec<f64>, usize) {
+        let stride = a.nrows() + SLACK;
+        let mut out = vec![0.0; stride * a.ncols()];
+        for j in 0..a.ncols() {
+            out[j * stride..][..a.nrows()].copy_from_slice(a.column(j).as_slice());
+        }
+        (out, stride)
+    }
+
+    /// Each of the products of A with B.
+    fn check_products(a: &DMatrix<f64>, b: &DMatrix<f64>) {
+        let (rows, columns, length) = (a.nrows(), b.nrows(), a.ncols());
+        let (shape, expected) = ([rows, columns, length], a * b.transpose());
+        let ((a, lda), (b, ldb)) = (padded(a), padded(b));
+        let (a, b) = (View::new(&a, lda), View::new(&b, ldb));
+        let all = || (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+        let check = |c: &[f64], ldc: usize, (i, j): (usize, usize), expected: f64| {
+            assert!((c[j * ldc + i] - expected).abs() < TOLERANCE, "entry ({i}, {j}) of shape {shape:?}");
+        };
+
+        let mut c = vec![0.0; lda * columns];
+        product(&mut c, lda, shape, a, b);
+        all().for_each(|at| check(&c, lda, at, expected[at]));
+        add_product(&mut c, lda, shape, a, b);
+        all().for_each(|at| check(&c, lda, at, 2.0 * expected[at]));
+        add_matrix(&mut c, lda, a, [rows, columns.min(length)]);
+        all().for_each(|(i, j)| {
+            let more = if j < length { a.data[j * lda + i] } else { 0.0 };
+            check(&c, lda, (i, j), 2.0 * expected[(i, j)] + more);
+        });
+        product(&mut c, lda, shape, a, b);
+        subtract_product(&mut c, lda, shape, a, b);
+        all().for_each(|at| check(&c, lda, at, 0.0));
+        let mut c = vec![0.0; rows * columns];
+        product_without_slack(&mut c, rows, shape, a, b);
+        all().for_each(|at| check(&c, rows, at, expected[at]));
+
+        let squares: f64 = all().map(|at| expected[at].powi(2)).sum();
+        let found = sum_of_squares(View::new(&c, rows), [rows, columns]);
+        assert!(squares * (1.0 - TOLERANCE) <= found && found <= 8.0 * squares * (1.0 + TOLERANCE));
+
+        if columns <= rows {
+            let mut c = vec![1.0; lda * columns];
+            add_product_lower(&mut c, lda, shape, a, b);
+            all().filter(|(i, j)| j <= i).for_each(|at| check(&c, lda, at, expected[at] + 1.0));
+        }
+        if columns == rows && length == rows {
+            let (mut c, mut scratch) = (vec![1.0; lda * columns], vec![0.0; lda * columns]);
+            add_transposed_product_lower(&mut c, lda, rows, a, b, &mut scratch, lda);
+            all().filter(|(i, j)| j <= i).for_each(|(i, j)| check(&c, lda, (i, j), expected[(j, i)] + 1.0));
+        }
+    }
+
+    #[test]
+    fn products_match_nalgebra_for_every_edge() {
+        at_each_level(|| {
+            for rows in 1..20 {
+                for columns in [1, 2, 3, 4, 5, 7, 8, 9, 12, 17, rows] {
+                    for length in [0, 1, 6, 13, rows] {
+                        let a = DMatrix::from_fn(rows, length, entry);
+                        let b = DMatrix::from_fn(columns, length, |i, j| entry(j, i + 3));
+                        check_products(&a, &b);
+                    }
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn products_with_a_triangle_match_nalgebra() {
+        at_each_level(|| {
+            for n in 1..20 {
+                let upper = DMatrix::from_fn(n, n, |i, j| if i <= j { entry(i, j) } else { 0.0 });
+                let full = DMatrix::from_fn(n, n, |i, j| entry(j, i));
+                let (upper, other) = (&upper, &full);
+                let ((u, ldu), (f, ldf)) = (padded(upper), padded(other));
+                let (u, f, mut c) = (View::new(&u, ldu), View::new(&f, ldf), vec![0.0; ldu * n]);
+                let expected = [other * upper.transpose(), upper * other.transpose()];
+                product_with_upper(&mut c, ldu, [n, n], f, u);
+                for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                    assert!((c[j * ldu + i] - expected[0][(i, j)]).abs() < TOLERANCE);
+                }
+                product_of_upper_lower(&mut c, ldu, n, u, f);
+                for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                    assert!((c[j * ldu + i] - expected[1][(i, j)]).abs() < TOLERANCE);
+                }
+            }
+        });
+    }
+}

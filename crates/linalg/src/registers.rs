@@ -1,0 +1,191 @@
+//! Vector registers for the dense kernels, and the choice of those that this machine has.
+
+use condyle_spatial::Scalar;
+use condyle_spatial::block::{Block, Real};
+use condyle_spatial::lanes::{Element, Lanes};
+use condyle_spatial::level::{Level, level};
+use condyle_spatial::simd::Kernel;
+use core::marker::PhantomData;
+
+/// The registers of [`Level::Avx512`], and the columns of a tile that suit their number.
+#[cfg(target_arch = "x86_64")]
+pub(crate) type Long = <f64 as Real>::Long;
+/// The registers of [`Level::Avx2`] or [`Level::Neon`].
+pub(crate) type Short = <f64 as Real>::Short;
+
+/// A register of N numbers.
+pub trait Vector: Copy {
+    /// How many numbers it holds.
+    const N: usize;
+
+    /// The first N numbers of `x`.
+    fn load(x: &[f64]) -> Self;
+    /// Writes the first N numbers of `x`.
+    fn store(self, x: &mut [f64]);
+    /// x in every lane.
+    fn splat(x: f64) -> Self;
+    /// self · b + c, fused where the processor can.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// self + b.
+    fn add(self, b: Self) -> Self;
+    /// self − b.
+    fn sub(self, b: Self) -> Self;
+    /// self · b.
+    fn mul(self, b: Self) -> Self;
+    /// The transpose of N registers: number i of register k becomes number k of register i.
+    fn transpose(rows: &mut [Self]);
+}
+
+/// Two numbers, which the compiler keeps in a register of the kind that every processor has.
+#[derive(Clone, Copy)]
+pub(crate) struct Pair([f64; 2]);
+
+impl Vector for Pair {
+    const N: usize = 2;
+
+    #[inline(always)]
+    fn load(x: &[f64]) -> Self {
+        Self([x[0], x[1]])
+    }
+    #[inline(always)]
+    fn store(self, x: &mut [f64]) {
+        x[..2].copy_from_slice(&self.0);
+    }
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self([x; 2])
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        let fused = |k: usize| Scalar::mul_add(self.0[k], b.0[k], c.0[k]);
+        Self([fused(0), fused(1)])
+    }
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        Self([self.0[0] + b.0[0], self.0[1] + b.0[1]])
+    }
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        Self([self.0[0] - b.0[0], self.0[1] - b.0[1]])
+    }
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        Self([self.0[0] * b.0[0], self.0[1] * b.0[1]])
+    }
+    #[inline(always)]
+    fn transpose(rows: &mut [Self]) {
+        let (a, b) = (rows[0].0, rows[1].0);
+        (rows[0], rows[1]) = (Self([a[0], b[0]]), Self([a[1], b[1]]));
+    }
+}
+
+impl<const N: usize> Vector for Lanes<f64, N>
+where
+    f64: Element<N>,
+{
+    const N: usize = N;
+
+    #[inline(always)]
+    fn load(x: &[f64]) -> Self {
+        let mut numbers = [0.0; N];
+        numbers.copy_from_slice(&x[..N]);
+        Self::from_array(numbers)
+    }
+    #[inline(always)]
+    fn store(self, x: &mut [f64]) {
+        x[..N].copy_from_slice(&self.to_array());
+    }
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Scalar::splat(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Scalar::mul_add(self, b, c)
+    }
+    #[inline(always)]
+    fn add(self, b: Self) -> Self {
+        self + b
+    }
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        self - b
+    }
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        self * b
+    }
+    #[inline(always)]
+    fn transpose(rows: &mut [Self]) {
+        Block::transpose(rows);
+    }
+}
+
+/// Work with vector loops, generic over the registers; see [`at_level`].
+pub trait Vectorized: Sized {
+    /// The work. It must be `#[inline(always)]`, and so must be what it calls with registers: so all is compiled for the
+    /// instructions of the function that [`at_level`] puts it in.
+    fn run<V: Vector>(self);
+}
+
+/// Runs `work` with the vector instructions in use (see [`level`]).
+///
+/// ```
+/// use condyle_linalg::{Vector, Vectorized, at_level};
+///
+/// /// x ← 2 x on eight numbers.
+/// struct Double<'a>(&'a mut [f64; 8]);
+///
+/// impl Vectorized for Double<'_> {
+///     #[inline(always)]
+///     fn run<V: Vector>(self) {
+///         for part in self.0.chunks_exact_mut(V::N) {
+///             V::load(part).mul(V::splat(2.0)).store(part);
+///         }
+///     }
+/// }
+///
+/// let mut x = [1.5; 8];
+/// at_level(Double(&mut x));
+/// assert_eq!(x, [3.0; 8]);
+/// ```
+pub fn at_level(work: impl Vectorized) {
+    /// Work on registers V, as the gate takes it.
+    struct On<W, V>(W, PhantomData<V>);
+    impl<W: Vectorized, V: Vector> Kernel for On<W, V> {
+        #[inline(always)]
+        fn run(self) {
+            self.0.run::<V>();
+        }
+        #[inline(always)]
+        fn run_fused(self) {
+            self.run();
+        }
+    }
+    match level() {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => Long::enter(On::<_, Long>(work, PhantomData)),
+        Level::Baseline => work.run::<Pair>(),
+        _ => Short::enter(On::<_, Short>(work, PhantomData)),
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use condyle_spatial::level::{Level, level, pin};
+    use std::sync::Mutex;
+
+    /// The level belongs to the whole process.
+    static PINNED: Mutex<()> = Mutex::new(());
+
+    /// Runs `f` at every level of this processor.
+    pub(crate) fn at_each_level(f: impl Fn()) {
+        let _guard = PINNED.lock();
+        let before = level();
+        for level in Level::ALL.into_iter().filter(|level| level.is_supported()) {
+            pin(level).unwrap();
+            f();
+        }
+        pin(before).unwrap();
+    }
+}

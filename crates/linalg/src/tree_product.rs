@@ -1,0 +1,269 @@
+//! X = −A B, of square matrices, where the columns of B have the zeros of a tree.
+
+use crate::axpy::axpy;
+use crate::cast::{as_f64, as_f64_mut};
+use crate::sparsity::NonzeroRows;
+use condyle_spatial::Scalar;
+use condyle_spatial::block::Block;
+use condyle_spatial::gate::{Kernel, Level, Long, Short, level};
+use condyle_spatial::kernel;
+use core::marker::PhantomData;
+
+/// C = −A B, where column j of B has zeros but in the rows of `nonzero_rows[j]`.
+///
+/// Four columns with the same rows, as those of one limb have, go together: as many entries of each as there are registers
+/// for stay there while their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored
+/// a quarter as often.
+#[inline(always)]
+pub fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
+    let (n, mut j) = (nonzero_rows.len(), 0);
+    while j < n {
+        let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
+        let many = if *same_pattern >= 4 { 4 } else { 1 };
+        let (b, c) = (&B[j * n..(j + many) * n], &mut C[j * n..(j + many) * n]);
+        match (many, size_of::<S>()) {
+            (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n),
+            (4, 16..) => four_columns::<S, 2>(A, b, c, rows, n),
+            (4, _) => four_columns::<S, 8>(A, b, c, rows, n),
+            _ => {
+                c.fill(S::zero());
+                subtract_column(A, b, c, rows);
+            }
+        }
+        j += many;
+    }
+}
+
+/// Twice `minus_product` with one A that is symmetric, in lanes, where matrices are too large for the nearest cache.
+#[inline(always)]
+fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+    let (n, mut j) = (nonzero_rows.len(), 0);
+    while j < n {
+        let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
+        let many = (*same_pattern).min(4);
+        let columns = j * n..(j + many) * n;
+        let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
+        let C = [&mut C0[columns.clone()], &mut C1[columns]];
+        match many {
+            4 => twice::<S, 4, 2>(A, B, C, rows, n),
+            3 => twice::<S, 3, 2>(A, B, C, rows, n),
+            2 => twice::<S, 2, 4>(A, B, C, rows, n),
+            _ => twice::<S, 1, 4>(A, B, C, rows, n),
+        }
+        j += many;
+    }
+}
+
+/// The sums of `subtract_column` for N rows of M columns at a time: of A, N columns are read from end to end.
+#[inline(always)]
+fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&mut [S]; 2], rows: &[usize], n: usize) {
+    let ([B0, B1], [C0, C1]) = (B, C);
+    let mut i = 0;
+    while i < n {
+        let mut a = [&A[..n]; N];
+        for y in 0..N {
+            a[y] = &A[(i + y).min(n - 1) * n..][..n];
+        }
+        let mut c = [[[S::zero(); 2]; M]; N];
+        for &k in rows {
+            for x in 0..M {
+                let (b0, b1) = (-B0[x * n + k], -B1[x * n + k]);
+                for y in 0..N {
+                    c[y][x][0] = a[y][k].mul_add(b0, c[y][x][0]);
+                    c[y][x][1] = a[y][k].mul_add(b1, c[y][x][1]);
+                }
+            }
+        }
+        for y in 0..N.min(n - i) {
+            for x in 0..M {
+                C0[x * n + i + y] = c[y][x][0];
+                C1[x * n + i + y] = c[y][x][1];
+            }
+        }
+        i += N;
+    }
+}
+
+/// c −= A b, where b has zeros but in these rows.
+#[inline(always)]
+pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize]) {
+    let n = c.len();
+    let (fours, rest) = rows.as_chunks::<4>();
+    for &[k0, k1, k2, k3] in fours {
+        let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
+        let (a2, a3) = (&A[k2 * n..(k2 + 1) * n], &A[k3 * n..(k3 + 1) * n]);
+        let (b0, b1, b2, b3) = (-b[k0], -b[k1], -b[k2], -b[k3]);
+        for i in 0..n {
+            c[i] = a3[i].mul_add(b3, a2[i].mul_add(b2, a1[i].mul_add(b1, a0[i].mul_add(b0, c[i]))));
+        }
+    }
+    for &k in rest {
+        axpy(-b[k], &A[k * n..(k + 1) * n], c);
+    }
+}
+
+/// The sums of `subtract_column`, in the same order, so that the bits are the same.
+#[inline(always)]
+fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], n: usize) {
+    let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
+    let mut i = 0;
+    while i + N <= n {
+        let mut c = [[S::zero(); N]; 4];
+        for &k in rows {
+            let a = &A[k * n + i..k * n + i + N];
+            let b = [-b0[k], -b1[k], -b2[k], -b3[k]];
+            for y in 0..4 {
+                for x in 0..N {
+                    c[y][x] = a[x].mul_add(b[y], c[y][x]);
+                }
+            }
+        }
+        for y in 0..4 {
+            C[y * n + i..y * n + i + N].copy_from_slice(&c[y]);
+        }
+        i += N;
+    }
+    while i < n {
+        let mut c = [S::zero(); 4];
+        for &k in rows {
+            let a = A[k * n + i];
+            let b = [-b0[k], -b1[k], -b2[k], -b3[k]];
+            for y in 0..4 {
+                c[y] = a.mul_add(b[y], c[y]);
+            }
+        }
+        for y in 0..4 {
+            C[y * n + i] = c[y];
+        }
+        i += 1;
+    }
+}
+
+/// X = −A B for two matrices B and one A that is symmetric; column j of both B has zeros but in the rows of
+/// `nonzero_rows[j]`.
+#[inline]
+pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+    let [X0, X1] = X;
+    if nonzero_rows.len() >= 4
+        && level() > Level::Baseline
+        && let (Some(A), Some(B0), Some(B1)) = (as_f64(A), as_f64(B[0]), as_f64(B[1]))
+        && let (Some(X0), Some(X1)) = (as_f64_mut(X0), as_f64_mut(X1))
+    {
+        return in_registers(A, [B0, B1], [X0, X1], nonzero_rows);
+    }
+    one_by_one(A, B, [X0, X1], nonzero_rows);
+}
+
+kernel! {
+    /// The products, scalar by scalar.
+    fn one_by_one<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+        if S::LANES > 1 {
+            minus_product_twice(A, B, X, nonzero_rows);
+        } else {
+            B.into_iter().zip(X).for_each(|(B, X)| minus_product(A, B, X, nonzero_rows));
+        }
+    }
+}
+
+/// The products of single numbers, in the vector registers of the level.
+fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[NonzeroRows]) {
+    if level() >= Level::Avx512 && nonzero_rows.len() >= 8 {
+        Long::enter(InRegisters::<Long> { A, B, X, nonzero_rows, vector: PhantomData });
+    } else {
+        Short::enter(InRegisters::<Short> { A, B, X, nonzero_rows, vector: PhantomData });
+    }
+}
+
+/// How many columns of B go together.
+const SIDE: usize = 4;
+/// How many operations are under way at any time: fewer sums than that take no less time.
+const UNDER_WAY: usize = 8;
+
+/// The products in vector registers.
+///
+/// As many entries of four columns of X as there are registers for stay there while their sums grow. The last of them begin
+/// where they still fit, and so are computed twice. Each entry is the same sum in the same order as in `minus_product`.
+struct InRegisters<'a, V> {
+    A: &'a [f64],
+    B: [&'a [f64]; 2],
+    X: [&'a mut [f64]; 2],
+    nonzero_rows: &'a [NonzeroRows],
+    vector: PhantomData<V>,
+}
+
+impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
+    #[inline(always)]
+    fn run(mut self) {
+        let n = self.nonzero_rows.len();
+        // how many vectors of a column stay in registers: for the fewest operations, the most
+        let (mut best, mut least) = (1, usize::MAX);
+        for many in 1..=3 {
+            let cost = n.div_ceil(many * V::LANES) * UNDER_WAY.max(many * SIDE);
+            if many * V::LANES <= n && cost <= least {
+                (best, least) = (many, cost);
+            }
+        }
+        match best {
+            1 => self.all::<1>(),
+            2 => self.all::<2>(),
+            _ => self.all::<3>(),
+        }
+    }
+}
+
+impl<V: Block<Number = f64>> InRegisters<'_, V> {
+    #[inline(always)]
+    fn all<const N: usize>(&mut self) {
+        let mut j = 0;
+        while j < self.nonzero_rows.len() {
+            let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
+            // columns j, …, j + same − 1 of the one matrix, then of the other
+            let (same, mut k) = (*same_pattern, 0);
+            while k < 2 * same {
+                let at = |k: usize| (k / same, j + k % same);
+                match 2 * same - k {
+                    4.. => self.columns::<4, N>([at(k), at(k + 1), at(k + 2), at(k + 3)], rows),
+                    2.. => self.columns::<2, N>([at(k), at(k + 1)], rows),
+                    _ => self.columns::<1, N>([at(k)], rows),
+                }
+                k += if 2 * same - k >= 4 { 4 } else { 2 };
+            }
+            j += same;
+        }
+    }
+
+    /// Some columns of X: of which matrix, and which.
+    #[inline(always)]
+    fn columns<const M: usize, const N: usize>(&mut self, which: [(usize, usize); M], rows: &[usize]) {
+        let (n, wide) = (self.nonzero_rows.len(), N * V::LANES);
+        let mut b = [&self.B[0][..n]; M];
+        for m in 0..M {
+            b[m] = &self.B[which[m].0][which[m].1 * n..][..n];
+        }
+        let mut i = 0;
+        while i < n {
+            let start = i.min(n - wide);
+            let mut sums = [[V::zero(); N]; M];
+            for &k in rows {
+                let column = &self.A[k * n + start..][..wide];
+                let mut a = [V::zero(); N];
+                for x in 0..N {
+                    a[x] = V::load(&column[x * V::LANES..]);
+                }
+                for m in 0..M {
+                    let b = V::splat(-b[m][k]);
+                    for x in 0..N {
+                        sums[m][x] = a[x].mul_add(b, sums[m][x]);
+                    }
+                }
+            }
+            for m in 0..M {
+                let X = &mut self.X[which[m].0][which[m].1 * n + start..][..wide];
+                for x in 0..N {
+                    sums[m][x].store(&mut X[x * V::LANES..]);
+                }
+            }
+            i += wide;
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! What a model is made of: bodies, frames, limits.
+
+use crate::joint::{Joint, Mimic};
+use condyle_spatial::{Inertia, Se3};
+use serde::{Deserialize, Serialize};
+
+/// A moving body (a link, with all that fixed joints merge into it) and the joint that carries it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Body {
+    /// The joint's name: how Pinocchio names the pair.
+    pub joint_name: String,
+    /// The link's name.
+    pub name: String,
+    /// The body on which the joint sits; smaller than this body's own number.
+    pub parent: usize,
+    /// The joint, from the parent to this body.
+    pub joint: Joint,
+    /// pXj: the joint's frame at position zero in the parent's frame.
+    pub placement: Se3<f64>,
+    /// The inertia, in the body's frame.
+    pub inertia: Inertia<f64>,
+    /// The place in q at which the joint's position begins.
+    pub idx_q: usize,
+    /// The place in v at which the joint's velocity begins.
+    pub idx_v: usize,
+    /// Set if the joint has no coordinate of its own and follows another one's.
+    pub mimic: Option<Mimic>,
+}
+
+/// A frame fixed to a body.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Frame {
+    /// The name of the link or joint, or the user's.
+    pub name: String,
+    /// The origin of the frame: a link, a joint, or the user.
+    pub kind: FrameKind,
+    /// The body to which it is fixed; 0 is the world.
+    pub body: usize,
+    /// bXf: the frame in the body's frame.
+    pub placement: Se3<f64>,
+}
+
+/// The origin of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FrameKind {
+    /// A link of the URDF.
+    Link,
+    /// A joint of the URDF: its frame on the child's side.
+    Joint,
+    /// Added by the user.
+    User,
+}
+
+/// Limits of position, velocity and effort; infinite where there are none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Limits {
+    /// Least position, nq numbers (rad, m).
+    #[serde(with = "condyle_spatial::finite::lower")]
+    pub lower: Vec<f64>,
+    /// Greatest position, nq numbers (rad, m).
+    #[serde(with = "condyle_spatial::finite::upper")]
+    pub upper: Vec<f64>,
+    /// Greatest speed, nv numbers (rad/s, m/s).
+    #[serde(with = "condyle_spatial::finite::upper")]
+    pub velocity: Vec<f64>,
+    /// Greatest effort, nv numbers (N m, N).
+    #[serde(with = "condyle_spatial::finite::upper")]
+    pub effort: Vec<f64>,
+}

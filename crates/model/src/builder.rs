@@ -1,0 +1,353 @@
+//! The builder: a model, body by body.
+
+use crate::body::{Body, Frame, FrameKind, Limits};
+use crate::error::Error;
+use crate::joint::{Joint, Mimic};
+use crate::limbs::Plan;
+use crate::model::Model;
+use crate::tree::Tree;
+use crate::validate;
+use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
+use std::collections::HashSet;
+
+/// The name of a body of a builder. [`WORLD`] is the one that is always there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BodyId(usize);
+
+/// The world, on which the first joints sit.
+pub const WORLD: BodyId = BodyId(0);
+
+/// Limits, losses and rotor of a joint; the default is none of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointOptions {
+    /// Least and greatest position (rad, m), for joints with one coordinate.
+    pub position: Option<(f64, f64)>,
+    /// Greatest speed (rad/s, m/s).
+    pub velocity: Option<f64>,
+    /// Greatest effort (N m, N).
+    pub effort: Option<f64>,
+    /// Viscous damping (N m s/rad, N s/m).
+    pub damping: f64,
+    /// Coulomb friction (N m, N).
+    pub friction: f64,
+    /// Inertia of the rotor as seen at the joint (kg m², kg).
+    pub armature: f64,
+}
+
+struct Draft {
+    body: Body,
+    options: JointOptions,
+    /// Whether it stands between the joints of a chain, without mass on purpose.
+    between: bool,
+    /// The body whose joint it follows, and how.
+    mimic: Option<(usize, Mimic)>,
+}
+
+/// Makes a [`Model`], body by body, parents first.
+///
+/// ```
+/// use condyle_model::{Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD};
+/// let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.08));
+/// let y = Vec3::new(0.0, 1.0, 0.0);
+/// let mut robot = ModelBuilder::new("double pendulum");
+/// let upper = robot.body("upper", WORLD, Joint::Revolute { axis: y }, Se3::identity(), rod);
+/// let elbow = Se3 { translation: Vec3::new(0.0, 0.0, -1.0), ..Se3::identity() };
+/// let lower = robot.body("lower", upper, Joint::Revolute { axis: y }, elbow, rod);
+/// robot.frame("tip", lower, elbow);
+/// let model = robot.build()?;
+/// assert_eq!(model.nv(), 2);
+/// # Ok::<(), condyle_model::Error>(())
+/// ```
+pub struct ModelBuilder {
+    name: String,
+    drafts: Vec<Draft>,
+    frames: Vec<Frame>,
+    gravity: Vec3<f64>,
+}
+
+impl ModelBuilder {
+    /// A robot of no bodies yet, under the gravity (0, 0, −9.81) m/s².
+    pub fn new(name: &str) -> Self {
+        let world = Body {
+            joint_name: "universe".to_owned(),
+            name: "universe".to_owned(),
+            parent: 0,
+            joint: Joint::Translation,
+            placement: Se3::identity(),
+            inertia: Inertia::zero(),
+            idx_q: 0,
+            idx_v: 0,
+            mimic: None,
+        };
+        Self {
+            name: name.to_owned(),
+            drafts: vec![Draft { body: world, options: JointOptions::default(), between: false, mimic: None }],
+            frames: Vec::new(),
+            gravity: Vec3::new(0.0, 0.0, -9.81),
+        }
+    }
+
+    /// Adds a body and its joint, both of this name, without limits. The joint sits at `placement` in the parent's
+    /// frame; `inertia` is in the body's frame, which is the joint's at position zero.
+    pub fn body(
+        &mut self,
+        name: &str,
+        parent: BodyId,
+        joint: Joint,
+        placement: Se3<f64>,
+        inertia: Inertia<f64>,
+    ) -> BodyId {
+        self.body_with((name, name), parent, joint, placement, inertia, JointOptions::default())
+    }
+
+    /// Adds a body and its joint, with names of their own (body, joint) and all that a joint may have.
+    pub fn body_with(
+        &mut self,
+        (name, joint_name): (&str, &str),
+        parent: BodyId,
+        joint: Joint,
+        placement: Se3<f64>,
+        inertia: Inertia<f64>,
+        options: JointOptions,
+    ) -> BodyId {
+        let body = Body {
+            joint_name: joint_name.to_owned(),
+            name: name.to_owned(),
+            parent: parent.0,
+            joint,
+            placement,
+            inertia,
+            idx_q: 0,
+            idx_v: 0,
+            mimic: None,
+        };
+        self.drafts.push(Draft { body, options, between: false, mimic: None });
+        BodyId(self.drafts.len() - 1)
+    }
+
+    /// Fixes more inertia to a body: `inertia` is in a frame that is at `placement` in the body's.
+    pub fn merge(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>) {
+        self.drafts[body.0].body.inertia += placement.act(inertia);
+    }
+
+    /// Adds a frame at `placement` in the body's frame.
+    pub fn frame(&mut self, name: &str, body: BodyId, placement: Se3<f64>) {
+        self.frame_of_kind(name, FrameKind::User, body, placement);
+    }
+
+    pub(crate) fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
+        self.frames.push(Frame { name: name.to_owned(), kind, body: body.0, placement });
+    }
+
+    /// Scales all masses and inertias.
+    pub(crate) fn scale_inertias(&mut self, by: f64) {
+        for draft in &mut self.drafts {
+            draft.body.inertia = draft.body.inertia.scale(by);
+        }
+    }
+
+    /// Marks a body without mass as one between the joints of a chain.
+    pub(crate) fn between(&mut self, body: BodyId) {
+        self.drafts[body.0].between = true;
+    }
+
+    /// Lets a joint follow another one, in place of a coordinate of its own; see [`Mimic`].
+    pub fn mimic(&mut self, follower: BodyId, leader: BodyId, mimic: Mimic) {
+        self.drafts[follower.0].mimic = Some((leader.0, mimic));
+    }
+
+    /// The acceleration of free fall (m/s²), in the world's frame.
+    pub fn gravity(&mut self, gravity: Vec3<f64>) {
+        self.gravity = gravity;
+    }
+
+    /// Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and freezes
+    /// the model.
+    ///
+    /// # Errors
+    /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`] and [`Error::Frame`]: names, axes, masses, limits,
+    /// placements, numbers that are not finite, what a mimic joint follows.
+    pub fn build(mut self) -> Result<Model, Error> {
+        self.check()?;
+        let order = self.depth_first();
+        let mut number = vec![0; order.len()];
+        for (new, &old) in order.iter().enumerate() {
+            number[old] = new;
+        }
+        for frame in &mut self.frames {
+            frame.body = number[frame.body];
+        }
+        // coordinates: of the joints that have their own, in order; then of those that follow one
+        let mut coordinates = Coordinates::default();
+        let mut bodies: Vec<Body> = Vec::with_capacity(order.len());
+        for (i, &old) in order.iter().enumerate() {
+            let Draft { body, options, mimic, .. } = &self.drafts[old];
+            let mut body = body.clone();
+            body.parent = number[body.parent];
+            (body.idx_q, body.idx_v) = (coordinates.nq, coordinates.nv);
+            if i > 0 && mimic.is_none() {
+                coordinates.add(body.joint, options);
+            }
+            bodies.push(body);
+        }
+        for (i, &old) in order.iter().enumerate() {
+            if let Draft { mimic: Some((leader, mimic)), options, .. } = &self.drafts[old] {
+                let (leader, mimic) = (&bodies[number[*leader]], *mimic);
+                let (idx_q, idx_v) = (leader.idx_q, leader.idx_v);
+                coordinates.armature[idx_v] += mimic.ratio * mimic.ratio * options.armature; // v_joint = ratio v
+                (bodies[i].idx_q, bodies[i].idx_v, bodies[i].mimic) = (idx_q, idx_v, Some(mimic));
+            }
+        }
+        let mut warnings = Vec::new();
+        for (body, &old) in bodies.iter().zip(&order).skip(1) {
+            validate::check_inertia(body, self.drafts[old].between, &mut warnings);
+        }
+        let Coordinates { nq, nv, limits, damping, friction, armature } = coordinates;
+        let tree = Tree::new(&bodies, nq, nv);
+        let mut model = Model {
+            name: self.name,
+            bodies,
+            frames: self.frames,
+            limits,
+            damping,
+            friction,
+            armature,
+            gravity: self.gravity,
+            limbs: Plan::new(&tree),
+            tree,
+            warnings,
+            singular: Vec::new(),
+        };
+        model.find_singular();
+        Ok(model)
+    }
+
+    /// The bodies depth first, each one's children in the order in which they were added.
+    fn depth_first(&self) -> Vec<usize> {
+        let mut children = vec![Vec::new(); self.drafts.len()];
+        for (i, draft) in self.drafts.iter().enumerate().skip(1) {
+            children[draft.body.parent].push(i);
+        }
+        let (mut order, mut stack) = (Vec::with_capacity(self.drafts.len()), vec![0]);
+        while let Some(i) = stack.pop() {
+            order.push(i);
+            stack.extend(children[i].iter().rev());
+        }
+        order
+    }
+
+    /// Checks names, bodies, joints and frames, and makes axes unit vectors.
+    fn check(&mut self) -> Result<(), Error> {
+        let (mut bodies, mut joints, mut frames) = (HashSet::new(), HashSet::new(), HashSet::new());
+        let mimics: Vec<bool> = self.drafts.iter().map(|d| d.mimic.is_some()).collect();
+        let kinds: Vec<Joint> = self.drafts.iter().map(|d| d.body.joint).collect();
+        for Draft { body, options, mimic, .. } in &mut self.drafts {
+            if !bodies.insert(body.name.clone()) {
+                return Err(Error::Duplicate { kind: "body", name: body.name.clone() });
+            }
+            if !joints.insert(body.joint_name.clone()) {
+                return Err(Error::Duplicate { kind: "joint", name: body.joint_name.clone() });
+            }
+            let wrong = |what: String| Error::Body { body: body.name.clone(), what };
+            body.joint = body.joint.normalized().map_err(wrong)?;
+            check_inertia(body).and_then(|()| check_options(options)).map_err(wrong)?;
+            if let Some((leader, mimic)) = *mimic {
+                let wrong = |what: String| Error::Joint { joint: body.joint_name.clone(), what };
+                if !(mimic.ratio.is_finite() && mimic.offset.is_finite()) {
+                    return Err(wrong(format!("mimic ratio {} or offset {} is not finite", mimic.ratio, mimic.offset)));
+                }
+                if mimics[leader] || leader == 0 {
+                    return Err(wrong("mimics a joint without a coordinate of its own".to_owned()));
+                }
+                body.joint.as_follower(kinds[leader], mimic).map_err(wrong)?;
+            }
+        }
+        for frame in &self.frames {
+            let wrong = |what: &str| Error::Frame { frame: frame.name.clone(), what: what.to_owned() };
+            if !squares(frame.placement).is_finite() {
+                return Err(wrong("is not finite"));
+            }
+            if !is_rotation(frame.placement.rotation) {
+                return Err(wrong("placement is no rotation and translation"));
+            }
+            if !frames.insert((frame.name.clone(), frame.kind as u8)) {
+                return Err(Error::Duplicate { kind: "frame", name: frame.name.clone() });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Says what is wrong with a body's inertia or placement.
+fn check_inertia(Body { inertia: I, placement, .. }: &Body) -> Result<(), String> {
+    let Sym3 { xx, yy, zz, xy, xz, yz } = I.rotational;
+    if !(I.mass_com.norm_squared() + (xx + yy + zz + xy + xz + yz) + squares(*placement)).is_finite() {
+        return Err("inertia or placement is not finite".to_owned());
+    }
+    if !is_rotation(placement.rotation) {
+        return Err("placement is no rotation and translation".to_owned());
+    }
+    if !(I.mass >= 0.0 && I.mass.is_finite()) {
+        return Err(format!("mass is {}", I.mass));
+    }
+    Ok(())
+}
+
+/// Says what is wrong with a joint's limits and losses.
+fn check_options(options: &JointOptions) -> Result<(), String> {
+    if let Some((lower, upper)) = options.position
+        && (lower > upper || lower.is_nan() || upper.is_nan())
+    {
+        return Err(format!("lower limit {lower} is above upper limit {upper}"));
+    }
+    let others = [options.damping, options.friction, options.armature];
+    if others.iter().chain(&options.velocity).chain(&options.effort).any(|x| x.is_nan()) {
+        return Err("a limit, damping, friction or armature is not a number".to_owned());
+    }
+    Ok(())
+}
+
+/// The sum of the squares of all numbers of a pose: finite if they are.
+fn squares(X: Se3<f64>) -> f64 {
+    X.rotation.columns().into_iter().chain([X.translation]).map(|c| c.norm_squared()).sum()
+}
+
+/// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
+const ROTATION_ROUNDING: f64 = 1e-6;
+
+/// Whether the columns of R are unit vectors at right angles, right-handed.
+fn is_rotation(R: Mat3<f64>) -> bool {
+    let Mat3 { x, y, z } = R;
+    let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
+    off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
+}
+
+/// The numbers that a model has for each coordinate.
+#[derive(Default)]
+struct Coordinates {
+    nq: usize,
+    nv: usize,
+    limits: Limits,
+    damping: Vec<f64>,
+    friction: Vec<f64>,
+    armature: Vec<f64>,
+}
+
+impl Coordinates {
+    /// Adds those of a joint, with their limits and losses.
+    fn add(&mut self, joint: Joint, options: &JointOptions) {
+        let (lower, upper) = match options.position {
+            Some(limits) if joint.nq() == 1 => limits,
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        };
+        self.nq += joint.nq();
+        self.nv += joint.nv();
+        self.limits.lower.resize(self.nq, lower);
+        self.limits.upper.resize(self.nq, upper);
+        self.limits.velocity.resize(self.nv, options.velocity.unwrap_or(f64::INFINITY));
+        self.limits.effort.resize(self.nv, options.effort.unwrap_or(f64::INFINITY));
+        self.damping.resize(self.nv, options.damping);
+        self.friction.resize(self.nv, options.friction);
+        self.armature.resize(self.nv, options.armature);
+    }
+}

@@ -1,0 +1,165 @@
+//! Models from models: chains of joints, appended robots, locked joints.
+
+use crate::body::FrameKind;
+use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+use crate::error::Error;
+use crate::joint::Joint;
+use crate::layout::Single;
+use crate::model::Model;
+use condyle_linalg::check;
+use condyle_spatial::{Inertia, Se3, Vec3};
+
+impl ModelBuilder {
+    /// Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+    ///
+    /// Its coordinates are those of the joints, one after the other. Between them are bodies without mass, named after
+    /// the last one: `name#1`, `name#2`, …. Returns the last body, which carries `inertia`.
+    ///
+    /// - universal joint about unit vectors a and b: `[(Revolute { a }, placement), (Revolute { b }, identity)]`;
+    /// - a ball in roll-pitch-yaw angles (z, y, x): [`spherical_zyx`](Self::spherical_zyx).
+    ///
+    /// # Panics
+    /// If there are no joints.
+    pub fn chain(&mut self, name: &str, parent: BodyId, joints: &[(Joint, Se3<f64>)], inertia: Inertia<f64>) -> BodyId {
+        let ((last, placement), before) = joints.split_last().expect("joints: expected at least one");
+        let mut at = parent;
+        for (i, &(joint, placement)) in before.iter().enumerate() {
+            at = self.body(&format!("{name}#{}", i + 1), at, joint, placement, Inertia::zero());
+            self.between(at);
+        }
+        self.body(name, at, *last, *placement, inertia)
+    }
+
+    /// Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+    ///
+    /// M is singular where q₁ = ±π/2. [`Joint::Spherical`] has no such place.
+    ///
+    /// ```
+    /// use condyle_model::{Inertia, ModelBuilder, Se3, Sym3, Vec3, WORLD};
+    /// let mut robot = ModelBuilder::new("ball");
+    /// robot.spherical_zyx("ball", WORLD, Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(0.1)));
+    /// let ball = robot.build()?;
+    /// assert_eq!(ball.nv(), 3);
+    /// let axes: Vec<_> = ball.bodies()[1..].iter().filter_map(|body| body.joint.axis()).collect();
+    /// assert_eq!(axes, [Vec3::new(0.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(1.0, 0.0, 0.0)]);
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    pub fn spherical_zyx(&mut self, name: &str, parent: BodyId, placement: Se3<f64>, inertia: Inertia<f64>) -> BodyId {
+        let about = |x, y, z| Joint::Revolute { axis: Vec3::new(x, y, z) };
+        let there = Se3::identity();
+        let joints = [(about(0.0, 0.0, 1.0), placement), (about(0.0, 1.0, 0.0), there), (about(1.0, 0.0, 0.0), there)];
+        self.chain(name, parent, &joints, inertia)
+    }
+
+    /// Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before them.
+    ///
+    /// ```
+    /// use condyle_model::{ModelBuilder, Se3, Vec3, WORLD, robots};
+    /// let at = |y| Se3 { translation: Vec3::new(0.0, y, 0.5), ..Se3::identity() };
+    /// let mut two = ModelBuilder::new("two arms");
+    /// two.append(WORLD, at(0.4), &robots::arm7(), "left_");
+    /// two.append(WORLD, at(-0.4), &robots::arm7(), "right_");
+    /// let two = two.build()?;
+    /// assert_eq!(two.nv(), 14);
+    /// assert!(two.frame("right_tool").is_ok());
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    pub fn append(&mut self, parent: BodyId, placement: Se3<f64>, model: &Model, prefix: &str) {
+        self.append_locked(parent, placement, model, prefix, &[], &[]);
+    }
+
+    /// Adds a whole robot, as `append` does, with some bodies fixed where they are at q.
+    fn append_locked(
+        &mut self,
+        parent: BodyId,
+        placement: Se3<f64>,
+        model: &Model,
+        prefix: &str,
+        locked: &[usize],
+        q: &[f64],
+    ) {
+        // where each body went: on which body of this builder, and at which placement there
+        let mut place = vec![(parent, placement)];
+        self.merge(parent, placement, model.bodies[0].inertia);
+        let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero()); // bXz
+        for (i, body) in model.bodies.iter().enumerate().skip(1) {
+            let (on, pXp) = place[body.parent];
+            if locked.contains(&i) {
+                let l = Single::<f64, f64>::new(model);
+                let pXb = pXp * turned(body.parent) * Joint::placement(&l, i, q) * turned(i).inverse();
+                self.merge(on, pXb, body.inertia);
+                place.push((on, pXb));
+                continue;
+            }
+            let (iq, iv) = (body.idx_q, body.idx_v);
+            let finite = |x: f64| x.is_finite().then_some(x);
+            let options = JointOptions {
+                position: (body.joint.nq() == 1).then(|| (model.limits.lower[iq], model.limits.upper[iq])),
+                velocity: finite(model.limits.velocity[iv]),
+                effort: finite(model.limits.effort[iv]),
+                damping: model.damping[iv],
+                friction: model.friction[iv],
+                armature: if body.mimic.is_some() { 0.0 } else { model.armature[iv] }, // the leader's has all of it
+            };
+            let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
+            let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
+            place.push((id, Se3::identity()));
+        }
+        for (i, body) in model.bodies.iter().enumerate().skip(1) {
+            if let Some(mimic) = body.mimic
+                && !locked.contains(&i)
+            {
+                let leads = |b: &crate::body::Body| b.mimic.is_none() && b.idx_v == body.idx_v;
+                let leader = 1 + model.bodies[1..].iter().position(leads).expect("a mimic joint follows a joint");
+                self.mimic(place[i].0, place[leader].0, mimic);
+            }
+        }
+        for frame in &model.frames {
+            let (on, pXb) = place[frame.body];
+            self.frame_of_kind(&format!("{prefix}{}", frame.name), frame.kind, on, pXb * frame.placement);
+        }
+        // a locked body's own frame stays, under its joint's name, as after a fixed joint
+        for &i in locked {
+            let (name, (on, pXb)) = (format!("{prefix}{}", model.bodies[i].joint_name), place[i]);
+            if !model.frames.iter().any(|f| f.kind == FrameKind::Joint && f.name == model.bodies[i].joint_name) {
+                self.frame_of_kind(&name, FrameKind::Joint, on, pXb);
+            }
+        }
+    }
+}
+
+impl Model {
+    /// The same robot with some joints, named by their bodies, locked where they are at q.
+    ///
+    /// Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
+    /// locked with it.
+    ///
+    /// ```
+    /// use condyle_model::robots;
+    /// let arm = robots::arm7();
+    /// let mut q = [0.0; 7];
+    /// q[3] = 1.2;
+    /// let stiff = arm.lock(&[arm.joint("joint4")?], &q)?;
+    /// assert_eq!((stiff.nv(), stiff.total_mass()), (6, arm.total_mass()));
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`ModelBuilder::build`].
+    ///
+    /// # Panics
+    /// If `q` has not nq numbers, or a body does not exist or is the world.
+    pub fn lock(&self, bodies: &[usize], q: &[f64]) -> Result<Self, Error> {
+        check("q", q.len(), self.tree.nq);
+        for &i in bodies {
+            assert!((1..self.bodies.len()).contains(&i), "bodies: there is no joint {i}");
+        }
+        let coordinates: Vec<usize> = bodies.iter().map(|&i| self.bodies[i].idx_v).collect();
+        let locked: Vec<usize> =
+            (1..self.bodies.len()).filter(|&i| coordinates.contains(&self.bodies[i].idx_v)).collect();
+        let mut builder = ModelBuilder::new(&self.name);
+        builder.gravity(self.gravity);
+        builder.append_locked(WORLD, Se3::identity(), self, "", &locked, q);
+        builder.build()
+    }
+}

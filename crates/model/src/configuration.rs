@@ -1,0 +1,261 @@
+//! The space of positions: a product of vector spaces and groups, with q ⊕ v on the tangent vectors v.
+
+use crate::joint::GroupJacobian;
+use crate::model::Model;
+use crate::tree::Space;
+use condyle_linalg::check;
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+
+/// The greatest distance from zero (rad, m) of a random position in a coordinate that has no limits.
+const UNLIMITED: f64 = 3.0;
+
+/// The position in which every body is at its joint's frame: zeros, and rotations by nothing.
+///
+/// ```
+/// use condyle_model::{neutral, robots};
+/// assert_eq!(neutral(&robots::quadruped())[..7], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+/// ```
+pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
+    let mut q = vec![0.0; model.nq()];
+    for (joint, iq, _) in model.tree.coordinates() {
+        joint.neutral(&mut q[iq]);
+    }
+    q
+}
+
+/// A position drawn uniformly: between its limits, within ±3 (rad, m) where a coordinate has none, over the whole group
+/// for rotations. The result depends on nothing but the model and the generator.
+///
+/// ```
+/// use condyle_model::{random_configuration, robots};
+/// use rand::SeedableRng;
+/// let q = random_configuration(&robots::arm7(), &mut rand::rngs::StdRng::seed_from_u64(1));
+/// assert_eq!(q.len(), 7);
+/// ```
+pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Vec<f64> {
+    let mut q = vec![0.0; model.nq()];
+    for (joint, iq, _) in model.tree.coordinates() {
+        let bound = |limits: &[f64], otherwise: f64| -> Vec<f64> {
+            limits.iter().map(|&x| if x.abs() < 1e6 { x } else { otherwise }).collect()
+        };
+        let lower = bound(&model.limits.lower[iq.clone()], -UNLIMITED);
+        let upper = bound(&model.limits.upper[iq.clone()], UNLIMITED);
+        joint.random(rng, &lower, &upper, &mut q[iq]);
+    }
+    q
+}
+
+/// q ⊕ v: the position after moving with the velocity v for one unit of time.
+///
+/// q: nq numbers; v: nv; out: nq. Allocates nothing.
+///
+/// ```
+/// use condyle_model::{difference, integrate, neutral, robots};
+/// let quadruped = robots::quadruped();
+/// let (q, v) = (neutral(&quadruped), vec![0.1; 18]);
+/// let (mut moved, mut back) = (vec![0.0; 19], vec![0.0; 18]);
+/// integrate(&quadruped, &q, &v, &mut moved);
+/// difference(&quadruped, &q, &moved, &mut back);
+/// assert!(back.iter().all(|x| (x - 0.1).abs() < 1e-15));
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]) {
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("out", out.len(), model.nq());
+    for space in &model.tree.spaces {
+        space.joint.integrate(&q[space.q.clone()], &v[space.v.clone()], &mut out[space.q.clone()]);
+    }
+}
+
+/// q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one.
+///
+/// q0, q1: nq numbers; out: nv. Allocates nothing.
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut [S]) {
+    check("q0", q0.len(), model.nq());
+    check("q1", q1.len(), model.nq());
+    check("out", out.len(), model.nv());
+    for space in &model.tree.spaces {
+        space.joint.difference(&q0[space.q.clone()], &q1[space.q.clone()], &mut out[space.v.clone()]);
+    }
+}
+
+/// q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity.
+///
+/// q0, q1, out: nq numbers; tangent: scratch of nv numbers, left at t (q₁ ⊖ q₀). Allocates nothing.
+///
+/// ```
+/// use condyle_model::{interpolate, robots};
+/// let (mut q, mut tangent) = ([0.0; 7], [0.0; 7]);
+/// interpolate(&robots::arm7(), &[0.0; 7], &[1.0; 7], 0.25, &mut tangent, &mut q);
+/// assert_eq!(q, [0.25; 7]);
+/// ```
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tangent: &mut [S], out: &mut [S]) {
+    difference(model, q0, q1, tangent);
+    for x in tangent.iter_mut() {
+        *x = *x * t;
+    }
+    integrate(model, q0, tangent, out);
+}
+
+/// ‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+///
+/// q0, q1: nq numbers; tangent: scratch of nv numbers, left at q₁ ⊖ q₀. Allocates nothing.
+///
+/// # Panics
+/// If an argument has the wrong length.
+pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mut [S]) -> S {
+    difference(model, q0, q1, tangent);
+    let mut sum = S::zero();
+    for &x in tangent.iter() {
+        sum = x.mul_add(x, sum);
+    }
+    sum.sqrt()
+}
+
+/// Brings quaternions and (cos, sin) pairs in q back to length 1, in place.
+///
+/// q: nq numbers. Allocates nothing.
+///
+/// ```
+/// use condyle_model::{neutral, normalize, robots};
+/// let quadruped = robots::quadruped();
+/// let mut q = neutral(&quadruped);
+/// q[6] = 2.0;
+/// normalize(&quadruped, &mut q);
+/// assert_eq!(q, neutral(&quadruped));
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers.
+pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
+    check("q", q.len(), model.nq());
+    for (joint, iq, _) in model.tree.coordinates() {
+        if let Some(unit) = joint.unit_part() {
+            let unit = &mut q[iq][unit];
+            let mut sum = S::zero();
+            for &x in unit.iter() {
+                sum = x.mul_add(x, sum);
+            }
+            let r = sum.sqrt().recip();
+            for x in unit {
+                *x = *x * r;
+            }
+        }
+    }
+}
+
+/// Takes the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: the inverse of ∂(q ⊕ v)/∂q, in place.
+///
+/// Along a vector space nothing changes; along a group the frame of the body is turned back by exp(v).
+/// v: nv numbers; X: nv rows. Allocates nothing.
+///
+/// # Panics
+/// If `v` has not nv numbers or `X` has not nv rows.
+pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
+    check("v", v.len(), model.nv());
+    assert!(X.nrows() == model.nv(), "X: expected {} rows, found {}", model.nv(), X.nrows());
+    for (joint, _, iv) in model.tree.coordinates() {
+        let mut back = [S::zero(); 6];
+        for (back, &v) in back.iter_mut().zip(&v[iv.clone()]) {
+            *back = -v; // (Ad exp(v)⁻¹)⁻¹ = Ad exp(−v)⁻¹
+        }
+        let Some(map) = joint.jacobian(GroupJacobian::Transport, &back[..iv.len()]) else { continue };
+        for mut column in X.column_iter_mut() {
+            let mut m = [S::zero(); 6];
+            for (k, &axis) in joint.axes().iter().enumerate() {
+                m[axis] = column[iv.start + k];
+            }
+            let m = (map * condyle_spatial::Motion::from(m)).to_array();
+            for (k, &axis) in joint.axes().iter().enumerate() {
+                column[iv.start + k] = m[axis];
+            }
+        }
+    }
+}
+
+/// The argument with respect to which a Jacobian of [`integrate`] is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IntegrateArgument {
+    /// The position q.
+    Position,
+    /// The velocity v.
+    Velocity,
+}
+
+/// ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v, nv × nv, block-diagonal, between tangent spaces; it does not depend on q.
+///
+/// v: nv numbers; J is overwritten. Allocates nothing.
+///
+/// # Panics
+/// If `v` has not nv numbers or `J` is not nv × nv.
+pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
+    let which = match argument {
+        IntegrateArgument::Position => GroupJacobian::Transport,
+        IntegrateArgument::Velocity => GroupJacobian::Exp,
+    };
+    block_diagonal(model, ("v", v), which, S::one(), J);
+}
+
+/// The argument with respect to which a Jacobian of [`difference`] is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DifferenceArgument {
+    /// The position q₀ that is subtracted.
+    From,
+    /// The position q₁.
+    To,
+}
+
+/// ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁, nv × nv, block-diagonal, between tangent spaces, given d = q₁ ⊖ q₀.
+///
+/// d: nv numbers; J is overwritten. Allocates nothing.
+///
+/// # Panics
+/// If `d` has not nv numbers or `J` is not nv × nv.
+pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
+    let sign = match argument {
+        DifferenceArgument::From => -S::one(), // −J_log(−d)
+        DifferenceArgument::To => S::one(),
+    };
+    block_diagonal(model, ("d", d), GroupJacobian::Log, sign, J);
+}
+
+/// sign · J(sign · v), joint by joint, for a tangent vector v with the name that its caller gave it.
+fn block_diagonal<S: Scalar, R>(
+    model: &Model<R>,
+    (name, v): (&str, &[S]),
+    which: GroupJacobian,
+    sign: S,
+    J: &mut DMatrix<S>,
+) {
+    check(name, v.len(), model.nv());
+    assert!(J.shape() == (model.nv(), model.nv()), "J: expected {0} × {0}, found {1:?}", model.nv(), J.shape());
+    J.as_mut_slice().fill(S::zero());
+    for Space { joint, v: iv, .. } in model.tree.spaces.iter().cloned() {
+        let mut signed = [S::zero(); 6];
+        for (signed, &v) in signed.iter_mut().zip(&v[iv.clone()]) {
+            *signed = v * sign;
+        }
+        match joint.jacobian(which, &signed[..iv.len().min(6)]) {
+            None => iv.for_each(|k| J[(k, k)] = sign),
+            Some(map) => {
+                let columns = map.columns();
+                for (k, &column) in joint.axes().iter().enumerate() {
+                    let column = columns[column].scale(sign).to_array();
+                    for (r, &row) in joint.axes().iter().enumerate() {
+                        J[(iv.start + r, iv.start + k)] = column[row];
+                    }
+                }
+            }
+        }
+    }
+}

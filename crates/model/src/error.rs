@@ -1,0 +1,193 @@
+//! Errors in a robot's description, and warnings about it.
+
+use serde::{Deserialize, Serialize};
+
+/// An error in a robot's description, or in a name that was looked up in it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file could not be read.
+    #[error("{file}: {what}")]
+    File {
+        /// Path as given.
+        file: String,
+        /// The operating system's word.
+        what: String,
+    },
+    /// No folder has the file that a `package://` address names.
+    #[error("{address}: no such file in a package `{package}`; {}", where_looked(looked))]
+    Package {
+        /// As given.
+        address: String,
+        /// The package's name.
+        package: String,
+        /// The places at which it was looked for.
+        looked: Vec<String>,
+    },
+    /// The text is not XML.
+    #[error("{file}:{line}: not well-formed XML: {what}")]
+    Xml {
+        /// Path, or `<string>`.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// The parser's word.
+        what: String,
+    },
+    /// An element of a URDF is wrong.
+    #[error("{file}:{line}: {element}: {what}")]
+    Urdf {
+        /// Path, or `<string>`.
+        file: String,
+        /// The line on which the element begins, counted from 1.
+        line: u32,
+        /// For example ``joint `elbow` ``.
+        element: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
+    /// An element of an MJCF or SDF is wrong.
+    #[error("{file}:{line}: {element}: {what}")]
+    Element {
+        /// Path, or `<string>`; of the included file, where it is in one.
+        file: String,
+        /// The line on which the element begins, counted from 1.
+        line: u32,
+        /// For example ``joint `elbow` ``.
+        element: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
+    /// A body given to a builder is wrong.
+    #[error("body `{body}`: {what}")]
+    Body {
+        /// The body's name.
+        body: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
+    /// A joint given to a builder is wrong.
+    #[error("joint `{joint}`: {what}")]
+    Joint {
+        /// The joint's name.
+        joint: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
+    /// A frame is wrong.
+    #[error("frame `{frame}`: {what}")]
+    Frame {
+        /// The frame's name.
+        frame: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
+    /// A list in a model's file is too short or too long.
+    #[error("{name}: expected {expected} entries, found {found}")]
+    Length {
+        /// The name of the list, for example `limits.lower`.
+        name: &'static str,
+        /// The number of entries that it must have.
+        expected: usize,
+        /// The number of entries that it has.
+        found: usize,
+    },
+    /// A constraint cannot be.
+    #[error("constraint {constraint}: {what}")]
+    Constraint {
+        /// The constraint's number, counted from 0.
+        constraint: usize,
+        /// The fault, with the numbers.
+        what: String,
+    },
+    /// A strict loader met what is only odd.
+    #[error("{file}: {warning}")]
+    Strict {
+        /// Path, or `<string>`.
+        file: String,
+        /// The warning.
+        warning: Warning,
+    },
+    /// Two bodies, joints or frames of one kind have the same name.
+    #[error("two {kind}s are named `{name}`")]
+    Duplicate {
+        /// `body`, `joint` or `frame`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// No frame has this name.
+    #[error("unknown frame `{name}`; nearest is `{nearest}`")]
+    UnknownFrame {
+        /// As asked for.
+        name: String,
+        /// The most similar name there is.
+        nearest: String,
+    },
+    /// No joint has this name.
+    #[error("unknown joint `{name}`; nearest is `{nearest}`")]
+    UnknownJoint {
+        /// As asked for.
+        name: String,
+        /// The most similar name there is.
+        nearest: String,
+    },
+}
+
+/// Something odd about a model. Loaders collect warnings, or refuse the model when they are strict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A body that moves has neither mass nor inertia.
+    #[error("body `{body}` moves and has no mass")]
+    Massless {
+        /// The body.
+        body: String,
+    },
+    /// A body's rotational inertia about its centre of mass has a negative principal moment.
+    #[error("body `{body}`: a principal moment of inertia is {moment:e} kg m²")]
+    Negative {
+        /// The body.
+        body: String,
+        /// The least moment (kg m²).
+        moment: f64,
+    },
+    /// One principal moment is larger than the sum of the others: no distribution of mass has such an inertia.
+    #[error(
+        "body `{body}`: principal moments {} > {} + {} kg m² break the triangle inequality",
+        moments[2], moments[0], moments[1]
+    )]
+    Triangle {
+        /// The body.
+        body: String,
+        /// The principal moments (kg m²), least first.
+        moments: [f64; 3],
+    },
+    /// Nothing resists a joint: M is singular, and forward dynamics has no answer.
+    #[error("joint `{joint}` moves nothing that has inertia along it: the inertia matrix is singular")]
+    Singular {
+        /// The joint.
+        joint: String,
+    },
+    /// A loader left something out that a tree of bodies cannot have, or assumed something.
+    #[error("{element}: {what}")]
+    LeftOut {
+        /// For example ``joint `loop` ``.
+        element: String,
+        /// The thing that was left out, and why.
+        what: String,
+    },
+}
+
+/// The end of the message of [`Error::Package`].
+fn where_looked(looked: &[String]) -> String {
+    if looked.is_empty() {
+        return "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)".to_owned();
+    }
+    format!("looked for {}", looked.join(", "))
+}
+
+/// The most similar of some names (optimal string alignment distance).
+pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
+    names.min_by_key(|n| strsim::osa_distance(n, name)).unwrap_or_default().to_owned()
+}

@@ -1,0 +1,136 @@
+//! Models in files of serde's formats: they have what a user may edit. All else follows from it, and is made and checked when
+//! a file is read.
+
+use crate::body::{Body, Frame, Limits};
+use crate::builder::{BodyId, ModelBuilder, WORLD};
+use crate::error::{Error, Warning};
+use crate::model::Model;
+use condyle_spatial::{Se3, Vec3};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// The fields of a model that stand in a file, each as in [`Model`].
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Description {
+    name: String,
+    bodies: Vec<Body>,
+    frames: Vec<Frame>,
+    limits: Limits,
+    damping: Vec<f64>,
+    friction: Vec<f64>,
+    armature: Vec<f64>,
+    gravity: Vec3<f64>,
+    warnings: Vec<Warning>,
+}
+
+impl Serialize for Model {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let description = Description {
+            name: self.name.clone(),
+            bodies: self.bodies.clone(),
+            frames: self.frames.clone(),
+            limits: self.limits.clone(),
+            damping: self.damping.clone(),
+            friction: self.friction.clone(),
+            armature: self.armature.clone(),
+            gravity: self.gravity,
+            warnings: self.warnings.clone(),
+        };
+        description.serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Model {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        Description::deserialize(from)?.model().map_err(serde::de::Error::custom)
+    }
+}
+
+impl Description {
+    /// Builds the model anew.
+    fn model(self) -> Result<Model, Error> {
+        let mut builder = ModelBuilder::new(&self.name);
+        builder.gravity(self.gravity);
+        let ids = self.add_bodies(&mut builder)?;
+        for frame in &self.frames {
+            let Some(&body) = ids.get(frame.body) else {
+                let what = format!("there is no body {}", frame.body);
+                return Err(Error::Frame { frame: frame.name.clone(), what });
+            };
+            builder.frame_of_kind(&frame.name, frame.kind, body, frame.placement);
+        }
+        let mut model = builder.build()?;
+        for (built, body) in model.bodies.iter().zip(&self.bodies).skip(1) {
+            let (expected, found) = ((built.idx_q, built.idx_v), (body.idx_q, body.idx_v));
+            if expected != found {
+                let what = format!("its coordinates in q and v begin at {found:?}, expected {expected:?}");
+                return Err(Error::Body { body: body.name.clone(), what });
+            }
+        }
+        self.check_coordinates(model.tree.nq, model.tree.nv)?;
+        let Self { limits, damping, friction, armature, warnings, .. } = self;
+        (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
+        model.warnings = warnings;
+        model.find_singular();
+        Ok(model)
+    }
+
+    /// Adds the bodies, which must stand depth first.
+    fn add_bodies(&self, builder: &mut ModelBuilder) -> Result<Vec<BodyId>, Error> {
+        let Some(world) = self.bodies.first() else {
+            return Err(Error::Length { name: "bodies", expected: 1, found: 0 });
+        };
+        builder.merge(WORLD, Se3::identity(), world.inertia);
+        let (mut ids, mut path) = (vec![WORLD], vec![0]);
+        for (i, body) in self.bodies.iter().enumerate().skip(1) {
+            while path.last().is_some_and(|&last| last != body.parent) {
+                path.pop();
+            }
+            if path.is_empty() {
+                let what = format!("number {i} on body {}: bodies stand parents first, depth first", body.parent);
+                return Err(Error::Body { body: body.name.clone(), what });
+            }
+            path.push(i);
+            let (names, parent) = ((&*body.name, &*body.joint_name), ids[body.parent]);
+            let options = Default::default();
+            ids.push(builder.body_with(names, parent, body.joint, body.placement, body.inertia, options));
+        }
+        for (i, body) in self.bodies.iter().enumerate().skip(1) {
+            let Some(mimic) = body.mimic else { continue };
+            let leads = |b: &Body| b.mimic.is_none() && b.idx_v == body.idx_v;
+            let Some(leader) = self.bodies[1..].iter().position(leads) else {
+                let what = format!("mimics the joint whose velocity begins at {}: there is none", body.idx_v);
+                return Err(Error::Joint { joint: body.joint_name.clone(), what });
+            };
+            builder.mimic(ids[i], ids[leader + 1], mimic);
+        }
+        Ok(ids)
+    }
+
+    /// Checks what has a number for each coordinate.
+    fn check_coordinates(&self, nq: usize, nv: usize) -> Result<(), Error> {
+        let Limits { lower, upper, velocity, effort } = &self.limits;
+        for (name, numbers, expected) in [
+            ("limits.lower", lower, nq),
+            ("limits.upper", upper, nq),
+            ("limits.velocity", velocity, nv),
+            ("limits.effort", effort, nv),
+            ("damping", &self.damping, nv),
+            ("friction", &self.friction, nv),
+            ("armature", &self.armature, nv),
+        ] {
+            if numbers.len() != expected {
+                return Err(Error::Length { name, expected, found: numbers.len() });
+            }
+        }
+        for body in self.bodies.iter().skip(1).filter(|b| b.mimic.is_none()) {
+            for k in body.idx_q..body.idx_q + body.joint.nq() {
+                if lower[k].is_nan() || upper[k].is_nan() || lower[k] > upper[k] {
+                    let what = format!("lower limit {} is above upper limit {}", lower[k], upper[k]);
+                    return Err(Error::Joint { joint: body.joint_name.clone(), what });
+                }
+            }
+        }
+        Ok(())
+    }
+}

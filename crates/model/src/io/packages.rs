@@ -1,0 +1,59 @@
+//! `package://name/path` addresses, as ROS writes them, and where packages are looked for.
+
+use crate::error::Error;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+/// How an address of a file in a package begins.
+const SCHEME: &str = "package://";
+
+/// The file that a path or a `package://` address names.
+pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error> {
+    match path.to_str().and_then(|p| p.strip_prefix(SCHEME)) {
+        None => Ok(path.to_owned()),
+        Some(address) => {
+            let [ros, ament] = ["ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"].map(std::env::var_os);
+            find(address, &folders(packages, ros, ament))
+        }
+    }
+}
+
+/// All folders in which packages may be, the most particular first.
+fn folders(packages: &[PathBuf], ros: Option<OsString>, ament: Option<OsString>) -> Vec<PathBuf> {
+    let split = |paths: Option<OsString>| -> Vec<PathBuf> {
+        let paths = paths.unwrap_or_default();
+        std::env::split_paths(&paths).filter(|p| !p.as_os_str().is_empty()).collect()
+    };
+    let installed = split(ament).into_iter().map(|prefix| prefix.join("share"));
+    packages.iter().cloned().chain(split(ros)).chain(installed).collect()
+}
+
+/// The first such file: of a package in a folder, or of a folder that is the package itself.
+fn find(address: &str, folders: &[PathBuf]) -> Result<PathBuf, Error> {
+    let (package, path) = address.split_once('/').unwrap_or((address, ""));
+    let mut looked = Vec::new();
+    for folder in folders {
+        let itself = folder.file_name().is_some_and(|name| name == package).then(|| folder.join(path));
+        for file in [Some(folder.join(package).join(path)), itself].into_iter().flatten() {
+            if !package.is_empty() && file.is_file() {
+                return Ok(file);
+            }
+            looked.push(file.display().to_string());
+        }
+    }
+    Err(Error::Package { address: format!("{SCHEME}{address}"), package: package.to_owned(), looked })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::folders;
+    use std::path::PathBuf;
+
+    #[test]
+    fn the_most_particular_first() {
+        let list = |paths: &[&str]| Some(std::env::join_paths(paths).unwrap());
+        let found = folders(&[PathBuf::from("own")], list(&["a", "", "b"]), list(&["opt", "home"]));
+        assert_eq!(found, ["own", "a", "b", "opt/share", "home/share"].map(PathBuf::from));
+        assert!(folders(&[], None, None).is_empty());
+    }
+}

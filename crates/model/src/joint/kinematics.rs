@@ -1,0 +1,134 @@
+//! What a pass asks of a joint: where its body is, how it moves, what efforts a force exerts.
+
+use super::{Joint, JointMotion, rotated_about_z};
+use crate::layout::Layout;
+use condyle_spatial::{Act, Force, Motion, Quaternion, Scalar, Se3, Vec3};
+
+/// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands behind the last body has no
+/// meaning.
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub struct JointSinCos<S> {
+    /// Shape: bodies, in whole steps. Written by: `Joint::sin_cos`.
+    pub sin: Vec<S>,
+    /// Shape: as sin. Written by: `Joint::sin_cos`.
+    pub cos: Vec<S>,
+}
+
+impl<S: Scalar> JointSinCos<S> {
+    /// Allocates room for some bodies, the world included.
+    pub fn new(bodies: usize) -> Self {
+        let n = bodies.next_multiple_of(4);
+        Self { sin: vec![S::zero(); n], cos: vec![S::zero(); n] }
+    }
+}
+
+#[doc(hidden)]
+impl Joint {
+    /// The sine and cosine of the angle by which each joint turns about z (0 and 1 where it does not), all of them at once.
+    #[inline(always)]
+    pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
+        for i in l.bodies() {
+            if let Self::Revolute { .. } | Self::Helical { .. } = l.joint(i) {
+                sin[i] = l.position(q, i, 0);
+            }
+        }
+        L::S::sin_cos_of_all(sin, cos);
+        for i in l.bodies() {
+            match l.joint(i) {
+                Self::Continuous { .. } => (cos[i], sin[i]) = (l.position(q, i, 0), l.position(q, i, 1)),
+                Self::Planar => (cos[i], sin[i]) = (l.position(q, i, 2), l.position(q, i, 3)),
+                _ => {}
+            }
+        }
+    }
+
+    /// λXi = X_T X_J(q), for joint i of a pass.
+    #[inline(always)]
+    pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
+        let (sin, cos) = match l.joint(i) {
+            Self::Revolute { .. } | Self::Helical { .. } => l.position(q, i, 0).sin_cos(),
+            Self::Continuous { .. } => (l.position(q, i, 1), l.position(q, i, 0)),
+            Self::Planar => (l.position(q, i, 3), l.position(q, i, 2)),
+            _ => (L::S::zero(), L::S::one()),
+        };
+        Self::placement_with(l, i, q, sin, cos)
+    }
+
+    /// λXi = X_T X_J(q), for joint i of a pass, whose sine and cosine are known.
+    #[inline(always)]
+    pub fn placement_with<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
+        let X_T = l.placement(i);
+        match l.joint(i) {
+            Self::Revolute { .. } | Self::Continuous { .. } => rotated_about_z(X_T, sin, cos),
+            Self::Prismatic { .. } => {
+                let d = l.position(q, i, 0);
+                Se3::new(X_T.rotation, X_T.rotation.z.scale_add(d, X_T.translation))
+            }
+            Self::Helical { pitch, .. } => {
+                let X = rotated_about_z(X_T, sin, cos);
+                let d = l.position(q, i, 0) * L::S::splat(pitch);
+                Se3::new(X.rotation, X.rotation.z.scale_add(d, X_T.translation))
+            }
+            Self::Spherical => {
+                let R = quaternion(l, i, q, 0).to_rotation();
+                Se3::new(X_T.rotation * R, X_T.translation)
+            }
+            Self::Planar => {
+                let p = Vec3::new(l.position(q, i, 0), l.position(q, i, 1), L::S::zero());
+                let X = rotated_about_z(X_T, sin, cos);
+                Se3::new(X.rotation, X_T.act(p))
+            }
+            Self::Translation => Se3::new(X_T.rotation, X_T.act(point(l, i, q))),
+            Self::FreeFlyer => X_T * Se3::new(quaternion(l, i, q, 3).to_rotation(), point(l, i, q)),
+        }
+    }
+
+    /// S v of joint i in the body's frame, for the velocity or acceleration coordinates v.
+    #[inline(always)]
+    pub fn motion<L: Layout>(l: &L, i: usize, v: &[L::S]) -> JointMotion<L::S> {
+        match l.joint(i) {
+            Self::Revolute { .. } | Self::Continuous { .. } => JointMotion::Revolute(l.joint_velocity(v, i, 0)),
+            Self::Prismatic { .. } => JointMotion::Prismatic(l.joint_velocity(v, i, 0)),
+            Self::Helical { pitch, .. } => {
+                let (o, x) = (L::S::zero(), l.joint_velocity(v, i, 0));
+                JointMotion::General(Motion::new(Vec3::new(o, o, x * L::S::splat(pitch)), Vec3::new(o, o, x)))
+            }
+            joint => {
+                let mut m = [L::S::zero(); 6];
+                for (k, &axis) in joint.axes().iter().enumerate() {
+                    m[axis] = l.joint_velocity(v, i, k);
+                }
+                JointMotion::General(m.into())
+            }
+        }
+    }
+
+    /// Sᵀ f of joint i, added to the coordinates τ.
+    #[inline(always)]
+    pub fn project<L: Layout>(l: &L, i: usize, f: Force<L::S>, tau: &mut [L::S]) {
+        match l.joint(i) {
+            Self::Revolute { .. } | Self::Continuous { .. } => l.add_joint_effort(tau, i, 0, f.angular.z),
+            Self::Prismatic { .. } => l.add_joint_effort(tau, i, 0, f.linear.z),
+            Self::Helical { pitch, .. } => {
+                l.add_joint_effort(tau, i, 0, f.linear.z.mul_add(L::S::splat(pitch), f.angular.z));
+            }
+            joint => {
+                let f = f.to_array();
+                for (k, &axis) in joint.axes().iter().enumerate() {
+                    l.add_joint_effort(tau, i, k, f[axis]);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn quaternion<L: Layout>(l: &L, i: usize, q: &[L::S], at: usize) -> Quaternion<L::S> {
+    Quaternion::new(l.position(q, i, at), l.position(q, i, at + 1), l.position(q, i, at + 2), l.position(q, i, at + 3))
+}
+
+#[inline(always)]
+fn point<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Vec3<L::S> {
+    Vec3::new(l.position(q, i, 0), l.position(q, i, 1), l.position(q, i, 2))
+}

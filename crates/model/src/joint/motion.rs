@@ -1,0 +1,74 @@
+//! The motion of a joint, and how it adds to that of a body.
+
+use condyle_spatial::{Motion, Scalar, Vec3};
+
+/// A joint's velocity S q̇ or acceleration S q̈ in the body's frame, in the form that costs least to compute with.
+#[derive(Clone, Copy)]
+pub enum JointMotion<S> {
+    /// About z.
+    Revolute(S),
+    /// Along z.
+    Prismatic(S),
+    /// Along several axes.
+    General(Motion<S>),
+}
+
+impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(mut self, vJ: JointMotion<S>) -> Self {
+        match vJ {
+            JointMotion::Revolute(x) => self.angular.z += x,
+            JointMotion::Prismatic(x) => self.linear.z += x,
+            JointMotion::General(m) => self += m,
+        }
+        self
+    }
+}
+
+/// The rotation of a body and the acceleration of its origin, as the equations of Newton and Euler need them.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct ClassicalMotion<S> {
+    /// ω.
+    pub w: Vec3<S>,
+    /// ω̇.
+    pub dw: Vec3<S>,
+    /// The classical acceleration of the origin.
+    pub a: Vec3<S>,
+}
+
+impl<S: Scalar> JointMotion<S> {
+    /// The motion with all its six numbers.
+    #[inline(always)]
+    fn motion(self) -> Motion<S> {
+        Motion::zero() + self
+    }
+
+    /// Adds a joint that moves with this velocity and with the acceleration aJ to what the body would do without it:
+    /// ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J.
+    #[inline(always)]
+    pub fn added_to(
+        self,
+        aJ: Self,
+        ClassicalMotion { mut w, mut dw, mut a }: ClassicalMotion<S>,
+    ) -> ClassicalMotion<S> {
+        match (self, aJ) {
+            (Self::Revolute(x), Self::Revolute(xx)) => {
+                dw = Vec3::new(w.y.mul_add(x, dw.x), (-w.x).mul_add(x, dw.y), dw.z + xx);
+                w.z += x;
+            }
+            (Self::Prismatic(x), Self::Prismatic(xx)) => {
+                let twice = x + x;
+                a = Vec3::new(w.y.mul_add(twice, a.x), (-w.x).mul_add(twice, a.y), a.z + xx);
+            }
+            (vJ, aJ) => {
+                let (vJ, aJ) = (vJ.motion(), aJ.motion());
+                dw = w.cross_add(vJ.angular, dw + aJ.angular);
+                a = (w + w + vJ.angular).cross_add(vJ.linear, a + aJ.linear);
+                w += vJ.angular;
+            }
+        }
+        ClassicalMotion { w, dw, a }
+    }
+}

@@ -1,0 +1,294 @@
+//! How a pass sees model and state.
+//!
+//! An algorithm is written once, over [`Layout`]. It reaches its parent, its children's sums and its coordinates only
+//! through the verbs below, so that one source runs on
+//!
+//! - one state: the scalar is `f64` (or `f32`, or a dual number), the constants are `f64`;
+//! - several knots of a horizon side by side: the scalar holds a number for each knot, the constants are broadcast;
+//! - the limbs of one robot side by side: a body of the pass stands for a body of each limb, all of one joint kind.
+//!
+//! The first two are [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v: several
+//! joints may share a coordinate (mimic joints), v_joint = G v with one entry in each row of G.
+//! [`joint_velocity`](Layout::joint_velocity) applies G, [`add_joint_effort`](Layout::add_joint_effort) Gᵀ,
+//! [`set_row`](Columns::set_row) and its like Gᵀ · G, and no algorithm knows more.
+
+use crate::joint::Joint;
+use crate::model::Model;
+use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};
+use core::marker::PhantomData;
+use core::ops::{AddAssign, Range};
+
+/// The bodies, joints and coordinates of a pass.
+pub trait Layout {
+    /// The number that the pass computes with.
+    type S: Scalar;
+
+    /// The bodies in order, parents first; 0 is the world and not among them.
+    fn bodies(&self) -> Range<usize>;
+    /// The kind of joint that carries body i, its axis turned to z.
+    fn joint(&self, i: usize) -> Joint;
+    /// X_T: the joint's frame in the parent's.
+    fn placement(&self, i: usize) -> Se3<Self::S>;
+    /// The body's inertia in its frame.
+    fn inertia(&self, i: usize) -> Inertia<Self::S>;
+    /// The acceleration of the world that stands for gravity, −g.
+    fn minus_gravity(&self) -> Vec3<Self::S>;
+    /// The armature at degree of freedom k of joint i.
+    fn armature(&self, i: usize, k: usize) -> Self::S;
+    /// The external force on body i, given per body in the body's public frame (or none at all).
+    fn force(&self, f_ext: &[Force<Self::S>], i: usize) -> Option<Force<Self::S>>;
+
+    /// The parent's entry in an array by bodies.
+    fn parent<T: Copy>(&self, of: &[T], i: usize) -> T;
+    /// Adds to the parent's entry in an array by bodies.
+    fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
+
+    /// The place of body i on the stack of a pass that goes down and up the branches, one after the other: the bodies on its
+    /// way from the world, which has place 0. There the pass keeps what it needs of a body until its subtree is closed.
+    fn stack_index(&self, i: usize) -> usize;
+    /// The bodies whose subtrees end with body i: children before parents.
+    fn closed_by(&self, i: usize) -> &[usize];
+    /// The parent's entry on the stack.
+    fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T;
+    /// Adds to the parent's entry on the stack.
+    fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
+
+    /// The sum over the lanes in which body i stands: each may hold a part of what the body carries.
+    fn sum_lanes<T: Copy>(&self, i: usize, x: T) -> T;
+    /// Replaces the entry of body i in an array by bodies by its sum over the lanes.
+    #[inline(always)]
+    fn sum_lanes_at<T: Copy>(&self, of: &mut [T], i: usize) {
+        of[i] = self.sum_lanes(i, of[i]);
+    }
+
+    /// The k-th number of the position of joint i.
+    fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
+    /// The k-th number of the velocity (or acceleration) of joint i.
+    fn joint_velocity(&self, v: &[Self::S], i: usize, k: usize) -> Self::S;
+    /// Adds the effort along degree of freedom k of joint i to its coordinate's: the transpose of `joint_velocity`.
+    fn add_joint_effort(&self, tau: &mut [Self::S], i: usize, k: usize, effort: Self::S);
+
+    /// The first of joint i's columns, in an array by columns.
+    fn column(&self, i: usize) -> usize;
+    /// Adds armature times acceleration to the efforts of all coordinates.
+    fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
+}
+
+/// The columns from the root to a joint, and the entries that they have with the joint's own in matrices.
+///
+/// The matrices have a row and a column for each coordinate and are stored by columns.
+pub trait Columns: Layout {
+    /// Names a column, among those from the root to a joint.
+    type Column: Copy;
+    /// Names a column of a body's own joint.
+    type OwnColumn: Copy;
+    /// The number that matrices are made of.
+    type Number: Scalar;
+
+    /// The columns of all joints from the root to joint i, its own last.
+    fn support(&self, i: usize) -> &[Self::Column];
+    /// Column k of joint i.
+    fn own_column(&self, i: usize, k: usize) -> Self::OwnColumn;
+    /// The entry of a column in an array by columns.
+    fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
+    /// Copies entries of an array by columns to where `at` looks for them, if that is elsewhere.
+    fn broadcast<T: Copy>(&self, of: &mut [T]);
+    /// Makes a matrix ready for `set_row` and `set_column`. Entries that are never set are 0.
+    fn clear(&self, matrix: &mut [Self::Number]);
+    /// Sets the entry in the row of a joint's own column and in the column e of its support, or adds to it if several
+    /// columns share it. To be called once for each pair of columns; that of the first body's last column with itself comes
+    /// last of all.
+    fn set_row(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
+    /// Sets the entry in the row of e and in the joint's own column, as `set_row` does.
+    fn set_column(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
+    /// Adds the armature of all coordinates to the diagonal of a matrix.
+    fn add_armature(&self, matrix: &mut [Self::Number]);
+}
+
+/// The entries of matrices for any pair of columns.
+pub trait Pairs: Columns<Number = <Self as Layout>::S> {
+    /// Sets the entry (row, column) of a matrix after `clear`, or adds to it if several columns share it. To be called once
+    /// for each pair of columns.
+    fn set_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
+    /// Adds to the entry (row, column) of a matrix.
+    fn add_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
+}
+
+/// One body at a time: of one state, or of several knots of a horizon in the lanes of the scalar.
+pub struct Single<'m, S, R> {
+    model: &'m Model<R>,
+    scalar: PhantomData<S>,
+}
+
+impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
+    /// The layout of a model.
+    #[inline(always)]
+    pub fn new(model: &'m Model<R>) -> Self {
+        Self { model, scalar: PhantomData }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
+    type S = S;
+
+    #[inline(always)]
+    fn bodies(&self) -> Range<usize> {
+        1..self.model.tree.nodes.len()
+    }
+    #[inline(always)]
+    fn joint(&self, i: usize) -> Joint {
+        self.model.tree.nodes[i].joint
+    }
+    #[inline(always)]
+    fn placement(&self, i: usize) -> Se3<S> {
+        self.model.tree.nodes[i].placement.lift()
+    }
+    #[inline(always)]
+    fn inertia(&self, i: usize) -> Inertia<S> {
+        self.model.tree.nodes[i].inertia.lift()
+    }
+    #[inline(always)]
+    fn minus_gravity(&self) -> Vec3<S> {
+        -self.model.gravity.lift()
+    }
+    #[inline(always)]
+    fn armature(&self, i: usize, k: usize) -> S {
+        self.model.armature[self.model.tree.nodes[i].idx_v + k].lift()
+    }
+    #[inline(always)]
+    fn force(&self, f_ext: &[Force<S>], i: usize) -> Option<Force<S>> {
+        let axis_rotation = Se3::new(self.model.tree.nodes[i].axis_rotation, Vec3::zero());
+        f_ext.get(i).map(|&f| axis_rotation.lift().act_inv(f))
+    }
+
+    #[inline(always)]
+    fn parent<T: Copy>(&self, of: &[T], i: usize) -> T {
+        of[self.model.tree.nodes[i].parent]
+    }
+    #[inline(always)]
+    fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        onto[self.model.tree.nodes[i].parent] += x;
+    }
+
+    #[inline(always)]
+    fn stack_index(&self, i: usize) -> usize {
+        self.model.tree.nodes[i].level
+    }
+    #[inline(always)]
+    fn closed_by(&self, i: usize) -> &[usize] {
+        let (first, end) = self.model.tree.nodes[i].closed;
+        &self.model.tree.closed[first..end]
+    }
+    #[inline(always)]
+    fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T {
+        of[self.model.tree.nodes[i].level - 1]
+    }
+    #[inline(always)]
+    fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
+        onto[self.model.tree.nodes[i].level - 1] += x;
+    }
+    #[inline(always)]
+    fn sum_lanes<T: Copy>(&self, _: usize, x: T) -> T {
+        x
+    }
+    #[inline(always)]
+    fn sum_lanes_at<T: Copy>(&self, _: &mut [T], _: usize) {}
+
+    #[inline(always)]
+    fn position(&self, q: &[S], i: usize, k: usize) -> S {
+        let node = &self.model.tree.nodes[i];
+        match node.mimic {
+            None => q[node.idx_q + k],
+            Some(mimic) => node.joint.mimic_position(mimic, &q[node.idx_q..], k),
+        }
+    }
+    #[inline(always)]
+    fn joint_velocity(&self, x: &[S], i: usize, k: usize) -> S {
+        let node = &self.model.tree.nodes[i];
+        match node.mimic {
+            None => x[node.idx_v + k],
+            Some(mimic) => x[node.idx_v + k] * S::splat(mimic.ratio),
+        }
+    }
+    #[inline(always)]
+    fn add_joint_effort(&self, x: &mut [S], i: usize, k: usize, value: S) {
+        let node = &self.model.tree.nodes[i];
+        match node.mimic {
+            None => x[node.idx_v + k] += value,
+            Some(mimic) => x[node.idx_v + k] += value * S::splat(mimic.ratio),
+        }
+    }
+
+    #[inline(always)]
+    fn column(&self, i: usize) -> usize {
+        self.model.tree.nodes[i].column
+    }
+    #[inline(always)]
+    fn add_armature_torque(&self, a: &[S], tau: &mut [S]) {
+        for (k, &armature) in self.model.armature.iter().enumerate() {
+            tau[k] += armature.lift() * a[k];
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
+    type Column = usize;
+    type OwnColumn = usize;
+    type Number = S;
+
+    #[inline(always)]
+    fn support(&self, i: usize) -> &[usize] {
+        let node = &self.model.tree.nodes[i];
+        self.model.tree.support(node)
+    }
+    #[inline(always)]
+    fn own_column(&self, i: usize, k: usize) -> usize {
+        self.column(i) + k
+    }
+    #[inline(always)]
+    fn at<T: Copy>(&self, of: &[T], column: usize) -> T {
+        of[column]
+    }
+    #[inline(always)]
+    fn broadcast<T: Copy>(&self, _: &mut [T]) {}
+    #[inline(always)]
+    fn clear(&self, matrix: &mut [S]) {
+        if self.model.has_mimic() {
+            matrix.fill(S::zero());
+        }
+    }
+    #[inline(always)]
+    fn set_row(&self, matrix: &mut [S], own: usize, e: usize, value: S) {
+        self.set_entry(matrix, own, e, value);
+    }
+    #[inline(always)]
+    fn set_column(&self, matrix: &mut [S], own: usize, e: usize, value: S) {
+        self.set_entry(matrix, e, own, value);
+    }
+    #[inline(always)]
+    fn add_armature(&self, matrix: &mut [S]) {
+        for (k, &armature) in self.model.armature.iter().enumerate() {
+            matrix[k * (self.model.tree.nv + 1)] += armature.lift();
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Pairs for Single<'_, S, R> {
+    #[inline(always)]
+    fn set_entry(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
+        if self.model.has_mimic() {
+            self.add_entry(matrix, row, column, value);
+        } else {
+            matrix[row + self.model.tree.nv * column] = value;
+        }
+    }
+    #[inline(always)]
+    fn add_entry(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
+        if self.model.has_mimic() {
+            let (r, c) = (&self.model.tree.columns[row], &self.model.tree.columns[column]);
+            matrix[r.coordinate + self.model.tree.nv * c.coordinate] += value * S::splat(r.ratio * c.ratio);
+        } else {
+            matrix[row + self.model.tree.nv * column] += value;
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The map of columns: which columns of other steps those of a step meet in matrices, and where the entries of such pairs
+//! stand.
+//!
+//! Of the bodies of a step, those before them stand in the same lanes, step by step, until a limb hangs on a body in
+//! another lane. Columns from there to the root are copied: into places behind those of all columns, once a call, so that
+//! whatever comes further out finds all that it needs in its own lanes.
+//!
+//! What belongs to a column and changes from body to body on the way out (as the columns of M⁻¹'s factor do) has a place
+//! for each entry of the support.
+
+use super::LANES;
+use super::schedule::Schedule;
+use super::steps::Step;
+use crate::tree::Tree;
+use condyle_spatial::moves::Move;
+use core::iter::successors;
+
+/// The places of columns and of the entries of matrices.
+#[derive(Clone, Debug)]
+pub struct ColumnMap {
+    /// The columns from the root to each step's joints, step by step.
+    pub support: Vec<LaneColumn>,
+    /// The pairs of each such column with the step's own.
+    pub pairs: Vec<Pair>,
+    /// The copies of columns that stand behind those of all steps: the columns, and how their lanes change.
+    pub copies: Vec<Vec<(usize, Move)>>,
+    /// For each entry of the support, the one before it on the way out.
+    pub predecessors: Vec<Predecessor>,
+    /// All columns, those after one another together.
+    pub blocks: Vec<ColumnBlock>,
+    /// The sizes of the matrices that hold Z.
+    pub sizes: Sizes,
+}
+
+/// A column of each lane, among those from the root to a step's joints.
+#[derive(Clone, Copy, Debug)]
+pub struct LaneColumn {
+    /// The place in arrays by columns.
+    pub column: usize,
+    /// The place in `ColumnMap::pairs` of its pairs with the step's own columns, one after the other.
+    pub pair: usize,
+}
+
+/// The places of the entries of a pair of columns, one in each lane, in a matrix stored by columns. Lanes that have no such
+/// pair point to an entry that is set after all others, and there by the first lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    /// The entry in the row of the step's own column.
+    pub in_row: [u32; LANES],
+    /// The entry in the column of the step's own column.
+    pub in_column: [u32; LANES],
+    /// The entry of Z D⁻¹.
+    pub in_ZD: [u32; LANES],
+    /// The entry of Zᵀ.
+    pub in_Zt: [u32; LANES],
+}
+
+/// The entry from which an entry of the support gets what changes on the way out.
+#[derive(Clone, Debug)]
+pub enum Predecessor {
+    /// From this entry, in the same lanes; the step's own columns from themselves.
+    InPlace(usize),
+    /// From several entries, or from other lanes.
+    Moved(Vec<(usize, Move)>),
+}
+
+/// A run of columns of which each carries the next.
+#[derive(Clone, Debug)]
+pub struct ColumnBlock {
+    /// The first of them.
+    pub first: usize,
+    /// Their number.
+    pub count: usize,
+    /// All columns from the root to the last of them.
+    pub path: Vec<usize>,
+}
+
+/// The sizes of the two matrices that hold Z = L⁻¹, where M = Lᵀ D L is the inertia matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// The number of rows of both.
+    pub rows: usize,
+    /// The length of a row of Z D⁻¹, which has the columns from the root on.
+    pub ZD: usize,
+    /// The length of a row of Zᵀ, which has all columns, in whole vectors.
+    pub Zt: usize,
+}
+
+impl Sizes {
+    fn new(tree: &Tree<f64>) -> Self {
+        let depth = tree.columns.iter().map(|c| c.depth + 1).max().unwrap_or(0);
+        Self { rows: tree.nv, ZD: depth, Zt: tree.nv.next_multiple_of(2 * LANES) }
+    }
+
+    /// The place behind all rows of Z D⁻¹, where lanes without a body write.
+    pub fn end_of_ZD(self) -> usize {
+        self.rows * self.ZD
+    }
+
+    /// The place behind all rows of Zᵀ, where lanes without a body write.
+    pub fn end_of_Zt(self) -> usize {
+        self.rows * self.Zt
+    }
+}
+
+/// The greatest number of columns of a block.
+const COUNT: usize = 4;
+
+/// The blocks of all columns.
+fn blocks(tree: &Tree<f64>) -> Vec<ColumnBlock> {
+    let columns = &tree.columns;
+    let mut blocks: Vec<ColumnBlock> = Vec::new();
+    for c in 0..columns.len() {
+        let mut path: Vec<usize> = successors(Some(c), |&c| columns[c].parent).collect();
+        path.reverse();
+        match blocks.last_mut() {
+            Some(block) if c > 0 && columns[c].parent == Some(c - 1) && block.count < COUNT => {
+                (block.count, block.path) = (block.count + 1, path);
+            }
+            _ => blocks.push(ColumnBlock { first: c, count: 1, path }),
+        }
+    }
+    blocks
+}
+
+/// A column on the way from the root to the body of a lane.
+#[derive(Clone, Copy)]
+struct Ancestor {
+    /// The place in arrays by columns.
+    column: usize,
+    /// The lane in which it stands.
+    lane: usize,
+    coordinate: usize,
+    /// The entry of the support of the step before.
+    entry: usize,
+}
+
+/// An entry of the support under construction: the place in arrays by columns, and the coordinate in each lane.
+type Draft = (usize, [Option<usize>; LANES]);
+
+impl ColumnMap {
+    /// The map for the steps of a schedule, which are told where their support stands.
+    pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule, steps: &mut [Step]) -> Self {
+        let sizes = Sizes::new(tree);
+        let (support, pairs, copies, predecessors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut map = Self { support, pairs, copies, predecessors, blocks: blocks(tree), sizes };
+        let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]); // whose last column is set last, in the first lane
+        let last = tree.nodes[first].idx_v + tree.nodes[first].joint.nv().saturating_sub(1);
+        let unused = (last * (tree.nv + 1)) as u32;
+        let mut drafts: Vec<Vec<Draft>> = vec![Vec::new()];
+        for s in 1..steps.len() {
+            let mut draft = map.ancestors(tree, schedule, steps, &drafts, s);
+            let (bodies, joint, column) = (schedule.bodies[s], steps[s].joint, steps[s].idx_v);
+            let coordinate = |k: usize| bodies.map(|i| (i > 0).then(|| tree.nodes[i].idx_v + k));
+            draft.extend((0..joint.nv()).map(|k| (column + k, coordinate(k))));
+            let first = map.support.len();
+            for &(column, others) in &draft {
+                map.support.push(LaneColumn { column, pair: map.pairs.len() });
+                for k in 0..joint.nv() {
+                    let mut own = coordinate(k);
+                    if schedule.in_all_lanes(s) {
+                        own[1..].fill(None);
+                    }
+                    let (in_ZD, in_Zt) = ([sizes.end_of_ZD() as u32; LANES], [sizes.end_of_Zt() as u32; LANES]);
+                    let mut pair = Pair { in_row: [unused; LANES], in_column: [unused; LANES], in_ZD, in_Zt };
+                    for lane in 0..LANES {
+                        if let (Some(d), Some(e)) = (own[lane], others[lane]) {
+                            pair.in_row[lane] = (d + tree.nv * e) as u32;
+                            pair.in_column[lane] = (e + tree.nv * d) as u32;
+                            if !tree.has_mimic() {
+                                pair.in_ZD[lane] = (d * sizes.ZD + tree.columns[e].depth) as u32;
+                                pair.in_Zt[lane] = (e * sizes.Zt + d) as u32;
+                            }
+                        }
+                    }
+                    map.pairs.push(pair);
+                }
+            }
+            let end = map.support.len();
+            map.predecessors.extend((map.predecessors.len()..end).map(Predecessor::InPlace)); // the step's own
+            steps[s].support = (first, end);
+            drafts.push(draft);
+        }
+        map
+    }
+
+    /// The columns before those of step s, with copies of what stands elsewhere.
+    fn ancestors(
+        &mut self,
+        tree: &Tree<f64>,
+        schedule: &Schedule,
+        steps: &[Step],
+        drafts: &[Vec<Draft>],
+        s: usize,
+    ) -> Vec<Draft> {
+        let mut paths: Vec<Vec<Ancestor>> = vec![Vec::new(); LANES];
+        for lane in (0..LANES).filter(|&lane| schedule.bodies[s][lane] > 0) {
+            let (step, its) = schedule.parent(&tree.nodes, s, lane);
+            let first = steps[step].support.0;
+            let ancestor = |(k, &(column, coordinates)): (usize, &Draft)| {
+                Some(Ancestor { column, lane: its, coordinate: coordinates[its]?, entry: first + k })
+            };
+            paths[lane] = drafts[step].iter().enumerate().filter_map(ancestor).collect();
+        }
+        let longest = paths.iter().map(Vec::len).max().unwrap_or(0);
+        let behind = steps.last().map_or(0, |last| last.idx_v + last.joint.nv()); // the columns of all steps
+        (0..longest)
+            .map(|at| {
+                let here = [0, 1, 2, 3].map(|lane| paths[lane].get(at).copied());
+                let entries = here.map(|a| a.map(|a| (a.entry, a.lane)));
+                self.predecessors.push(match in_place(entries) {
+                    Some(entry) => Predecessor::InPlace(entry),
+                    None => Predecessor::Moved(moves(entries)),
+                });
+                // a column in all lanes is in this one, too
+                let in_all = |column: usize| schedule.shared && column < steps[1].joint.nv();
+                let columns = [0, 1, 2, 3]
+                    .map(|lane| here[lane].map(|a| (a.column, if in_all(a.column) { lane } else { a.lane })));
+                let column = in_place(columns).unwrap_or_else(|| {
+                    self.copies.push(moves(columns));
+                    behind + self.copies.len() - 1
+                });
+                (column, here.map(|a| a.map(|a| a.coordinate)))
+            })
+            .collect()
+    }
+}
+
+/// The place from which all lanes have what they need, each from the same lane, if there is one: of each lane, (place, lane)
+/// is given.
+fn in_place(from: [Option<(usize, usize)>; LANES]) -> Option<usize> {
+    let (first, _) = from.iter().flatten().next()?;
+    let stays = |(lane, from): (usize, &Option<(usize, usize)>)| from.is_none_or(|from| from == (*first, lane));
+    from.iter().enumerate().all(stays).then_some(*first)
+}
+
+/// The places from which lanes have what they need, and how it changes lanes, where `in_place` finds no single one.
+fn moves(from: [Option<(usize, usize)>; LANES]) -> Vec<(usize, Move)> {
+    let mut places: Vec<usize> = from.iter().flatten().map(|x| x.0).collect();
+    places.sort_unstable();
+    places.dedup();
+    let pairs = |place: usize| -> Vec<(usize, usize)> {
+        (0..LANES).filter_map(|lane| from[lane].filter(|x| x.0 == place).map(|(_, its)| (its, lane))).collect()
+    };
+    places.into_iter().map(|place| (place, Move::new(&pairs(place)))).collect()
+}

@@ -1,0 +1,216 @@
+//! The frozen description of a robot.
+
+use crate::body::{Body, Frame, FrameKind, Limits};
+use crate::error::{Error, Warning, nearest};
+use crate::limbs::Plan;
+use crate::tree::{Column, Node, Tree};
+use condyle_linalg::ColumnTree;
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_spatial::Vec3;
+use core::fmt;
+
+/// A robot: bodies, joints, frames, inertias, limits. Frozen, checked when built, shared between threads.
+///
+/// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names (of
+/// a URDF; as Pinocchio numbers them) or in which a builder was given them. `R` is the type of the constants: `f64`,
+/// or a dual number for derivatives with respect to inertias ([`with_inertias`](Self::with_inertias)).
+///
+/// A model of plain numbers can be written to a file and read from it (serde). A file may be edited: what it says is
+/// checked as in [`ModelBuilder::build`](crate::ModelBuilder::build) when it is read.
+///
+/// ```
+/// let arm = condyle_model::robots::arm7();
+/// assert_eq!((arm.nq(), arm.nv()), (7, 7));
+/// assert_eq!(arm.frames()[arm.frame("tool")?].body, 7);
+/// # Ok::<(), condyle_model::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Model<R = f64> {
+    pub(crate) name: String,
+    pub(crate) bodies: Vec<Body>,
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) limits: Limits,
+    pub(crate) damping: Vec<f64>,
+    pub(crate) friction: Vec<f64>,
+    pub(crate) armature: Vec<R>,
+    pub(crate) gravity: Vec3<R>,
+    /// The robot as passes see it.
+    pub(crate) tree: Tree<R>,
+    /// The plan by which single calls compute several bodies at once, if they do.
+    pub(crate) limbs: Option<Plan>,
+    pub(crate) warnings: Vec<Warning>,
+    /// Bodies whose joints make M singular.
+    pub(crate) singular: Vec<usize>,
+}
+
+impl<R> Model<R> {
+    /// The robot's name.
+    #[inline]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+    /// nq, the number of entries of a position q.
+    #[inline(always)]
+    pub fn nq(&self) -> usize {
+        self.tree.nq
+    }
+    /// nv, the number of degrees of freedom: the entries of v, a, τ and of a tangent vector.
+    #[inline(always)]
+    pub fn nv(&self) -> usize {
+        self.tree.nv
+    }
+    /// All bodies; number 0 is the world.
+    #[inline(always)]
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+    /// All frames.
+    #[inline(always)]
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+    /// The limits.
+    #[inline]
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+    /// Viscous damping of each degree of freedom (N m s/rad, N s/m): stored, used by no algorithm unasked.
+    #[inline]
+    pub fn damping(&self) -> &[f64] {
+        &self.damping
+    }
+    /// Coulomb friction of each degree of freedom (N m, N): stored, used by no algorithm unasked.
+    #[inline]
+    pub fn friction(&self) -> &[f64] {
+        &self.friction
+    }
+    /// Inertia of the rotor as seen at each joint (kg m², kg), part of M in every algorithm.
+    #[inline(always)]
+    pub fn armature(&self) -> &[R] {
+        &self.armature
+    }
+    /// The acceleration of free fall, in the world's frame (m/s²).
+    #[inline(always)]
+    pub fn gravity(&self) -> &Vec3<R> {
+        &self.gravity
+    }
+    /// Mass of all bodies, of what is fixed to the world too (kg).
+    pub fn total_mass(&self) -> f64 {
+        self.bodies.iter().map(|b| b.inertia.mass).sum()
+    }
+    /// Whether some joints share a coordinate.
+    #[inline(always)]
+    pub fn has_mimic(&self) -> bool {
+        self.tree.has_mimic()
+    }
+
+    /// The number of the frame with this name: a link's, else the user's, else a joint's.
+    ///
+    /// # Errors
+    /// [`Error::UnknownFrame`], with the nearest name.
+    pub fn frame(&self, name: &str) -> Result<usize, Error> {
+        let find = |kind| self.frames.iter().position(|f| f.name == name && f.kind == kind);
+        [FrameKind::Link, FrameKind::User, FrameKind::Joint].into_iter().find_map(find).ok_or_else(|| {
+            let nearest = nearest(name, self.frames.iter().map(|f| f.name.as_str()));
+            Error::UnknownFrame { name: name.to_owned(), nearest }
+        })
+    }
+
+    /// The number of the body that the joint with this name carries.
+    ///
+    /// # Errors
+    /// [`Error::UnknownJoint`], with the nearest name.
+    pub fn joint(&self, name: &str) -> Result<usize, Error> {
+        self.bodies.iter().skip(1).position(|b| b.joint_name == name).map(|i| i + 1).ok_or_else(|| {
+            let nearest = nearest(name, self.bodies.iter().skip(1).map(|b| b.joint_name.as_str()));
+            Error::UnknownJoint { name: name.to_owned(), nearest }
+        })
+    }
+}
+
+/// The model as passes see it.
+#[doc(hidden)]
+impl<R> Model<R> {
+    /// The bodies as passes see them.
+    #[inline(always)]
+    pub fn nodes(&self) -> &[Node<R>] {
+        &self.tree.nodes
+    }
+    /// The degrees of freedom of all joints.
+    #[inline(always)]
+    pub fn columns(&self) -> &[Column] {
+        &self.tree.columns
+    }
+    /// The columns from the root to a body's joint, its own last.
+    #[inline(always)]
+    pub fn support(&self, node: &Node<R>) -> &[usize] {
+        self.tree.support(node)
+    }
+    /// The number of pairs of a body and a column from the root to its joint.
+    #[inline(always)]
+    pub fn support_len(&self) -> usize {
+        self.tree.support.len()
+    }
+    /// The coordinates in which efforts are needed to move one of them.
+    #[inline(always)]
+    pub fn nonzero_rows(&self) -> &[NonzeroRows] {
+        &self.tree.nonzero_rows
+    }
+    /// The bodies, children before parents, in the order in which their subtrees are closed.
+    #[inline(always)]
+    pub fn closed(&self) -> &[usize] {
+        &self.tree.closed
+    }
+    /// The plan by which single calls compute several bodies at once, if they do.
+    #[inline(always)]
+    pub fn limbs(&self) -> Option<&Plan> {
+        self.limbs.as_ref()
+    }
+    /// A hash of the parents, joints and coordinates: tells trees apart.
+    #[inline(always)]
+    pub fn tree_hash(&self) -> u64 {
+        self.tree.hash
+    }
+}
+
+/// The tree of the inertia matrix M: columns are the degrees of freedom of the joints, rows the coordinates.
+impl<R> ColumnTree for Model<R> {
+    fn rows(&self) -> usize {
+        self.nv()
+    }
+    fn columns(&self) -> usize {
+        self.tree.columns.len()
+    }
+    fn parent(&self, c: usize) -> Option<usize> {
+        self.tree.columns[c].parent
+    }
+    fn row(&self, c: usize) -> usize {
+        self.tree.columns[c].coordinate
+    }
+}
+
+impl<R> fmt::Display for Model<R> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {} bodies, nq = {}, nv = {}, {} frames, {:.3} kg",
+            self.name,
+            self.bodies.len() - 1,
+            self.nq(),
+            self.nv(),
+            self.frames.len(),
+            self.total_mass()
+        )?;
+        for (i, b) in self.bodies.iter().enumerate().skip(1) {
+            let kind = b.joint.kind();
+            write!(f, "  {i:3}  {:<28} {kind:<12} on {:<3} q {:<3} v {:<3}", b.joint_name, b.parent, b.idx_q, b.idx_v)?;
+            if let Some(mimic) = b.mimic {
+                write!(f, " follows: {} q + {}", mimic.ratio, mimic.offset)?;
+            } else if b.joint.nq() == 1 && self.limits.lower[b.idx_q].is_finite() {
+                write!(f, " [{}, {}]", self.limits.lower[b.idx_q], self.limits.upper[b.idx_q])?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}

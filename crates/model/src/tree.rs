@@ -1,0 +1,268 @@
+//! The tree of bodies as passes see it: turned frames, columns, ancestors.
+//!
+//! A *column* is a degree of freedom of a joint; a *coordinate* is an entry of v. Joints that mimic others share a
+//! coordinate, so several columns may have the same one.
+
+use crate::body::Body;
+use crate::joint::{Joint, Mimic};
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
+use core::iter::successors;
+use core::ops::Range;
+
+/// A body as passes see it: its joint's axis is turned to z, and all that a pass needs stands side by side.
+#[derive(Clone, Debug)]
+pub struct Node<R> {
+    /// The kind of the joint, as which it is computed.
+    pub joint: Joint,
+    /// The parent's number.
+    pub parent: usize,
+    /// The place in q at which the joint's position begins.
+    pub idx_q: usize,
+    /// The place in v at which the joint's velocity begins.
+    pub idx_v: usize,
+    /// The way in which the joint follows another one, if it does.
+    pub mimic: Option<Mimic>,
+    /// The number of the joint's first column.
+    pub column: usize,
+    /// The place in `Tree::support` at which the columns from the root to this joint begin.
+    pub support: usize,
+    /// The number of columns from the root to this joint, its own included.
+    pub depth: usize,
+    /// The number of bodies between it and the world, itself included.
+    pub level: usize,
+    /// The places in `Tree::closed`, from and to, of the bodies whose subtrees end with this body.
+    pub closed: (usize, usize),
+    /// X_T, between turned frames.
+    pub placement: Se3<R>,
+    /// The inertia in the turned frame.
+    pub inertia: Inertia<R>,
+    /// bRz: the turned frame in the body's.
+    pub axis_rotation: Mat3<f64>,
+}
+
+/// A degree of freedom of a joint, and the coordinate that it follows.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// The coordinate's number.
+    pub coordinate: usize,
+    /// The joint's velocity divided by the coordinate's.
+    pub ratio: f64,
+    /// The column before it on the way to the root.
+    pub parent: Option<usize>,
+    /// The column after the last of its subtree.
+    pub end: usize,
+    /// The number of columns between it and the root.
+    pub depth: usize,
+}
+
+/// Coordinates of one joint, or of several joints side by side whose coordinates are vectors.
+#[derive(Clone, Debug)]
+pub(crate) struct Space {
+    /// One of the joints.
+    pub joint: Joint,
+    pub q: Range<usize>,
+    pub v: Range<usize>,
+}
+
+/// A robot's bodies and joints, as passes need them.
+#[derive(Clone, Debug)]
+pub(crate) struct Tree<R> {
+    pub nq: usize,
+    pub nv: usize,
+    /// Shape: bodies, the world included.
+    pub nodes: Vec<Node<R>>,
+    pub columns: Vec<Column>,
+    /// The columns from the root to the joint of one body, then of the next, and so on.
+    pub support: Vec<usize>,
+    /// The bodies, children before parents.
+    pub closed: Vec<usize>,
+    /// The coordinates in which efforts are needed to move one of them: those before and after it in the tree, and itself.
+    /// Shape: nv.
+    pub nonzero_rows: Vec<NonzeroRows>,
+    /// All coordinates, in order, in as few spaces as they make.
+    pub spaces: Vec<Space>,
+    /// A hash of the parents, joints and coordinates: tells trees apart.
+    pub hash: u64,
+}
+
+impl Tree<f64> {
+    /// The tree of some bodies, depth first, whose coordinates are numbered.
+    pub(crate) fn new(bodies: &[Body], nq: usize, nv: usize) -> Self {
+        let mut tree = Self {
+            nq,
+            nv,
+            nodes: Vec::with_capacity(bodies.len()),
+            columns: Vec::new(),
+            support: Vec::new(),
+            closed: Vec::new(),
+            nonzero_rows: Vec::new(),
+            spaces: Vec::new(),
+            hash: 0,
+        };
+        tree.add_nodes(bodies);
+        tree.close_subtrees();
+        tree.add_nonzero_rows();
+        tree.add_spaces();
+        // Fowler, Noll, Vo (1991): FNV-1a
+        let structure = tree.columns.iter().flat_map(|c| [c.coordinate, c.parent.map_or(0, |p| p + 1)]);
+        let structure = structure.chain(tree.nodes.iter().flat_map(|n| [n.parent, n.column]));
+        tree.hash = structure.fold(0xcbf2_9ce4_8422_2325, |hash, x| (hash ^ x as u64).wrapping_mul(0x100_0000_01b3));
+        tree
+    }
+
+    fn add_nodes(&mut self, bodies: &[Body]) {
+        let mut last_column: Vec<Option<usize>> = Vec::new(); // of each body or, failing one, of its ancestors
+        for (i, body) in bodies.iter().enumerate() {
+            let axis_rotation = body.joint.axis_rotation();
+            let bXz = Se3::new(axis_rotation, Vec3::zero());
+            let leads = |b: &&Body| b.mimic.is_none() && b.idx_v == body.idx_v;
+            let (joint, offset) = match body.mimic {
+                None => (body.joint, Se3::identity()),
+                Some(mimic) => {
+                    let leader = bodies[1..].iter().find(leads).expect("a mimic joint follows a joint");
+                    let joint = body.joint.as_follower(leader.joint, mimic).expect("the builder has checked it");
+                    (joint, joint.mimic_offset(mimic))
+                }
+            };
+            let (mut pXz, mut level) = (Se3::identity(), 0);
+            let first = self.columns.len();
+            let mut parent = None;
+            if i > 0 {
+                pXz = Se3::new(self.nodes[body.parent].axis_rotation, Vec3::zero());
+                level = self.nodes[body.parent].level + 1;
+                parent = last_column[body.parent];
+                for k in 0..body.joint.nv() {
+                    let depth = parent.map_or(0, |p| self.columns[p].depth + 1);
+                    let ratio = body.mimic.map_or(1.0, |m| m.ratio);
+                    self.columns.push(Column { coordinate: body.idx_v + k, ratio, parent, end: 0, depth });
+                    parent = Some(first + k);
+                }
+            }
+            last_column.push(parent);
+            let mut path: Vec<usize> = successors(parent, |&c| self.columns[c].parent).collect();
+            path.reverse();
+            self.nodes.push(Node {
+                joint,
+                parent: body.parent,
+                idx_q: body.idx_q,
+                idx_v: body.idx_v,
+                mimic: body.mimic,
+                column: first,
+                support: self.support.len(),
+                depth: path.len(),
+                level,
+                closed: (0, 0),
+                placement: pXz.inverse() * body.placement * bXz * offset,
+                inertia: bXz.act_inv(body.inertia),
+                axis_rotation,
+            });
+            self.support.extend(path);
+        }
+        // depth first, so a subtree's columns end where its last descendant's do
+        for c in (0..self.columns.len()).rev() {
+            self.columns[c].end = self.columns[c].end.max(c + 1);
+            if let Some(p) = self.columns[c].parent {
+                self.columns[p].end = self.columns[p].end.max(self.columns[c].end);
+            }
+        }
+    }
+
+    /// Depth first, a body after which no child stands closes its own subtree, and those of all ancestors of which it is
+    /// the last.
+    fn close_subtrees(&mut self) {
+        let mut open = Vec::new();
+        for i in 1..self.nodes.len() {
+            open.push(i);
+            let next = self.nodes.get(i + 1).map_or(0, |next| next.level.saturating_sub(1));
+            let first = self.closed.len();
+            self.closed.extend(open.drain(next..).rev());
+            self.nodes[i].closed = (first, self.closed.len());
+        }
+    }
+
+    fn add_nonzero_rows(&mut self) {
+        let related = |c: usize| {
+            let mut rows: Vec<usize> = successors(Some(c), |&c| self.columns[c].parent).collect();
+            rows.reverse();
+            rows.extend(c + 1..self.columns[c].end);
+            rows
+        };
+        let all = || (0..self.nv).collect(); // joints that follow tie branches together
+        let rows = (0..self.nv).map(|c| if self.has_mimic() { all() } else { related(c) });
+        self.nonzero_rows = NonzeroRows::of_columns(rows.collect());
+    }
+
+    fn add_spaces(&mut self) {
+        let is_vector = |joint: Joint| joint.nq() == joint.nv();
+        let mut spaces: Vec<Space> = Vec::new();
+        for (joint, q, v) in self.coordinates() {
+            match spaces.last_mut() {
+                Some(last)
+                    if is_vector(last.joint) && is_vector(joint) && (last.q.end, last.v.end) == (q.start, v.start) =>
+                {
+                    (last.q.end, last.v.end) = (q.end, v.end);
+                }
+                _ => spaces.push(Space { joint, q, v }),
+            }
+        }
+        self.spaces = spaces;
+    }
+}
+
+impl<R> Tree<R> {
+    /// Whether some joints share a coordinate.
+    #[inline(always)]
+    pub(crate) fn has_mimic(&self) -> bool {
+        self.columns.len() != self.nv
+    }
+
+    /// The columns from the root to a body's joint, its own last.
+    #[inline(always)]
+    pub(crate) fn support(&self, node: &Node<R>) -> &[usize] {
+        &self.support[node.support..node.support + node.depth]
+    }
+
+    /// The joints that have coordinates of their own, with where these stand in q and in v.
+    pub(crate) fn coordinates(&self) -> impl Iterator<Item = (Joint, Range<usize>, Range<usize>)> + '_ {
+        let own = self.nodes.iter().skip(1).filter(|n| n.mimic.is_none());
+        own.map(|n| (n.joint, n.idx_q..n.idx_q + n.joint.nq(), n.idx_v..n.idx_v + n.joint.nv()))
+    }
+
+    /// The same tree with constants of another type, given by functions of the placements and of (body, inertia).
+    pub(crate) fn map<T>(
+        &self,
+        lift: impl Fn(Se3<R>) -> Se3<T>,
+        mut inertia: impl FnMut(usize) -> Inertia<T>,
+    ) -> Tree<T>
+    where
+        R: Copy,
+    {
+        let node = |(i, n): (usize, &Node<R>)| Node {
+            joint: n.joint,
+            parent: n.parent,
+            idx_q: n.idx_q,
+            idx_v: n.idx_v,
+            mimic: n.mimic,
+            column: n.column,
+            support: n.support,
+            depth: n.depth,
+            level: n.level,
+            closed: n.closed,
+            placement: lift(n.placement),
+            inertia: inertia(i),
+            axis_rotation: n.axis_rotation,
+        };
+        Tree {
+            nq: self.nq,
+            nv: self.nv,
+            nodes: self.nodes.iter().enumerate().map(node).collect(),
+            columns: self.columns.clone(),
+            support: self.support.clone(),
+            closed: self.closed.clone(),
+            nonzero_rows: self.nonzero_rows.clone(),
+            spaces: self.spaces.clone(),
+            hash: self.hash,
+        }
+    }
+}

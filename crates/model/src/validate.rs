@@ -1,0 +1,234 @@
+//! The validation of a model: inertias that no body has, degrees of freedom along which M is singular.
+
+use crate::body::Body;
+use crate::configuration::random_configuration;
+use crate::error::Warning;
+use crate::joint::Joint;
+use crate::layout::{Columns, Layout, Pairs, Single};
+use crate::model::Model;
+use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3};
+use nalgebra::{DMatrix, Matrix3};
+use rand::{SeedableRng, rngs::StdRng};
+
+/// Rounding in a body's moments of inertia, as files have them: six digits.
+const MOMENT_ROUNDING: f64 = 1e-6;
+/// A pivot that is smaller than this share of the products it is a sum of is rounding, and none.
+const PIVOT_ROUNDING: f64 = 1e-13;
+/// Positions at which M is looked at. A joint is called singular if it is so at all of them.
+const SAMPLES: usize = 3;
+
+/// Says what is odd about a body's inertia. The bodies between the joints of a chain have no mass on purpose.
+pub(crate) fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
+    let (I, name) = (body.inertia, || body.name.clone());
+    if I == Inertia::zero() {
+        if !between {
+            warnings.push(Warning::Massless { body: name() });
+        }
+        return;
+    }
+    let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { I.mass_com };
+    let shift = Inertia::from_com(I.mass, com, condyle_spatial::Sym3::zero()).rotational;
+    let c = I.rotational - shift;
+    let moments = Matrix3::new(c.xx, c.xy, c.xz, c.xy, c.yy, c.yz, c.xz, c.yz, c.zz).symmetric_eigenvalues();
+    let mut moments = [moments[0], moments[1], moments[2]];
+    moments.sort_by(f64::total_cmp);
+    let rounding = MOMENT_ROUNDING * moments[2].abs();
+    if moments[0] < -rounding {
+        warnings.push(Warning::Negative { body: name(), moment: moments[0] });
+    } else if moments[2] > moments[0] + moments[1] + rounding {
+        warnings.push(Warning::Triangle { body: name(), moments });
+    }
+}
+
+impl Model {
+    /// Warnings about the robot, which is odd though it could be built.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Finds the joints along which M is singular, wherever the robot is.
+    pub(crate) fn find_singular(&mut self) {
+        let mut always = vec![true; self.bodies.len()];
+        let mut rng = StdRng::seed_from_u64(0);
+        for _ in 0..SAMPLES {
+            let q = random_configuration(self, &mut rng);
+            let placed = Placed::at(self, &q);
+            let here =
+                if self.has_mimic() { self.singular_by_matrix(&placed) } else { self.singular_by_bodies(&placed) };
+            always.iter_mut().zip(here).for_each(|(always, here)| *always &= here);
+        }
+        self.singular = (1..self.bodies.len()).filter(|&i| always[i]).collect();
+        self.warnings.retain(|w| !matches!(w, Warning::Singular { .. }));
+        let named = self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() });
+        self.warnings.extend(named);
+    }
+
+    /// The pivots D = Sᵀ Iᴬ S of the articulated bodies; a joint without one is passed over.
+    fn singular_by_bodies(&self, Placed { oX, S }: &Placed) -> Vec<bool> {
+        let l = Single::<f64, f64>::new(self);
+        let mut singular = vec![false; self.bodies.len()];
+        let mut IA = vec![ArticulatedInertia::zero(); self.bodies.len()];
+        for i in l.bodies().rev() {
+            let mut Ia = IA[i] + oX[i].act(l.inertia(i)).into();
+            for k in (0..l.joint(i).nv()).rev() {
+                let S = S[l.column(i) + k];
+                let U = Ia * S;
+                let D = S.dot(U) + l.armature(i, k);
+                let products = S.to_array().iter().zip(U.to_array()).map(|(s, u)| (s * u).abs()).sum::<f64>();
+                if D <= PIVOT_ROUNDING * products {
+                    singular[i] = true;
+                } else {
+                    Ia = Ia.minus_outer(U, 1.0 / D);
+                }
+            }
+            l.add_to_parent(&mut IA, i, Ia);
+        }
+        singular
+    }
+
+    /// The pivots of M, of robots whose joints share coordinates.
+    fn singular_by_matrix(&self, placed: &Placed) -> Vec<bool> {
+        let mut M = self.inertia_matrix(placed);
+        let diagonal = M.diagonal();
+        let mut singular = vec![false; self.tree.nv];
+        for k in (0..self.tree.nv).rev() {
+            let D = M[(k, k)];
+            if D <= PIVOT_ROUNDING * diagonal[k] {
+                singular[k] = true;
+                continue;
+            }
+            for i in 0..k {
+                let x = M[(k, i)] / D;
+                for j in 0..=i {
+                    M[(i, j)] -= x * M[(k, j)];
+                }
+            }
+        }
+        let owns = |b: &Body| b.mimic.is_none() && (b.idx_v..b.idx_v + b.joint.nv()).any(|k| singular[k]);
+        self.bodies.iter().enumerate().map(|(i, b)| i > 0 && owns(b)).collect()
+    }
+}
+
+/// The bodies and the columns of S in the world's frame, at one position.
+struct Placed {
+    /// oXi. Shape: bodies.
+    oX: Vec<Se3<f64>>,
+    /// Shape: columns.
+    S: Vec<Motion<f64>>,
+}
+
+impl Placed {
+    fn at(model: &Model, q: &[f64]) -> Self {
+        let l = Single::<f64, f64>::new(model);
+        let (mut oX, mut S) = (vec![Se3::identity(); model.bodies.len()], Vec::with_capacity(model.tree.columns.len()));
+        for i in l.bodies() {
+            oX[i] = l.parent(&oX, i) * Joint::placement(&l, i, q); // oXi = oXλ λXi
+            S.extend((0..l.joint(i).nv()).map(|k| l.joint(i).column(&oX[i], k)));
+        }
+        Self { oX, S }
+    }
+}
+
+impl Model {
+    /// M, by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
+    fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
+        let l = Single::<f64, f64>::new(self);
+        let mut M = DMatrix::zeros(self.tree.nv, self.tree.nv);
+        let mut IC: Vec<_> = oX.iter().zip(&self.tree.nodes).map(|(X, node)| X.act(node.inertia)).collect();
+        for i in l.bodies().rev() {
+            let support = l.support(i);
+            let before = support.len() - l.joint(i).nv();
+            for own in before..support.len() {
+                let F = IC[i] * l.at(S, support[own]); // F = Iᶜ S
+                for &e in &support[..own] {
+                    let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e
+                    l.add_entry(M.as_mut_slice(), support[own], e, x);
+                    l.add_entry(M.as_mut_slice(), e, support[own], x);
+                }
+                l.add_entry(M.as_mut_slice(), support[own], support[own], l.at(S, support[own]).dot(F));
+            }
+            let IC_i = IC[i];
+            l.add_to_parent(&mut IC, i, IC_i); // Iᶜ_λ += Iᶜ_i
+        }
+        l.add_armature(M.as_mut_slice());
+        M
+    }
+}
+
+impl<R> Model<R> {
+    /// The bodies whose joints make M singular: nothing that they carry has inertia along them. Forward dynamics and
+    /// M⁻¹ refuse such a robot; armature on these joints cures it.
+    pub fn singular_joints(&self) -> &[usize] {
+        &self.singular
+    }
+
+    /// Panics, with the joint's name, where M has no inverse.
+    #[doc(hidden)]
+    #[inline]
+    #[track_caller]
+    pub fn check_regular(&self) {
+        if let Some(&i) = self.singular.first() {
+            panic!("{}", Warning::Singular { joint: self.bodies[i].joint_name.clone() });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{ModelBuilder, WORLD};
+    use crate::joint::Joint;
+    use condyle_spatial::{Se3, Sym3, Vec3};
+
+    fn z() -> Joint {
+        Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) }
+    }
+
+    fn ball() -> Inertia<f64> {
+        Inertia::from_com(1.0, Vec3::new(0.1, 0.0, 0.0), Sym3::diagonal(0.01))
+    }
+
+    #[test]
+    fn a_massless_leaf_is_singular_and_named() {
+        let mut builder = ModelBuilder::new("leaf");
+        let arm = builder.body("arm", WORLD, z(), Se3::identity(), ball());
+        builder.body("leaf", arm, z(), Se3::new(Se3::identity().rotation, Vec3::new(1.0, 0.0, 0.0)), Inertia::zero());
+        let model = builder.build().unwrap();
+        assert_eq!(model.singular_joints(), [2]);
+        let said: Vec<String> = model.warnings().iter().map(ToString::to_string).collect();
+        assert_eq!(said[0], "body `leaf` moves and has no mass");
+        assert!(said[1].starts_with("joint `leaf` moves nothing"), "{said:?}");
+        assert!(model.with_armature(&[0.0, 0.1]).singular_joints().is_empty());
+    }
+
+    #[test]
+    fn a_mass_point_on_its_axis_is_singular_wherever_it_is() {
+        let mut builder = ModelBuilder::new("point");
+        let far = Se3::new(Se3::identity().rotation, Vec3::new(3.0, -2.0, 1.0));
+        let arm = builder.body("arm", WORLD, z(), far, ball());
+        let point = Inertia::from_com(0.7, Vec3::new(0.0, 0.0, 0.3), Sym3::zero());
+        builder.body("point", arm, z(), far, point);
+        assert_eq!(builder.build().unwrap().singular_joints(), [2]);
+    }
+
+    #[test]
+    fn a_chain_may_have_massless_bodies_inside() {
+        let mut builder = ModelBuilder::new("chain");
+        builder.spherical_zyx("ball", WORLD, Se3::identity(), ball());
+        let model = builder.build().unwrap();
+        assert!(model.singular_joints().is_empty() && model.warnings().is_empty());
+    }
+
+    #[test]
+    fn impossible_inertias_are_named() {
+        let body = |rotational| {
+            let mut builder = ModelBuilder::new("odd");
+            builder.body("odd", WORLD, z(), Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), rotational));
+            builder.build().unwrap().warnings().to_vec()
+        };
+        let flat = |xx, yy, zz| Sym3 { xx, xy: 0.0, yy, xz: 0.0, yz: 0.0, zz };
+        assert!(matches!(body(flat(0.1, 0.1, 0.3))[..], [Warning::Triangle { .. }]));
+        assert!(matches!(body(flat(0.1, -0.1, 0.1))[..], [Warning::Negative { .. }]));
+        assert!(body(flat(0.1, 0.1, 0.2)).is_empty()); // a flat plate
+    }
+}

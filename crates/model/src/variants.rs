@@ -1,0 +1,99 @@
+//! The same robot with something changed.
+
+use crate::body::Body;
+use crate::limbs::Plan;
+use crate::model::Model;
+use condyle_linalg::check;
+use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
+use core::any::Any;
+
+impl<R> Model<R> {
+    /// The same robot under another gravity (m/s², in the world's frame).
+    #[must_use]
+    pub fn with_gravity(mut self, gravity: Vec3<R>) -> Self {
+        self.gravity = gravity;
+        self
+    }
+}
+
+impl Model {
+    /// The same robot with another armature, one number for each degree of freedom (kg m², kg).
+    ///
+    /// # Panics
+    /// If `armature` has not nv numbers.
+    #[must_use]
+    pub fn with_armature(mut self, armature: &[f64]) -> Self {
+        check("armature", armature.len(), self.nv());
+        self.armature.copy_from_slice(armature);
+        self.find_singular();
+        self
+    }
+
+    /// The same robot with constants of another type, its inertias given by a function of (body, inertia).
+    ///
+    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters. [`Body::inertia`]
+    /// is a plain number: it follows if the new ones are.
+    ///
+    /// ```
+    /// use condyle_model::{Inertia, robots};
+    /// use num_dual::Dual64;
+    /// // ∂/∂(mass of the last body): seed that one number
+    /// let arm = robots::arm7();
+    /// let dual = arm.with_inertias(|body, I| Inertia::<Dual64> {
+    ///     mass: Dual64::new(I.mass, if body == 7 { 1.0 } else { 0.0 }),
+    ///     ..I.lift()
+    /// });
+    /// assert_eq!(dual.nv(), arm.nv()); // rnea(&dual, …) gives ∂τ/∂m with τ
+    /// ```
+    pub fn with_inertias<T: Scalar + Constant<T>>(
+        &self,
+        mut inertia: impl FnMut(usize, Inertia<f64>) -> Inertia<T>,
+    ) -> Model<T> {
+        let mut bodies = self.bodies.clone();
+        let replace = |(i, b): (usize, &mut Body)| {
+            let I = inertia(i, b.inertia);
+            if let Some(&plain) = (&I as &dyn Any).downcast_ref::<Inertia<f64>>() {
+                b.inertia = plain;
+            }
+            I
+        };
+        let inertias: Vec<Inertia<T>> = bodies.iter_mut().enumerate().map(replace).collect();
+        let turned = |i: usize| Se3::new(self.tree.nodes[i].axis_rotation, Vec3::zero()).lift(); // bXz
+        let mut model = Model {
+            tree: self.tree.map(|X| X.lift(), |i| turned(i).act_inv(inertias[i])),
+            armature: self.armature.iter().map(|&a| T::of(a)).collect(),
+            gravity: self.gravity.lift(),
+            name: self.name.clone(),
+            bodies,
+            frames: self.frames.clone(),
+            limits: self.limits.clone(),
+            damping: self.damping.clone(),
+            friction: self.friction.clone(),
+            limbs: None,
+            warnings: self.warnings.clone(),
+            singular: self.singular.clone(),
+        };
+        if let Some(plain) = (&mut model as &mut dyn Any).downcast_mut::<Model>() {
+            plain.limbs = self.limbs.as_ref().and_then(|_| Plan::new(&plain.tree));
+        }
+        model
+    }
+
+    /// The same robot, with its limbs side by side in single calls or one body after the other.
+    ///
+    /// Where it has limbs enough (four legs, two legs and two arms, fingers), `rnea`, `aba`, `crba`, `minv`, the derivatives
+    /// of the first two and `constrained_dynamics` compute four bodies of one state at a time if the processor has AVX2 or
+    /// NEON, two to three times as fast. A `Batch` never does, since its lanes hold states. The two ways add up in
+    /// different orders, so their results differ in the last digits; without limbs a single call gives the bits of a batch.
+    ///
+    /// ```
+    /// let quadruped = condyle_model::robots::quadruped();
+    /// let in_turn = quadruped.clone().with_limbs(false); // rnea(&in_turn, …) is rnea(&quadruped, …) but for rounding
+    /// assert_eq!(in_turn.nv(), quadruped.nv());
+    /// ```
+    #[must_use]
+    pub fn with_limbs(mut self, side_by_side: bool) -> Self {
+        self.limbs = if side_by_side { Plan::new(&self.tree) } else { None };
+        self
+    }
+}

@@ -1,0 +1,207 @@
+//! Quadratic programs with bounds, by projected Newton steps.
+#![allow(non_snake_case)] // the names of the literature
+
+use condyle_linalg::{SLACK, dot, eliminate, solve_right};
+use nalgebra::DMatrix;
+
+/// Newton steps by Crocoddyl's rule, and as many by the careful one.
+const STEPS: usize = 100;
+
+/// Converged when no entry of the gradient on the free variables is larger.
+const GRADIENT: f64 = 1e-5;
+
+/// A step length is taken if the objective falls by more than this times what its slope says.
+const ACCEPT: f64 = 0.1;
+
+/// Step lengths tried, 2⁻ⁿ.
+const STEP_LENGTHS: i32 = 10;
+
+/// Workspace for
+///
+/// ```text
+/// minimise   ½ xᵀ H x + qᵀ x      subject to   lower ≤ x ≤ upper
+/// ```
+///
+/// by the method of Tassa, Mansard, Todorov (ICRA 2014, section III), with the rules and constants of Crocoddyl's box
+/// solvers: a variable is clamped where it lies on a bound that the gradient pushes it against, the others are free and
+/// make a Newton step, cut off at the bounds.
+///
+/// Crocoddyl's rule for a step counts the slope of the free variables with the wrong sign, so that a step may raise the
+/// objective. It mostly converges all the same, and then to the same last set of clamped variables; where it goes round in
+/// circles (18 of the 600 problems of the test below), the rule of the paper takes over.
+#[derive(Debug, Clone)]
+pub(crate) struct BoxQp {
+    pub(crate) x: Vec<f64>,
+    /// Indices of the variables that the last Newton step moved, in order.
+    pub(crate) free: Vec<usize>,
+    gradient: Vec<f64>,
+    step: Vec<f64>,
+    trial: Vec<f64>,
+    /// [H_ff; g_fᵀ] of the free variables, and scratch for its factor.
+    H: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+impl BoxQp {
+    /// Room for `size` variables.
+    pub(crate) fn new(size: usize) -> Self {
+        Self {
+            x: vec![0.0; size],
+            free: Vec::with_capacity(size),
+            gradient: vec![0.0; size],
+            step: vec![0.0; size],
+            trial: vec![0.0; size],
+            H: vec![0.0; (size + 1 + SLACK) * (size + SLACK)],
+            upper: vec![0.0; (size + SLACK) * size],
+        }
+    }
+
+    /// Solves from `start`, moved into the bounds; x and `free` are the result.
+    ///
+    /// # Errors
+    /// The variable and the pivot, if H is not positive definite on the free variables.
+    pub(crate) fn solve(
+        &mut self,
+        H: &DMatrix<f64>,
+        q: &[f64],
+        lower: &[f64],
+        upper: &[f64],
+        start: impl Iterator<Item = f64>,
+    ) -> Result<(), (usize, f64)> {
+        let m = q.len();
+        for (i, start) in start.enumerate() {
+            self.x[i] = start.min(upper[i]).max(lower[i]);
+        }
+        for n in 0..2 * STEPS {
+            // g = q + H x
+            self.gradient[..m].copy_from_slice(q);
+            for j in 0..m {
+                for i in 0..m {
+                    self.gradient[i] += H[(i, j)] * self.x[j];
+                }
+            }
+            self.free.clear();
+            for (i, g) in self.gradient[..m].iter().enumerate() {
+                if !(self.x[i] == lower[i] && *g > 0.0 || self.x[i] == upper[i] && *g < 0.0) {
+                    self.free.push(i);
+                }
+            }
+            self.newton_step(H)?;
+            let slope = self.free.iter().fold(0.0, |largest: f64, &i| largest.max(self.gradient[i].abs()));
+            self.line_search(H, q, lower, upper, n >= STEPS);
+            if slope <= GRADIENT {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Δx_f = −H_ff⁻¹ g_f,   Δx = 0 for the clamped.
+    fn newton_step(&mut self, H: &DMatrix<f64>) -> Result<(), (usize, f64)> {
+        let Self { free, gradient, step, H: work, upper, .. } = self;
+        let (count, stride) = (free.len(), free.len() + 1 + SLACK);
+        for (column, &j) in free.iter().enumerate() {
+            let column = &mut work[column * stride..][..stride];
+            for (row, &i) in free.iter().enumerate() {
+                column[row] = H[(i, j)];
+            }
+            column[count] = gradient[j];
+            column[count + 1..].fill(0.0);
+        }
+        eliminate(work, stride, [count + 1, count, count]).map_err(|(row, pivot)| (free[row], pivot))?;
+        solve_right(work, stride, [count, count + 1, count], upper);
+        step.fill(0.0);
+        for (column, &j) in free.iter().enumerate() {
+            step[j] = -work[column * stride + count];
+        }
+        Ok(())
+    }
+
+    /// Takes the longest good step, if there is one, by the rule of the paper if `careful`, else by Crocoddyl's.
+    fn line_search(&mut self, H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64], careful: bool) {
+        let m = q.len();
+        if !careful {
+            for &i in &self.free {
+                self.gradient[i] = -self.gradient[i];
+            }
+        }
+        let value = objective(H, q, &self.x[..m]);
+        for n in 0..STEP_LENGTHS {
+            let length = 0.5_f64.powi(n);
+            let mut expected = 0.0;
+            for i in 0..m {
+                self.trial[i] = (self.x[i] + length * self.step[i]).min(upper[i]).max(lower[i]);
+                expected += self.gradient[i] * (self.x[i] - self.trial[i]);
+            }
+            if value - objective(H, q, &self.trial[..m]) > ACCEPT * expected {
+                self.x[..m].copy_from_slice(&self.trial[..m]);
+                return;
+            }
+        }
+    }
+}
+
+/// ½ xᵀ H x + qᵀ x.
+fn objective(H: &DMatrix<f64>, q: &[f64], x: &[f64]) -> f64 {
+    let curvature: f64 = H.column_iter().zip(x).map(|(column, xj)| xj * dot(column.as_slice(), x)).sum();
+    0.5 * curvature + dot(q, x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The problems have entries of size one; the last Newton step is exact on the set it finds.
+    const KKT: f64 = 1e-10;
+
+    fn solve(H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64]) -> Result<BoxQp, (usize, f64)> {
+        let mut qp = BoxQp::new(q.len());
+        qp.solve(H, q, lower, upper, std::iter::repeat_n(0.0, q.len()))?;
+        Ok(qp)
+    }
+
+    /// The gradient is zero where the solution is free and points out of the box where it is not.
+    #[test]
+    fn solutions_satisfy_the_conditions_of_optimality() {
+        for size in 1..13 {
+            for case in 0..50_usize {
+                let entry = |i: usize, j: usize| ((i * 37 + j * 19 + case * 11 + 3) % 29) as f64 / 29.0 - 0.5;
+                let root = DMatrix::from_fn(size, size, entry);
+                let H = &root * root.transpose() + DMatrix::identity(size, size) * 0.1;
+                let q: Vec<f64> = (0..size).map(|i| entry(i, 7)).collect();
+                let lower: Vec<f64> =
+                    (0..size).map(|i| if i % 3 == 0 { f64::NEG_INFINITY } else { -0.1 - 0.1 * entry(i, 2) }).collect();
+                let upper: Vec<f64> = (0..size).map(|i| 0.05 + 0.05 * entry(i, 5)).collect();
+                let qp = solve(&H, &q, &lower, &upper).unwrap();
+                for i in 0..size {
+                    let gradient = q[i] + (0..size).map(|j| H[(i, j)] * qp.x[j]).sum::<f64>();
+                    // x = the projection of x − ∇ into the box
+                    let error = (qp.x[i] - (qp.x[i] - gradient).min(upper[i]).max(lower[i])).abs();
+                    assert!(error < KKT, "size {size}, case {case}, variable {i}: {error:e}");
+                    assert!(lower[i] <= qp.x[i] && qp.x[i] <= upper[i]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_bounds_it_is_a_newton_step() {
+        let H = nalgebra::dmatrix![2.0, 1.0; 1.0, 3.0];
+        let infinite = [f64::INFINITY; 2];
+        let qp = solve(&H, &[1.0, -1.0], &infinite.map(|x| -x), &infinite).unwrap();
+        assert!((qp.x[0] + 0.8).abs() < KKT && (qp.x[1] - 0.6).abs() < KKT && qp.free == [0, 1]);
+    }
+
+    #[test]
+    fn a_variable_without_curvature_is_named() {
+        let H = DMatrix::from_diagonal(&nalgebra::dvector![1.0, -1.0]);
+        assert_eq!(solve(&H, &[0.0, 0.0], &[-1.0; 2], &[1.0; 2]).unwrap_err(), (1, -1.0));
+    }
+
+    #[test]
+    fn a_box_of_one_point_is_its_solution() {
+        let H = DMatrix::identity(2, 2);
+        let qp = solve(&H, &[5.0, -5.0], &[1.0, 1.0], &[1.0, 1.0]).unwrap();
+        assert_eq!(qp.x, [1.0, 1.0]);
+    }
+}

@@ -1,0 +1,213 @@
+//! What a segment of a horizon costs, for every state at its start and whatever comes after its end.
+//!
+//! Let x be the state at the first knot of a segment and z that after its last one. The least cost of the segment plus
+//! λᵀz, with a multiplier λ as a parameter, is quadratic in both,
+//!
+//! ```text
+//! V(x, λ) = ½ xᵀPx + pᵀx + λᵀ(Θ x + θ) − ½ λᵀC λ + const
+//! ```
+//!
+//! and with P = 0, p = 0, Θ = 1, θ = 0, C = 0 behind the segment, the elimination of a Riccati step gives it knot by knot, if
+//! λ has rows below H ([`Sweep`](crate::Sweep) has the rest):
+//!
+//! ```text
+//! ⎡ H       ⎤      ⎡ L  ·   ⎤      Y = Θ⁺B L⁻ᵀ,   Θ = Θ⁺A − Y Xᵀ
+//! ⎢         ⎥  →   ⎢ X  Vxx ⎥      θ = θ⁺ + Θ⁺f − Y y
+//! ⎣ Θ⁺[B A] ⎦      ⎣ Y  Θ   ⎦      C = C⁺ + Y Yᵀ
+//! ```
+//!
+//! The best z is ∂V/∂λ = Θ x + θ − C λ. If what comes after is worth ½ zᵀP₁z + p₁ᵀz, its multiplier is λ = P₁z + p₁; with
+//! both eliminated, P₁ = L Lᵀ and M = 1 + LᵀC L, the value function at the start of the segment has
+//!
+//! ```text
+//! P₀ = P + (ΘᵀL) M⁻¹ (ΘᵀL)ᵀ,      p₀ = p + Θᵀp₁ + (ΘᵀL) M⁻¹ Lᵀ(θ − C p₁)
+//! ```
+//!
+//! Särkkä and García-Fernández, "Temporal parallelization of dynamic programming and linear quadratic control" (IEEE
+//! TAC, 2023), call V a conditional value function, and have it of x and z; Jallet, Dantec, Arlaud, Mansard, Carpentier,
+//! "Parallel and proximal constrained linear-quadratic methods for real-time nonlinear MPC" (RSS 2024), of x and λ.
+#![allow(non_snake_case)] // the names of the literature
+
+use super::node::LqNode;
+use super::step::Step;
+use condyle_linalg::{
+    SLACK, View, add_product_lower, add_scaled_product, copy_lower, copy_matrix, copy_symmetric, dot, eliminate,
+    product_of_upper_lower, product_with_upper, transpose,
+};
+
+/// A value function; P is symmetric and full, with slack rows.
+#[derive(Debug, Clone)]
+pub(crate) struct Value {
+    pub(crate) P: Vec<f64>,
+    pub(crate) p: Vec<f64>,
+}
+
+impl Value {
+    pub(crate) fn zeros(n: usize) -> Self {
+        Self { P: vec![0.0; (n + SLACK) * n], p: vec![0.0; n] }
+    }
+
+    pub(crate) fn copy_from(&mut self, P: &[f64], p: &[f64]) {
+        self.P.copy_from_slice(P);
+        self.p.copy_from_slice(p);
+    }
+}
+
+/// How the end of a segment depends on its start and on the multiplier; beside P and p, which are in its [`Step`].
+/// Matrices have slack rows.
+#[derive(Debug, Clone)]
+pub(crate) struct Transfer {
+    Theta: Vec<f64>,
+    theta: Vec<f64>,
+    /// Its lower triangle.
+    C: Vec<f64>,
+}
+
+impl Transfer {
+    pub(crate) fn zeros(n: usize) -> Self {
+        let square = || vec![0.0; (n + SLACK) * n];
+        Self { Theta: square(), theta: vec![0.0; n], C: square() }
+    }
+
+    /// P, p, Θ, θ and C of a segment from its nodes. Whether all Quu were positive definite.
+    pub(crate) fn run(&mut self, step: &mut Step, nodes: &[LqNode], regularisation: f64) -> bool {
+        let (n, ld) = (self.theta.len(), self.theta.len() + SLACK);
+        let work = &mut step.work;
+        for zero in [&mut work.P, &mut work.p, &mut self.Theta, &mut self.theta, &mut self.C] {
+            zero.fill(0.0);
+        }
+        for j in 0..n {
+            self.Theta[j * ld + j] = 1.0;
+        }
+        nodes.iter().rev().all(|node| self.step(step, node, regularisation))
+    }
+
+    /// One knot.
+    fn step(&mut self, step: &mut Step, node: &LqNode, regularisation: f64) -> bool {
+        let (n, m) = (node.ndx(), node.nu());
+        let (ldt, last) = (n + SLACK, m + n);
+        let Self { Theta, theta, C } = self;
+        if node.f.iter().any(|f| *f != 0.0) {
+            add_scaled_product(theta, 1.0, View::new(Theta, ldt), node.f.as_slice()); // θ + Θ f
+        }
+        let (work, turn) = step.write_with_rows_below(node, regularisation, Theta);
+        let ld = work.stride(m);
+        if eliminate(&mut work.H, ld, [last + 1 + n, last, m]).is_err() {
+            return false;
+        }
+        work.take_value(ld, m, turn);
+        for j in 0..n {
+            work.P[j * ldt + j] += regularisation;
+        }
+        // Θ, with its columns turned back, and Y
+        let (below, split) = (&work.H[last + 1..], n - turn);
+        copy_matrix(&mut Theta[turn * ldt..], ldt, View::new(&below[m * ld..], ld), [n, split]);
+        if turn > 0 {
+            copy_matrix(Theta, ldt, View::new(&below[(m + split) * ld..], ld), [n, turn]);
+        }
+        for j in 0..m {
+            let (y, Y) = work.H[j * ld + last..][..n + 1].split_at(1);
+            add_scaled_product(theta, -y[0], View::new(Y, n), &[1.0]);
+        }
+        let Y = View::new(below, ld);
+        add_product_lower(C, ldt, [n, n, m], Y, Y);
+        true
+    }
+}
+
+/// Scratch for the value function at the start of a segment, given that at its end. Matrices have slack rows, and the
+/// stride n + 1 + SLACK.
+#[derive(Debug, Clone)]
+pub(crate) struct Link {
+    /// C, both triangles.
+    C: Vec<f64>,
+    L: Vec<f64>,
+    /// Lᵀ, with its zeros.
+    upper: Vec<f64>,
+    /// C L.
+    CL: Vec<f64>,
+    /// (C L)ᵀ, and then [Θ, θ − C p₁]ᵀ.
+    rows: Vec<f64>,
+    /// [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ]; with the stride 2n + 1 + SLACK.
+    H: Vec<f64>,
+}
+
+impl Link {
+    pub(crate) fn new(n: usize) -> Self {
+        let square = || vec![0.0; (n + 1 + SLACK) * n];
+        let H = vec![0.0; (2 * n + 1 + SLACK) * 2 * n];
+        Self { C: square(), L: square(), upper: square(), CL: square(), rows: square(), H }
+    }
+
+    /// L of P₁ = L Lᵀ, and its transpose. Where states cost nothing P₁ may be singular, and then rounding decides whether
+    /// a pivot is positive: a second try has a little more on the diagonal.
+    fn factorise(&mut self, P: &[f64], n: usize) -> bool {
+        let (ld, ldp) = (n + 1 + SLACK, n + SLACK);
+        let mut largest = 0.0_f64;
+        for j in 0..n {
+            largest = largest.max(P[j * ldp + j]);
+        }
+        for more in [0.0, n as f64 * f64::EPSILON * largest] {
+            copy_lower(&mut self.L, ld, View::new(P, ldp), n);
+            for j in 0..n {
+                self.L[j * ld + j] += more;
+            }
+            if eliminate(&mut self.L, ld, [n, n, n]).is_ok() {
+                transpose(&mut self.upper, ld, View::new(&self.L, ld), [n, n]);
+                for k in 0..n {
+                    self.upper[k * ld + k + 1..(k + 1) * ld].fill(0.0);
+                }
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The value function `start` at the start of a segment with P, p in `step`, from the one at its `end`. Whether
+    /// that one is convex.
+    pub(crate) fn run(&mut self, step: &Step, transfer: &Transfer, end: &Value, start: &mut Value) -> bool {
+        let (n, work) = (end.p.len(), &step.work);
+        let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);
+        if !self.factorise(&end.P, n) {
+            return false;
+        }
+        let Self { C, upper, CL, rows, H, .. } = self;
+        let upper = View::new(upper, ld);
+
+        // M = 1 + Lᵀ(C L)
+        copy_symmetric(C, ld, View::new(&transfer.C, ldp), n);
+        product_with_upper(CL, ld, [n, n], View::new(C, ld), upper);
+        transpose(rows, ld, View::new(CL, ld), [n, n]);
+        product_of_upper_lower(H, ldh, n, upper, View::new(rows, ld));
+        for j in 0..n {
+            H[j * ldh + j] += 1.0;
+        }
+
+        // [Θ, θ − C p₁]ᵀL
+        transpose(rows, ld, View::new(&transfer.Theta, ldp), [n, n]);
+        for k in 0..n {
+            rows[k * ld + n] = transfer.theta[k] - dot(&C[k * ld..][..n], &end.p);
+        }
+        product_with_upper(&mut H[n..], ldh, [n + 1, n], View::new(rows, ld), upper);
+
+        // −P and −(p + Θᵀp₁), from which the elimination subtracts what is to be added to P and p
+        for j in 0..n {
+            let (H, P) = (&mut H[(n + j) * ldh + n..][..n + 1], &work.P[j * ldp..][..n]);
+            for i in j..n {
+                H[i] = -P[i];
+            }
+            H[n] = -work.p[j] - dot(&transfer.Theta[j * ldp..][..n], &end.p);
+        }
+        if eliminate(H, ldh, [2 * n + 1, 2 * n, n]).is_err() {
+            return false;
+        }
+        copy_symmetric(&mut start.P, ldp, View::new(&H[n * ldh + n..], ldh), n);
+        for j in 0..n {
+            for i in 0..n {
+                start.P[j * ldp + i] = -start.P[j * ldp + i];
+            }
+            start.p[j] = -H[(n + j) * ldh + 2 * n];
+        }
+        true
+    }
+}

@@ -1,0 +1,159 @@
+//! The linear-quadratic problem: all that a solver sees of a horizon.
+#![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
+
+use super::implicit::Implicit;
+use super::structure::{EulerBlock, LARGEST_BLOCK, Structure};
+use crate::error::assert_length;
+use nalgebra::{DMatrix, DVector};
+
+/// Beyond this a value has diverged and the sweep or the trial is given up.
+pub(crate) const DIVERGED: f64 = 1e30;
+
+/// One knot of a linear-quadratic problem in the changes δx (ndx), δu (nu):
+///
+/// ```text
+/// minimise   Σₜ ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu    subject to   δx⁺ = A δx + B δu + f
+/// ```
+///
+/// and to lower ≤ δu ≤ upper. Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q
+/// and q are read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LqNode {
+    /// ∂x⁺/∂x, ndx × ndx.
+    pub A: DMatrix<f64>,
+    /// ∂x⁺/∂u, ndx × nu.
+    pub B: DMatrix<f64>,
+    /// The gap: the predicted next state ⊖ the next state of the trajectory, ndx. Written by the solver.
+    pub f: DVector<f64>,
+    /// ∂²ℓ/∂x², ndx × ndx.
+    pub Q: DMatrix<f64>,
+    /// ∂²ℓ/∂x∂u, ndx × nu.
+    pub S: DMatrix<f64>,
+    /// ∂²ℓ/∂u², nu × nu.
+    pub R: DMatrix<f64>,
+    /// ∂ℓ/∂x, ndx.
+    pub q: DVector<f64>,
+    /// ∂ℓ/∂u, nu.
+    pub r: DVector<f64>,
+    /// Least δu, nu; −∞ for none. Written by the solver.
+    pub lower: DVector<f64>,
+    /// Greatest δu, nu; ∞ for none. Written by the solver.
+    pub upper: DVector<f64>,
+    /// What is known of the form of A and B.
+    pub structure: Structure,
+    /// What stands for A, B, S, R and part of Q where the solver and the action can both use it.
+    pub(crate) implicit: Implicit,
+}
+
+impl LqNode {
+    /// A knot of zeros with ndx states and nu controls without bounds.
+    pub fn zeros(ndx: usize, nu: usize) -> Self {
+        Self {
+            A: DMatrix::zeros(ndx, ndx),
+            B: DMatrix::zeros(ndx, nu),
+            f: DVector::zeros(ndx),
+            Q: DMatrix::zeros(ndx, ndx),
+            S: DMatrix::zeros(ndx, nu),
+            R: DMatrix::zeros(nu, nu),
+            q: DVector::zeros(ndx),
+            r: DVector::zeros(nu),
+            lower: DVector::from_element(nu, f64::NEG_INFINITY),
+            upper: DVector::from_element(nu, f64::INFINITY),
+            structure: Structure::default(),
+            implicit: Implicit::default(),
+        }
+    }
+
+    /// The number of states, ndx.
+    pub fn ndx(&self) -> usize {
+        self.q.len()
+    }
+
+    /// The number of controls, nu.
+    pub fn nu(&self) -> usize {
+        self.r.len()
+    }
+
+    /// Whether a control has a bound.
+    pub(crate) fn is_bounded(&self) -> bool {
+        self.lower.iter().chain(&self.upper).any(|bound| bound.is_finite())
+    }
+
+    /// Panics with the name of the first field whose shape does not fit q and r.
+    #[track_caller]
+    pub(crate) fn assert_shapes(&self, ndx: usize, nu: usize) {
+        assert_length("q", self.q.len(), ndx);
+        assert_length("r", self.r.len(), nu);
+        assert_length("f", self.f.len(), ndx);
+        assert_length("lower", self.lower.len(), nu);
+        assert_length("upper", self.upper.len(), nu);
+        if let Some((_, blocks)) = self.structure.euler() {
+            assert!(ndx.is_multiple_of(2), "`structure` is that of x = (q, v), but ndx is {ndx}");
+            let inside = |block: &EulerBlock| block.range().end <= ndx / 2 && block.range().len() <= LARGEST_BLOCK;
+            assert!(blocks.iter().all(inside), "a block of `structure` has more than 6 rows or leaves those of q");
+        }
+        for (name, matrix, shape) in [
+            ("A", &self.A, (ndx, ndx)),
+            ("B", &self.B, (ndx, nu)),
+            ("Q", &self.Q, (ndx, ndx)),
+            ("S", &self.S, (ndx, nu)),
+            ("R", &self.R, (nu, nu)),
+        ] {
+            assert!(matrix.shape() == shape, "`{name}` has shape {:?}, expected {shape:?}", matrix.shape());
+        }
+    }
+}
+
+/// What the sweep finds at one knot: the feedback δu = k + K δx, and the value function
+/// V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx + const of the rest of the horizon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LqKnot {
+    /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
+    pub K: DMatrix<f64>,
+    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the δu that is best at δx = 0.
+    pub k: DVector<f64>,
+    /// Gradient of the value function at δx = 0, ndx.
+    pub Vx: DVector<f64>,
+    /// Hessian of the value function, with the regularisation on its diagonal; ndx × ndx, symmetric.
+    pub Vxx: DMatrix<f64>,
+    /// r + Bᵀ(Vx⁺ + Vxx⁺ f), nu; zero for a control at its bound.
+    pub Qu: DVector<f64>,
+    /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
+    pub Quu: DMatrix<f64>,
+    /// Quᵀk and kᵀQuu k: what a full step is expected to change of the cost, to first and (twice) to second order.
+    pub expected: [f64; 2],
+}
+
+impl LqKnot {
+    /// A knot of zeros with ndx states and nu controls.
+    pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
+        Self {
+            K: DMatrix::zeros(nu, ndx),
+            k: DVector::zeros(nu),
+            Vx: DVector::zeros(ndx),
+            Vxx: DMatrix::zeros(ndx, ndx),
+            Qu: DVector::zeros(nu),
+            Quu: DMatrix::zeros(nu, nu),
+            expected: [0.0; 2],
+        }
+    }
+}
+
+/// The second derivatives of a function ψ(δx, δu) of one knot; see
+/// [`dynamics_hessian`](crate::ActionModel::dynamics_hessian).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hessian {
+    /// ∂²ψ/∂x², ndx × ndx, symmetric.
+    pub xx: DMatrix<f64>,
+    /// ∂²ψ/∂x∂u, ndx × nu.
+    pub xu: DMatrix<f64>,
+    /// ∂²ψ/∂u², nu × nu, symmetric.
+    pub uu: DMatrix<f64>,
+}
+
+impl Hessian {
+    /// Zeros for ndx states and nu controls.
+    pub fn zeros(ndx: usize, nu: usize) -> Self {
+        Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }
+    }
+}

@@ -1,0 +1,117 @@
+//! Inertias of rigid bodies, and of articulated ones.
+
+use crate::algebra::motion::{Force, Motion};
+use crate::algebra::se3::{Act, Se3};
+use crate::algebra::vector::{Mat3, Sym3, Vec3, impl_linear};
+use crate::scalar::{Constant, Scalar};
+use core::ops::Mul;
+use serde::{Deserialize, Serialize};
+
+/// The inertia of a rigid body: the ten numbers that its dynamics is linear in.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
+pub struct Inertia<S> {
+    /// m (kg).
+    pub mass: S,
+    /// h = m c, mass times the centre of mass in the frame (kg m).
+    pub mass_com: Vec3<S>,
+    /// Ī, the rotational inertia about the origin of the frame (kg m²).
+    pub rotational: Sym3<S>,
+}
+impl_linear!(Inertia { mass, mass_com, rotational });
+
+impl<S: Scalar> Inertia<S> {
+    /// From mass, centre of mass and rotational inertia about the centre of mass: Ī = I_c − m c× c×.
+    ///
+    /// ```
+    /// use condyle_spatial::{Inertia, Motion, Sym3, Vec3};
+    /// let I = Inertia::from_com(2.0, Vec3::new(0.0, 0.0, 0.5), Sym3::diagonal(0.1));
+    /// assert_eq!(I.rotational.xx, 0.1 + 2.0 * 0.25); // the parallel-axis theorem
+    /// ```
+    pub fn from_com(mass: S, com: Vec3<S>, rotational: Sym3<S>) -> Self {
+        let shift = Sym3::diagonal(com.norm_squared()) - Sym3::outer(com);
+        Self { mass, mass_com: com.scale(mass), rotational: rotational + shift.scale(mass) }
+    }
+}
+
+impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
+    type Output = Force<S>;
+    /// I v = [m v − h × ω; Ī ω + h × v].
+    #[inline(always)]
+    fn mul(self, v: Motion<S>) -> Force<S> {
+        Force {
+            linear: v.linear.scale_add(self.mass, v.angular.cross(self.mass_com)),
+            angular: self.rotational.mul_add(v.angular, self.mass_com.cross(v.linear)),
+        }
+    }
+}
+
+impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
+    /// Rotate, then shift the origin: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× − m p× p×.
+    #[inline(always)]
+    fn act(&self, I: Inertia<S>) -> Inertia<S> {
+        let p = self.translation;
+        let h = self.rotation * I.mass_com;
+        // −[p]ₓ[h]ₓ − [h]ₓ[p]ₓ − m [p]ₓ[p]ₓ = −[p]ₓ[w]ₓ − [w]ₓ[p]ₓ with w = h + m p / 2
+        let w = p.scale_add(I.mass * S::splat(0.5), h);
+        let shift = -Sym3::outer_sum(p, w).add_diagonal(-(S::splat(2.0) * p.dot(w)));
+        Inertia {
+            mass: I.mass,
+            mass_com: p.scale_add(I.mass, h),
+            rotational: I.rotational.rotate(self.rotation) + shift,
+        }
+    }
+    fn act_inv(&self, I: Inertia<S>) -> Inertia<S> {
+        self.inverse().act(I)
+    }
+}
+
+/// The inertia that an articulated body shows at its handle: a symmetric 6×6 matrix, in blocks
+/// [[linear, coupling], [couplingᵀ, rotational]].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct ArticulatedInertia<S> {
+    /// Force per linear acceleration.
+    pub linear: Sym3<S>,
+    /// Force per angular acceleration.
+    pub coupling: Mat3<S>,
+    /// Moment per angular acceleration.
+    pub rotational: Sym3<S>,
+}
+impl_linear!(ArticulatedInertia { linear, coupling, rotational });
+
+impl<S: Scalar> From<Inertia<S>> for ArticulatedInertia<S> {
+    #[inline(always)]
+    fn from(I: Inertia<S>) -> Self {
+        Self { linear: Sym3::diagonal(I.mass), coupling: (-I.mass_com).skew(), rotational: I.rotational }
+    }
+}
+
+impl<S: Scalar> Mul<Motion<S>> for ArticulatedInertia<S> {
+    type Output = Force<S>;
+    #[inline(always)]
+    fn mul(self, v: Motion<S>) -> Force<S> {
+        Force {
+            linear: self.linear.mul_add(v.linear, self.coupling * v.angular),
+            angular: self.coupling.transpose_mul_add(v.linear, self.rotational * v.angular),
+        }
+    }
+}
+
+impl<S: Scalar> ArticulatedInertia<S> {
+    /// I − s U Uᵀ.
+    #[inline(always)]
+    pub fn minus_outer(self, U: Force<S>, s: S) -> Self {
+        let (s, Mat3 { x, y, z }) = (-s, self.coupling);
+        let a = U.angular.scale(s);
+        Self {
+            linear: self.linear.add_outer(s, U.linear),
+            coupling: Mat3 {
+                x: U.linear.scale_add(a.x, x),
+                y: U.linear.scale_add(a.y, y),
+                z: U.linear.scale_add(a.z, z),
+            },
+            rotational: self.rotational.add_outer(s, U.angular),
+        }
+    }
+}

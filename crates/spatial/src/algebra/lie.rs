@@ -1,0 +1,211 @@
+//! Rotations and rigid motions as Lie groups: exponentials, logarithms, Jacobians.
+//!
+//! Exact near 0 and near π, on any scalar: whatever has a removable singularity is written with the entire functions
+//! of [`stumpff`]. Rotation vectors are in rad; a twist is a [`Motion`], linear first. Jacobians are *right* ones,
+//! exp(x + δ) = exp(x) exp(J δ), as tangent vectors of a configuration are in the body's frame.
+
+use crate::algebra::motion::Motion;
+pub use crate::algebra::quaternion::Quaternion;
+use crate::algebra::se3::Se3;
+use crate::algebra::vector::{Mat3, Vec3};
+use crate::scalar::Scalar;
+
+/// The entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, of t = θ²:
+/// cos θ, sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, (cos θ − 1 + θ²/2)/θ⁴, (sin θ − θ + θ³/6)/θ⁵.
+///
+/// Source: Stumpff (1959). Below 1 from the series of c₄ and c₅ and the recurrence cₖ = 1/k! − t cₖ₊₂, to full relative
+/// precision (no cancellation there); above from sine and cosine and the same recurrence upwards, within 1e-15.
+///
+/// ```
+/// let c = condyle_spatial::lie::stumpff(0.0_f64);
+/// assert_eq!(c, [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0]);
+/// ```
+#[inline(always)]
+pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
+    const INVERSE_FACTORIAL: [f64; 4] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0];
+    let small = t.lt(S::one());
+    // the series, for t < 1 (elsewhere of a harmless number)
+    let ts = S::select(small, t, S::zero());
+    let (s4, s5) =
+        (stumpff_series::<S, 4>(ts) * S::splat(1.0 / 24.0), stumpff_series::<S, 5>(ts) * S::splat(1.0 / 120.0));
+    let s3 = S::splat(INVERSE_FACTORIAL[3]) - ts * s5;
+    let s2 = S::splat(INVERSE_FACTORIAL[2]) - ts * s4;
+    let s1 = S::splat(INVERSE_FACTORIAL[1]) - ts * s3;
+    let s0 = S::splat(INVERSE_FACTORIAL[0]) - ts * s2;
+    // the closed forms, for t ≥ 1
+    let tl = S::select(small, S::one(), t);
+    let angle = tl.sqrt();
+    let (sin, cos) = angle.sin_cos();
+    let (r, l0, l1) = (tl.recip(), cos, sin * angle.recip());
+    let l2 = (S::splat(INVERSE_FACTORIAL[0]) - l0) * r;
+    let l3 = (S::splat(INVERSE_FACTORIAL[1]) - l1) * r;
+    let l4 = (S::splat(INVERSE_FACTORIAL[2]) - l2) * r;
+    let l5 = (S::splat(INVERSE_FACTORIAL[3]) - l3) * r;
+    [
+        S::select(small, s0, l0),
+        S::select(small, s1, l1),
+        S::select(small, s2, l2),
+        S::select(small, s3, l3),
+        S::select(small, s4, l4),
+        S::select(small, s5, l5),
+    ]
+}
+
+/// k! cₖ(t) for t < 1 by Horner's rule: 1 − t/((k+1)(k+2)) (1 − t/((k+3)(k+4)) (…)), to the last term a double can see.
+#[inline(always)]
+fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
+    let mut sum = S::one();
+    for j in 0..9 {
+        let last = K + 18 - 2 * j;
+        sum = (t * sum).mul_add(S::splat(-1.0 / f64::from((last - 1) * last)), S::one());
+    }
+    sum
+}
+
+/// exp of a rotation vector: the rotation by |w| about w.
+#[inline(always)]
+pub fn exp3<S: Scalar>(w: Vec3<S>) -> Quaternion<S> {
+    let [cos, sinc, ..] = stumpff(w.norm_squared() * S::splat(0.25)); // of half the angle
+    Quaternion { vector: w.scale(sinc * S::splat(0.5)), scalar: cos }
+}
+
+/// The rotation vector of a rotation, of length at most π.
+#[inline(always)]
+pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
+    // q and −q are the same rotation: take the one with w ≥ 0.
+    let negative = q.scalar.lt(S::zero());
+    let v = q.vector.scale(S::select(negative, S::splat(-1.0), S::one()));
+    let w = S::select(negative, -q.scalar, q.scalar);
+    // θ = 2 atan(n/w), n = |v|; θ/n → (2/w)(1 − r/3 + r²/5 − …), r = n²/w², near 0
+    let n2 = v.norm_squared();
+    let small = n2.lt(S::splat(1e-3));
+    let n = S::select(small, S::one(), n2).sqrt();
+    let far = n.atan2(w) * n.recip();
+    let w_near = S::select(small, w, S::one());
+    let r = S::select(small, n2, S::zero()) * (w_near * w_near).recip();
+    let mut sum = S::splat(1.0 / 15.0);
+    for k in [13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
+        sum = S::splat(1.0 / k) - r * sum;
+    }
+    let near = sum * w_near.recip();
+    v.scale(S::select(small, near, far) * S::splat(2.0))
+}
+
+/// 1/θ² − (cot(θ/2))/(2θ) of t = θ², the coefficient of w×² in the inverse Jacobians: (c₂ − c₃)/(4 c₁) at θ/2.
+#[inline(always)]
+fn inverse_coefficient<S: Scalar>(t: S) -> S {
+    let c = stumpff(t * S::splat(0.25));
+    (c[2] - c[3]) * (c[1] * S::splat(4.0)).recip()
+}
+
+/// 1 + a w× + b w×².
+#[inline(always)]
+fn rotation_series<S: Scalar>(w: Vec3<S>, a: S, b: S) -> Mat3<S> {
+    // [w]ₓ² = w wᵀ − |w|² 1
+    let bw = w.scale(b);
+    let square = Mat3 { x: w.scale(bw.x), y: w.scale(bw.y), z: w.scale(bw.z) };
+    (square + w.scale(a).skew()).add_diagonal(S::one() - bw.dot(w))
+}
+
+/// The right Jacobian of [`exp3`]: 1 − c₂ w× + c₃ w×².
+#[inline(always)]
+pub fn jexp3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
+    let c = stumpff(w.norm_squared());
+    rotation_series(w, -c[2], c[3])
+}
+
+/// Its inverse, the right Jacobian of [`log3`]: 1 + w×/2 + (1/θ² − cot(θ/2)/(2θ)) w×².
+#[inline(always)]
+pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
+    rotation_series(w, S::splat(0.5), inverse_coefficient(w.norm_squared()))
+}
+
+/// exp of a twist: the pose after moving with it for one unit of time.
+///
+/// Returns the rotation as a quaternion (what a configuration stores), and the translation V v, V = 1 + c₂ w× + c₃ w×².
+#[inline(always)]
+pub fn exp6<S: Scalar>(m: Motion<S>) -> (Quaternion<S>, Vec3<S>) {
+    let c = stumpff(m.angular.norm_squared());
+    (exp3(m.angular), rotation_series(m.angular, c[2], c[3]) * m.linear)
+}
+
+/// The twist of a pose (rotation, translation), of angle at most π: [V⁻¹ p; w].
+#[inline(always)]
+pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<S> {
+    let w = log3(rotation);
+    let V_inverse = rotation_series(w, S::splat(-0.5), inverse_coefficient(w.norm_squared()));
+    Motion { linear: V_inverse * translation, angular: w }
+}
+
+/// A linear map of motions that keeps rotations apart: [[A, B], [0, A]] on [linear; angular].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionMap<S> {
+    /// Of linear on linear, and of angular on angular.
+    pub diagonal: Mat3<S>,
+    /// Of angular on linear.
+    pub coupling: Mat3<S>,
+}
+
+impl<S: Scalar> MotionMap<S> {
+    /// The map aXb: motions in b to motions in a.
+    #[inline(always)]
+    pub fn adjoint(aXb: Se3<S>) -> Self {
+        Self { diagonal: aXb.rotation, coupling: aXb.translation.skew() * aXb.rotation }
+    }
+    /// The six columns, for the unit motions in order.
+    #[inline(always)]
+    pub fn columns(self) -> [Motion<S>; 6] {
+        let (A, B, o) = (self.diagonal, self.coupling, Vec3::zero());
+        [
+            Motion::new(A.x, o),
+            Motion::new(A.y, o),
+            Motion::new(A.z, o),
+            Motion::new(B.x, A.x),
+            Motion::new(B.y, A.y),
+            Motion::new(B.z, A.z),
+        ]
+    }
+}
+
+impl<S: Scalar> core::ops::Mul<Motion<S>> for MotionMap<S> {
+    type Output = Motion<S>;
+    #[inline(always)]
+    fn mul(self, m: Motion<S>) -> Motion<S> {
+        Motion { linear: self.diagonal * m.linear + self.coupling * m.angular, angular: self.diagonal * m.angular }
+    }
+}
+
+impl<S: Scalar> core::ops::Mul for MotionMap<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Self { diagonal: self.diagonal * o.diagonal, coupling: self.diagonal * o.coupling + self.coupling * o.diagonal }
+    }
+}
+
+/// The right Jacobian of [`exp6`].
+///
+/// Source: Barfoot and Furgale (2014), equations 100 and 102, for the twist turned round (right from left Jacobian).
+#[inline(always)]
+pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
+    let (v, w) = (-m.linear, -m.angular);
+    let t = w.norm_squared();
+    let c = stumpff(t);
+    let (V, W) = (v.skew(), w.skew());
+    let (WV, VW) = (W * V, V * W);
+    let WVW = WV * W;
+    let three = S::splat(3.0);
+    // Q = V/2 + c₃ (WV + VW + WVW) + c₄ (WWV + VWW − 3 WVW) + (c₄ − 3c₅)/2 (WVWW + WWVW)
+    let Q = V.scale(S::splat(0.5))
+        + (WV + VW + WVW).scale(c[3])
+        + (W * WV + VW * W - WVW.scale(three)).scale(c[4])
+        + (WVW * W + W * WVW).scale((c[4] - c[5] * three) * S::splat(0.5));
+    MotionMap { diagonal: rotation_series(w, c[2], c[3]), coupling: Q }
+}
+
+/// Its inverse, the right Jacobian of [`log6`], at the twist m: [[J, −J Q J], [0, J]] with J = [`jlog3`].
+#[inline(always)]
+pub fn jlog6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
+    let J = jlog3(m.angular);
+    MotionMap { diagonal: J, coupling: -(J * jexp6(m).coupling * J) }
+}

@@ -1,0 +1,90 @@
+//! Spatial vectors: motions (velocities, accelerations) and forces.
+
+use crate::algebra::vector::{Vec3, impl_linear};
+use crate::scalar::{Constant, Scalar};
+use serde::{Deserialize, Serialize};
+
+/// The cross product of spatial algebra, chosen by type: v × m of motions, v ×* f of a motion and a force.
+pub trait Cross<T> {
+    /// v × x: how fast x changes when it is fixed in a body that moves with v.
+    fn cross(self, x: T) -> T;
+}
+
+/// A spatial velocity or acceleration, [linear; angular]: that of the body's point at the frame's origin, and of the
+/// body's rotation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
+pub struct Motion<S> {
+    /// Of the point of the body at the origin of the frame: m/s or m/s².
+    pub linear: Vec3<S>,
+    /// Of the body's rotation: rad/s or rad/s².
+    pub angular: Vec3<S>,
+}
+impl_linear!(Motion { linear, angular });
+
+/// A spatial force or momentum, [linear; angular]: the sum of the forces, and their moment about the frame's origin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
+pub struct Force<S> {
+    /// Force (N) or momentum (kg m/s).
+    pub linear: Vec3<S>,
+    /// Moment about the origin of the frame (N m), or angular momentum (kg m²/s).
+    pub angular: Vec3<S>,
+}
+impl_linear!(Force { linear, angular });
+
+macro_rules! impl_six {
+    ($type:ident) => {
+        impl<S: Scalar> $type<S> {
+            /// From linear and angular part.
+            #[inline(always)]
+            pub fn new(linear: Vec3<S>, angular: Vec3<S>) -> Self {
+                Self { linear, angular }
+            }
+            /// The six numbers, linear first.
+            #[inline(always)]
+            pub fn to_array(self) -> [S; 6] {
+                let (l, a) = (self.linear, self.angular);
+                [l.x, l.y, l.z, a.x, a.y, a.z]
+            }
+        }
+        impl<S> From<[S; 6]> for $type<S> {
+            #[inline(always)]
+            fn from([a, b, c, d, e, f]: [S; 6]) -> Self {
+                Self { linear: [a, b, c].into(), angular: [d, e, f].into() }
+            }
+        }
+    };
+}
+impl_six!(Motion);
+impl_six!(Force);
+
+impl<S: Scalar> Motion<S> {
+    /// ⟨m, f⟩ = m · f: the power of force f on motion m (W).
+    #[inline(always)]
+    pub fn dot(self, f: Force<S>) -> S {
+        self.linear.dot_add(f.linear, self.angular.dot(f.angular))
+    }
+}
+
+impl<S: Scalar> Cross<Motion<S>> for Motion<S> {
+    /// v × m = [ω × mᵥ + v × m_ω; ω × m_ω].
+    #[inline(always)]
+    fn cross(self, m: Motion<S>) -> Motion<S> {
+        Motion {
+            linear: self.angular.cross_add(m.linear, self.linear.cross(m.angular)),
+            angular: self.angular.cross(m.angular),
+        }
+    }
+}
+
+impl<S: Scalar> Cross<Force<S>> for Motion<S> {
+    /// v ×* f = [ω × f; ω × n + v × f].
+    #[inline(always)]
+    fn cross(self, f: Force<S>) -> Force<S> {
+        Force {
+            linear: self.angular.cross(f.linear),
+            angular: self.angular.cross_add(f.angular, self.linear.cross(f.linear)),
+        }
+    }
+}

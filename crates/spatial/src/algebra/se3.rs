@@ -1,0 +1,126 @@
+//! Poses, and how they act on motions, forces, inertias and points.
+
+use crate::algebra::motion::{Force, Motion};
+use crate::algebra::quaternion::Quaternion;
+use crate::algebra::vector::{Mat3, Vec3, impl_lift};
+use crate::scalar::{Constant, Scalar};
+use core::ops::Mul;
+use serde::{Deserialize, Serialize};
+
+/// The pose aXb of frame b in frame a: it takes coordinates in b to coordinates in a.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[repr(C)]
+pub struct Se3<S> {
+    /// aRb: its columns are the axes of b in a.
+    pub rotation: Mat3<S>,
+    /// The origin of b in a (m).
+    pub translation: Vec3<S>,
+}
+impl_lift!(Se3 { rotation, translation });
+
+/// What a pose does to the coordinates of a `T`.
+pub trait Act<T> {
+    /// From coordinates in b to coordinates in a, for the pose aXb.
+    fn act(&self, x: T) -> T;
+    /// From coordinates in a to coordinates in b, for the pose aXb.
+    fn act_inv(&self, x: T) -> T;
+}
+
+impl<S: Scalar> Se3<S> {
+    /// The pose of a frame in itself.
+    #[inline(always)]
+    pub fn identity() -> Self {
+        Self { rotation: Mat3::identity(), translation: Vec3::zero() }
+    }
+    /// From rotation and translation.
+    #[inline(always)]
+    pub fn new(rotation: Mat3<S>, translation: Vec3<S>) -> Self {
+        Self { rotation, translation }
+    }
+    /// bXa = (aXb)⁻¹.
+    #[inline(always)]
+    pub fn inverse(self) -> Self {
+        let Rt = self.rotation.transpose();
+        Self { rotation: Rt, translation: -(Rt * self.translation) }
+    }
+}
+
+impl<S: Scalar> Mul for Se3<S> {
+    type Output = Self;
+    /// aXc = aXb bXc.
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Self {
+            rotation: self.rotation * o.rotation,
+            translation: self.rotation.mul_add(o.translation, self.translation),
+        }
+    }
+}
+
+impl<S: Scalar> Act<Motion<S>> for Se3<S> {
+    /// [R v + p × R ω; R ω].
+    #[inline(always)]
+    fn act(&self, m: Motion<S>) -> Motion<S> {
+        let angular = self.rotation * m.angular;
+        Motion { linear: self.rotation.mul_add(m.linear, self.translation.cross(angular)), angular }
+    }
+    /// [Rᵀ(v − p × ω); Rᵀ ω].
+    #[inline(always)]
+    fn act_inv(&self, m: Motion<S>) -> Motion<S> {
+        Motion {
+            linear: self.rotation.transpose_mul(m.angular.cross_add(self.translation, m.linear)),
+            angular: self.rotation.transpose_mul(m.angular),
+        }
+    }
+}
+
+impl<S: Scalar> Act<Force<S>> for Se3<S> {
+    /// [R f; R n + p × R f].
+    #[inline(always)]
+    fn act(&self, f: Force<S>) -> Force<S> {
+        let linear = self.rotation * f.linear;
+        Force { linear, angular: self.rotation.mul_add(f.angular, self.translation.cross(linear)) }
+    }
+    /// [Rᵀ f; Rᵀ(n − p × f)].
+    #[inline(always)]
+    fn act_inv(&self, f: Force<S>) -> Force<S> {
+        Force {
+            linear: self.rotation.transpose_mul(f.linear),
+            angular: self.rotation.transpose_mul(f.linear.cross_add(self.translation, f.angular)),
+        }
+    }
+}
+
+/// A point.
+impl<S: Scalar> Act<Vec3<S>> for Se3<S> {
+    /// R x + p.
+    #[inline(always)]
+    fn act(&self, x: Vec3<S>) -> Vec3<S> {
+        self.rotation.mul_add(x, self.translation)
+    }
+    /// Rᵀ(x − p).
+    #[inline(always)]
+    fn act_inv(&self, x: Vec3<S>) -> Vec3<S> {
+        self.rotation.transpose_mul(x - self.translation)
+    }
+}
+
+impl<R: Constant<f64>> From<Se3<R>> for nalgebra::Isometry3<f64> {
+    fn from(X: Se3<R>) -> Self {
+        let X = X.lift::<f64>();
+        // Not `UnitQuaternion::from_matrix`: it iterates, and stays where it began at half turns.
+        let q = Quaternion::from_rotation(X.rotation);
+        let q = nalgebra::Quaternion::new(q.scalar, q.vector.x, q.vector.y, q.vector.z);
+        let rotation = nalgebra::UnitQuaternion::new_normalize(q);
+        Self::from_parts(nalgebra::Vector3::from(X.translation.to_array()).into(), rotation)
+    }
+}
+
+impl From<nalgebra::Isometry3<f64>> for Se3<f64> {
+    fn from(X: nalgebra::Isometry3<f64>) -> Self {
+        let R = X.rotation.to_rotation_matrix();
+        let column = |i: usize| Vec3::new(R[(0, i)], R[(1, i)], R[(2, i)]);
+        let p = X.translation.vector;
+        Self { rotation: Mat3 { x: column(0), y: column(1), z: column(2) }, translation: Vec3::new(p.x, p.y, p.z) }
+    }
+}

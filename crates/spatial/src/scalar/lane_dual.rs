@@ -1,0 +1,191 @@
+//! Dual numbers over lanes: derivatives in as many directions as there are lanes, or of as many states, in one pass.
+
+use super::{Constant, Scalar};
+use crate::simd::kernel::Kernel;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// x + x′ε with ε² = 0, both vectors of numbers: lane by lane a value and its derivative.
+///
+/// num-dual's numbers do not serve here: they ask of what they are made of an order, a conversion into one number and
+/// functions that branch on it, which several numbers side by side have not. The rules are the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct LaneDual<S> {
+    /// The value.
+    pub re: S,
+    /// The derivative.
+    pub eps: S,
+}
+
+impl<S: Scalar> LaneDual<S> {
+    /// f(x) and f′(x) x′.
+    #[inline(always)]
+    fn chain(self, value: S, slope: S) -> Self {
+        Self { re: value, eps: slope * self.eps }
+    }
+}
+
+impl<S: Scalar> Add for LaneDual<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self { re: self.re + o.re, eps: self.eps + o.eps }
+    }
+}
+
+impl<S: Scalar> Sub for LaneDual<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self { re: self.re - o.re, eps: self.eps - o.eps }
+    }
+}
+
+impl<S: Scalar> Mul for LaneDual<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Self { re: self.re * o.re, eps: self.re.mul_add(o.eps, self.eps * o.re) }
+    }
+}
+
+impl<S: Scalar> Div for LaneDual<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        let re = self.re / o.re;
+        Self { re, eps: (self.eps - re * o.eps) / o.re } // (x/y)′ = (x′ − (x/y) y′)/y
+    }
+}
+
+impl<S: Scalar> Neg for LaneDual<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { re: -self.re, eps: -self.eps }
+    }
+}
+
+impl<S: Scalar> AddAssign for LaneDual<S> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
+
+impl<S: Scalar> SubAssign for LaneDual<S> {
+    #[inline(always)]
+    fn sub_assign(&mut self, o: Self) {
+        *self = *self - o;
+    }
+}
+
+impl<S: Scalar> Scalar for LaneDual<S> {
+    type Mask = S::Mask;
+    const LANES: usize = S::LANES;
+
+    #[inline(always)]
+    fn enter(kernel: impl Kernel) {
+        S::enter(kernel);
+    }
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self { re: S::splat(x), eps: S::zero() }
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self { re: self.re.mul_add(b.re, c.re), eps: self.re.mul_add(b.eps, self.eps.mul_add(b.re, c.eps)) }
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        let re = self.re.recip();
+        self.chain(re, -(re * re))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        let re = self.re.sqrt();
+        self.chain(re, (re + re).recip())
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.re.sin_cos();
+        (self.chain(sin, cos), self.chain(cos, -sin))
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        // (x y′ − y x′)/(x² + y²), by quotients that do not overflow
+        let scale = S::select(x.re.abs().lt(self.re.abs()), self.re, x.re);
+        let (sin, cos) = (self.re / scale, x.re / scale);
+        let slope = (cos * self.eps - sin * x.eps) / (scale * sin.mul_add(sin, cos * cos));
+        Self { re: self.re.atan2(x.re), eps: slope }
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        let negative = self.re.lt(S::zero());
+        Self { re: self.re.abs(), eps: S::select(negative, -self.eps, self.eps) }
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> S::Mask {
+        self.re.lt(other.re)
+    }
+    #[inline(always)]
+    fn select(mask: S::Mask, a: Self, b: Self) -> Self {
+        Self { re: S::select(mask, a.re, b.re), eps: S::select(mask, a.eps, b.eps) }
+    }
+    #[inline(always)]
+    fn and(a: S::Mask, b: S::Mask) -> S::Mask {
+        S::and(a, b)
+    }
+    #[inline(always)]
+    fn or(a: S::Mask, b: S::Mask) -> S::Mask {
+        S::or(a, b)
+    }
+}
+
+impl<S: Scalar> Constant<LaneDual<S>> for LaneDual<S> {
+    #[inline(always)]
+    fn lift(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        Self::splat(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_dual::Dual64;
+
+    /// A few roundings.
+    const ROUNDING: f64 = 2e-15;
+
+    fn all<S: Scalar>(x: S, y: S) -> Vec<S> {
+        let (sin, cos) = x.sin_cos();
+        let least = S::select(x.lt(y), x, y);
+        let both = S::and(x.lt(y), S::zero().lt(x));
+        let mut sum = x;
+        sum += y * y;
+        sum -= -x;
+        let one_of = S::select(S::or(y.lt(x), both), x * y, y);
+        let angles = [x.atan2(y), x.atan2(-y), (-x).atan2(y), y.atan2(-x)];
+        let roots = [(x * x).sqrt(), y.recip(), x / y, x.mul_add(y, x)];
+        let rest = [sin, cos, least, one_of, sum, (-x).abs(), x.abs(), x + y, x - y, S::one() * x];
+        [&angles[..], &roots, &rest].concat()
+    }
+
+    #[test]
+    fn the_rules_are_those_of_dual_numbers() {
+        for (x, y) in [(0.7, 1.9), (-0.7, 1.9), (1.9, -0.7), (-3.0, -0.1)] {
+            for (dx, dy) in [(0.3, -0.4), (1.0, 0.0), (0.0, 1.0)] {
+                let mine = all(LaneDual { re: x, eps: dx }, LaneDual { re: y, eps: dy });
+                let theirs = all(Dual64::new(x, dx), Dual64::new(y, dy));
+                for (a, b) in mine.iter().zip(&theirs) {
+                    assert!((a.re - b.re).abs() <= ROUNDING * b.re.abs().max(1.0), "{a:?} {b:?}");
+                    assert!((a.eps - b.eps).abs() <= ROUNDING * b.eps.abs().max(1.0), "{a:?} {b:?}");
+                }
+            }
+        }
+    }
+}

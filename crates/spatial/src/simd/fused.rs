@@ -1,0 +1,161 @@
+//! A single number that computes as a lane does.
+#![allow(unsafe_code)]
+
+use crate::scalar::Scalar;
+use crate::scalar::number::Number;
+use crate::scalar::operators::operators;
+use crate::simd::kernel::{Kernel, short};
+use crate::simd::lanes::{Element, Lanes};
+use crate::simd::level::{Level, level};
+use crate::simd::pack::Block;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// An `f64` whose products and sums are fused: what a lane is, alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
+pub struct Fused(pub f64);
+
+impl Fused {
+    /// Numbers under this name.
+    #[inline(always)]
+    pub fn of(x: &[f64]) -> &[Self] {
+        // SAFETY: it is a transparent wrapper.
+        unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) }
+    }
+
+    /// Numbers to be written, under this name.
+    #[inline(always)]
+    pub fn of_mut(x: &mut [f64]) -> &mut [Self] {
+        // SAFETY: as for `of`.
+        unsafe { core::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), x.len()) }
+    }
+}
+
+impl Block for Fused {
+    type Number = f64;
+    #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        Self(from[0])
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to[0] = self.0;
+    }
+    #[inline(always)]
+    fn transpose(_: &mut [Self]) {}
+}
+
+macro_rules! fused_operators {
+    ($($trait:ident $name:ident),*) => {$(
+        impl $trait for Fused {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, o: Self) -> Self {
+                Self(self.0.$name(o.0))
+            }
+        }
+    )*};
+}
+fused_operators!(Add add, Sub sub, Mul mul, Div div);
+operators!(Fused);
+
+impl Neg for Fused {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl Scalar for Fused {
+    type Mask = bool;
+    const LANES: usize = 1;
+    const COMPILED: bool = true;
+
+    #[inline(always)]
+    fn enter(kernel: impl Kernel) {
+        assert!(level() > Level::Baseline, "products are fused from AVX2 and NEON on");
+        // SAFETY: the processor has the level.
+        unsafe { short(kernel) }
+    }
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self(x)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(self.0.mul_add(b.0, c.0))
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self(1.0 / self.0)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        if self.0.abs() <= f64::LARGEST {
+            return f64::near(self);
+        }
+        let (sin, cos) = self.0.far();
+        (Self(sin), Self(cos))
+    }
+    /// Four at a time: where products are fused, there are vectors of four.
+    #[inline(always)]
+    fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
+        let (angles, others) = angles.as_chunks_mut::<4>();
+        let (cosines, other_cosines) = cosines.as_chunks_mut::<4>();
+        for (x, y) in angles.iter_mut().zip(cosines) {
+            let (sin, cos) = Lanes::<f64, 4>::from_fused(x).sin_cos();
+            (*x, *y) = (sin.to_fused(), cos.to_fused());
+        }
+        for (sin, cos) in others.iter_mut().zip(other_cosines) {
+            (*sin, *cos) = sin.sin_cos();
+        }
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        Self(self.0.atan2(x.0))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs())
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self.0 < other.0
+    }
+    #[inline(always)]
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+    #[inline(always)]
+    fn and(a: bool, b: bool) -> bool {
+        a && b
+    }
+    #[inline(always)]
+    fn or(a: bool, b: bool) -> bool {
+        a || b
+    }
+}
+
+impl<const N: usize> Lanes<f64, N>
+where
+    f64: Element<N>,
+{
+    /// Single numbers, one for each lane.
+    #[inline(always)]
+    pub fn from_fused(x: &[Fused; N]) -> Self {
+        // SAFETY: `Fused` is a transparent wrapper of `f64`.
+        Self::from_array(unsafe { *core::ptr::from_ref(x).cast() })
+    }
+    /// The single number in each lane.
+    #[inline(always)]
+    pub fn to_fused(self) -> [Fused; N] {
+        let x = self.to_array();
+        // SAFETY: as for `from_fused`.
+        unsafe { *core::ptr::from_ref(&x).cast() }
+    }
+}

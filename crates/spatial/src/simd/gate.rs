@@ -1,0 +1,139 @@
+//! The gate to vector instructions: where kernels are compiled, for which scalars, and with what.
+//!
+//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factor, whose body is generic and inlined throughout, into a function
+//! that is called:
+//!
+//! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
+//!   instructions that the scalar is made of; whoever uses the library calls that code;
+//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same 64 bits
+//!   under another name;
+//! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
+//!
+//! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one state.
+#![allow(unsafe_code)]
+
+pub use crate::simd::fused::Fused;
+pub use crate::simd::kernel::Kernel;
+pub use crate::simd::level::{Level, level};
+use crate::simd::pack::Real;
+use core::any::TypeId;
+use core::mem::ManuallyDrop;
+
+/// Four numbers at once, with AVX2 or NEON.
+pub type Short = <f64 as Real>::Short;
+/// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
+pub type Long = <f64 as Real>::Long;
+
+/// Whether two types are the same one.
+#[inline(always)]
+pub fn is<A: 'static, B: 'static>() -> bool {
+    TypeId::of::<A>() == TypeId::of::<B>()
+}
+
+/// An argument under another name of its type.
+///
+/// # Safety
+/// `A` and `B` are the same type, or the same but for `f64` in place of [`Fused`]: a transparent wrapper. Workspaces and the
+/// structs of spatial algebra are `repr(C)`, hence laid out alike; nalgebra's matrices are transparent and `repr(C)` structs
+/// over a `Vec`. Of `Vec` it is taken for granted that its three words stand in the same order whatever it holds;
+/// `tests::one_layout` looks.
+#[inline(always)]
+pub unsafe fn renamed<A, B>(a: A) -> B {
+    assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
+    // SAFETY: by the caller; `a` is not dropped, so there is one of it.
+    unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
+}
+
+/// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
+/// [`gate`](crate::simd::gate). It returns nothing: what it computes is in its arguments.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! kernel {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident<$S:ident $(, $R:ident)?>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+        $(#[$doc])*
+        #[inline]
+        #[allow(unsafe_code, clippy::too_many_arguments)]
+        $vis fn $name<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?>($($arg: $type),*) {
+            use $crate::simd::gate::{Fused, Kernel, Level, Long, Short, is, level};
+
+            struct Work<T, Scalars>(T, ::core::marker::PhantomData<Scalars>);
+            impl<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
+                #[inline(always)]
+                fn run(self) {
+                    let Work(($($arg,)*), _) = self;
+                    $body
+                }
+            }
+
+            if !$S::COMPILED {
+                return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
+            }
+            $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
+            let (f64, fused) = (is::<$S, f64>(), is::<$S, f64>() && level() > Level::Baseline);
+            $crate::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
+        }
+    };
+    // the function compiled for one scalar, if it is the one
+    (@call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)) => {
+        let chosen = $chosen;
+        {
+            type $S = $scalar;
+            $(type $R = f64;)?
+            #[inline(never)]
+            fn compiled($($arg: $type),*) {
+                $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
+            }
+            if chosen {
+                // SAFETY: R is f64, and S is this scalar, or f64 in place of `Fused`.
+                return unsafe { compiled($($crate::simd::gate::renamed($arg)),*) };
+            }
+        }
+    };
+}
+/// A function on `f64` whose body is generic over the vector registers `V` that it may use: the widest of the level, compiled
+/// for them in the crate that owns it. It is for levels that have registers, above the baseline, and returns nothing.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! register_kernel {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident<$V:ident>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+        $(#[$doc])*
+        #[allow(clippy::too_many_arguments)]
+        $vis fn $name($($arg: $type),*) {
+            use $crate::simd::gate::{Kernel, Level, Long, Short, level};
+
+            struct Work<T, V>(T, ::core::marker::PhantomData<V>);
+            impl<$V: $crate::simd::pack::Block<Number = f64>> Kernel for Work<($($type,)*), $V> {
+                #[inline(always)]
+                fn run(self) {
+                    let Work(($($arg,)*), _) = self;
+                    $body
+                }
+            }
+
+            let work = ($($arg,)*);
+            if level() >= Level::Avx512 {
+                <Long as $crate::Scalar>::enter(Work::<_, Long>(work, ::core::marker::PhantomData));
+            } else {
+                <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A `Vec` of either kind is the same three words.
+    #[test]
+    fn one_layout() {
+        let plain = vec![1.0_f64, 2.0, 3.0];
+        // SAFETY: what this test is about; nothing is read but the vector's words and its numbers.
+        let fused = unsafe { &*core::ptr::from_ref(&plain).cast::<Vec<Fused>>() };
+        assert_eq!((fused.as_ptr().cast(), fused.len(), fused.capacity()), (plain.as_ptr(), 3, plain.capacity()));
+        assert_eq!(fused[2].0, 3.0);
+    }
+}

@@ -1,0 +1,247 @@
+//! Several numbers side by side in one vector register.
+//!
+//! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON, where they are two registers each;
+//! `Lanes<f64, 8>` and `Lanes<f32, 16>` AVX-512; and [`Fused`] is a single `f64` where products and sums are fused. They are
+//! for code that has been entered through a function compiled for their [`Level`](crate::simd::level::Level), which is the
+//! business of a dispatcher: anywhere else each operation would be a function call, and on a processor without the
+//! instructions an illegal one. Every operation treats each lane alone, so what one lane holds (not-a-numbers included) never
+//! reaches another.
+//!
+//! What a processor does is in the file of its kind, x86.rs or neon.rs, as an implementation of [`Register`].
+#![allow(unsafe_code)]
+
+use crate::scalar::number::Number;
+use crate::scalar::operators::operators;
+use crate::scalar::{Constant, Scalar};
+use crate::simd::kernel::Kernel;
+use core::fmt;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+pub use processor::{LongF32, LongF64, moves};
+
+#[cfg_attr(target_arch = "x86_64", path = "x86.rs")]
+#[cfg_attr(target_arch = "aarch64", path = "neon.rs")]
+#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), path = "array.rs")]
+mod processor;
+
+/// A number of which vectors of N exist.
+pub trait Element<const N: usize>: Number {
+    /// Where they are.
+    type Register: Register<Self, N>;
+}
+
+/// N numbers in a vector register, or in two of them. It stands only in code that runs where the processor has the
+/// instructions, see the head of the file.
+pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
+    /// The outcome of a comparison.
+    type Mask: Copy;
+
+    /// Runs a kernel with the instructions of these registers.
+    fn enter(kernel: impl Kernel);
+    /// The numbers of an array.
+    fn load(x: [T; N]) -> Self;
+    /// As an array.
+    fn store(a: Self) -> [T; N];
+    /// x in every lane.
+    fn splat(x: T) -> Self;
+    /// a + b.
+    fn add(a: Self, b: Self) -> Self;
+    /// a − b.
+    fn sub(a: Self, b: Self) -> Self;
+    /// a b.
+    fn mul(a: Self, b: Self) -> Self;
+    /// a / b.
+    fn div(a: Self, b: Self) -> Self;
+    /// a b + c, rounded once.
+    fn mul_add(a: Self, b: Self, c: Self) -> Self;
+    /// √a.
+    fn sqrt(a: Self) -> Self;
+    /// −a.
+    fn neg(a: Self) -> Self;
+    /// |a|.
+    fn abs(a: Self) -> Self;
+    /// a < b.
+    fn lt(a: Self, b: Self) -> Self::Mask;
+    /// a where the mask holds, b elsewhere.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Both masks hold.
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// At least one of the masks holds.
+    fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// The mask holds in some lane.
+    fn any(mask: Self::Mask) -> bool;
+    /// Number i of row k becomes number k of row i.
+    #[inline(always)]
+    fn transpose(rows: &mut [Self; N]) {
+        let mut to = [[T::zero(); N]; N];
+        for k in 0..N {
+            let from = Self::store(rows[k]);
+            for i in 0..N {
+                to[i][k] = from[i];
+            }
+        }
+        for i in 0..N {
+            rows[i] = Self::load(to[i]);
+        }
+    }
+}
+
+/// N numbers side by side.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub struct Lanes<T: Element<N>, const N: usize>(T::Register);
+
+/// Functions of the instructions that a processor has.
+#[allow(unused_macros)] // where it has none
+macro_rules! instructions {
+    ($($(#[$doc:meta])* fn $name:ident($($x:ident: $type:ty),*) $(-> $out:ty)? { $body:expr })*) => {$(
+        $(#[$doc])*
+        #[inline(always)]
+        #[allow(unused_unsafe)]
+        fn $name($($x: $type),*) $(-> $out)? {
+            // SAFETY: the level is supported, see the head of `lanes.rs`.
+            unsafe { $body }
+        }
+    )*};
+}
+#[allow(unused_imports)]
+use instructions;
+
+macro_rules! register_operators {
+    ($($trait:ident $name:ident),*) => {$(
+        impl<T: Element<N>, const N: usize> $trait for Lanes<T, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, o: Self) -> Self {
+                Self(T::Register::$name(self.0, o.0))
+            }
+        }
+    )*};
+}
+register_operators!(Add add, Sub sub, Mul mul, Div div);
+operators!(Lanes<T, N>, T: Element<N>, const N: usize);
+
+impl<T: Element<N>, const N: usize> Neg for Lanes<T, N> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(T::Register::neg(self.0))
+    }
+}
+
+impl<T: Element<N>, const N: usize> PartialEq for Lanes<T, N> {
+    fn eq(&self, o: &Self) -> bool {
+        self.to_array() == o.to_array()
+    }
+}
+
+impl<T: Element<N>, const N: usize> fmt::Debug for Lanes<T, N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.to_array().fmt(f)
+    }
+}
+
+impl<T: Element<N>, const N: usize> Lanes<T, N> {
+    /// One number for each lane.
+    #[inline(always)]
+    pub fn from_array(x: [T; N]) -> Self {
+        Self(T::Register::load(x))
+    }
+    /// The number in each lane.
+    #[inline(always)]
+    pub fn to_array(self) -> [T; N] {
+        T::Register::store(self.0)
+    }
+    /// Of as many vectors as there are lanes, number i of vector k becomes number k of vector i.
+    #[inline(always)]
+    pub(crate) fn transpose(rows: &mut [Self; N]) {
+        // SAFETY: these are transparent wrappers.
+        T::Register::transpose(unsafe { &mut *core::ptr::from_mut(rows).cast() });
+    }
+    /// Each lane alone, by a function of one number.
+    #[inline(always)]
+    fn each(self, f: fn(T) -> (T, T)) -> (Self, Self) {
+        let x = self.to_array();
+        let (mut a, mut b) = (x, x);
+        for k in 0..N {
+            (a[k], b[k]) = f(x[k]);
+        }
+        (Self::from_array(a), Self::from_array(b))
+    }
+}
+
+/// A constant of its own in each lane.
+impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
+    #[inline(always)]
+    fn lift(self) -> Lanes<T, N> {
+        Lanes::from_array(self)
+    }
+    fn of(x: f64) -> Self {
+        [T::splat(x); N]
+    }
+}
+
+impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
+    type Mask = <T::Register as Register<T, N>>::Mask;
+    const LANES: usize = N;
+    const COMPILED: bool = T::COMPILED;
+
+    #[inline(always)]
+    fn enter(kernel: impl Kernel) {
+        T::Register::enter(kernel);
+    }
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self(T::Register::splat(T::splat(x)))
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(T::Register::mul_add(self.0, b.0, c.0))
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::splat(1.0) / self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(T::Register::sqrt(self.0))
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let beyond = Self::splat(T::LARGEST).lt(self.abs());
+        if T::Register::any(beyond) {
+            let (sin, cos) = self.each(T::far);
+            let (s, c) = T::near(self);
+            return (Self::select(beyond, sin, s), Self::select(beyond, cos, c));
+        }
+        T::near(self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        let (y, x) = (self.to_array(), x.to_array());
+        let mut angle = y;
+        for k in 0..N {
+            angle[k] = y[k].atan2(x[k]);
+        }
+        Self::from_array(angle)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(T::Register::abs(self.0))
+    }
+    #[inline(always)]
+    fn lt(self, o: Self) -> Self::Mask {
+        T::Register::lt(self.0, o.0)
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
+        Self(T::Register::select(mask, a.0, b.0))
+    }
+    #[inline(always)]
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        T::Register::and(a, b)
+    }
+    #[inline(always)]
+    fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        T::Register::or(a, b)
+    }
+}

@@ -1,0 +1,320 @@
+//! From rows of numbers, one row for each lane, to vectors, one for each place in a row, and back.
+//!
+//! L rows of L numbers are L vectors, and what is wanted is their transpose: log₂ L exchanges of ever larger parts, each
+//! of which keeps one half of a vector and takes the other from its partner.
+#![allow(unsafe_code)]
+
+use crate::algebra::motion::Force;
+use crate::scalar::Scalar;
+use crate::simd::kernel::Kernel;
+use crate::simd::lanes::{self, Element, Lanes};
+
+/// A scalar that is made of numbers side by side, or is one of them.
+pub trait Block: Scalar {
+    /// One of the numbers.
+    type Number: Scalar;
+
+    /// The first numbers of a slice, one for each lane.
+    fn load(from: &[Self::Number]) -> Self;
+    /// Writes the number of each lane.
+    fn store(self, to: &mut [Self::Number]);
+    /// Of as many vectors as there are lanes, number i of vector k becomes number k of vector i.
+    fn transpose(rows: &mut [Self]);
+}
+
+/// Rows of numbers become vectors: number i of row k becomes lane k of `to[i]`, for rows of as many numbers as `to` has, one
+/// after the other in `from`. If there are fewer rows than lanes, the last one fills up.
+#[inline]
+pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
+    let n = to.len();
+    gather_rows(&core::array::from_fn::<_, MOST, _>(|k| &from[k.min(rows - 1) * n..][..n])[..rows], to);
+}
+
+/// Rows of numbers become vectors, as in [`gather`], for rows that stand anywhere.
+#[inline]
+pub fn gather_rows<S: Block>(from: &[&[S::Number]], to: &mut [S]) {
+    S::enter(Gather(from, to));
+}
+
+/// Vectors become rows of numbers: lane k of `from[i]` becomes number i of row k, for the first `rows` lanes.
+#[inline]
+pub fn scatter<S: Block>(from: &[S], rows: usize, to: &mut [S::Number]) {
+    let mut each: [&mut [S::Number]; MOST] = Default::default();
+    if !from.is_empty() {
+        for (row, to) in each.iter_mut().zip(to.chunks_exact_mut(from.len()).take(rows)) {
+            *row = to;
+        }
+        scatter_rows(from, &mut each[..rows]);
+    }
+}
+
+/// Vectors become rows of numbers, as in [`scatter`], to rows that stand anywhere.
+#[inline]
+pub fn scatter_rows<S: Block>(from: &[S], to: &mut [&mut [S::Number]]) {
+    let columns = from.len();
+    scatter_matrix(
+        &Strided { vectors: from, strides: [columns, 1], shape: [1, columns], negative: false },
+        to,
+        columns,
+    );
+}
+
+/// Lane k of a matrix of vectors becomes a matrix of numbers in `to[k]`, row by row, with `stride` numbers from one row to
+/// the next.
+#[inline]
+pub fn scatter_matrix<S: Block>(from: &Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
+    S::enter(Scatter(*from, to, stride));
+}
+
+/// A matrix of vectors, or minus it.
+#[derive(Clone, Copy, Debug)]
+pub struct Strided<'a, S> {
+    /// Its entries.
+    pub vectors: &'a [S],
+    /// How far it is from one row to the next, and from one column to the next.
+    pub strides: [usize; 2],
+    /// How many rows and columns it has.
+    pub shape: [usize; 2],
+    /// Whether minus the matrix is meant.
+    pub negative: bool,
+}
+
+struct Gather<'a, S: Block>(&'a [&'a [S::Number]], &'a mut [S]);
+
+impl<S: Block> Kernel for Gather<'_, S> {
+    #[inline(always)]
+    fn run(self) {
+        let Self(from, to) = self;
+        let n = to.len();
+        let row = |k: usize| from[k.min(from.len() - 1)];
+        if n < S::LANES {
+            let mut lanes = [S::Number::zero(); MOST];
+            for (i, to) in to.iter_mut().enumerate() {
+                for k in 0..S::LANES {
+                    lanes[k] = row(k)[i];
+                }
+                *to = S::load(&lanes);
+            }
+            return;
+        }
+        let mut i = 0;
+        loop {
+            for k in 0..S::LANES {
+                to[i + k] = S::load(&row(k)[i..][..S::LANES]);
+            }
+            S::transpose(&mut to[i..i + S::LANES]);
+            if i + S::LANES >= n {
+                return;
+            }
+            i = (i + S::LANES).min(n - S::LANES); // the last tile overlaps the one before
+        }
+    }
+}
+
+struct Scatter<'a, 'b, S: Block>(Strided<'a, S>, &'a mut [&'b mut [S::Number]], usize);
+
+impl<S: Block> Kernel for Scatter<'_, '_, S> {
+    #[inline(always)]
+    fn run(self) {
+        let Self(Strided { vectors: from, strides: [down, along], shape: [rows, columns], negative }, to, stride) =
+            self;
+        if rows == 0 || columns == 0 || to.is_empty() {
+            return;
+        }
+        if S::LANES == 1 && along == 1 && !negative {
+            for i in 0..rows {
+                to[0][i * stride..][..columns].copy_from_slice(lanes(&from[i * down..][..columns]));
+            }
+            return;
+        }
+        let mut block = [S::zero(); MOST];
+        if columns < S::LANES {
+            let mut numbers = [S::Number::zero(); MOST];
+            for i in 0..rows {
+                for j in 0..columns {
+                    let x = from[i * down + j * along];
+                    let x = if negative { -x } else { x };
+                    x.store(&mut numbers);
+                    for (k, to) in to.iter_mut().enumerate() {
+                        to[i * stride + j] = numbers[k];
+                    }
+                }
+            }
+            return;
+        }
+        for i in 0..rows {
+            let mut j = 0;
+            loop {
+                for k in 0..S::LANES {
+                    block[k] = from[i * down + (j + k) * along];
+                }
+                if negative {
+                    for k in 0..S::LANES {
+                        block[k] = -block[k];
+                    }
+                }
+                S::transpose(&mut block[..S::LANES]);
+                for (k, to) in to.iter_mut().enumerate() {
+                    block[k].store(&mut to[i * stride + j..]);
+                }
+                if j + S::LANES >= columns {
+                    break;
+                }
+                j = (j + S::LANES).min(columns - S::LANES); // the last tile overlaps the one before
+            }
+        }
+    }
+}
+
+/// The numbers in the lanes of some vectors.
+pub fn lanes<S: Block>(of: &[S]) -> &[S::Number] {
+    assert!(size_of::<S>() == S::LANES * size_of::<S::Number>());
+    // SAFETY: a vector is its numbers side by side, as the assertion says too, and is aligned at least as they are.
+    unsafe { core::slice::from_raw_parts(of.as_ptr().cast(), of.len() * S::LANES) }
+}
+
+/// The numbers of some forces, six of each.
+pub fn flat<S>(forces: &[Force<S>]) -> &[S] {
+    // SAFETY: a force is `repr(C)`, of two vectors that are `repr(C)`, of three numbers each: six numbers and nothing else.
+    unsafe { core::slice::from_raw_parts(forces.as_ptr().cast(), 6 * forces.len()) }
+}
+
+/// The numbers of some forces, to be written.
+pub fn flat_mut<S>(forces: &mut [Force<S>]) -> &mut [S] {
+    // SAFETY: as for `flat`.
+    unsafe { core::slice::from_raw_parts_mut(forces.as_mut_ptr().cast(), 6 * forces.len()) }
+}
+
+/// More lanes than this no vector has.
+const MOST: usize = 16;
+
+macro_rules! single {
+    ($($float:ident),*) => {$(
+        impl Block for $float {
+            type Number = Self;
+            #[inline(always)]
+            fn load(from: &[Self]) -> Self {
+                from[0]
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [Self]) {
+                to[0] = self;
+            }
+            #[inline(always)]
+            fn transpose(_: &mut [Self]) {}
+        }
+    )*};
+}
+single!(f64, f32);
+
+impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
+    type Number = T;
+    #[inline(always)]
+    fn load(from: &[T]) -> Self {
+        Self::from_array(*from.first_chunk().expect("a number for each lane"))
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [T]) {
+        *to.first_chunk_mut().expect("a place for each lane") = self.to_array();
+    }
+    #[inline(always)]
+    fn transpose(rows: &mut [Self]) {
+        Self::transpose(rows.try_into().expect("a row for each lane"));
+    }
+}
+
+/// A number with its vectors.
+pub trait Real: Block<Number = Self> {
+    /// Those of [`Level::Avx2`](crate::simd::level::Level::Avx2), or of [`Level::Neon`](crate::simd::level::Level::Neon).
+    type Short: Block<Number = Self>;
+    /// Those of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as short ones where there is none.
+    type Long: Block<Number = Self>;
+}
+
+impl Real for f64 {
+    type Short = Lanes<Self, 4>;
+    type Long = lanes::LongF64;
+}
+impl Real for f32 {
+    type Short = Lanes<Self, 8>;
+    type Long = lanes::LongF32;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::level::{Level, Unsupported};
+
+    /// Rows there and back, with some rows and numbers over.
+    struct Back<S>(core::marker::PhantomData<S>);
+
+    impl<S: Block<Number: From<u16> + PartialEq>> Kernel for Back<S> {
+        fn run(self) {
+            let n = 3 * S::LANES + 2;
+            let rows: Vec<S::Number> = (0..(n * S::LANES) as u16).map(From::from).collect();
+            let mut vectors = vec![S::zero(); n];
+            gather(&rows, S::LANES, &mut vectors);
+            for (i, x) in vectors.iter().enumerate() {
+                let mut lanes = [S::Number::zero(); MOST];
+                x.store(&mut lanes);
+                (0..S::LANES).for_each(|k| assert!(lanes[k] == rows[k * n + i]));
+            }
+            for some in 0..=S::LANES {
+                let mut back = vec![S::Number::zero(); rows.len()];
+                scatter(&vectors, some, &mut back);
+                assert!(back[..some * n] == rows[..some * n]);
+                assert!(back[some * n..].iter().all(|&x| x == S::Number::zero()));
+                if some == 0 {
+                    continue;
+                }
+                let mut again = vec![S::zero(); n];
+                gather(&rows[..some * n], some, &mut again);
+                scatter(&again, S::LANES, &mut back);
+                (0..S::LANES).for_each(|k| assert!(back[k * n..][..n] == rows[k.min(some - 1) * n..][..n]));
+            }
+            // as a matrix, and minus its transpose, of as many columns and of fewer than lanes
+            for columns in [n, 1] {
+                let shape = [n / columns, columns];
+                let upright = Strided { vectors: &vectors, strides: [columns, 1], shape, negative: false };
+                let turned = Strided { strides: [1, shape[1]], shape: [shape[1], shape[0]], negative: true, ..upright };
+                for (matrix, sign) in [(upright, 1.0), (turned, -1.0)] {
+                    let ([m, n], stride) = (matrix.shape, matrix.shape[1] + 3);
+                    let mut back = vec![S::Number::zero(); S::LANES * m * stride];
+                    let mut places: Vec<_> = back.chunks_exact_mut(m * stride).collect();
+                    scatter_matrix(&matrix, &mut places, stride);
+                    for (k, place) in places.iter().enumerate() {
+                        for (i, j) in (0..m).flat_map(|i| (0..stride).map(move |j| (i, j))) {
+                            let at = i * matrix.strides[0] + j * matrix.strides[1];
+                            let there = if j < n { rows[k * m * n + at] } else { S::Number::zero() };
+                            assert!(place[i * stride + j] == S::Number::splat(sign) * there);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn there_and_back() {
+        fn kernel<S>() -> Back<S> {
+            Back(core::marker::PhantomData)
+        }
+        for level in Level::ALL {
+            match level {
+                _ if !level.is_supported() => eprintln!("NOT RUN: {}", Unsupported(level)),
+                Level::Baseline => {
+                    f64::enter(kernel::<f64>());
+                    f32::enter(kernel::<f32>());
+                }
+                Level::Neon | Level::Avx2 => {
+                    <f64 as Real>::Short::enter(kernel::<<f64 as Real>::Short>());
+                    <f32 as Real>::Short::enter(kernel::<<f32 as Real>::Short>());
+                }
+                Level::Avx512 => {
+                    <f64 as Real>::Long::enter(kernel::<<f64 as Real>::Long>());
+                    <f32 as Real>::Long::enter(kernel::<<f32 as Real>::Long>());
+                }
+            }
+        }
+    }
+}

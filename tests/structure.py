@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+"""Prints how the house stands: modules that use each other in a circle, and with --sizes how large and how slow to build it is.
+
+    python3 tests/structure.py [--sizes]
+
+Fails if a circle has more than three modules, and with --sizes if a function of the program has more than 64 KB of text. A
+module and its children count as one where the child reaches up to its parent only. --sizes builds the program from nothing in
+a folder of its own (some minutes) and needs `nm` and `size`.
+"""
+
+import argparse
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).resolve().parents[1]
+LARGEST_CIRCLE = 3
+LARGEST_FUNCTION = 64 * 1024
+
+Module = tuple[str, ...]
+
+
+def without_comments(text: str) -> str:
+    text = re.sub(r"//[^\n]*", "", text)
+    return re.sub(r"#\[cfg\(test\)\]\s*(?:pub(?:\(crate\))? )?mod \w+ \{.*", "", text, flags=re.DOTALL)
+
+
+def paths(tree: str, prefix: Module = ()) -> list[Module]:
+    """The paths that a `use` tree names."""
+    parts, depth, start = [], 0, 0
+    for i, c in enumerate(tree):
+        depth += (c == "{") - (c == "}")
+        if c == "," and depth == 0:
+            parts.append(tree[start:i])
+            start = i + 1
+    found = []
+    for part in [*parts, tree[start:]]:
+        head, brace, rest = part.strip().partition("{")
+        names = prefix + tuple(name for name in head.split(" as ")[0].strip().split("::") if name)
+        found += paths(rest.rsplit("}", 1)[0], names) if brace else [names] if names else []
+    return found
+
+
+def modules(source: Path) -> dict[Module, Path]:
+    found = {}
+    for path in sorted(source.rglob("*.rs")):
+        parts = path.relative_to(source).with_suffix("").parts
+        found[parts[:-1] if parts[-1] in ("mod", "lib", "main") else parts] = path
+    return found
+
+
+def arrows(source: Path) -> dict[Module, set[Module]]:
+    """Which modules each module uses."""
+    files = modules(source)
+    texts = {module: without_comments(path.read_text(encoding="utf-8")) for module, path in files.items()}
+    shown = {}  # what the crate's root shows, and from where
+    for tree in re.findall(r"\bpub(?:\(crate\))? use ([^;]+);", texts.get((), "")):
+        shown.update({path[-1]: path for path in paths(tree)})
+    uses: dict[Module, set[Module]] = {}
+    for module, text in texts.items():
+        named = [path for tree in re.findall(r"\buse ([^;]+);", text) for path in paths(tree)]
+        named += [tuple(path.split("::")) for path in re.findall(r"\b(?:crate|super|self)(?:::\w+)+", text)]
+        uses[module] = set()
+        for path in named:
+            here, rest = module, list(path)
+            if rest[0] not in ("crate", "super", "self"):
+                continue
+            while rest and rest[0] in ("crate", "super", "self"):
+                first = rest.pop(0)
+                here = () if first == "crate" else here[:-1] if first == "super" else here
+            full = (*here, *rest)
+            if here == () and rest and (rest[0],) not in files and rest[0] in shown:
+                full = shown[rest[0]]
+            target = next((full[:n] for n in range(len(full), 0, -1) if full[:n] in files), None)
+            upwards = target is not None and module[: len(target)] == target
+            if target is not None and target != module and not upwards:
+                uses[module].add(target)
+    return uses
+
+
+def circles(uses: dict[Module, set[Module]]) -> list[list[Module]]:
+    """Sets of modules each of which reaches all others (Tarjan)."""
+    order: dict[Module, int] = {}
+    low: dict[Module, int] = {}
+    stack: list[Module] = []
+    found = []
+
+    def visit(module: Module) -> None:
+        order[module] = low[module] = len(order)
+        stack.append(module)
+        for other in uses[module]:
+            if other not in order:
+                visit(other)
+                low[module] = min(low[module], low[other])
+            elif other in stack:
+                low[module] = min(low[module], order[other])
+        if low[module] == order[module]:
+            component = stack[stack.index(module) :]
+            del stack[-len(component) :]
+            if len(component) > 1:
+                found.append(sorted(component))
+
+    for module in uses:
+        if module not in order:
+            visit(module)
+    return found
+
+
+def sizes() -> int:
+    """Prints build time, text and the largest functions of the program; how large the largest one is."""
+    with TemporaryDirectory() as target:
+        begin = time.monotonic()
+        subprocess.run(
+            ["cargo", "build", "--release", "--locked", "--quiet", "--target-dir", target], cwd=ROOT, check=True
+        )
+        seconds = time.monotonic() - begin
+        program = Path(target) / "release" / "condyle"
+        lines = subprocess.run(["nm", "-CS", "--size-sort", program], check=True, capture_output=True, text=True).stdout
+        text = subprocess.run(["size", program], check=True, capture_output=True, text=True).stdout.split()
+    functions = [line.split(None, 3) for line in lines.splitlines()]
+    functions = [(int(size, 16), name) for _, size, kind, name in functions if kind in "tT"]
+    own = [(size, name) for size, name in functions if "condyle" in name]
+    print(f"cold build of the program: {seconds:.0f} s")
+    print(f"its text: {int(text[6]) / 1e6:.1f} MB")
+    for size, name in own[:-6:-1]:
+        print(f"  {size / 1024:6.1f} KB  {name[:100]}")
+    return own[-1][0]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--sizes", action="store_true", help="build the program, and print its sizes")
+    wanted = parser.parse_args()
+    failed = False
+    for source in [*sorted(ROOT.glob("crates/*/src")), ROOT / "python" / "src"]:
+        found = circles(arrows(source))
+        largest = max(map(len, found), default=0)
+        failed |= largest > LARGEST_CIRCLE
+        lines = sum(
+            1
+            for path in source.rglob("*.rs")
+            for line in path.read_text(encoding="utf-8").splitlines()
+            if line.strip() and not line.lstrip().startswith("//")
+        )
+        name = source.relative_to(ROOT).parts[-2]
+        print(f"{name:10} {lines:6} lines of code, {len(found)} circles, the largest of {largest} modules")
+        for circle in found:
+            print("    " + ", ".join("::".join(module) or "lib" for module in circle))
+    if wanted.sizes:
+        failed |= sizes() > LARGEST_FUNCTION
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()
