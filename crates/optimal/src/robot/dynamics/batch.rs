@@ -13,13 +13,12 @@ use crate::robot::horizon_terms::HorizonTerms;
 use crate::robot::knot::{KnotData, WIDEST, unpack, unpack_matrix};
 use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use crate::robot::residuals::surplus::Surplus;
-use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_dynamics_equations, rnea, rnea_derivatives,
 };
 use condyle_spatial::block::{Block, Strided, gather_rows};
-use condyle_spatial::lanes::{Element, Fused, Lanes};
+use condyle_spatial::lanes::{Element, Lanes};
 use core::fmt::Debug;
 use nalgebra::DMatrix;
 
@@ -92,26 +91,22 @@ where
     }
 }
 
-/// A single knot rounds as a lane does: its products are fused wherever there are lanes.
 impl KnotScalar for f64 {
-    type Residuals = (ResidualKernel<Fused>, ResidualKernel<Self>);
+    type Residuals = ResidualKernel<Self>;
 
-    fn residuals(nv: usize) -> Self::Residuals {
-        (ResidualKernel::new(nv), ResidualKernel::new(nv))
+    fn residuals(nv: usize) -> ResidualKernel<Self> {
+        ResidualKernel::new(nv)
     }
 
     fn run_residuals(
-        (fused, plain): &mut Self::Residuals,
+        scratch: &mut ResidualKernel<Self>,
         model: &Model,
         data: &mut Data<Self>,
         x: [&[Self]; 2],
         group: &mut KnotGroup<'_>,
     ) {
-        if level() == Level::Baseline {
-            return plain.run(model, data, x, group);
-        }
         data.placements(model); // those of limbs too are then body by body
-        fused.run(model, data.fused(), x.map(Fused::of), group);
+        scratch.run(model, data, x, group);
     }
 
     fn run_equations(_: &mut KnotBatch<Self>, _: &Model, _: &mut [KnotData]) {

@@ -11,7 +11,7 @@ use condyle_dynamics::{
     forward_velocities,
 };
 use condyle_spatial::block::{Block, Strided};
-use condyle_spatial::lanes::Kernel;
+use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Force, Mat3, Motion, Quaternion, Se3, Vec3, lie};
 use nalgebra::DMatrix;
 
@@ -193,7 +193,6 @@ macro_rules! at_level {
                     let Self($arguments) = self;
                     $body
                 }
-                #[inline(always)]
             }
             S::enter(Work($arguments));
         }
