@@ -26,7 +26,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// Allocates nothing.
     ///
     /// ```
-    /// use condyle_dynamics::{Data, crba, robots};
+    /// use condyle_dynamics::{Data, crba, forward_velocities, robots};
     /// use nalgebra::DVector;
     /// let arm = robots::arm7();
     /// let (mut data, v) = (Data::new(&arm), DVector::from_element(7, 0.5));
