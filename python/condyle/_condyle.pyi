@@ -1,5 +1,7 @@
 """Rigid-body dynamics with exact derivatives: the compiled part of `condyle`."""
 
+# Written by python/stubs.py from the extension module. Do not edit.
+
 import os
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, final
@@ -69,6 +71,7 @@ __all__ = [
     "ParseError",
     "Problem",
     "ProblemError",
+    "Residual",
     "Simulation",
     "WrenchCone",
     "__version__",
@@ -155,41 +158,34 @@ __all__ = [
 ]
 
 _Array: TypeAlias = NDArray[np.float64]
-_RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translation"]
+_Number: TypeAlias = HyperDual | float
+_Path: TypeAlias = str | os.PathLike[str]
+_Size: TypeAlias = tuple[float, float] | Sequence[float]
+_Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
 _Joints: TypeAlias = Sequence[tuple[Joint, ArrayLike | None]]
-_Method: TypeAlias = Literal["aba", "dense", "sparse"]
-_Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
-_Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
-_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translation"]
 _Reference: TypeAlias = Literal["local", "world", "local_world_aligned"]
 _Input: TypeAlias = (
     Literal["gravity", "armature", "damping"]
     | tuple[Literal["force", "inertia"], str | int]
     | tuple[Literal["friction"], float]
 )
+_Method: TypeAlias = Literal["aba", "dense", "sparse"]
+_Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
+_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
 _Action: TypeAlias = (
     FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction
 )
-_Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
-_RneaOut: TypeAlias = RneaDerivatives | tuple[_Array, _Array, _Array]
-_AbaOut: TypeAlias = AbaDerivatives | tuple[_Array, _Array, _Array, _Array]
-_MapOut: TypeAlias = CentroidalMap | tuple[_Array, _Array, _Array, _Array]
-_MapRateOut: TypeAlias = CentroidalMapRate | tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array]
 
 __version__: str
+WORLD: BodyId
 ARM7: str
 QUADRUPED: str
 HUMANOID: str
-WORLD: BodyId
 
 class Error(Exception):
     """What is wrong with a robot's description or with a name in it."""
-
-class ParseError(Error):
-    """A file cannot be read, is no XML, or does not describe a robot."""
-
-class ProblemError(Error):
-    """An optimal control problem, a warm start or a setting makes no sense."""
 
 class ModelError(Error):
     """A model cannot be built, or has no frame or joint of that name."""
@@ -197,866 +193,11 @@ class ModelError(Error):
 class NotPhysicalError(Error):
     """No body of positive density has this inertia."""
 
-@final
-class Model:
-    """A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
-
-    Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
-    Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
-    pickled.
-
-    >>> arm = condyle.robots.arm7()
-    >>> arm.nq, arm.nv, arm.names[:3]
-    (7, 7, ['universe', 'joint1', 'joint2'])
-    """
-
-    @staticmethod
-    def from_urdf(
-        path: str | os.PathLike[str],
-        root_joint: _RootJoint | None = None,
-        mimic: bool = False,
-        strict: bool = False,
-        packages: Sequence[str | os.PathLike[str]] | None = None,
-    ) -> Model:
-        """Reads a URDF file.
-
-        Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
-
-        path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
-        root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
-            'spherical' or 'translation'; None fixes the root link to the world.
-        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
-            their own.
-        strict: whether what is only odd (`warnings`) is an error.
-        packages: folders that have packages in them, or are packages; before those that the environment names in
-            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-    @staticmethod
-    def from_urdf_str(
-        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """Reads a URDF from a string; see `from_urdf`.
-
-        >>> text = condyle.robots.QUADRUPED
-        >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
-        18
-        """
-    @staticmethod
-    def from_mjcf(
-        path: str | os.PathLike[str], mimic: bool = False, strict: bool = False, weightless_meshes: bool = False
-    ) -> Model:
-        """Reads an MJCF file (MuJoCo), and the files that it includes.
-
-        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
-        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
-        bodies without mass, `name#1`, `name#2`, …, between them. What a tree of bodies cannot have is left out and
-        stands in `warnings`.
-
-        path: a path, as text or `os.PathLike`.
-        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being left out; its `polycoef`
-            must be linear.
-        strict: whether what is only odd, or left out (`warnings`), is an error.
-        weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and stands in
-            `warnings`, instead of being an error.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-    @staticmethod
-    def from_mjcf_str(text: str, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
-        """Reads an MJCF from a string, which may not include files; see `from_mjcf`.
-
-        >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
-        >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
-        2.0
-        """
-    @staticmethod
-    def from_sdf(
-        path: str | os.PathLike[str], root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """Reads an SDF file (Gazebo) with one model in it.
-
-        Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
-        parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
-
-        path: a path, as text or `os.PathLike`.
-        root_joint: as for `from_urdf`.
-        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
-        strict: whether what is only odd, or left out (`warnings`), is an error.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-    @staticmethod
-    def from_sdf_str(
-        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """Reads an SDF from a string; see `from_sdf`.
-
-        >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
-        >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
-        >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
-        6
-        """
-    @property
-    def warnings(self) -> list[str]:
-        """What is odd about the robot, though it could be loaded.
-
-        Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
-        """
-
-    @property
-    def singular_joints(self) -> list[int]:
-        """The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`."""
-
-    @property
-    def name(self) -> str:
-        """The robot's name."""
-    @property
-    def nq(self) -> int:
-        """How many numbers a position q has."""
-    @property
-    def nv(self) -> int:
-        """How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector."""
-    @property
-    def nbodies(self) -> int:
-        """How many bodies there are, the world included: the rows of f_ext and of what `forward_kinematics` returns."""
-    @property
-    def names(self) -> list[str]:
-        """The names of the joints, one for each body; 'universe' for the world."""
-    @property
-    def body_names(self) -> list[str]:
-        """The names of the links that the joints carry; 'universe' for the world."""
-    @property
-    def joint_types(self) -> list[str]:
-        """The kind of each joint: 'revolute', 'continuous', 'prismatic', 'helical', 'spherical', 'planar',
-        'translation' or 'free_flyer'; 'universe' for the world.
-        """
-    @property
-    def joints(self) -> list[Joint | None]:
-        """Each joint, as `Joint`; None for the world."""
-    @property
-    def parents(self) -> list[int]:
-        """The body on which each joint sits; 0 is the world."""
-    @property
-    def idx_qs(self) -> list[int]:
-        """Where each joint's position begins in q; that of a joint that mimics another is the other's."""
-    @property
-    def idx_vs(self) -> list[int]:
-        """Where each joint's velocity begins in v; that of a joint that mimics another is the other's."""
-    @property
-    def nqs(self) -> list[int]:
-        """How many numbers of q each joint has of its own: none if it mimics another; 0 for the world."""
-    @property
-    def nvs(self) -> list[int]:
-        """How many degrees of freedom each joint has of its own: none if it mimics another; 0 for the world."""
-    @property
-    def mimics(self) -> list[Mimic | None]:
-        """How each joint follows another one, as `Mimic(ratio, offset)`, or None if it does not."""
-    @property
-    def joint_placements(self) -> _Array:
-        """The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4)."""
-    @property
-    def inertias(self) -> list[Inertia]:
-        """The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame."""
-    @property
-    def inertial_parameters(self) -> _Array:
-        """π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
-        xy, yy, xz, yz, zz of the rotational inertia about the origin of the body's frame; what regressors are
-        multiplied with.
-        """
-    @property
-    def limits(self) -> Limits:
-        """The limits of position, velocity and effort, as `Limits`; infinite where there are none."""
-    @property
-    def damping(self) -> _Array:
-        """Viscous damping of each degree of freedom (N m s/rad, N s/m), nv numbers: used by no algorithm unasked."""
-    @property
-    def friction(self) -> _Array:
-        """Coulomb friction of each degree of freedom (N m, N), nv numbers: used by no algorithm unasked."""
-    @property
-    def armature(self) -> _Array:
-        """Inertia of the rotor as seen at each joint (kg m², kg), nv numbers, part of M in every algorithm."""
-    @property
-    def gravity(self) -> _Array:
-        """The acceleration of free fall, in the world's frame (m/s²), 3 numbers."""
-    @property
-    def total_mass(self) -> float:
-        """Mass of all bodies, of what is fixed to the world too (kg)."""
-    @property
-    def frames(self) -> list[Frame]:
-        """All frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the
-        joint's and the link's.
-        """
-    def frame(self, name: str) -> int:
-        """The number of the frame with this name: a link's, else the user's, else a joint's.
-
-        Raises `ModelError`, with the nearest name.
-        """
-    def joint(self, name: str) -> int:
-        """The number of the body that the joint with this name carries.
-
-        Raises `ModelError`, with the nearest name.
-        """
-    def with_gravity(self, gravity: ArrayLike) -> Model:
-        """The same robot under another gravity (m/s², 3 numbers, in the world's frame)."""
-    def with_armature(self, armature: ArrayLike) -> Model:
-        """The same robot with another armature, nv numbers (kg m², kg)."""
-    def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
-        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
-
-        >>> arm = condyle.robots.arm7()
-        >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
-        >>> heavier = arm.with_inertias(twice)
-        >>> heavier.total_mass == 2.0 * arm.total_mass
-        True
-        """
-    def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
-        """The same robot with some joints locked where they are at q.
-
-        Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
-        locked with it.
-
-        joints: a list of names or numbers of bodies.
-        q: nq numbers.
-
-        >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
-        ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
-
-        Raises `ModelError`.
-        """
-    def __copy__(self) -> Model:
-        """The model itself: it never changes."""
-    def __deepcopy__(self, memo: object) -> Model:
-        """The model itself: it never changes."""
-    def __reduce__(self) -> tuple[Any, ...]:
-        """For pickle."""
-
-@final
-class Data:
-    """Scratch and results of every algorithm, for one model: made once, used by one thread at a time.
-
-    It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
-    what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
-    with another robot's model, a `ValueError`.
-
-    Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
-    registers, and on so many threads.
-
-    >>> arm = condyle.robots.arm7()
-    >>> condyle.Data(arm)
-    <condyle.Data of 'arm7'>
-    """
-
-    def __new__(cls, model: Model, threads: int = 1) -> Data: ...
-
-def _model_from_bytes(data: bytes) -> Model:
-    """The model that a pickle holds."""
-
-def arm7() -> Model:
-    """A seven-axis arm with a fixed base, nq = nv = 7; its last frame is `tool`.
-
-    >>> condyle.robots.arm7()
-    <condyle.Model 'arm7': 7 bodies, nq = 7, nv = 7>
-    """
-
-def quadruped() -> Model:
-    """A quadruped of twelve joints on a free-flyer, nq = 19, nv = 18, with point feet `LF_foot`, `LH_foot`, `RF_foot`,
-    `RH_foot`.
-
-    >>> condyle.robots.quadruped()
-    <condyle.Model 'quadruped': 13 bodies, nq = 19, nv = 18>
-    """
-
-def humanoid() -> Model:
-    """A humanoid of thirty-two joints on a free-flyer, nq = 39, nv = 38, with soles `left_sole`, `right_sole`.
-
-    >>> condyle.robots.humanoid()
-    <condyle.Model 'humanoid': 33 bodies, nq = 39, nv = 38>
-    """
-
-def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Where all bodies are: (nbodies, 4, 4), the pose of each body in the world as a homogeneous matrix; O(n).
-
-    q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
-    A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> data = condyle.Data(quadruped)
-    >>> condyle.forward_kinematics(quadruped, data, condyle.neutral(quadruped)).shape
-    (14, 4, 4)
-    """
-
-def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
-    """oXf, the pose of a frame in the world: (4, 4), a homogeneous matrix that takes coordinates in the frame to
-    coordinates in the world; O(n).
-
-    q: nq numbers; frame: its name or number.
-
-    >>> arm = condyle.robots.arm7()
-    >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
-    >>> bool(tool[2, 3] > 0.5)  # stretched upwards
-    True
-    """
-
-def rnea_input_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    wrt: _Input,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at most O(n) a
-    column.
-
-    q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
-    (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
-    frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
-    `passive_torque`; f_ext: as for `rnea`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
-    >>> dtau_dg = condyle.rnea_input_derivative(arm, data, q, zero, zero, "gravity")
-    >>> np.allclose(dtau_dg @ [0.0, 0.0, -9.81], condyle.gravity(arm, data, q))  # τ is linear in g
-    True
-    """
-
-def aba_input_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    wrt: _Input,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at most O(n²) a
-    column.
-
-    q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
-    >>> da_df = condyle.aba_input_derivative(quadruped, data, q, zero, zero, ("force", "root_joint"))
-    >>> np.allclose(da_df, condyle.minv(quadruped, data, q)[:, :6])  # a force on the trunk is an effort of its joint
-    True
-    """
-
-def rnea_hessian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    lambda_: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: Sequence[_Array] | None = None,
-) -> RneaHessian:
-    """The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
-    (nv, nv); the other blocks are zero.
-
-    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-    derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
-    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, np.ones(7))
-    >>> np.allclose(hessian.dqdq, hessian.dqdq.T)
-    True
-    """
-
-def aba_hessian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    lambda_: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: Sequence[_Array] | None = None,
-) -> AbaHessian:
-    """The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
-    other blocks are zero.
-
-    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-    derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
-    """
-
-def rnea_second_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: Sequence[_Array] | None = None,
-) -> RneaSecondDerivatives:
-    """The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
-    `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
-
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
-    contracted with a vector, many times faster.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
-    >>> tensors = condyle.rnea_second_derivatives(arm, data, q, v, a)
-    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, weights)
-    >>> np.allclose(np.einsum("i,ijk->jk", weights, tensors.dqdq), hessian.dqdq)
-    True
-    """
-
-def frame_velocity_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """∂v/∂q of a frame's velocity, (6, nv), linear rows first; ∂v/∂(velocity) is its Jacobian.
-
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
-    >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
-    True
-    """
-
-def frame_acceleration_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: Sequence[_Array] | None = None,
-) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-    Jacobian.
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-    """
-
-def frame_classical_acceleration_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: Sequence[_Array] | None = None,
-) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-    Jacobian.
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-    """
-
-def body_velocity_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
-
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_acceleration_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: Sequence[_Array] | None = None,
-) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
-    `frame_acceleration_derivatives` of its own frame.
-
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def centroidal_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    out: Sequence[_Array] | None = None,
-) -> CentroidalDerivatives:
-    """The derivatives of the centroidal momentum, its rate and the centre of mass by q, v and a, exact, in O(n), as
-    `CentroidalDerivatives`.
-
-    q: nq numbers; v, a: nv. Gravity is not among the accelerations.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
-    >>> d = condyle.centroidal_derivatives(quadruped, data, q, zero, zero)
-    >>> np.allclose(d.drate_da, condyle.centroidal_map(quadruped, data, q).Ag)
-    True
-    """
-
-def energy_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    out: Sequence[_Array] | None = None,
-) -> EnergyDerivatives:
-    """The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
-    `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
-
-    q: nq numbers; v: nv.
-    """
-
-def static_torque_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """∂τ/∂q of `static_torque`, and without forces of `gravity`, (nv, nv); exact, in O(n depth).
-
-    q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
-    """
-
-def coriolis_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    out: Sequence[_Array] | None = None,
-) -> CoriolisDerivatives:
-    """The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
-    `CoriolisDerivatives(dq, dv)`, each (nv, nv).
-
-    q: nq numbers; v: nv.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
-    >>> d = condyle.coriolis_derivatives(arm, data, q, v)
-    >>> np.allclose(d.dv, 2.0 * condyle.coriolis_matrix(arm, data, q, v))  # C v is quadratic in v
-    True
-    """
-
-def frame_jacobian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The Jacobian J of a frame, (6, nv), linear rows first: the frame's velocity is J v.
-
-    q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
-    the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
-    origin, along the world's axes.
-
-    >>> arm = condyle.robots.arm7()
-    >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
-    (6, 7)
-    """
-
-def frame_velocity(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The velocity of a frame, 6 numbers: of its body's point at the origin of the reference (m/s), then of its
-    rotation (rad/s); O(n).
-
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
-    >>> J = condyle.frame_jacobian(arm, data, q, "tool")
-    >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
-    True
-    """
-
-def frame_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
-    velocity, seen from the world, expressed in the reference; O(n).
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-    """
-
-def frame_classical_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of its body's point at the origin of the reference
-    (m/s²), then of its rotation (rad/s²); in 'local_world_aligned' p̈ of the frame's origin; O(n).
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
-    >>> J = condyle.frame_jacobian(arm, data, q, "tool", "local_world_aligned")
-    >>> dJ = condyle.frame_jacobian_rate(arm, data, q, v, "tool", "local_world_aligned")
-    >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
-    >>> np.allclose(acceleration, J @ a + dJ @ v)
-    True
-    """
-
-def frame_jacobian_rate(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """dJ/dt, the rate of a frame's Jacobian along v, (6, nv), linear rows first.
-
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-    acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
-    frame.
-    """
-
-def body_jacobian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The Jacobian J of a body, (6, nv), linear rows first: the body's velocity is J v.
-
-    q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
-    body's own frame.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q = condyle.Data(arm), [0.3] * 7
-    >>> J = condyle.frame_jacobian(arm, data, q, "link7")
-    >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
-    True
-    """
-
-def body_velocity(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
-
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
-    own frame; O(n).
-
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_classical_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
-    frame; O(n).
-
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_jacobian_rate(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """dJ/dt, the rate of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
-
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """c, the centre of mass of the moving bodies, 3 numbers, in the world's frame (m); O(n).
-
-    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
-    >>> bool(abs(com[1]) < 1e-12)  # left and right weigh the same
-    True
-    """
-
-def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """ċ, the velocity of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s); O(n).
-
-    q: nq numbers; v: nv.
-    """
-
-def com_acceleration(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
-) -> _Array:
-    """c̈, the acceleration of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s²), without
-    gravity; O(n).
-
-    q: nq numbers; v, a: nv.
-    """
-
-def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Jcom(q), the Jacobian of the centre of mass: (3, nv), ċ = Jcom v; O(n).
-
-    q: nq numbers. It is a part of `centroidal_map`.
-    """
-
-def centroidal_map(model: Model, data: Data, q: ArrayLike, out: _MapOut | None = None) -> CentroidalMap:
-    """The centroidal momentum matrix Ag(q), hg = Ag v, and what it needs, in O(n), as `CentroidalMap(Ag, Ig, com,
-    Jcom)`.
-
-    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
-    arrays, such as an earlier result.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
-    >>> bool(abs(map.Ag[0, 0] - quadruped.total_mass) < 1e-9)  # pushed forwards, all goes forwards
-    True
-    """
-
-def centroidal_map_rate(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _MapRateOut | None = None
-) -> CentroidalMapRate:
-    """Ag(q), its rate along v, and the centroidal momentum hg = Ag v, in O(n), as
-    `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`; the rate of hg is Ag a + dAg v.
-
-    q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
-    seven arrays, such as an earlier result.
-    """
-
-def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """hg, the momentum of the moving bodies about their centre of mass, along the world's axes: 6 numbers (kg m/s, then
-    kg m²/s); O(n).
-
-    q: nq numbers; v: nv.
-    """
-
-def centroidal_momentum_rate(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
-) -> _Array:
-    """The rate of hg, along the world's axes: 6 numbers (N, then N m), the weight and the external forces about the
-    centre of mass; O(n).
-
-    q: nq numbers; v, a: nv.
-    """
-
-def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """T = ½ vᵀ M(q) v, the kinetic energy of the moving bodies and the rotors (J); O(n).
-
-    q: nq numbers; v: nv.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v = condyle.Data(arm), [0.3] * 7, np.full(7, 0.5)
-    >>> np.isclose(condyle.kinetic_energy(arm, data, q, v), 0.5 * v @ condyle.crba(arm, data, q) @ v).item()
-    True
-    """
-
-def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
-    """V = −m gᵀ c(q), the potential energy of the moving bodies under gravity (J), 0 at the world's origin; O(n).
-
-    q: nq numbers.
-    """
-
-def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """E = T + V, the mechanical energy (J); O(n).
-
-    q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
-    """
-
-def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
-    """What the equations of motion are made of, from one pass to the tips and one back, in O(n depth), as
-    `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
-
-    q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
-    `kinetic_energy` and `potential_energy`, up to rounding.
-
-    >>> arm = condyle.robots.arm7()
-    >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)
-    >>> terms.M.shape, terms.h.shape, terms.centroidal.Ag.shape
-    ((7, 7), (7,), (6, 7))
-    """
-
-def rnea(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n); nv
-    numbers (N m, N).
-
-    q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
-    expressed in its frame, row 0 being the world's.
-
-    >>> arm = condyle.robots.arm7()
-    >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
-    >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
-    True
-    """
+class ParseError(Error):
+    """A file cannot be read, is no XML, or does not describe a robot."""
+
+class ProblemError(Error):
+    """An optimal control problem, a warm start or a setting makes no sense."""
 
 def aba(
     model: Model,
@@ -1075,6 +216,51 @@ def aba(
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
     >>> a = condyle.aba(quadruped, condyle.Data(quadruped), q, zero, zero)
     >>> bool(abs(a[2] + 9.81) < 1e-12)  # it falls
+    True
+    """
+
+def aba_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> AbaDerivatives:
+    """`aba` and its derivatives with respect to q, v and τ, exact, as `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv
+    numbers and three matrices (nv, nv).
+
+    q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
+    change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data = condyle.Data(arm)
+    >>> d = condyle.aba_derivatives(arm, data, [0.3] * 7, [0.1] * 7, [1.0] * 7)
+    >>> np.array_equal(d.da_dtau, condyle.minv(arm, data, [0.3] * 7))
+    True
+    """
+
+def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """C(q, v), the Coriolis matrix by Christoffel symbols: (nv, nv), C v = h − g, Ṁ = C + Cᵀ; O(n depth).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
+    >>> h, g = condyle.nonlinear_effects(arm, data, q, v), condyle.gravity(arm, data, q)
+    >>> np.allclose(condyle.coriolis_matrix(arm, data, q, v) @ v, h - g)
+    True
+    """
+
+def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """M(q), the joint-space inertia matrix: (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+
+    q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
+
+    >>> arm = condyle.robots.arm7()
+    >>> M = condyle.crba(arm, condyle.Data(arm), [0.3] * 7)
+    >>> bool(np.linalg.eigvalsh(M).min() > 0.0)
     True
     """
 
@@ -1101,14 +287,14 @@ def forward_dynamics(
     True
     """
 
-def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """M(q), the joint-space inertia matrix: (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """g(q): the efforts that hold the robot still, nv numbers; `rnea` with v = a = 0.
 
-    q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
+    q: nq numbers.
 
-    >>> arm = condyle.robots.arm7()
-    >>> M = condyle.crba(arm, condyle.Data(arm), [0.3] * 7)
-    >>> bool(np.linalg.eigvalsh(M).min() > 0.0)
+    >>> quadruped = condyle.robots.quadruped()
+    >>> g = condyle.gravity(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(g[2] - 9.81 * quadruped.total_mass) < 1e-9)  # the base carries the weight
     True
     """
 
@@ -1129,15 +315,46 @@ def nonlinear_effects(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out:
     q: nq numbers; v: nv.
     """
 
-def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """g(q): the efforts that hold the robot still, nv numbers; `rnea` with v = a = 0.
+def rnea(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n); nv
+    numbers (N m, N).
 
-    q: nq numbers.
+    q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
+    expressed in its frame, row 0 being the world's.
 
-    >>> quadruped = condyle.robots.quadruped()
-    >>> g = condyle.gravity(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
-    >>> bool(abs(g[2] - 9.81 * quadruped.total_mass) < 1e-9)  # the base carries the weight
+    >>> arm = condyle.robots.arm7()
+    >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
+    >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
     True
+    """
+
+def rnea_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array] | list[_Array] | None = None,
+) -> RneaDerivatives:
+    """The derivatives of `rnea` with respect to q, v and a, exact, in O(n depth), as
+    `RneaDerivatives(dtau_dq, dtau_dv, dtau_da)`, each (nv, nv).
+
+    q: nq numbers; v, a: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
+    change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
+    >>> dtau_dq.shape
+    (7, 7)
     """
 
 def static_torque(
@@ -1147,6 +364,430 @@ def static_torque(
 
     q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
     """
+
+@final
+class BodyId:
+    """Names a body of a builder: what `ModelBuilder.body` and others return. `WORLD` is always there."""
+
+@final
+class Joint:
+    """The kind of a joint, with what it needs to know.
+
+    | | q | v |
+    | --- | --- | --- |
+    | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
+    | `continuous` | 2: cos θ, sin θ | 1 |
+    | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
+    | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
+    | `translation` | 3 | 3 |
+    | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
+
+    An axis is a vector in the body's frame, of any length but 0.
+
+    >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
+    1
+    """
+
+    @property
+    def axis(self) -> _Array | None:
+        """The axis, 3 numbers in the body's frame, a unit vector in a model; None if the joint has none."""
+
+    @property
+    def nq(self) -> int:
+        """How many numbers the position has."""
+
+    @property
+    def nv(self) -> int:
+        """How many degrees of freedom it has: the numbers of its velocity."""
+
+    @staticmethod
+    def revolute(axis: ArrayLike) -> Joint:
+        """One angle about an axis: q = [θ], v = [θ̇]."""
+
+    @staticmethod
+    def continuous(axis: ArrayLike) -> Joint:
+        """One angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
+
+    @staticmethod
+    def prismatic(axis: ArrayLike) -> Joint:
+        """One length along an axis: q = [d], v = [ḋ]."""
+
+    @staticmethod
+    def helical(axis: ArrayLike, pitch: float) -> Joint:
+        """A screw: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
+
+    @staticmethod
+    def spherical() -> Joint:
+        """A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
+
+    @staticmethod
+    def planar() -> Joint:
+        """Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
+
+    @staticmethod
+    def translation() -> Joint:
+        """Three lengths: q = [x, y, z], v = q̇."""
+
+    @staticmethod
+    def free_flyer() -> Joint:
+        """A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame."""
+
+@final
+class ModelBuilder:
+    """Makes a `Model`, body by body, parents first.
+
+    Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
+    joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
+    and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
+    the rows of f_ext count them.
+
+    name: the robot's.
+
+    >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
+    >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
+    >>> elbow = np.eye(4)
+    >>> elbow[2, 3] = -1.0
+    >>> robot = ModelBuilder("double pendulum")
+    >>> upper = robot.body("upper", WORLD, Joint.revolute([0.0, 1.0, 0.0]), inertia=rod)
+    >>> lower = robot.body("lower", upper, Joint.revolute([0.0, 1.0, 0.0]), elbow, rod, damping=0.1)
+    >>> robot.frame("tip", lower, elbow)
+    >>> robot.build()
+    <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
+    """
+
+    def __new__(cls, name: str) -> ModelBuilder: ...
+    def body(
+        self,
+        name: str,
+        parent: BodyId,
+        joint: Joint,
+        placement: ArrayLike | None = None,
+        inertia: Inertia | None = None,
+        *,
+        joint_name: str | None = None,
+        position: tuple[float, float] | None = None,
+        velocity: float | None = None,
+        effort: float | None = None,
+        damping: float = 0.0,
+        friction: float = 0.0,
+        armature: float = 0.0,
+    ) -> BodyId:
+        """Adds a body and its joint.
+
+        name: the body's, and the joint's unless it has a `joint_name` of its own.
+        parent: the body on which the joint sits.
+        placement: the joint's frame at position zero in the parent's frame.
+        inertia: in the body's frame, which is the joint's at position zero.
+        position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
+        velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
+        damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
+        armature: inertia of the rotor as seen at the joint (kg m², kg).
+        """
+
+    def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
+        """Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+
+        Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
+        `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
+        `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+
+        joints: a list of (joint, placement).
+        """
+
+    def spherical_zyx(
+        self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
+    ) -> BodyId:
+        """Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+
+        M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
+        """
+
+    def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
+        """Fixes more inertia to a body, given in a frame that is at `placement` in the body's."""
+
+    def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
+        """Adds a frame at `placement` in the body's frame."""
+
+    def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
+        """Lets a joint follow another one, in place of a coordinate of its own: its position is ratio q + offset.
+
+        follower, leader: the bodies that the joints carry.
+        """
+
+    def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
+        """Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before
+        them.
+
+        >>> from condyle import ModelBuilder, WORLD
+        >>> two = ModelBuilder("two arms")
+        >>> for side, y in ("left_", 0.4), ("right_", -0.4):
+        ...     at = np.eye(4)
+        ...     at[1, 3] = y
+        ...     two.append(WORLD, at, condyle.robots.arm7(), side)
+        >>> two.build().nv
+        14
+        """
+
+    def gravity(self, gravity: ArrayLike) -> None:
+        """Sets the acceleration of free fall (m/s², 3 numbers, in the world's frame); (0, 0, −9.81) otherwise."""
+
+    def build(self) -> Model:
+        """Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and
+        freezes the model. The builder cannot be used any more.
+
+        Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
+        """
+
+def centroidal_map(
+    model: Model, data: Data, q: ArrayLike, out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None
+) -> CentroidalMap:
+    """The centroidal momentum matrix Ag(q), hg = Ag v, and what it needs, in O(n), as `CentroidalMap(Ag, Ig, com,
+    Jcom)`.
+
+    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
+    arrays, such as an earlier result.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(map.Ag[0, 0] - quadruped.total_mass) < 1e-9)  # pushed forwards, all goes forwards
+    True
+    """
+
+def centroidal_map_rate(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> CentroidalMapRate:
+    """Ag(q), its rate along v, and the centroidal momentum hg = Ag v, in O(n), as
+    `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`; the rate of hg is Ag a + dAg v.
+
+    q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
+    seven arrays, such as an earlier result.
+    """
+
+def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """hg, the momentum of the moving bodies about their centre of mass, along the world's axes: 6 numbers (kg m/s, then
+    kg m²/s); O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def centroidal_momentum_rate(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The rate of hg, along the world's axes: 6 numbers (N, then N m), the weight and the external forces about the
+    centre of mass; O(n).
+
+    q: nq numbers; v, a: nv.
+    """
+
+def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """c, the centre of mass of the moving bodies, 3 numbers, in the world's frame (m); O(n).
+
+    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(com[1]) < 1e-12)  # left and right weigh the same
+    True
+    """
+
+def com_acceleration(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """c̈, the acceleration of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s²), without
+    gravity; O(n).
+
+    q: nq numbers; v, a: nv.
+    """
+
+def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """Jcom(q), the Jacobian of the centre of mass: (3, nv), ċ = Jcom v; O(n).
+
+    q: nq numbers. It is a part of `centroidal_map`.
+    """
+
+def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """ċ, the velocity of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s); O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
+    """What the equations of motion are made of, from one pass to the tips and one back, in O(n depth), as
+    `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
+
+    q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
+    `kinetic_energy` and `potential_energy`, up to rounding.
+
+    >>> arm = condyle.robots.arm7()
+    >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)
+    >>> terms.M.shape, terms.h.shape, terms.centroidal.Ag.shape
+    ((7, 7), (7,), (6, 7))
+    """
+
+def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
+    """T = ½ vᵀ M(q) v, the kinetic energy of the moving bodies and the rotors (J); O(n).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, np.full(7, 0.5)
+    >>> np.isclose(condyle.kinetic_energy(arm, data, q, v), 0.5 * v @ condyle.crba(arm, data, q) @ v).item()
+    True
+    """
+
+def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
+    """E = T + V, the mechanical energy (J); O(n).
+
+    q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
+    """
+
+def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
+    """V = −m gᵀ c(q), the potential energy of the moving bodies under gravity (J), 0 at the world's origin; O(n).
+
+    q: nq numbers.
+    """
+
+def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
+    """q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one; nv numbers.
+
+    q0, q1: nq numbers.
+    """
+
+def difference_jacobian(
+    model: Model, d: ArrayLike, argument: Literal["from", "to"], out: _Array | None = None
+) -> _Array:
+    """∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁: (nv, nv), block-diagonal, between tangent spaces; of the positions it needs
+    their difference only.
+
+    d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
+    """
+
+def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
+    """‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+
+    q0, q1: nq numbers.
+    """
+
+def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """q ⊕ v: the position after moving with the velocity v for one unit of time, nq numbers.
+
+    q: nq numbers; v: nv.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> q0 = condyle.neutral(quadruped)
+    >>> q1 = condyle.integrate(quadruped, q0, np.full(18, 0.1))
+    >>> np.allclose(condyle.difference(quadruped, q0, q1), 0.1)
+    True
+    """
+
+def integrate_jacobian(
+    model: Model, v: ArrayLike, argument: Literal["position", "velocity"], out: _Array | None = None
+) -> _Array:
+    """∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v: (nv, nv), block-diagonal, between tangent spaces; it does not depend on q.
+
+    v: nv numbers; argument: 'position' for q or 'velocity' for v.
+    """
+
+def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Array | None = None) -> _Array:
+    """q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity, nq numbers.
+
+    q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
+
+    >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
+    array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
+    """
+
+def neutral(model: Model) -> _Array:
+    """The position in which every body is at its joint's frame, nq numbers: zeros, and rotations by nothing.
+
+    >>> condyle.neutral(condyle.robots.quadruped())[:7]
+    array([0., 0., 0., 0., 0., 0., 1.])
+    """
+
+def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
+    `out`.
+
+    q: nq numbers.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> q = condyle.neutral(quadruped)
+    >>> q[6] = 2.0
+    >>> np.array_equal(condyle.normalize(quadruped, q), condyle.neutral(quadruped))
+    True
+    """
+
+def random_configuration(model: Model, seed: int | None = None) -> _Array:
+    """A position drawn uniformly, nq numbers: between its limits, within ±3 (rad, m) where a coordinate has none, over
+    the whole group for rotations.
+
+    seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
+    """
+
+def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
+    """The columns of X, tangent vectors at q ⊕ v, taken to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+
+    v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
+    `transport` with −v.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> v = np.full(18, 0.1)
+    >>> J = condyle.integrate_jacobian(quadruped, v, "position")
+    >>> np.allclose(condyle.transport(quadruped, v, J), np.eye(18))
+    True
+    """
+
+@final
+class ConstraintSet:
+    """Constraints of one model: contacts and loops, and the scratch of `constrained_dynamics` and its like.
+
+    Make one set for each combination of contacts; the `Data` can be the same for all sets. As a `Data`, a set serves
+    one thread at a time.
+
+    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found, so
+    that redundant constraints share the smallest forces; μ is small beside J M⁻¹ Jᵀ, as 1e-8. With μ = 0 one iteration
+    is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
+    sparse resolution of constrained dynamic equations (2021).
+
+    model: the robot; constraints: a list of `Constraint`s; mu: μ (1/kg); iterations: how many there are, always.
+
+    Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
+    'world', a gain is negative or not finite, or two constraints are the same.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> trot = condyle.ConstraintSet(quadruped, [condyle.Constraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
+    >>> len(trot), trot.rows, trot.range(1)
+    (2, 6, slice(3, 6, 1))
+    """
+
+    def __new__(
+        cls, model: Model, constraints: Sequence[Constraint], mu: float = 0.0, iterations: int = 1
+    ) -> ConstraintSet: ...
+    @property
+    def rows(self) -> int:
+        """How many rows J has, and λ numbers."""
+
+    def __len__(self, /) -> int: ...
+    def range(self, k: int) -> slice:
+        """The rows of constraint k, as a slice."""
+
+    def set_target(
+        self,
+        k: int,
+        placement: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+    ) -> None:
+        """Changes where constraint k wants its frame to be, and how it should move there: what is given, as in
+        `Constraint`.
+        """
+
+    def jacobian(self, out: _Array | None = None) -> _Array:
+        """J, (rows, nv), as the last call left it."""
 
 def constrained_dynamics(
     model: Model,
@@ -1267,297 +908,270 @@ def impulse_dynamics_derivatives(
     True
     """
 
-def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """C(q, v), the Coriolis matrix by Christoffel symbols: (nv, nv), C v = h − g, Ṁ = C + Cᵀ; O(n depth).
+@final
+class Data:
+    """Scratch and results of every algorithm, for one model: made once, used by one thread at a time.
+
+    It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
+    what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
+    with another robot's model, a `ValueError`.
+
+    Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
+    registers, and on so many threads.
+
+    >>> arm = condyle.robots.arm7()
+    >>> condyle.Data(arm)
+    <condyle.Data of 'arm7'>
+    """
+
+    def __new__(cls, model: Model, threads: int = 1) -> Data: ...
+
+def aba_hessian(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    lambda_: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> AbaHessian:
+    """The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
+    other blocks are zero.
+
+    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+    derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+    """
+
+def aba_input_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    wrt: _Input,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at most O(n²) a
+    column.
+
+    q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+    >>> da_df = condyle.aba_input_derivative(quadruped, data, q, zero, zero, ("force", "root_joint"))
+    >>> np.allclose(da_df, condyle.minv(quadruped, data, q)[:, :6])  # a force on the trunk is an effort of its joint
+    True
+    """
+
+def body_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: tuple[_Array, _Array] | list[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+    `frame_acceleration_derivatives` of its own frame.
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_velocity_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def centroidal_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> CentroidalDerivatives:
+    """The derivatives of the centroidal momentum, its rate and the centre of mass by q, v and a, exact, in O(n), as
+    `CentroidalDerivatives`.
+
+    q: nq numbers; v, a: nv. Gravity is not among the accelerations.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+    >>> d = condyle.centroidal_derivatives(quadruped, data, q, zero, zero)
+    >>> np.allclose(d.drate_da, condyle.centroidal_map(quadruped, data, q).Ag)
+    True
+    """
+
+def coriolis_derivatives(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: tuple[_Array, _Array] | list[_Array] | None = None
+) -> CoriolisDerivatives:
+    """The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
+    `CoriolisDerivatives(dq, dv)`, each (nv, nv).
 
     q: nq numbers; v: nv.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
-    >>> h, g = condyle.nonlinear_effects(arm, data, q, v), condyle.gravity(arm, data, q)
-    >>> np.allclose(condyle.coriolis_matrix(arm, data, q, v) @ v, h - g)
+    >>> d = condyle.coriolis_derivatives(arm, data, q, v)
+    >>> np.allclose(d.dv, 2.0 * condyle.coriolis_matrix(arm, data, q, v))  # C v is quadratic in v
     True
     """
 
-def rnea_derivatives(
+def energy_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    out: tuple[_Array, _Array, _Array] | list[_Array] | None = None,
+) -> EnergyDerivatives:
+    """The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
+    `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
+
+    q: nq numbers; v: nv.
+    """
+
+def frame_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: tuple[_Array, _Array] | list[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
+    Jacobian.
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_classical_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: tuple[_Array, _Array] | list[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
+    Jacobian.
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_velocity_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """∂v/∂q of a frame's velocity, (6, nv), linear rows first; ∂v/∂(velocity) is its Jacobian.
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
+    >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
+    True
+    """
+
+def rnea_hessian(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    lambda_: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> RneaHessian:
+    """The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
+    (nv, nv); the other blocks are zero.
+
+    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+    derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
+    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, np.ones(7))
+    >>> np.allclose(hessian.dqdq, hessian.dqdq.T)
+    True
+    """
+
+def rnea_input_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    wrt: _Input,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at most O(n) a
+    column.
+
+    q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
+    (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
+    frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
+    `passive_torque`; f_ext: as for `rnea`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
+    >>> dtau_dg = condyle.rnea_input_derivative(arm, data, q, zero, zero, "gravity")
+    >>> np.allclose(dtau_dg @ [0.0, 0.0, -9.81], condyle.gravity(arm, data, q))  # τ is linear in g
+    True
+    """
+
+def rnea_second_derivatives(
     model: Model,
     data: Data,
     q: ArrayLike,
     v: ArrayLike,
     a: ArrayLike,
     f_ext: ArrayLike | None = None,
-    out: _RneaOut | None = None,
-) -> RneaDerivatives:
-    """The derivatives of `rnea` with respect to q, v and a, exact, in O(n depth), as
-    `RneaDerivatives(dtau_dq, dtau_dv, dtau_da)`, each (nv, nv).
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> RneaSecondDerivatives:
+    """The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
+    `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
 
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
-    change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
-
-    >>> arm = condyle.robots.arm7()
-    >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
-    >>> dtau_dq.shape
-    (7, 7)
-    """
-
-def aba_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: _AbaOut | None = None,
-) -> AbaDerivatives:
-    """`aba` and its derivatives with respect to q, v and τ, exact, as `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv
-    numbers and three matrices (nv, nv).
-
-    q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
-    change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+    q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
+    contracted with a vector, many times faster.
 
     >>> arm = condyle.robots.arm7()
-    >>> data = condyle.Data(arm)
-    >>> d = condyle.aba_derivatives(arm, data, [0.3] * 7, [0.1] * 7, [1.0] * 7)
-    >>> np.array_equal(d.da_dtau, condyle.minv(arm, data, [0.3] * 7))
+    >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
+    >>> tensors = condyle.rnea_second_derivatives(arm, data, q, v, a)
+    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, weights)
+    >>> np.allclose(np.einsum("i,ijk->jk", weights, tensors.dqdq), hessian.dqdq)
     True
     """
 
-def joint_torque_regressor(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+def static_torque_derivative(
+    model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
 ) -> _Array:
-    """Y(q, v, a) with τ = Y π: (nv, 10 (nbodies − 1)), `rnea` as a linear function of `Model.inertial_parameters`; O(n
-    depth).
+    """∂τ/∂q of `static_torque`, and without forces of `gravity`, (nv, nv); exact, in O(n depth).
 
-    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
-    >>> Y = condyle.joint_torque_regressor(arm, data, q, v, a)
-    >>> np.allclose(Y @ arm.inertial_parameters, condyle.rnea(arm, data, q, v, a))
-    True
+    q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
     """
-
-def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """y(q, v) with T = y · π: 10 (nbodies − 1) numbers, `kinetic_energy` as a linear function of
-    `Model.inertial_parameters`, without the rotors; O(n).
-
-    q: nq numbers; v: nv.
-    """
-
-def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """y(q) with V = y · π: 10 (nbodies − 1) numbers, `potential_energy` as a linear function of
-    `Model.inertial_parameters`; O(n).
-
-    q: nq numbers.
-    """
-
-def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """τ = −d v − f tanh(v/ε): the efforts of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
-    O(n).
-
-    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
-    them: whoever wants them adds them to τ.
-
-    >>> arm = condyle.robots.arm7()
-    >>> v = np.ones(7)
-    >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
-    True
-    """
-
-def passive_torque_derivative(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`: nv numbers, the diagonal of a matrix without other
-    entries; O(n).
-
-    v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
-    """
-
-def neutral(model: Model) -> _Array:
-    """The position in which every body is at its joint's frame, nq numbers: zeros, and rotations by nothing.
-
-    >>> condyle.neutral(condyle.robots.quadruped())[:7]
-    array([0., 0., 0., 0., 0., 0., 1.])
-    """
-
-def random_configuration(model: Model, seed: int | None = None) -> _Array:
-    """A position drawn uniformly, nq numbers: between its limits, within ±3 (rad, m) where a coordinate has none, over
-    the whole group for rotations.
-
-    seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
-    """
-
-def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """q ⊕ v: the position after moving with the velocity v for one unit of time, nq numbers.
-
-    q: nq numbers; v: nv.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> q0 = condyle.neutral(quadruped)
-    >>> q1 = condyle.integrate(quadruped, q0, np.full(18, 0.1))
-    >>> np.allclose(condyle.difference(quadruped, q0, q1), 0.1)
-    True
-    """
-
-def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
-    """q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one; nv numbers.
-
-    q0, q1: nq numbers.
-    """
-
-def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Array | None = None) -> _Array:
-    """q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity, nq numbers.
-
-    q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
-
-    >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
-    array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
-    """
-
-def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
-    """‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
-
-    q0, q1: nq numbers.
-    """
-
-def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
-    `out`.
-
-    q: nq numbers.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> q = condyle.neutral(quadruped)
-    >>> q[6] = 2.0
-    >>> np.array_equal(condyle.normalize(quadruped, q), condyle.neutral(quadruped))
-    True
-    """
-
-def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
-    """The columns of X, tangent vectors at q ⊕ v, taken to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
-
-    v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
-    `transport` with −v.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> v = np.full(18, 0.1)
-    >>> J = condyle.integrate_jacobian(quadruped, v, "position")
-    >>> np.allclose(condyle.transport(quadruped, v, J), np.eye(18))
-    True
-    """
-
-def integrate_jacobian(
-    model: Model, v: ArrayLike, argument: Literal["position", "velocity"], out: _Array | None = None
-) -> _Array:
-    """∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v: (nv, nv), block-diagonal, between tangent spaces; it does not depend on q.
-
-    v: nv numbers; argument: 'position' for q or 'velocity' for v.
-    """
-
-def difference_jacobian(
-    model: Model, d: ArrayLike, argument: Literal["from", "to"], out: _Array | None = None
-) -> _Array:
-    """∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁: (nv, nv), block-diagonal, between tangent spaces; of the positions it needs
-    their difference only.
-
-    d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
-    """
-
-@final
-class ConstraintSet:
-    """Constraints of one model: contacts and loops, and the scratch of `constrained_dynamics` and its like.
-
-    Make one set for each combination of contacts; the `Data` can be the same for all sets. As a `Data`, a set serves
-    one thread at a time.
-
-    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found, so
-    that redundant constraints share the smallest forces; μ is small beside J M⁻¹ Jᵀ, as 1e-8. With μ = 0 one iteration
-    is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
-    sparse resolution of constrained dynamic equations (2021).
-
-    model: the robot; constraints: a list of `Constraint`s; mu: μ (1/kg); iterations: how many there are, always.
-
-    Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
-    'world', a gain is negative or not finite, or two constraints are the same.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> trot = condyle.ConstraintSet(quadruped, [condyle.Constraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
-    >>> len(trot), trot.rows, trot.range(1)
-    (2, 6, slice(3, 6, 1))
-    """
-
-    def __new__(
-        cls, model: Model, constraints: Sequence[Constraint], mu: float = 0.0, iterations: int = 1
-    ) -> ConstraintSet: ...
-    def __len__(self) -> int: ...
-    @property
-    def rows(self) -> int:
-        """How many rows J has, and λ numbers."""
-    def range(self, k: int) -> slice:
-        """The rows of constraint k, as a slice."""
-    def set_target(
-        self,
-        k: int,
-        placement: ArrayLike | None = None,
-        velocity: ArrayLike | None = None,
-        acceleration: ArrayLike | None = None,
-    ) -> None:
-        """Changes where constraint k wants its frame to be, and how it should move there: what is given, as in
-        `Constraint`.
-        """
-    def jacobian(self, out: _Array | None = None) -> _Array:
-        """J, (rows, nv), as the last call left it."""
-
-@final
-class Ltdl:
-    """M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
-
-    With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
-    `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
-    matrix for branched kinematic trees (2005).
-
-    model: the robot whose zeros M has.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
-    >>> factor = condyle.Ltdl(quadruped)
-    >>> factor.factorize(M)
-    >>> np.allclose(M @ factor.solve(np.ones(18)), 1.0)
-    True
-    >>> factor.nonzeros  # the base, and three joints of each leg: not 171
-    117
-    """
-
-    def __new__(cls, model: Model) -> Ltdl: ...
-    def factorize(self, M: ArrayLike) -> None:
-        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
-
-        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
-        """
-    def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
-        """x with M x = b, as many numbers as M has rows.
-
-        b: as many numbers.
-        """
-    def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
-        """X with M X = B, column by column.
-
-        B: a matrix of as many rows as M has.
-        """
-    def inverse(self, out: _Array | None = None) -> _Array:
-        """M⁻¹, both triangles filled."""
-    @property
-    def nonzeros(self) -> int:
-        """How many entries of L and D may differ from zero, the ones on L's diagonal not counted."""
-    @property
-    def order(self) -> list[int]:
-        """The coordinates in their order from the root to the tips: they are eliminated last to first.
-
-        It is 0, 1, 2, … unless joints share coordinates.
-        """
-    def row(self, k: int) -> list[tuple[int, float]]:
-        """Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value)."""
-    @property
-    def diagonal(self) -> _Array:
-        """D, in the `order` of the places."""
 
 @final
 class Cholesky:
@@ -1575,26 +1189,30 @@ class Cholesky:
     """
 
     def __new__(cls, n: int) -> Cholesky: ...
+    @property
+    def lower(self) -> _Array:
+        """L, lower triangular."""
+
     def factorize(self, M: ArrayLike) -> None:
         """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
 
         If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
         """
+
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
         """x with M x = b, as many numbers as M has rows.
 
         b: as many numbers.
         """
+
     def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
         """X with M X = B, column by column.
 
         B: a matrix of as many rows as M has.
         """
+
     def inverse(self, out: _Array | None = None) -> _Array:
         """M⁻¹, both triangles filled."""
-    @property
-    def lower(self) -> _Array:
-        """L, lower triangular."""
 
 @final
 class DivideConquer:
@@ -1622,6 +1240,7 @@ class DivideConquer:
     @property
     def size(self) -> AssemblySize:
         """How much work the assembly is, and how many levels wait for one another, as `AssemblySize`."""
+
     def aba(
         self,
         model: Model,
@@ -1638,68 +1257,64 @@ class DivideConquer:
         """
 
 @final
-class Simulation:
-    """A robot's state, and all that is needed to move it on.
+class Ltdl:
+    """M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
 
-    Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
-    external forces stay as they are during a step.
+    With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
+    `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
+    matrix for branched kinematic trees (2005).
 
-    model: the robot; it stands still at `neutral`, at time 0.
-    integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
-        whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
-        is conserved to rounding.
-    dt: h, the length of a step (s).
-    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
-        none of either.
-    tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-    max_iterations: it gives up after so many iterations.
+    model: the robot whose zeros M has.
 
-    Raises `ModelError` if M is singular.
-
-    >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
-    >>> simulation = Simulation(quadruped, dt=1e-3)
-    >>> def damper(now):
-    ...     now.tau[8] = -0.5 * now.v[8]
-    >>> simulation.run(100, damper)
-    'done'
-    >>> bool(abs(simulation.q[2] + 0.5 * 9.81 * 0.1**2) < 2e-3)  # it has fallen ½ g t²
+    >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> factor = condyle.Ltdl(quadruped)
+    >>> factor.factorize(M)
+    >>> np.allclose(M @ factor.solve(np.ones(18)), 1.0)
     True
+    >>> factor.nonzeros  # the base, and three joints of each leg: not 171
+    117
     """
 
-    def __new__(
-        cls,
-        model: Model,
-        integrator: _Integrator = "semi_implicit_euler",
-        dt: float = 1e-3,
-        passive: float | None = None,
-        tolerance: float = 1e-9,
-        max_iterations: int = 20,
-    ) -> Simulation: ...
+    def __new__(cls, model: Model) -> Ltdl: ...
     @property
-    def q(self) -> _Array:
-        """The position, nq numbers."""
-    @property
-    def v(self) -> _Array:
-        """The velocity, nv numbers."""
-    @property
-    def time(self) -> float:
-        """The sum of the steps since the state was set (s)."""
-    def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
-        """Puts the robot at position q (nq numbers) with velocity v (nv), and the clock to 0."""
-    def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
-        """One step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach
-        the tolerance (a shorter step helps); or 'not_finite': then the step was not taken.
+    def diagonal(self) -> _Array:
+        """D, in the `order` of the places."""
 
-        tau: nv numbers (N m, N); f_ext: as for `rnea`.
-        """
-    def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
-        """So many steps, with a control law that is called before each of them; ends early when one fails, with its
-        status.
+    @property
+    def nonzeros(self) -> int:
+        """How many entries of L and D may differ from zero, the ones on L's diagonal not counted."""
 
-        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
-            efforts, then other threads run meanwhile.
+    @property
+    def order(self) -> list[int]:
+        """The coordinates in their order from the root to the tips: they are eliminated last to first.
+
+        It is 0, 1, 2, … unless joints share coordinates.
         """
+
+    def row(self, k: int) -> list[tuple[int, float]]:
+        """Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value)."""
+
+    def factorize(self, M: ArrayLike) -> None:
+        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+
+        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+        """
+
+    def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
+        """x with M x = b, as many numbers as M has rows.
+
+        b: as many numbers.
+        """
+
+    def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
+        """X with M X = B, column by column.
+
+        B: a matrix of as many rows as M has.
+        """
+
+    def inverse(self, out: _Array | None = None) -> _Array:
+        """M⁻¹, both triangles filled."""
 
 @final
 class HyperDual:
@@ -1720,25 +1335,45 @@ class HyperDual:
 
     def __new__(cls, re: float, eps1: float = 0.0, eps2: float = 0.0, eps1eps2: float = 0.0) -> HyperDual: ...
     @property
-    def re(self) -> float:
-        """The value."""
-
-    @property
     def eps1(self) -> float:
         """The derivative in the first direction."""
+
+    @property
+    def eps1eps2(self) -> float:
+        """The second derivative by both."""
 
     @property
     def eps2(self) -> float:
         """The derivative in the second direction."""
 
     @property
-    def eps1eps2(self) -> float:
-        """The second derivative by both."""
+    def re(self) -> float:
+        """The value."""
 
-    def arctan2(self, x: HyperDual | float) -> HyperDual:
+    def __lt__(self, value: _Number, /) -> bool: ...
+    def __le__(self, value: _Number, /) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    def __gt__(self, value: _Number, /) -> bool: ...
+    def __ge__(self, value: _Number, /) -> bool: ...
+    def __add__(self, value: _Number, /) -> HyperDual: ...
+    def __radd__(self, value: _Number, /) -> HyperDual: ...
+    def __sub__(self, value: _Number, /) -> HyperDual: ...
+    def __rsub__(self, value: _Number, /) -> HyperDual: ...
+    def __mul__(self, value: _Number, /) -> HyperDual: ...
+    def __rmul__(self, value: _Number, /) -> HyperDual: ...
+    def __pow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
+    def __rpow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
+    def __neg__(self, /) -> HyperDual: ...
+    def __pos__(self, /) -> HyperDual: ...
+    def __abs__(self, /) -> HyperDual: ...
+    def __bool__(self, /) -> bool: ...
+    def __truediv__(self, value: _Number, /) -> HyperDual: ...
+    def __rtruediv__(self, value: _Number, /) -> HyperDual: ...
+    def arctan2(self, x: _Number) -> HyperDual:
         """The angle of the point (x, self) in the plane."""
 
-    def hypot(self, other: HyperDual | float) -> HyperDual:
+    def hypot(self, other: _Number) -> HyperDual:
         """√(self² + other²)."""
 
     def fabs(self) -> HyperDual:
@@ -1807,181 +1442,17 @@ class HyperDual:
     def arctanh(self) -> HyperDual:
         """The number whose hyperbolic tangent is self."""
 
-    def __add__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __radd__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __sub__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __rsub__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __mul__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __rmul__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __truediv__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __rtruediv__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __pow__(self, exponent: HyperDual | float, mod: None = None, /) -> HyperDual: ...
-    def __rpow__(self, base: HyperDual | float, mod: None = None, /) -> HyperDual: ...
-    def __neg__(self) -> HyperDual: ...
-    def __pos__(self) -> HyperDual: ...
-    def __abs__(self) -> HyperDual: ...
-    def __bool__(self) -> bool: ...
-    def __lt__(self, other: HyperDual | float, /) -> bool: ...
-    def __le__(self, other: HyperDual | float, /) -> bool: ...
-    def __gt__(self, other: HyperDual | float, /) -> bool: ...
-    def __ge__(self, other: HyperDual | float, /) -> bool: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    def __ne__(self, other: object, /) -> bool: ...
+def check(inertia: Inertia) -> None:
+    """Raises `NotPhysicalError` unless a body of positive density can have this inertia: J ≻ 0.
 
-@final
-class Joint:
-    """The kind of a joint, with what it needs to know.
+    Point masses, rods and plates are at the border, without volume, and are refused.
 
-    | | q | v |
-    | --- | --- | --- |
-    | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
-    | `continuous` | 2: cos θ, sin θ | 1 |
-    | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
-    | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
-    | `translation` | 3 | 3 |
-    | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
-
-    An axis is a vector in the body's frame, of any length but 0.
-
-    >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
-    1
+    >>> from condyle import inertial_parameters
+    >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
+    Traceback (most recent call last):
+        ...
+    condyle.NotPhysicalError: mass is 0 kg
     """
-
-    @staticmethod
-    def revolute(axis: ArrayLike) -> Joint:
-        """One angle about an axis: q = [θ], v = [θ̇]."""
-    @staticmethod
-    def continuous(axis: ArrayLike) -> Joint:
-        """One angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
-    @staticmethod
-    def prismatic(axis: ArrayLike) -> Joint:
-        """One length along an axis: q = [d], v = [ḋ]."""
-    @staticmethod
-    def helical(axis: ArrayLike, pitch: float) -> Joint:
-        """A screw: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
-    @staticmethod
-    def spherical() -> Joint:
-        """A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
-    @staticmethod
-    def planar() -> Joint:
-        """Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
-    @staticmethod
-    def translation() -> Joint:
-        """Three lengths: q = [x, y, z], v = q̇."""
-    @staticmethod
-    def free_flyer() -> Joint:
-        """A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame."""
-    @property
-    def nq(self) -> int:
-        """How many numbers the position has."""
-    @property
-    def nv(self) -> int:
-        """How many degrees of freedom it has: the numbers of its velocity."""
-    @property
-    def axis(self) -> _Array | None:
-        """The axis, 3 numbers in the body's frame, a unit vector in a model; None if the joint has none."""
-
-@final
-class BodyId:
-    """Names a body of a builder: what `ModelBuilder.body` and others return. `WORLD` is always there."""
-
-@final
-class ModelBuilder:
-    """Makes a `Model`, body by body, parents first.
-
-    Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
-    joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
-    and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
-    the rows of f_ext count them.
-
-    name: the robot's.
-
-    >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
-    >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
-    >>> elbow = np.eye(4)
-    >>> elbow[2, 3] = -1.0
-    >>> robot = ModelBuilder("double pendulum")
-    >>> upper = robot.body("upper", WORLD, Joint.revolute([0.0, 1.0, 0.0]), inertia=rod)
-    >>> lower = robot.body("lower", upper, Joint.revolute([0.0, 1.0, 0.0]), elbow, rod, damping=0.1)
-    >>> robot.frame("tip", lower, elbow)
-    >>> robot.build()
-    <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
-    """
-
-    def __new__(cls, name: str) -> ModelBuilder: ...
-    def body(
-        self,
-        name: str,
-        parent: BodyId,
-        joint: Joint,
-        placement: ArrayLike | None = None,
-        inertia: Inertia | None = None,
-        *,
-        joint_name: str | None = None,
-        position: tuple[float, float] | None = None,
-        velocity: float | None = None,
-        effort: float | None = None,
-        damping: float = 0.0,
-        friction: float = 0.0,
-        armature: float = 0.0,
-    ) -> BodyId:
-        """Adds a body and its joint.
-
-        name: the body's, and the joint's unless it has a `joint_name` of its own.
-        parent: the body on which the joint sits.
-        placement: the joint's frame at position zero in the parent's frame.
-        inertia: in the body's frame, which is the joint's at position zero.
-        position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
-        velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
-        damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
-        armature: inertia of the rotor as seen at the joint (kg m², kg).
-        """
-    def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
-        """Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
-
-        Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
-        `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
-        `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
-
-        joints: a list of (joint, placement).
-        """
-    def spherical_zyx(
-        self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
-    ) -> BodyId:
-        """Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
-
-        M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
-        """
-    def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
-        """Fixes more inertia to a body, given in a frame that is at `placement` in the body's."""
-    def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
-        """Adds a frame at `placement` in the body's frame."""
-    def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
-        """Lets a joint follow another one, in place of a coordinate of its own: its position is ratio q + offset.
-
-        follower, leader: the bodies that the joints carry.
-        """
-    def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
-        """Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before
-        them.
-
-        >>> from condyle import ModelBuilder, WORLD
-        >>> two = ModelBuilder("two arms")
-        >>> for side, y in ("left_", 0.4), ("right_", -0.4):
-        ...     at = np.eye(4)
-        ...     at[1, 3] = y
-        ...     two.append(WORLD, at, condyle.robots.arm7(), side)
-        >>> two.build().nv
-        14
-        """
-    def gravity(self, gravity: ArrayLike) -> None:
-        """Sets the acceleration of free fall (m/s², 3 numbers, in the world's frame); (0, 0, −9.81) otherwise."""
-    def build(self) -> Model:
-        """Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and
-        freezes the model. The builder cannot be used any more.
-
-        Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
-        """
 
 def from_inertia(inertia: Inertia) -> _Array:
     """π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational inertia about
@@ -1993,35 +1464,10 @@ def from_inertia(inertia: Inertia) -> _Array:
     array([2. , 0. , 0. , 1. , 0.6, 0. , 0.6, 0. , 0. , 0.1])
     """
 
-def to_inertia(pi: ArrayLike) -> Inertia:
-    """The `Inertia` with the ten parameters π; the inverse of `from_inertia`.
+def from_log_cholesky(theta: ArrayLike) -> Inertia:
+    """The `Inertia` with the log-Cholesky parameters θ, physical whatever they are; the inverse of `log_cholesky`.
 
-    pi: 10 numbers.
-    """
-
-def pseudo_inertia(inertia: Inertia) -> _Array:
-    """J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and kg.
-
-    Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
-    Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
-    (2018).
-
-    >>> from condyle import inertial_parameters
-    >>> J = inertial_parameters.pseudo_inertia(condyle.robots.arm7().inertias[3])
-    >>> bool(np.linalg.eigvalsh(J).min() > 0.0)
-    True
-    """
-
-def check(inertia: Inertia) -> None:
-    """Raises `NotPhysicalError` unless a body of positive density can have this inertia: J ≻ 0.
-
-    Point masses, rods and plates are at the border, without volume, and are refused.
-
-    >>> from condyle import inertial_parameters
-    >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
-    Traceback (most recent call last):
-        ...
-    condyle.NotPhysicalError: mass is 0 kg
+    theta: 10 numbers; α within ±32 and dᵢ within ±64.
     """
 
 def log_cholesky(inertia: Inertia) -> _Array:
@@ -2040,12 +1486,6 @@ def log_cholesky(inertia: Inertia) -> _Array:
     True
     """
 
-def from_log_cholesky(theta: ArrayLike) -> Inertia:
-    """The `Inertia` with the log-Cholesky parameters θ, physical whatever they are; the inverse of `log_cholesky`.
-
-    theta: 10 numbers; α within ±32 and dᵢ within ±64.
-    """
-
 def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
     """∂π/∂θ, (10, 10) and never singular: how the ten parameters change with the log-Cholesky parameters.
 
@@ -2055,6 +1495,512 @@ def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
     >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ
     2.0
     """
+
+def pseudo_inertia(inertia: Inertia) -> _Array:
+    """J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and kg.
+
+    Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
+    Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
+    (2018).
+
+    >>> from condyle import inertial_parameters
+    >>> J = inertial_parameters.pseudo_inertia(condyle.robots.arm7().inertias[3])
+    >>> bool(np.linalg.eigvalsh(J).min() > 0.0)
+    True
+    """
+
+def to_inertia(pi: ArrayLike) -> Inertia:
+    """The `Inertia` with the ten parameters π; the inverse of `from_inertia`.
+
+    pi: 10 numbers.
+    """
+
+def body_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
+    own frame; O(n).
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_classical_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
+    frame; O(n).
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_jacobian(
+    model: Model, data: Data, q: ArrayLike, body: str | int, reference: _Reference = "local", out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a body, (6, nv), linear rows first: the body's velocity is J v.
+
+    q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
+    body's own frame.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q = condyle.Data(arm), [0.3] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "link7")
+    >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
+    True
+    """
+
+def body_jacobian_rate(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """dJ/dt, the rate of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_velocity(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """Where all bodies are: (nbodies, 4, 4), the pose of each body in the world as a homogeneous matrix; O(n).
+
+    q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
+    A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data = condyle.Data(quadruped)
+    >>> condyle.forward_kinematics(quadruped, data, condyle.neutral(quadruped)).shape
+    (14, 4, 4)
+    """
+
+def frame_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
+    velocity, seen from the world, expressed in the reference; O(n).
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_classical_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of its body's point at the origin of the reference
+    (m/s²), then of its rotation (rad/s²); in 'local_world_aligned' p̈ of the frame's origin; O(n).
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "tool", "local_world_aligned")
+    >>> dJ = condyle.frame_jacobian_rate(arm, data, q, v, "tool", "local_world_aligned")
+    >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
+    >>> np.allclose(acceleration, J @ a + dJ @ v)
+    True
+    """
+
+def frame_jacobian(
+    model: Model, data: Data, q: ArrayLike, frame: str | int, reference: _Reference = "local", out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a frame, (6, nv), linear rows first: the frame's velocity is J v.
+
+    q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
+    the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
+    origin, along the world's axes.
+
+    >>> arm = condyle.robots.arm7()
+    >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
+    (6, 7)
+    """
+
+def frame_jacobian_rate(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """dJ/dt, the rate of a frame's Jacobian along v, (6, nv), linear rows first.
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
+    acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
+    frame.
+    """
+
+def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
+    """oXf, the pose of a frame in the world: (4, 4), a homogeneous matrix that takes coordinates in the frame to
+    coordinates in the world; O(n).
+
+    q: nq numbers; frame: its name or number.
+
+    >>> arm = condyle.robots.arm7()
+    >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
+    >>> bool(tool[2, 3] > 0.5)  # stretched upwards
+    True
+    """
+
+def frame_velocity(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The velocity of a frame, 6 numbers: of its body's point at the origin of the reference (m/s), then of its
+    rotation (rad/s); O(n).
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "tool")
+    >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
+    True
+    """
+
+@final
+class Model:
+    """A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
+
+    Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
+    Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
+    pickled.
+
+    >>> arm = condyle.robots.arm7()
+    >>> arm.nq, arm.nv, arm.names[:3]
+    (7, 7, ['universe', 'joint1', 'joint2'])
+    """
+
+    @property
+    def armature(self) -> _Array:
+        """Inertia of the rotor as seen at each joint (kg m², kg), nv numbers, part of M in every algorithm."""
+
+    @property
+    def body_names(self) -> list[str]:
+        """The names of the links that the joints carry; 'universe' for the world."""
+
+    @property
+    def damping(self) -> _Array:
+        """Viscous damping of each degree of freedom (N m s/rad, N s/m), nv numbers: used by no algorithm unasked."""
+
+    @property
+    def frames(self) -> list[Frame]:
+        """All frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the
+        joint's and the link's.
+        """
+
+    @property
+    def friction(self) -> _Array:
+        """Coulomb friction of each degree of freedom (N m, N), nv numbers: used by no algorithm unasked."""
+
+    @property
+    def gravity(self) -> _Array:
+        """The acceleration of free fall, in the world's frame (m/s²), 3 numbers."""
+
+    @property
+    def idx_qs(self) -> list[int]:
+        """Where each joint's position begins in q; that of a joint that mimics another is the other's."""
+
+    @property
+    def idx_vs(self) -> list[int]:
+        """Where each joint's velocity begins in v; that of a joint that mimics another is the other's."""
+
+    @property
+    def inertial_parameters(self) -> _Array:
+        """π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
+        xy, yy, xz, yz, zz of the rotational inertia about the origin of the body's frame; what regressors are
+        multiplied with.
+        """
+
+    @property
+    def inertias(self) -> list[Inertia]:
+        """The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame."""
+
+    @property
+    def joint_placements(self) -> _Array:
+        """The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4)."""
+
+    @property
+    def joint_types(self) -> list[str]:
+        """The kind of each joint: 'revolute', 'continuous', 'prismatic', 'helical', 'spherical', 'planar',
+        'translation' or 'free_flyer'; 'universe' for the world.
+        """
+
+    @property
+    def joints(self) -> list[Joint | None]:
+        """Each joint, as `Joint`; None for the world."""
+
+    @property
+    def limits(self) -> Limits:
+        """The limits of position, velocity and effort, as `Limits`; infinite where there are none."""
+
+    @property
+    def mimics(self) -> list[Mimic | None]:
+        """How each joint follows another one, as `Mimic(ratio, offset)`, or None if it does not."""
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the joints, one for each body; 'universe' for the world."""
+
+    @property
+    def nbodies(self) -> int:
+        """How many bodies there are, the world included: the rows of f_ext and of what `forward_kinematics` returns."""
+
+    @property
+    def nq(self) -> int:
+        """How many numbers a position q has."""
+
+    @property
+    def nqs(self) -> list[int]:
+        """How many numbers of q each joint has of its own: none if it mimics another; 0 for the world."""
+
+    @property
+    def nv(self) -> int:
+        """How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector."""
+
+    @property
+    def nvs(self) -> list[int]:
+        """How many degrees of freedom each joint has of its own: none if it mimics another; 0 for the world."""
+
+    @property
+    def parents(self) -> list[int]:
+        """The body on which each joint sits; 0 is the world."""
+
+    @property
+    def singular_joints(self) -> list[int]:
+        """The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`."""
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of all bodies, of what is fixed to the world too (kg)."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is odd about the robot, though it could be loaded.
+
+        Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
+        """
+
+    @staticmethod
+    def from_urdf(
+        path: _Path,
+        root_joint: _RootJoint | None = None,
+        mimic: bool = False,
+        strict: bool = False,
+        packages: Sequence[_Path] | None = None,
+    ) -> Model:
+        """Reads a URDF file.
+
+        Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
+
+        path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
+        root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
+            'spherical' or 'translation'; None fixes the root link to the world.
+        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
+            their own.
+        strict: whether what is only odd (`warnings`) is an error.
+        packages: folders that have packages in them, or are packages; before those that the environment names in
+            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+
+    @staticmethod
+    def from_urdf_str(
+        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
+    ) -> Model:
+        """Reads a URDF from a string; see `from_urdf`.
+
+        >>> text = condyle.robots.QUADRUPED
+        >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
+        18
+        """
+
+    @staticmethod
+    def from_mjcf(path: _Path, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
+        """Reads an MJCF file (MuJoCo), and the files that it includes.
+
+        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
+        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
+        bodies without mass, `name#1`, `name#2`, …, between them. What a tree of bodies cannot have is left out and
+        stands in `warnings`.
+
+        path: a path, as text or `os.PathLike`.
+        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being left out; its `polycoef`
+            must be linear.
+        strict: whether what is only odd, or left out (`warnings`), is an error.
+        weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and stands in
+            `warnings`, instead of being an error.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+
+    @staticmethod
+    def from_mjcf_str(text: str, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
+        """Reads an MJCF from a string, which may not include files; see `from_mjcf`.
+
+        >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
+        >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
+        2.0
+        """
+
+    @staticmethod
+    def from_sdf(path: _Path, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False) -> Model:
+        """Reads an SDF file (Gazebo) with one model in it.
+
+        Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
+        parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
+
+        path: a path, as text or `os.PathLike`.
+        root_joint: as for `from_urdf`.
+        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
+        strict: whether what is only odd, or left out (`warnings`), is an error.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+
+    @staticmethod
+    def from_sdf_str(
+        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
+    ) -> Model:
+        """Reads an SDF from a string; see `from_sdf`.
+
+        >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
+        >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
+        >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
+        6
+        """
+
+    def frame(self, name: str) -> int:
+        """The number of the frame with this name: a link's, else the user's, else a joint's.
+
+        Raises `ModelError`, with the nearest name.
+        """
+
+    def joint(self, name: str) -> int:
+        """The number of the body that the joint with this name carries.
+
+        Raises `ModelError`, with the nearest name.
+        """
+
+    def with_gravity(self, gravity: ArrayLike) -> Model:
+        """The same robot under another gravity (m/s², 3 numbers, in the world's frame)."""
+
+    def with_armature(self, armature: ArrayLike) -> Model:
+        """The same robot with another armature, nv numbers (kg m², kg)."""
+
+    def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
+        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
+
+        >>> arm = condyle.robots.arm7()
+        >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
+        >>> heavier = arm.with_inertias(twice)
+        >>> heavier.total_mass == 2.0 * arm.total_mass
+        True
+        """
+
+    def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
+        """The same robot with some joints locked where they are at q.
+
+        Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
+        locked with it.
+
+        joints: a list of names or numbers of bodies.
+        q: nq numbers.
+
+        >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
+        ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
+
+        Raises `ModelError`.
+        """
+
+    def __copy__(self) -> Model:
+        """The model itself: it never changes."""
+
+    def __deepcopy__(self, memo: object) -> Model:
+        """The model itself: it never changes."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle."""
+
+@final
+class Action:
+    """An action written in Python.
+
+    nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
+    calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
+        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+
+    >>> from condyle.optimal import Action, Fddp, Problem
+    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
+    >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+    >>> problem = Problem([1.0], [knot], [0] * 30, end)
+    >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
+    0.809017
+    """
+
+    def __new__(
+        cls,
+        nx: int,
+        nu: int,
+        calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
+        calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Action: ...
 
 @final
 class Activation:
@@ -2091,341 +2037,102 @@ class Activation:
         """
 
 @final
-class FrictionCone:
-    """Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: lower ≤ A f ≤ upper.
+class AugmentedLagrangian:
+    """The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s and for
+    `ConstrainedAction`s.
 
-    mu: μ; facets: the pyramid's sides; inner: whether it lies inside of the cone; rotation: the surface's axes (its
-    normal is z) along the contact's, (3, 3); least, greatest: of the normal force (N).
+    repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
+    y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 
-    >>> condyle.optimal.FrictionCone(0.5).rows()[0]
-    array([ 1. ,  0. , -0.5])
+    problem: what is solved; the solver allocates for its shape once.
+    inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen, `time_budget` is for all.
+    settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
+        gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
+        `penalty_max`, `penalty_factor` (by which it rises).
+
+    >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
+    >>> arm = condyle.robots.arm7()
+    >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+    >>> costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    >>> weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+    >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
+    >>> reach = Limit("reach", Residual.frame_translation(arm, "tool", [0.5, 0.1, 0.6]))  # exactly
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
+    >>> solver = AugmentedLagrangian(problem)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
+    >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
+    ('converged', True, True)
+    """
+
+    def __new__(
+        cls, problem: Problem, inner: dict[str, Any] | None = None, **settings: float
+    ) -> AugmentedLagrangian: ...
+    @property
+    def outcome(self) -> Outcome:
+        """What the last solve says of the limits, an `Outcome`."""
+
+    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+        """Solves the problem from a warm start and multipliers of zero, and returns a `Solution`. Other threads run
+        meanwhile.
+
+        Its status is "converged" when the residuals of `outcome` are below the tolerances, and "infeasible" if the
+        penalty reached its limit and the limits do not hold. Its cost contains the terms of the limits, that of
+        `outcome` does not; its trace and gains are those of the last inner solve.
+
+        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+
+        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+        """
+
+    def resume(self) -> Solution:
+        """Solves the problem from the last solution, its multipliers and its penalty; returns a `Solution`.
+
+        The initial state may be another one, or the problem be shifted. After a solve that ended as "infeasible" or
+        "not_finite" the multipliers are zero.
+
+        Raises `ProblemError` as `solve`.
+        """
+
+    def shift(self, last: int) -> None:
+        """Moves the horizon of the problem on by a knot, and the last solution with its multipliers, as `Fddp.shift`.
+
+        last: the index of the model that serves the last knot.
+
+        Raises `ProblemError` if there is no such model.
+        """
+
+@final
+class ConstrainedAction:
+    """An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
+
+    To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+
+    action: the action.
+    size: how many numbers g has.
+    calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
+    calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
+        space of the state. Without it, central differences of calc.
+    lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
+
+    >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
+    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
+    >>> end = ConstrainedAction(Action(1, 0, lambda t, x, u: (None, 0.0)), 1, lambda t, x, u: x - 3.0)  # x = 3
+    >>> problem = Problem([0.0], [knot], [0] * 6, end)
+    >>> solver = AugmentedLagrangian(problem)
+    >>> solver.solve(np.zeros((7, 1)), np.zeros((6, 1))).us.round(6).ravel().tolist()
+    [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
     """
 
     def __new__(
         cls,
-        mu: float,
-        facets: int = 4,
-        inner: bool = False,
-        rotation: ArrayLike | None = None,
-        least: float = 0.0,
-        greatest: float = float("inf"),
-    ) -> FrictionCone: ...
-    def rows(self) -> _Array:
-        """A, (facets + 1, 3)."""
-
-    def bounds(self) -> tuple[_Array, _Array]:
-        """The least and greatest values of A f."""
-
-@final
-class WrenchCone:
-    """Friction, the centre of pressure within a rectangle, and the yaw moment: lower ≤ A w ≤ upper.
-
-    friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
-
-    >>> from condyle.optimal import FrictionCone, WrenchCone
-    >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
-    (17, 6)
-    """
-
-    def __new__(cls, friction: FrictionCone, size: tuple[float, float] | Sequence[float]) -> WrenchCone: ...
-    def rows(self) -> _Array:
-        """A, (facets + 13, 6)."""
-
-    def bounds(self) -> tuple[_Array, _Array]:
-        """The least and greatest values of A w."""
-
-@final
-class Cost:
-    """A term of a cost: weight times an activation of a residual. The activation is quadratic unless given.
-
-    >>> condyle.optimal.Cost.control("effort", 1e-3, [0.0] * 7)
-    <condyle.optimal.Cost 'effort', weight 0.001>
-    """
-
-    @staticmethod
-    def state(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
-
-    @staticmethod
-    def control(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = u − reference, nu numbers."""
-
-    @staticmethod
-    def control_gravity(name: str, weight: float, activation: Activation | None = None) -> Cost:
-        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
-
-    @staticmethod
-    def joint_effort(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = τ − reference, the efforts of all joints, nv numbers."""
-
-    @staticmethod
-    def joint_acceleration(
-        name: str, weight: float, reference: ArrayLike, activation: Activation | None = None
-    ) -> Cost:
-        """r = q̈ − reference, nv numbers."""
-
-    @staticmethod
-    def center_of_mass(name: str, weight: float, target: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = c − target, 3 numbers in the world, of the centre of mass."""
-
-    @staticmethod
-    def centroidal_momentum(
-        name: str, weight: float, target: ArrayLike | None = None, activation: Activation | None = None
-    ) -> Cost:
-        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
-
-    @staticmethod
-    def frame_placement(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix."""
-
-    @staticmethod
-    def frame_translation(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = p − target, 3 numbers in the world, of the origin of a frame of the model."""
-
-    @staticmethod
-    def frame_rotation(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
-
-    @staticmethod
-    def frame_velocity(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike | None = None,
-        reference: _Reference = "local",
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
-        'local_world_aligned'.
-        """
-
-    @staticmethod
-    def contact_force(
-        name: str, weight: float, contact: str, target: ArrayLike | None = None, activation: Activation | None = None
-    ) -> Cost:
-        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
-
-    @staticmethod
-    def friction_cone(
-        name: str, weight: float, contact: str, cone: FrictionCone, activation: Activation | None = None
-    ) -> Cost:
-        """r = A f of a contact's force, and by default the barrier of the cone's bounds."""
-
-    @staticmethod
-    def wrench_cone(
-        name: str, weight: float, contact: str, cone: WrenchCone, activation: Activation | None = None
-    ) -> Cost:
-        """r = A w of a rigid contact's wrench, and by default the barrier of the cone's bounds."""
-
-    @staticmethod
-    def center_of_pressure(
-        name: str,
-        weight: float,
-        contact: str,
-        size: tuple[float, float] | Sequence[float],
-        rotation: ArrayLike | None = None,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """Four numbers of a rigid contact that are not above 0 while the centre of pressure is inside a rectangle, and
-        by default the barrier above 0.
-
-        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
-        (3, 3).
-        """
-
-    @staticmethod
-    def impulse_center_of_mass(name: str, weight: float, activation: Activation | None = None) -> Cost:
-        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass."""
-
-@final
-class Limit:
-    """A residual r of a robot within bounds, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
-
-    lower, upper: as many numbers as r has, infinite where there is no bound; a missing one is no bound. Without both
-    r = 0; entries where both are equal are equalities too. Limits hold at the beginning of a knot. To `Fddp` alone they
-    are costs for leaving the bounds.
-
-    >>> condyle.optimal.Limit.control("effort", [0.0] * 7, lower=[-30.0] * 7, upper=[30.0] * 7)
-    <condyle.optimal.Limit 'effort'>
-    """
-
-    @staticmethod
-    def state(name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
-        """r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
-
-    @staticmethod
-    def control(
-        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = u − reference, nu numbers."""
-
-    @staticmethod
-    def control_gravity(name: str, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
-        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
-
-    @staticmethod
-    def joint_effort(
-        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = τ − reference, the efforts of all joints, nv numbers."""
-
-    @staticmethod
-    def joint_acceleration(
-        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = q̈ − reference, nv numbers."""
-
-    @staticmethod
-    def center_of_mass(
-        name: str, target: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = c − target, 3 numbers in the world, of the centre of mass."""
-
-    @staticmethod
-    def centroidal_momentum(
-        name: str, target: ArrayLike | None = None, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
-
-    @staticmethod
-    def frame_placement(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
+        action: _Action,
+        size: int,
+        calc: Callable[[int, _Array, _Array], ArrayLike],
+        calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix."""
-
-    @staticmethod
-    def frame_translation(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = p − target, 3 numbers in the world, of the origin of a frame of the model."""
-
-    @staticmethod
-    def frame_rotation(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
-
-    @staticmethod
-    def frame_velocity(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike | None = None,
-        reference: _Reference = "local",
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
-        'local_world_aligned'.
-        """
-
-    @staticmethod
-    def contact_force(
-        name: str,
-        contact: str,
-        target: ArrayLike | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
-
-    @staticmethod
-    def friction_cone(name: str, contact: str, cone: FrictionCone) -> Limit:
-        """r = A f of a contact's force, within the cone's bounds."""
-
-    @staticmethod
-    def wrench_cone(name: str, contact: str, cone: WrenchCone) -> Limit:
-        """r = A w of a rigid contact's wrench, within the cone's bounds."""
-
-    @staticmethod
-    def center_of_pressure(
-        name: str,
-        contact: str,
-        size: tuple[float, float] | Sequence[float],
-        rotation: ArrayLike | None = None,
-    ) -> Limit:
-        """The centre of pressure of a rigid contact inside a rectangle: four numbers not above 0.
-
-        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
-        (3, 3).
-        """
-
-    @staticmethod
-    def impulse_center_of_mass(name: str, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
-        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass."""
-
-@final
-class FreeDynamics:
-    """A knot of a robot that moves freely under its joints' efforts.
-
-    q̈ = aba(q, v, S u); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is
-    x = (q, v).
-
-    model: the robot.
-    dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
-    costs: a list of `Cost`.
-    costs_at: lists of `Cost` by the number of a knot, for knots with costs of their own; so one action serves a phase.
-    actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
-    integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
-    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-    limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
-    limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
-
-    Raises `ProblemError` for a cost, a limit or drives that do not fit.
-    """
-
-    def __new__(
-        cls,
-        model: Model,
-        dt: float | None,
-        costs: Sequence[Cost],
-        costs_at: dict[int, Sequence[Cost]] | None = None,
-        actuation: ArrayLike | None = None,
-        integrator: _Scheme = "semi_implicit_euler",
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-        limits: Sequence[Limit] | None = None,
-        limits_at: dict[int, Sequence[Limit]] | None = None,
-    ) -> FreeDynamics: ...
-    def quasi_static(self, x: ArrayLike) -> _Array:
-        """The efforts that hold the robot still at the state x, nu numbers."""
+    ) -> ConstrainedAction: ...
 
 @final
 class ContactDynamics:
@@ -2466,202 +2173,20 @@ class ContactDynamics:
         """The smallest controls and forces that hold the robot still at the state x: nu controls of them."""
 
 @final
-class ImpulseDynamics:
-    """A knot at which contacts set in: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w a(r).
+class Cost:
+    """A term of a cost: weight times an activation of a residual.
 
-    There are no controls.
+    name: what `Problem.set_weight` and errors call it.
+    residual: a `Residual`.
+    activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
+        for other residuals.
 
-    model: the robot.
-    contacts: a dict of `Constraint`s by name.
-    costs: a list of `Cost`; they look at the state before the impact.
-    restitution: ε, 0 to 1.
-    damping: μ (1/kg).
-    limits: a list of `Limit`, or None; they too look at the state before the impact.
-
-    Raises `ProblemError` as `ContactDynamics` does.
+    >>> from condyle.optimal import Cost, Residual
+    >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
+    <condyle.optimal.Cost 'effort', weight 0.001>
     """
 
-    def __new__(
-        cls,
-        model: Model,
-        contacts: dict[str, Constraint],
-        costs: Sequence[Cost],
-        restitution: float = 0.0,
-        damping: float = 0.0,
-        limits: Sequence[Limit] | None = None,
-    ) -> ImpulseDynamics: ...
-
-@final
-class InverseDynamics:
-    """A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
-
-    model: the robot.
-    dt: Δt in seconds.
-    costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
-    integrator, lower, upper, limits: as of `FreeDynamics`.
-
-    Raises `ProblemError` for a cost or a limit that does not fit.
-    """
-
-    def __new__(
-        cls,
-        model: Model,
-        dt: float,
-        costs: Sequence[Cost],
-        integrator: _Scheme = "semi_implicit_euler",
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-        limits: Sequence[Limit] | None = None,
-    ) -> InverseDynamics: ...
-
-@final
-class Lqr:
-    """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
-
-    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
-    bound; without R and B it has no controls, as at a terminal knot.
-
-    >>> from condyle.optimal import Lqr
-    >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
-    """
-
-    def __new__(
-        cls,
-        A: ArrayLike,
-        B: ArrayLike | None = None,
-        f: ArrayLike | None = None,
-        Q: ArrayLike | None = None,
-        S: ArrayLike | None = None,
-        R: ArrayLike | None = None,
-        q: ArrayLike | None = None,
-        r: ArrayLike | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Lqr: ...
-
-@final
-class Action:
-    """An action written in Python.
-
-    nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
-    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
-        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
-    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-
-    >>> from condyle.optimal import Action, Fddp, Problem
-    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
-    >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
-    >>> problem = Problem([1.0], [knot], [0] * 30, end)
-    >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
-    0.809017
-    """
-
-    def __new__(
-        cls,
-        nx: int,
-        nu: int,
-        calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
-        calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Action: ...
-
-@final
-class ConstrainedAction:
-    """An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
-
-    To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
-
-    action: the action.
-    size: how many numbers g has.
-    calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
-    calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
-        space of the state. Without it, central differences of calc.
-    lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
-
-    >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
-    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
-    >>> end = ConstrainedAction(Action(1, 0, lambda t, x, u: (None, 0.0)), 1, lambda t, x, u: x - 3.0)  # x = 3
-    >>> problem = Problem([0.0], [knot], [0] * 6, end)
-    >>> solver = AugmentedLagrangian(problem)
-    >>> solver.solve(np.zeros((7, 1)), np.zeros((6, 1))).us.round(6).ravel().tolist()
-    [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
-    """
-
-    def __new__(
-        cls,
-        action: _Action,
-        size: int,
-        calc: Callable[[int, _Array, _Array], ArrayLike],
-        calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> ConstrainedAction: ...
-
-@final
-class Problem:
-    """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
-
-    x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`,
-        `ConstrainedAction`.
-    stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
-    terminal: the model of the end, without controls.
-
-    Raises `ProblemError` if they do not fit together.
-    """
-
-    def __new__(
-        cls,
-        x0: ArrayLike,
-        models: Sequence[_Action],
-        stages: Sequence[int],
-        terminal: _Action,
-    ) -> Problem: ...
-    @staticmethod
-    def from_json(text: str) -> Problem:
-        """A problem of a robot from the text that `to_json` gave.
-
-        Raises `ProblemError` for a text that is none, and for what does not fit together in it.
-        """
-
-    def to_json(self) -> str:
-        """The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
-
-        Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
-        robots.
-        """
-
-    @property
-    def horizon(self) -> int:
-        """The number of knots before the terminal one, N."""
-
-    def set_x0(self, x0: ArrayLike) -> None:
-        """Sets the initial state, nx numbers, as an MPC does before each solve.
-
-        Raises `ProblemError` for a number that is not finite.
-        """
-
-    def set_weight(self, name: str, weight: float) -> None:
-        """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
-
-        Raises `KeyError` if there is no such term.
-        """
-
-    def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
-        """Gives a knot costs of its own, between solves: an MPC's new targets. They move with their knot at a `shift`.
-
-        knot: its number, 0 to N; N is the terminal one.
-        costs: a list of `Cost`.
-
-        Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
-        """
-    def rollout(self, us: _Controls) -> _Array:
-        """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
-
-        us: (N, nu), or a list of N arrays where knots differ in nu.
-        """
+    def __new__(cls, name: str, weight: float, residual: Residual, activation: Activation | None = None) -> Cost: ...
 
 @final
 class Fddp:
@@ -2693,11 +2218,13 @@ class Fddp:
         Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises. How the solve
         ended is the solution's status.
         """
+
     def resume(self) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
         Raises `ProblemError` as `solve`.
         """
+
     def shift(self, last: int) -> None:
         """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
 
@@ -2710,64 +2237,461 @@ class Fddp:
         """
 
 @final
-class AugmentedLagrangian:
-    """The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s and for
-    `ConstrainedAction`s.
+class FreeDynamics:
+    """A knot of a robot that moves freely under its joints' efforts.
 
-    repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
-    y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
+    q̈ = aba(q, v, S u); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is
+    x = (q, v).
 
-    problem: what is solved; the solver allocates for its shape once.
-    inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen, `time_budget` is for all.
-    settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
-        gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
-        `penalty_max`, `penalty_factor` (by which it rises).
+    model: the robot.
+    dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
+    costs: a list of `Cost`.
+    costs_at: lists of `Cost` by the number of a knot, for knots with costs of their own; so one action serves a phase.
+    actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
+    integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+    limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
+    limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
 
-    >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem
-    >>> arm = condyle.robots.arm7()
-    >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
-    >>> costs = [Cost.state("rest", 1e-1, x0), Cost.control("effort", 1e-3, np.zeros(7))]
-    >>> weak = Limit.control("weak", np.zeros(7), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
-    >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
-    >>> reach = Limit.frame_translation("reach", arm, "tool", [0.5, 0.1, 0.6])  # exactly
-    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
-    >>> solver = AugmentedLagrangian(problem)
-    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
-    >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
-    ('converged', True, True)
+    Raises `ProblemError` for a cost, a limit or drives that do not fit.
     """
 
     def __new__(
-        cls, problem: Problem, inner: dict[str, Any] | None = None, **settings: float
-    ) -> AugmentedLagrangian: ...
-    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
-        """Solves the problem from a warm start and multipliers of zero, and returns a `Solution`. Other threads run
-        meanwhile.
+        cls,
+        model: Model,
+        dt: float | None,
+        costs: Sequence[Cost],
+        costs_at: dict[int, Sequence[Cost]] | None = None,
+        actuation: ArrayLike | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+        limits_at: dict[int, Sequence[Limit]] | None = None,
+    ) -> FreeDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """The efforts that hold the robot still at the state x, nu numbers."""
 
-        Its status is "converged" when the residuals of `outcome` are below the tolerances, and "infeasible" if the
-        penalty reached its limit and the limits do not hold. Its cost contains the terms of the limits, that of
-        `outcome` does not; its trace and gains are those of the last inner solve.
+@final
+class FrictionCone:
+    """Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: lower ≤ A f ≤ upper.
 
-        xs: states, (N + 1, nx); they need not satisfy the dynamics.
-        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+    mu: μ; facets: the pyramid's sides; inner: whether it lies inside of the cone; rotation: the surface's axes (its
+    normal is z) along the contact's, (3, 3); least, greatest: of the normal force (N).
 
-        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
-        """
-    def resume(self) -> Solution:
-        """Solves the problem from the last solution, its multipliers and its penalty; returns a `Solution`.
+    >>> condyle.optimal.FrictionCone(0.5).rows()[0]
+    array([ 1. ,  0. , -0.5])
+    """
 
-        The initial state may be another one, or the problem be shifted. After a solve that ended as "infeasible" or
-        "not_finite" the multipliers are zero.
+    def __new__(
+        cls,
+        mu: float,
+        facets: int = 4,
+        inner: bool = False,
+        rotation: ArrayLike | None = None,
+        least: float = 0.0,
+        greatest: float = ...,
+    ) -> FrictionCone: ...
+    def rows(self) -> _Array:
+        """A, (facets + 1, 3)."""
 
-        Raises `ProblemError` as `solve`.
-        """
-    def shift(self, last: int) -> None:
-        """Moves the horizon of the problem on by a knot, and the last solution with its multipliers, as `Fddp.shift`.
+    def bounds(self) -> tuple[_Array, _Array]:
+        """The least and greatest values of A f."""
 
-        last: the index of the model that serves the last knot.
+@final
+class ImpulseDynamics:
+    """A knot at which contacts set in: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w a(r).
 
-        Raises `ProblemError` if there is no such model.
-        """
+    There are no controls.
+
+    model: the robot.
+    contacts: a dict of `Constraint`s by name.
+    costs: a list of `Cost`; they look at the state before the impact.
+    restitution: ε, 0 to 1.
+    damping: μ (1/kg).
+    limits: a list of `Limit`, or None; they too look at the state before the impact.
+
+    Raises `ProblemError` as `ContactDynamics` does.
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        contacts: dict[str, Constraint],
+        costs: Sequence[Cost],
+        restitution: float = 0.0,
+        damping: float = 0.0,
+        limits: Sequence[Limit] | None = None,
+    ) -> ImpulseDynamics: ...
+
+@final
+class InverseDynamics:
+    """A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
+
+    model: the robot.
+    dt: Δt in seconds.
+    costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
+    integrator, lower, upper, limits: as of `FreeDynamics`.
+
+    Raises `ProblemError` for a cost or a limit that does not fit.
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        dt: float,
+        costs: Sequence[Cost],
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+    ) -> InverseDynamics: ...
+
+@final
+class Limit:
+    """A residual r of a robot within bounds, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+
+    Limits hold at the beginning of a knot. To `Fddp` alone they are costs for leaving the bounds.
+
+    name: what errors call it.
+    residual: a `Residual`.
+    lower, upper: as many numbers as r has, infinite where there is no bound; None is no bound. If both are None, a cone
+        or a centre of pressure has its own bounds, and any other r is 0. Entries where both are equal are equalities.
+
+    >>> from condyle.optimal import Limit, Residual
+    >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
+    <condyle.optimal.Limit 'effort'>
+    """
+
+    def __new__(
+        cls, name: str, residual: Residual, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+    ) -> Limit: ...
+
+@final
+class Lqr:
+    """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
+
+    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
+    bound; without R and B it has no controls, as at a terminal knot.
+
+    >>> from condyle.optimal import Lqr
+    >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
+    """
+
+    def __new__(
+        cls,
+        A: ArrayLike,
+        B: ArrayLike | None = None,
+        f: ArrayLike | None = None,
+        Q: ArrayLike | None = None,
+        S: ArrayLike | None = None,
+        R: ArrayLike | None = None,
+        q: ArrayLike | None = None,
+        r: ArrayLike | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Lqr: ...
+
+@final
+class Problem:
+    """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
+
+    x0: the initial state, nx numbers.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`,
+        `ConstrainedAction`.
+    stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
+    terminal: the model of the end, without controls.
+
+    Raises `ProblemError` if they do not fit together.
+    """
+
+    def __new__(cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int], terminal: _Action) -> Problem: ...
     @property
-    def outcome(self) -> Outcome:
-        """What the last solve says of the limits, an `Outcome`."""
+    def horizon(self) -> int:
+        """The number of knots before the terminal one, N."""
+
+    @staticmethod
+    def from_json(text: str) -> Problem:
+        """A problem of a robot from the text that `to_json` gave.
+
+        Raises `ProblemError` for a text that is none, and for what does not fit together in it.
+        """
+
+    def to_json(self) -> str:
+        """The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
+
+        Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
+        robots.
+        """
+
+    def set_x0(self, x0: ArrayLike) -> None:
+        """Sets the initial state, nx numbers, as an MPC does before each solve.
+
+        Raises `ProblemError` for a number that is not finite.
+        """
+
+    def set_weight(self, name: str, weight: float) -> None:
+        """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
+
+        Raises `KeyError` if there is no such term.
+        """
+
+    def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
+        """Gives a knot costs of its own, between solves: an MPC's new targets. They move with their knot at a `shift`.
+
+        knot: its number, 0 to N; N is the terminal one.
+        costs: a list of `Cost`.
+
+        Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
+        """
+
+    def rollout(self, us: _Controls) -> _Array:
+        """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
+
+        us: (N, nu), or a list of N arrays where knots differ in nu.
+        """
+
+@final
+class Residual:
+    """A vector r(x, u) of a robot that a `Cost` makes small and that a `Limit` bounds.
+
+    A frame is given by its name or number, a contact by the name that it has in `ContactDynamics` or `ImpulseDynamics`.
+    What a method does not ask for, a reference, a target or a rotation, is zero or the identity.
+
+    >>> from condyle.optimal import Residual
+    >>> Residual.center_of_mass([0.4, 0.2, 0.5])
+    <condyle.optimal.Residual {"center_of_mass":{"target":{"x":0.4,"y":0.2,"z":0.5}}}>
+    """
+
+    @staticmethod
+    def state(reference: ArrayLike) -> Residual:
+        """r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
+
+    @staticmethod
+    def control(reference: ArrayLike) -> Residual:
+        """r = u − reference, nu numbers."""
+
+    @staticmethod
+    def control_gravity() -> Residual:
+        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
+
+    @staticmethod
+    def joint_effort(reference: ArrayLike) -> Residual:
+        """r = τ − reference, the efforts of all joints, nv numbers."""
+
+    @staticmethod
+    def joint_acceleration(reference: ArrayLike) -> Residual:
+        """r = q̈ − reference, nv numbers."""
+
+    @staticmethod
+    def center_of_mass(target: ArrayLike) -> Residual:
+        """r = c − target, 3 numbers in the world, of the centre of mass (m)."""
+
+    @staticmethod
+    def centroidal_momentum(target: ArrayLike | None = None) -> Residual:
+        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
+
+    @staticmethod
+    def frame_placement(model: Model, frame: str | int, target: ArrayLike) -> Residual:
+        """r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix."""
+
+    @staticmethod
+    def frame_translation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
+        """r = p − target, 3 numbers in the world, of the origin of a frame of the model (m)."""
+
+    @staticmethod
+    def frame_rotation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
+        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
+
+    @staticmethod
+    def frame_velocity(
+        model: Model, frame: str | int, target: ArrayLike | None = None, reference: ArrayLike = "local"
+    ) -> Residual:
+        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
+        'local_world_aligned'.
+        """
+
+    @staticmethod
+    def contact_force(contact: str, target: ArrayLike | None = None) -> Residual:
+        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
+
+    @staticmethod
+    def friction_cone(contact: str, cone: FrictionCone) -> Residual:
+        """r = A f of a contact's force f, within the bounds of the cone."""
+
+    @staticmethod
+    def wrench_cone(contact: str, cone: WrenchCone) -> Residual:
+        """r = A w of a rigid contact's wrench w, within the bounds of the cone."""
+
+    @staticmethod
+    def center_of_pressure(contact: str, size: _Size, rotation: ArrayLike | None = None) -> Residual:
+        """Four numbers of a rigid contact that are not above 0 while the centre of pressure is inside a rectangle.
+
+        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
+        (3, 3).
+        """
+
+    @staticmethod
+    def impulse_center_of_mass() -> Residual:
+        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass (m/s)."""
+
+@final
+class WrenchCone:
+    """Friction, the centre of pressure within a rectangle, and the yaw moment: lower ≤ A w ≤ upper.
+
+    friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
+
+    >>> from condyle.optimal import FrictionCone, WrenchCone
+    >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
+    (17, 6)
+    """
+
+    def __new__(cls, friction: FrictionCone, size: _Size) -> WrenchCone: ...
+    def rows(self) -> _Array:
+        """A, (facets + 13, 6)."""
+
+    def bounds(self) -> tuple[_Array, _Array]:
+        """The least and greatest values of A w."""
+
+def joint_torque_regressor(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """Y(q, v, a) with τ = Y π: (nv, 10 (nbodies − 1)), `rnea` as a linear function of `Model.inertial_parameters`; O(n
+    depth).
+
+    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
+    >>> Y = condyle.joint_torque_regressor(arm, data, q, v, a)
+    >>> np.allclose(Y @ arm.inertial_parameters, condyle.rnea(arm, data, q, v, a))
+    True
+    """
+
+def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """y(q, v) with T = y · π: 10 (nbodies − 1) numbers, `kinetic_energy` as a linear function of
+    `Model.inertial_parameters`, without the rotors; O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
+    """τ = −d v − f tanh(v/ε): the efforts of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
+    O(n).
+
+    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
+    them: whoever wants them adds them to τ.
+
+    >>> arm = condyle.robots.arm7()
+    >>> v = np.ones(7)
+    >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
+    True
+    """
+
+def passive_torque_derivative(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
+    """∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`: nv numbers, the diagonal of a matrix without other
+    entries; O(n).
+
+    v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
+    """
+
+def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """y(q) with V = y · π: 10 (nbodies − 1) numbers, `potential_energy` as a linear function of
+    `Model.inertial_parameters`; O(n).
+
+    q: nq numbers.
+    """
+
+def arm7() -> Model:
+    """A seven-axis arm with a fixed base, nq = nv = 7; its last frame is `tool`.
+
+    >>> condyle.robots.arm7()
+    <condyle.Model 'arm7': 7 bodies, nq = 7, nv = 7>
+    """
+
+def humanoid() -> Model:
+    """A humanoid of thirty-two joints on a free-flyer, nq = 39, nv = 38, with soles `left_sole`, `right_sole`.
+
+    >>> condyle.robots.humanoid()
+    <condyle.Model 'humanoid': 33 bodies, nq = 39, nv = 38>
+    """
+
+def _model_from_bytes(data: bytes) -> Model:
+    """The model that a pickle holds."""
+
+def quadruped() -> Model:
+    """A quadruped of twelve joints on a free-flyer, nq = 19, nv = 18, with point feet `LF_foot`, `LH_foot`, `RF_foot`,
+    `RH_foot`.
+
+    >>> condyle.robots.quadruped()
+    <condyle.Model 'quadruped': 13 bodies, nq = 19, nv = 18>
+    """
+
+@final
+class Simulation:
+    """A robot's state, and all that is needed to move it on.
+
+    Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
+    external forces stay as they are during a step.
+
+    model: the robot; it stands still at `neutral`, at time 0.
+    integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
+        whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
+        is conserved to rounding.
+    dt: h, the length of a step (s).
+    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
+        none of either.
+    tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
+    max_iterations: it gives up after so many iterations.
+
+    Raises `ModelError` if M is singular.
+
+    >>> from condyle.simulation import Simulation
+    >>> quadruped = condyle.robots.quadruped()
+    >>> simulation = Simulation(quadruped, dt=1e-3)
+    >>> def damper(now):
+    ...     now.tau[8] = -0.5 * now.v[8]
+    >>> simulation.run(100, damper)
+    'done'
+    >>> bool(abs(simulation.q[2] + 0.5 * 9.81 * 0.1**2) < 2e-3)  # it has fallen ½ g t²
+    True
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        integrator: _Integrator = "semi_implicit_euler",
+        dt: float = 0.001,
+        passive: float | None = None,
+        tolerance: float = 1e-09,
+        max_iterations: int = 20,
+    ) -> Simulation: ...
+    @property
+    def q(self) -> _Array:
+        """The position, nq numbers."""
+
+    @property
+    def time(self) -> float:
+        """The sum of the steps since the state was set (s)."""
+
+    @property
+    def v(self) -> _Array:
+        """The velocity, nv numbers."""
+
+    def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
+        """Puts the robot at position q (nq numbers) with velocity v (nv), and the clock to 0."""
+
+    def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
+        """One step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach
+        the tolerance (a shorter step helps); or 'not_finite': then the step was not taken.
+
+        tau: nv numbers (N m, N); f_ext: as for `rnea`.
+        """
+
+    def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
+        """So many steps, with a control law that is called before each of them; ends early when one fails, with its
+        status.
+
+        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
+            efforts, then other threads run meanwhile.
+        """

@@ -88,7 +88,7 @@ mod _condyle {
     #[pymodule_export]
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, Fddp, FreeDynamics,
-        FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, WrenchCone,
+        FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

@@ -2,7 +2,6 @@
 
 mod actions;
 mod costs;
-mod limits;
 mod own;
 mod residuals;
 mod solvers;
@@ -12,12 +11,12 @@ use crate::exceptions::ProblemError;
 use actions::{Boxed, Described, Model};
 pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
 use condyle::optimal as rust;
-pub(crate) use costs::{Activation, Cost, FrictionCone, WrenchCone};
-pub(crate) use limits::Limit;
+pub(crate) use costs::{Activation, Cost, Limit};
 use own::Fault;
 pub(crate) use own::{Action, ConstrainedAction, Lqr};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+pub(crate) use residuals::{FrictionCone, Residual, WrenchCone};
 pub(crate) use solvers::{AugmentedLagrangian, Fddp};
 use std::sync::{Arc, Mutex, MutexGuard};
 

@@ -1,7 +1,6 @@
 //! Actions of robots; those of one's own are in `own.rs`.
 
-use super::costs::Cost;
-use super::limits::Limit;
+use super::costs::{Cost, Limit};
 use super::own::{Action, ConstrainedAction, Fault, Lqr};
 use super::{exception, rust};
 use crate::arrays::{Give, matrix, vector};
@@ -417,7 +416,7 @@ impl ImpulseDynamics {
 ///
 /// model: the robot.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
+/// costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
 /// integrator, lower, upper, limits: as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a cost or a limit that does not fit.

@@ -193,13 +193,13 @@ impl Fddp {
 ///     gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
 ///     `penalty_max`, `penalty_factor` (by which it rises).
 ///
-/// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem
+/// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()
 /// >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
-/// >>> costs = [Cost.state("rest", 1e-1, x0), Cost.control("effort", 1e-3, np.zeros(7))]
-/// >>> weak = Limit.control("weak", np.zeros(7), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+/// >>> costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+/// >>> weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
 /// >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
-/// >>> reach = Limit.frame_translation("reach", arm, "tool", [0.5, 0.1, 0.6])  # exactly
+/// >>> reach = Limit("reach", Residual.frame_translation(arm, "tool", [0.5, 0.1, 0.6]))  # exactly
 /// >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
 /// >>> solver = AugmentedLagrangian(problem)
 /// >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
