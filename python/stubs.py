@@ -216,11 +216,11 @@ class Writer:
 
     def out(self, result: str) -> str:
         """The type of `out`, for a function that returns this: what it fills, such as an earlier result."""
+        if result == "_Array":
+            return result
         members = re.findall("_Array", result)
         if hasattr(self.types, result):
             members = [str(member) for member in getattr(self.types, result).__annotations__.values()]
-        if result == "_Array":
-            return result
         if all("array" in member.lower() for member in members):
             return f"tuple[{', '.join('_Array' for _ in members)}] | list[_Array]"
         return f"{result} | Sequence[_Array]"

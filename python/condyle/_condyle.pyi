@@ -208,7 +208,7 @@ def aba(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, nv numbers (rad/s², m/s²); O(n).
+    """Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 
@@ -228,8 +228,8 @@ def aba_derivatives(
     f_ext: ArrayLike | None = None,
     out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> AbaDerivatives:
-    """`aba` and its derivatives with respect to q, v and τ, exact, as `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv
-    numbers and three matrices (nv, nv).
+    """The acceleration of `aba` and its derivatives with respect to q, v and τ, exact, as
+    `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
     change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
@@ -242,7 +242,7 @@ def aba_derivatives(
     """
 
 def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """C(q, v), the Coriolis matrix by Christoffel symbols: (nv, nv), C v = h − g, Ṁ = C + Cᵀ; O(n depth).
+    """The Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 
     q: nq numbers; v: nv.
 
@@ -254,7 +254,7 @@ def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _
     """
 
 def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """M(q), the joint-space inertia matrix: (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+    """The joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
 
     q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
 
@@ -274,7 +274,7 @@ def forward_dynamics(
     method: _Method | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, nv numbers (rad/s², m/s²).
+    """Forward dynamics by a method of choice: the acceleration of `aba`, nv numbers (rad/s², m/s²).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', by a
     dense factor of M, O(n³); 'sparse', by one with the zeros of the tree, O(n d²) for depth d; None, the fastest:
@@ -288,7 +288,7 @@ def forward_dynamics(
     """
 
 def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """g(q): the efforts that hold the robot still, nv numbers; `rnea` with v = a = 0.
+    """The gravity efforts g(q), nv numbers, which hold the robot still: the efforts of `rnea` with v = a = 0.
 
     q: nq numbers.
 
@@ -299,7 +299,7 @@ def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -
     """
 
 def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """M(q)⁻¹: (nv, nv), symmetric, both triangles filled; without forming M.
+    """The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 
     q: nq numbers.
 
@@ -310,7 +310,7 @@ def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _
     """
 
 def nonlinear_effects(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """h(q, v) = C(q, v) v + g(q): the efforts that keep the velocity as it is, nv numbers; `rnea` with a = 0.
+    """The nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 
     q: nq numbers; v: nv.
     """
@@ -324,8 +324,8 @@ def rnea(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n); nv
-    numbers (N m, N).
+    """Inverse dynamics: the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a, nv numbers
+    (N m, N); O(n).
 
     q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
     expressed in its frame, row 0 being the world's.
@@ -360,81 +360,18 @@ def rnea_derivatives(
 def static_torque(
     model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
 ) -> _Array:
-    """τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, nv numbers (N m, N); O(n).
+    """The efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N); O(n).
 
     q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
     """
 
 @final
 class BodyId:
-    """Names a body of a builder: what `ModelBuilder.body` and others return. `WORLD` is always there."""
-
-@final
-class Joint:
-    """The kind of a joint, with what it needs to know.
-
-    | | q | v |
-    | --- | --- | --- |
-    | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
-    | `continuous` | 2: cos θ, sin θ | 1 |
-    | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
-    | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
-    | `translation` | 3 | 3 |
-    | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
-
-    An axis is a vector in the body's frame, of any length but 0.
-
-    >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
-    1
-    """
-
-    @property
-    def axis(self) -> _Array | None:
-        """The axis, 3 numbers in the body's frame, a unit vector in a model; None if the joint has none."""
-
-    @property
-    def nq(self) -> int:
-        """How many numbers the position has."""
-
-    @property
-    def nv(self) -> int:
-        """How many degrees of freedom it has: the numbers of its velocity."""
-
-    @staticmethod
-    def revolute(axis: ArrayLike) -> Joint:
-        """One angle about an axis: q = [θ], v = [θ̇]."""
-
-    @staticmethod
-    def continuous(axis: ArrayLike) -> Joint:
-        """One angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
-
-    @staticmethod
-    def prismatic(axis: ArrayLike) -> Joint:
-        """One length along an axis: q = [d], v = [ḋ]."""
-
-    @staticmethod
-    def helical(axis: ArrayLike, pitch: float) -> Joint:
-        """A screw: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
-
-    @staticmethod
-    def spherical() -> Joint:
-        """A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
-
-    @staticmethod
-    def planar() -> Joint:
-        """Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
-
-    @staticmethod
-    def translation() -> Joint:
-        """Three lengths: q = [x, y, z], v = q̇."""
-
-    @staticmethod
-    def free_flyer() -> Joint:
-        """A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame."""
+    """The identity of a body in a builder, as `ModelBuilder.body` and others return it. `WORLD` is always there."""
 
 @final
 class ModelBuilder:
-    """Makes a `Model`, body by body, parents first.
+    """A builder that makes a `Model` body by body, parents first.
 
     Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
     joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
@@ -497,26 +434,25 @@ class ModelBuilder:
     def spherical_zyx(
         self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
     ) -> BodyId:
-        """Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+        """Adds a body on a ball joint that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
 
         M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
         """
 
     def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
-        """Fixes more inertia to a body, given in a frame that is at `placement` in the body's."""
+        """Adds inertia to a body, given in a frame that is at `placement` in the body's frame."""
 
     def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
         """Adds a frame at `placement` in the body's frame."""
 
     def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
-        """Lets a joint follow another one, in place of a coordinate of its own: its position is ratio q + offset.
+        """Makes a joint follow another one, instead of having a coordinate of its own: its position is ratio q + offset.
 
         follower, leader: the bodies that the joints carry.
         """
 
     def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
-        """Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before
-        them.
+        """Adds a whole robot, its world at `placement` in the frame of `parent`; `prefix` is put before all its names.
 
         >>> from condyle import ModelBuilder, WORLD
         >>> two = ModelBuilder("two arms")
@@ -529,11 +465,11 @@ class ModelBuilder:
         """
 
     def gravity(self, gravity: ArrayLike) -> None:
-        """Sets the acceleration of free fall (m/s², 3 numbers, in the world's frame); (0, 0, −9.81) otherwise."""
+        """Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). Without this it is (0, 0, −9.81)."""
 
     def build(self) -> Model:
-        """Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and
-        freezes the model. The builder cannot be used any more.
+        """Builds the model: checks everything and numbers the bodies depth first, siblings in the order in which they were
+        added. The builder cannot be used any more.
 
         Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
         """
@@ -541,8 +477,8 @@ class ModelBuilder:
 def centroidal_map(
     model: Model, data: Data, q: ArrayLike, out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None
 ) -> CentroidalMap:
-    """The centroidal momentum matrix Ag(q), hg = Ag v, and what it needs, in O(n), as `CentroidalMap(Ag, Ig, com,
-    Jcom)`.
+    """The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
+    `CentroidalMap(Ag, Ig, com, Jcom)`.
 
     q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
     arrays, such as an earlier result.
@@ -560,16 +496,16 @@ def centroidal_map_rate(
     v: ArrayLike,
     out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> CentroidalMapRate:
-    """Ag(q), its rate along v, and the centroidal momentum hg = Ag v, in O(n), as
-    `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`; the rate of hg is Ag a + dAg v.
+    """The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
+    `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 
     q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
     seven arrays, such as an earlier result.
     """
 
 def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """hg, the momentum of the moving bodies about their centre of mass, along the world's axes: 6 numbers (kg m/s, then
-    kg m²/s); O(n).
+    """The centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6 numbers
+    (kg m/s, then kg m²/s); O(n).
 
     q: nq numbers; v: nv.
     """
@@ -577,14 +513,14 @@ def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, ou
 def centroidal_momentum_rate(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The rate of hg, along the world's axes: 6 numbers (N, then N m), the weight and the external forces about the
-    centre of mass; O(n).
+    """The rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m). It equals the weight and
+    the external forces about the centre of mass; O(n).
 
     q: nq numbers; v, a: nv.
     """
 
 def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """c, the centre of mass of the moving bodies, 3 numbers, in the world's frame (m); O(n).
+    """The centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
 
     q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
 
@@ -597,26 +533,26 @@ def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _A
 def com_acceleration(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """c̈, the acceleration of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s²), without
-    gravity; O(n).
+    """The acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3 numbers
+    (m/s²); O(n).
 
     q: nq numbers; v, a: nv.
     """
 
 def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Jcom(q), the Jacobian of the centre of mass: (3, nv), ċ = Jcom v; O(n).
+    """The Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 
     q: nq numbers. It is a part of `centroidal_map`.
     """
 
 def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """ċ, the velocity of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s); O(n).
+    """The velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
 
     q: nq numbers; v: nv.
     """
 
 def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
-    """What the equations of motion are made of, from one pass to the tips and one back, in O(n depth), as
+    """All terms of the equations of motion, from one pass to the tips and one back, in O(n depth), as
     `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
 
     q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
@@ -629,7 +565,7 @@ def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> A
     """
 
 def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """T = ½ vᵀ M(q) v, the kinetic energy of the moving bodies and the rotors (J); O(n).
+    """The kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
 
     q: nq numbers; v: nv.
 
@@ -640,19 +576,19 @@ def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> floa
     """
 
 def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """E = T + V, the mechanical energy (J); O(n).
+    """The mechanical energy E = T + V (J); O(n).
 
     q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
     """
 
 def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
-    """V = −m gᵀ c(q), the potential energy of the moving bodies under gravity (J), 0 at the world's origin; O(n).
+    """The potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 
     q: nq numbers.
     """
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
-    """q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one; nv numbers.
+    """The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
 
     q0, q1: nq numbers.
     """
@@ -660,20 +596,20 @@ def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = 
 def difference_jacobian(
     model: Model, d: ArrayLike, argument: Literal["from", "to"], out: _Array | None = None
 ) -> _Array:
-    """∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁: (nv, nv), block-diagonal, between tangent spaces; of the positions it needs
-    their difference only.
+    """The Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. Of the positions it
+    needs only their difference.
 
     d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
     """
 
 def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
-    """‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+    """The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
 
     q0, q1: nq numbers.
     """
 
 def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """q ⊕ v: the position after moving with the velocity v for one unit of time, nq numbers.
+    """The position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
 
     q: nq numbers; v: nv.
 
@@ -687,13 +623,13 @@ def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = Non
 def integrate_jacobian(
     model: Model, v: ArrayLike, argument: Literal["position", "velocity"], out: _Array | None = None
 ) -> _Array:
-    """∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v: (nv, nv), block-diagonal, between tangent spaces; it does not depend on q.
+    """The Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not depend on q.
 
     v: nv numbers; argument: 'position' for q or 'velocity' for v.
     """
 
 def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Array | None = None) -> _Array:
-    """q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity, nq numbers.
+    """The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
 
     q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
 
@@ -702,15 +638,15 @@ def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Arra
     """
 
 def neutral(model: Model) -> _Array:
-    """The position in which every body is at its joint's frame, nq numbers: zeros, and rotations by nothing.
+    """The neutral position, nq numbers: zeros, and the identity for rotations.
 
     >>> condyle.neutral(condyle.robots.quadruped())[:7]
     array([0., 0., 0., 0., 0., 0., 1.])
     """
 
 def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
-    `out`.
+    """The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
+    stays as it is unless it is `out`.
 
     q: nq numbers.
 
@@ -722,14 +658,14 @@ def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
     """
 
 def random_configuration(model: Model, seed: int | None = None) -> _Array:
-    """A position drawn uniformly, nq numbers: between its limits, within ±3 (rad, m) where a coordinate has none, over
-    the whole group for rotations.
+    """A random position, nq numbers: uniform between its limits, within ±3 (rad, m) where a coordinate has no limits, and
+    over the whole group for rotations.
 
     seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
     """
 
 def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
-    """The columns of X, tangent vectors at q ⊕ v, taken to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+    """The columns of X, tangent vectors at q ⊕ v, moved to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 
     v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
     `transport` with −v.
@@ -769,7 +705,7 @@ class ConstraintSet:
     ) -> ConstraintSet: ...
     @property
     def rows(self) -> int:
-        """How many rows J has, and λ numbers."""
+        """The number of rows of J, and of numbers in λ."""
 
     def __len__(self, /) -> int: ...
     def range(self, k: int) -> slice:
@@ -782,12 +718,12 @@ class ConstraintSet:
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
     ) -> None:
-        """Changes where constraint k wants its frame to be, and how it should move there: what is given, as in
-        `Constraint`.
+        """Changes the target of constraint k: where its frame should be and how it should move there. What is not given
+        stays as it is.
         """
 
     def jacobian(self, out: _Array | None = None) -> _Array:
-        """J, (rows, nv), as the last call left it."""
+        """The Jacobian J of the constraints, (rows, nv), at the state of the last call."""
 
 def constrained_dynamics(
     model: Model,
@@ -799,8 +735,8 @@ def constrained_dynamics(
     f_ext: ArrayLike | None = None,
     out: Constrained | Sequence[_Array] | None = None,
 ) -> Constrained:
-    """q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that make J q̈ + γ = 0: forward dynamics under
-    constraints, as `Constrained(a, lambda_, residual, redundant)`.
+    """Forward dynamics under constraints: the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that
+    make J q̈ + γ = 0, as `Constrained(a, lambda_, residual, redundant)`.
 
     constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
     other, or themselves at a singular posture, give finite numbers and a residual.
@@ -824,7 +760,8 @@ def constrained_dynamics_derivatives(
     f_ext: ArrayLike | None = None,
     out: ConstrainedDerivatives | Sequence[_Array] | None = None,
 ) -> ConstrainedDerivatives:
-    """`constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as `ConstrainedDerivatives`.
+    """The result of `constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as
+    `ConstrainedDerivatives`.
 
     constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving
     with the bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier
@@ -847,8 +784,8 @@ def constrained_dynamics_equations(
     f_ext: ArrayLike | None = None,
     out: ConstrainedEquations | Sequence[_Array] | None = None,
 ) -> ConstrainedEquations:
-    """`constrained_dynamics` and the linear equations between changes of q, v, τ and of the q̈ and λ that follow, as
-    `ConstrainedEquations`:
+    """The result of `constrained_dynamics` and the linear equations between changes of q, v, τ and the changes of q̈ and λ
+    that follow, as `ConstrainedEquations`:
 
         M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 
@@ -872,7 +809,7 @@ def impulse_dynamics(
     restitution: float = 0.0,
     out: Impulse | Sequence[_Array] | None = None,
 ) -> Impulse:
-    """v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact, as
+    """The velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as
     `Impulse(v, lambda_, residual, redundant)`.
 
     constraints: a `ConstraintSet`, of which gains, velocities and accelerations do not count; q: nq numbers; v: nv;
@@ -895,7 +832,7 @@ def impulse_dynamics_derivatives(
     restitution: float = 0.0,
     out: ImpulseDerivatives | Sequence[_Array] | None = None,
 ) -> ImpulseDerivatives:
-    """`impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
+    """The result of `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
     `ImpulseDerivatives`.
 
     constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: as many arrays
@@ -910,7 +847,7 @@ def impulse_dynamics_derivatives(
 
 @final
 class Data:
-    """Scratch and results of every algorithm, for one model: made once, used by one thread at a time.
+    """The memory that algorithms compute in, for one model: made once, and used by one thread at a time.
 
     It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
     what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
@@ -953,8 +890,8 @@ def aba_input_derivative(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at most O(n²) a
-    column.
+    """The derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at
+    most O(n²) a column.
 
     q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
 
@@ -975,7 +912,7 @@ def body_acceleration_derivatives(
     reference: _Reference = "local",
     out: tuple[_Array, _Array] | list[_Array] | None = None,
 ) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+    """The derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
     `frame_acceleration_derivatives` of its own frame.
 
     q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
@@ -990,7 +927,7 @@ def body_velocity_derivative(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+    """The derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1003,8 +940,8 @@ def centroidal_derivatives(
     a: ArrayLike,
     out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> CentroidalDerivatives:
-    """The derivatives of the centroidal momentum, its rate and the centre of mass by q, v and a, exact, in O(n), as
-    `CentroidalDerivatives`.
+    """The derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and a, exact, in
+    O(n), as `CentroidalDerivatives`.
 
     q: nq numbers; v, a: nv. Gravity is not among the accelerations.
 
@@ -1053,8 +990,8 @@ def frame_acceleration_derivatives(
     reference: _Reference = "local",
     out: tuple[_Array, _Array] | list[_Array] | None = None,
 ) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-    Jacobian.
+    """The derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative by
+    the joint accelerations is the frame's Jacobian.
 
     q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
     """
@@ -1069,8 +1006,8 @@ def frame_classical_acceleration_derivatives(
     reference: _Reference = "local",
     out: tuple[_Array, _Array] | list[_Array] | None = None,
 ) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-    Jacobian.
+    """The derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative
+    by the joint accelerations is the frame's Jacobian.
 
     q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
     """
@@ -1084,7 +1021,7 @@ def frame_velocity_derivative(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """∂v/∂q of a frame's velocity, (6, nv), linear rows first; ∂v/∂(velocity) is its Jacobian.
+    """The derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. Its derivative by v is the frame's Jacobian.
 
     q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
 
@@ -1127,8 +1064,8 @@ def rnea_input_derivative(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at most O(n) a
-    column.
+    """The derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at
+    most O(n) a column.
 
     q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
     (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
@@ -1168,14 +1105,14 @@ def rnea_second_derivatives(
 def static_torque_derivative(
     model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
 ) -> _Array:
-    """∂τ/∂q of `static_torque`, and without forces of `gravity`, (nv, nv); exact, in O(n depth).
+    """The derivative ∂τ/∂q of `static_torque`, (nv, nv), and without forces that of `gravity`; exact, in O(n depth).
 
     q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
     """
 
 @final
 class Cholesky:
-    """M = L Lᵀ of any symmetric positive definite matrix.
+    """The factor M = L Lᵀ of any symmetric positive definite matrix.
 
     `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
     and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
@@ -1191,32 +1128,32 @@ class Cholesky:
     def __new__(cls, n: int) -> Cholesky: ...
     @property
     def lower(self) -> _Array:
-        """L, lower triangular."""
+        """The factor L, lower triangular."""
 
     def factorize(self, M: ArrayLike) -> None:
-        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+        """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
         If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
-        """x with M x = b, as many numbers as M has rows.
+        """The solution x of M x = b, as many numbers as M has rows.
 
         b: as many numbers.
         """
 
     def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
-        """X with M X = B, column by column.
+        """The solution X of M X = B, column by column.
 
         B: a matrix of as many rows as M has.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
-        """M⁻¹, both triangles filled."""
+        """The inverse M⁻¹, both triangles filled."""
 
 @final
 class DivideConquer:
-    """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its scratch.
+    """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
 
     The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
     a join of two pieces costs some six times as much as the elimination of a body. On two threads this is faster than
@@ -1239,7 +1176,7 @@ class DivideConquer:
     def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
     @property
     def size(self) -> AssemblySize:
-        """How much work the assembly is, and how many levels wait for one another, as `AssemblySize`."""
+        """The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`."""
 
     def aba(
         self,
@@ -1250,7 +1187,7 @@ class DivideConquer:
         f_ext: ArrayLike | None = None,
         out: _Array | None = None,
     ) -> _Array:
-        """q̈, nv numbers: those of `aba`, up to rounding, in O(n) work and O(log n + grain) steps.
+        """The acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
 
         model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
         f_ext: as for `rnea`.
@@ -1258,7 +1195,8 @@ class DivideConquer:
 
 @final
 class Ltdl:
-    """M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+    """The factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
+    diagonal.
 
     With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
     `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
@@ -1279,11 +1217,11 @@ class Ltdl:
     def __new__(cls, model: Model) -> Ltdl: ...
     @property
     def diagonal(self) -> _Array:
-        """D, in the `order` of the places."""
+        """The diagonal D, in the `order` of the places."""
 
     @property
     def nonzeros(self) -> int:
-        """How many entries of L and D may differ from zero, the ones on L's diagonal not counted."""
+        """The number of entries of L and D that may differ from zero, without the ones on L's diagonal."""
 
     @property
     def order(self) -> list[int]:
@@ -1296,30 +1234,30 @@ class Ltdl:
         """Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value)."""
 
     def factorize(self, M: ArrayLike) -> None:
-        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+        """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
         If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
-        """x with M x = b, as many numbers as M has rows.
+        """The solution x of M x = b, as many numbers as M has rows.
 
         b: as many numbers.
         """
 
     def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
-        """X with M X = B, column by column.
+        """The solution X of M X = B, column by column.
 
         B: a matrix of as many rows as M has.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
-        """M⁻¹, both triangles filled."""
+        """The inverse M⁻¹, both triangles filled."""
 
 @final
 class HyperDual:
-    """re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂, ε₁² = ε₂² = 0: a number that knows its derivatives in two directions,
-    and the second one by both.
+    """A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0: it knows its derivatives in two
+    directions, and the second derivative by both.
 
     Arrays of them are NumPy arrays of objects; arithmetic and NumPy's elementary functions work on these, and so do
     all functions of a model and a state, which then return such arrays. Comparisons look at `re`. `condyle.jacobian`,
@@ -1374,25 +1312,25 @@ class HyperDual:
         """The angle of the point (x, self) in the plane."""
 
     def hypot(self, other: _Number) -> HyperDual:
-        """√(self² + other²)."""
+        """The hypotenuse √(self² + other²)."""
 
     def fabs(self) -> HyperDual:
-        """|self|."""
+        """The absolute value of self."""
 
     def sqrt(self) -> HyperDual:
-        """√self."""
+        """The square root of self."""
 
     def cbrt(self) -> HyperDual:
         """The cubic root of self."""
 
     def exp(self) -> HyperDual:
-        """e to the power of self."""
+        """The exponential of self, e to the power of self."""
 
     def exp2(self) -> HyperDual:
-        """2 to the power of self."""
+        """The power of 2 with exponent self."""
 
     def expm1(self) -> HyperDual:
-        """e to the power of self, minus 1."""
+        """The exponential of self, minus 1."""
 
     def log(self) -> HyperDual:
         """The natural logarithm of self."""
@@ -1443,7 +1381,7 @@ class HyperDual:
         """The number whose hyperbolic tangent is self."""
 
 def check(inertia: Inertia) -> None:
-    """Raises `NotPhysicalError` unless a body of positive density can have this inertia: J ≻ 0.
+    """A check that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
 
     Point masses, rods and plates are at the border, without volume, and are refused.
 
@@ -1455,8 +1393,8 @@ def check(inertia: Inertia) -> None:
     """
 
 def from_inertia(inertia: Inertia) -> _Array:
-    """π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational inertia about
-    the origin, 10 numbers.
+    """The ten parameters π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
+    inertia about the origin, 10 numbers.
 
     >>> from condyle import inertial_parameters
     >>> I = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
@@ -1465,14 +1403,14 @@ def from_inertia(inertia: Inertia) -> _Array:
     """
 
 def from_log_cholesky(theta: ArrayLike) -> Inertia:
-    """The `Inertia` with the log-Cholesky parameters θ, physical whatever they are; the inverse of `log_cholesky`.
+    """The `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of `log_cholesky`.
 
     theta: 10 numbers; α within ±32 and dᵢ within ±64.
     """
 
 def log_cholesky(inertia: Inertia) -> _Array:
-    """θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃), the log-Cholesky parameters of a physical inertia: any ten
-    numbers, of which each tuple is another body.
+    """The log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Any ten numbers
+    are those of exactly one physical inertia.
 
     α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). With them an identification needs no
     constraints. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
@@ -1487,7 +1425,7 @@ def log_cholesky(inertia: Inertia) -> _Array:
     """
 
 def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
-    """∂π/∂θ, (10, 10) and never singular: how the ten parameters change with the log-Cholesky parameters.
+    """The Jacobian ∂π/∂θ of the ten parameters by the log-Cholesky parameters, (10, 10), never singular.
 
     theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the slope of the efforts in θ.
 
@@ -1497,7 +1435,8 @@ def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
     """
 
 def pseudo_inertia(inertia: Inertia) -> _Array:
-    """J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and kg.
+    """The pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and
+    kg.
 
     Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
     Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
@@ -1514,6 +1453,71 @@ def to_inertia(pi: ArrayLike) -> Inertia:
 
     pi: 10 numbers.
     """
+
+@final
+class Joint:
+    """The kind of a joint, with its axis and pitch where it has them.
+
+    | | q | v |
+    | --- | --- | --- |
+    | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
+    | `continuous` | 2: cos θ, sin θ | 1 |
+    | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
+    | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
+    | `translation` | 3 | 3 |
+    | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
+
+    An axis is a vector in the body's frame, of any length but 0.
+
+    >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
+    1
+    """
+
+    @property
+    def axis(self) -> _Array | None:
+        """The axis, 3 numbers in the body's frame; a unit vector in a model. None if the joint has no axis."""
+
+    @property
+    def nq(self) -> int:
+        """The number of coordinates of its position."""
+
+    @property
+    def nv(self) -> int:
+        """The number of its degrees of freedom: of the numbers in its velocity."""
+
+    @staticmethod
+    def revolute(axis: ArrayLike) -> Joint:
+        """A joint with one angle about an axis: q = [θ], v = [θ̇]."""
+
+    @staticmethod
+    def continuous(axis: ArrayLike) -> Joint:
+        """A joint with one angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
+
+    @staticmethod
+    def prismatic(axis: ArrayLike) -> Joint:
+        """A joint with one length along an axis: q = [d], v = [ḋ]."""
+
+    @staticmethod
+    def helical(axis: ArrayLike, pitch: float) -> Joint:
+        """A screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
+
+    @staticmethod
+    def spherical() -> Joint:
+        """A ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
+
+    @staticmethod
+    def planar() -> Joint:
+        """A joint that moves in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
+
+    @staticmethod
+    def translation() -> Joint:
+        """A joint with three lengths: q = [x, y, z], v = q̇."""
+
+    @staticmethod
+    def free_flyer() -> Joint:
+        """A joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's
+        frame.
+        """
 
 def body_acceleration(
     model: Model,
@@ -1550,7 +1554,7 @@ def body_classical_acceleration(
 def body_jacobian(
     model: Model, data: Data, q: ArrayLike, body: str | int, reference: _Reference = "local", out: _Array | None = None
 ) -> _Array:
-    """The Jacobian J of a body, (6, nv), linear rows first: the body's velocity is J v.
+    """The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 
     q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
     body's own frame.
@@ -1571,7 +1575,7 @@ def body_jacobian_rate(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """dJ/dt, the rate of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+    """The rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1591,7 +1595,7 @@ def body_velocity(
     """
 
 def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Where all bodies are: (nbodies, 4, 4), the pose of each body in the world as a homogeneous matrix; O(n).
+    """The pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 
     q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
     A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
@@ -1613,7 +1617,7 @@ def frame_acceleration(
     out: _Array | None = None,
 ) -> _Array:
     """The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
-    velocity, seen from the world, expressed in the reference; O(n).
+    velocity as seen from the world, expressed in the reference; O(n).
 
     q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
     """
@@ -1628,8 +1632,9 @@ def frame_classical_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of its body's point at the origin of the reference
-    (m/s²), then of its rotation (rad/s²); in 'local_world_aligned' p̈ of the frame's origin; O(n).
+    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the reference
+    (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the frame's
+    origin; O(n).
 
     q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
 
@@ -1645,7 +1650,7 @@ def frame_classical_acceleration(
 def frame_jacobian(
     model: Model, data: Data, q: ArrayLike, frame: str | int, reference: _Reference = "local", out: _Array | None = None
 ) -> _Array:
-    """The Jacobian J of a frame, (6, nv), linear rows first: the frame's velocity is J v.
+    """The Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 
     q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
     the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
@@ -1665,7 +1670,7 @@ def frame_jacobian_rate(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """dJ/dt, the rate of a frame's Jacobian along v, (6, nv), linear rows first.
+    """The rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 
     q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
     acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
@@ -1673,8 +1678,8 @@ def frame_jacobian_rate(
     """
 
 def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
-    """oXf, the pose of a frame in the world: (4, 4), a homogeneous matrix that takes coordinates in the frame to
-    coordinates in the world; O(n).
+    """The pose oXf of a frame in the world: a homogeneous matrix (4, 4) that takes coordinates in the frame to coordinates
+    in the world; O(n).
 
     q: nq numbers; frame: its name or number.
 
@@ -1693,8 +1698,8 @@ def frame_velocity(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The velocity of a frame, 6 numbers: of its body's point at the origin of the reference (m/s), then of its
-    rotation (rad/s); O(n).
+    """The velocity of a frame, 6 numbers: that of the body's point at the origin of the reference (m/s), then the angular
+    velocity (rad/s); O(n).
 
     q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
 
@@ -1707,7 +1712,7 @@ def frame_velocity(
 
 @final
 class Model:
-    """A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
+    """A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 
     Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
     Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
@@ -1720,7 +1725,7 @@ class Model:
 
     @property
     def armature(self) -> _Array:
-        """Inertia of the rotor as seen at each joint (kg m², kg), nv numbers, part of M in every algorithm."""
+        """The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm."""
 
     @property
     def body_names(self) -> list[str]:
@@ -1728,17 +1733,21 @@ class Model:
 
     @property
     def damping(self) -> _Array:
-        """Viscous damping of each degree of freedom (N m s/rad, N s/m), nv numbers: used by no algorithm unasked."""
+        """The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
+        and where a `Simulation` is asked for it.
+        """
 
     @property
     def frames(self) -> list[Frame]:
-        """All frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the
-        joint's and the link's.
+        """The frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the joint's
+        and the link's.
         """
 
     @property
     def friction(self) -> _Array:
-        """Coulomb friction of each degree of freedom (N m, N), nv numbers: used by no algorithm unasked."""
+        """The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and where
+        a `Simulation` is asked for it.
+        """
 
     @property
     def gravity(self) -> _Array:
@@ -1746,22 +1755,22 @@ class Model:
 
     @property
     def idx_qs(self) -> list[int]:
-        """Where each joint's position begins in q; that of a joint that mimics another is the other's."""
+        """The index in q at which each joint's position begins; for a joint that mimics another, that of the other."""
 
     @property
     def idx_vs(self) -> list[int]:
-        """Where each joint's velocity begins in v; that of a joint that mimics another is the other's."""
+        """The index in v at which each joint's velocity begins; for a joint that mimics another, that of the other."""
 
     @property
     def inertial_parameters(self) -> _Array:
-        """π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
-        xy, yy, xz, yz, zz of the rotational inertia about the origin of the body's frame; what regressors are
-        multiplied with.
+        """The inertial parameters π, which regressors are multiplied with: ten numbers for each body but the world, 10
+        (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
+        inertia about the origin of the body's frame.
         """
 
     @property
     def inertias(self) -> list[Inertia]:
-        """The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame."""
+        """The inertia of each body in the body's frame, with all that fixed joints merge into it, as `Inertia`."""
 
     @property
     def joint_placements(self) -> _Array:
@@ -1775,7 +1784,7 @@ class Model:
 
     @property
     def joints(self) -> list[Joint | None]:
-        """Each joint, as `Joint`; None for the world."""
+        """The joints, as `Joint`; None for the world."""
 
     @property
     def limits(self) -> Limits:
@@ -1783,7 +1792,7 @@ class Model:
 
     @property
     def mimics(self) -> list[Mimic | None]:
-        """How each joint follows another one, as `Mimic(ratio, offset)`, or None if it does not."""
+        """The rule by which each joint follows another one, as `Mimic(ratio, offset)`; None for a joint that does not."""
 
     @property
     def name(self) -> str:
@@ -1795,23 +1804,25 @@ class Model:
 
     @property
     def nbodies(self) -> int:
-        """How many bodies there are, the world included: the rows of f_ext and of what `forward_kinematics` returns."""
+        """The number of bodies, the world included: of the rows of f_ext and of the result of `forward_kinematics`."""
 
     @property
     def nq(self) -> int:
-        """How many numbers a position q has."""
+        """The number of coordinates of a position q."""
 
     @property
     def nqs(self) -> list[int]:
-        """How many numbers of q each joint has of its own: none if it mimics another; 0 for the world."""
+        """The number of coordinates that each joint has of its own: 0 if it mimics another joint, and 0 for the world."""
 
     @property
     def nv(self) -> int:
-        """How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector."""
+        """The number of degrees of freedom: of the numbers in v, a, τ and in a tangent vector."""
 
     @property
     def nvs(self) -> list[int]:
-        """How many degrees of freedom each joint has of its own: none if it mimics another; 0 for the world."""
+        """The number of degrees of freedom that each joint has of its own: 0 if it mimics another joint, and 0 for the
+        world.
+        """
 
     @property
     def parents(self) -> list[int]:
@@ -1823,11 +1834,11 @@ class Model:
 
     @property
     def total_mass(self) -> float:
-        """Mass of all bodies, of what is fixed to the world too (kg)."""
+        """The mass of all bodies, with that of what is fixed to the world (kg)."""
 
     @property
     def warnings(self) -> list[str]:
-        """What is odd about the robot, though it could be loaded.
+        """Warnings: what is odd about the robot although it could be loaded.
 
         Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
         """
@@ -1840,7 +1851,7 @@ class Model:
         strict: bool = False,
         packages: Sequence[_Path] | None = None,
     ) -> Model:
-        """Reads a URDF file.
+        """A model from a URDF file.
 
         Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
 
@@ -1860,7 +1871,7 @@ class Model:
     def from_urdf_str(
         text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
     ) -> Model:
-        """Reads a URDF from a string; see `from_urdf`.
+        """A model from a URDF in a string; see `from_urdf`.
 
         >>> text = condyle.robots.QUADRUPED
         >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
@@ -1869,7 +1880,7 @@ class Model:
 
     @staticmethod
     def from_mjcf(path: _Path, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
-        """Reads an MJCF file (MuJoCo), and the files that it includes.
+        """A model from an MJCF file (MuJoCo) and the files that it includes.
 
         q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
         in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
@@ -1888,7 +1899,7 @@ class Model:
 
     @staticmethod
     def from_mjcf_str(text: str, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
-        """Reads an MJCF from a string, which may not include files; see `from_mjcf`.
+        """A model from an MJCF in a string, which may not include files; see `from_mjcf`.
 
         >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
         >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
@@ -1897,7 +1908,7 @@ class Model:
 
     @staticmethod
     def from_sdf(path: _Path, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False) -> Model:
-        """Reads an SDF file (Gazebo) with one model in it.
+        """A model from an SDF file (Gazebo) that holds one model.
 
         Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
         parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
@@ -1914,7 +1925,7 @@ class Model:
     def from_sdf_str(
         text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
     ) -> Model:
-        """Reads an SDF from a string; see `from_sdf`.
+        """A model from an SDF in a string; see `from_sdf`.
 
         >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
         >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
@@ -1972,7 +1983,10 @@ class Model:
         """The model itself: it never changes."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For pickle."""
+        """The parts of a pickle."""
+
+def _model_from_bytes(data: bytes) -> Model:
+    """The model that a pickle holds."""
 
 @final
 class Action:
@@ -2004,7 +2018,7 @@ class Action:
 
 @final
 class Activation:
-    """How much a residual r costs.
+    """The cost a(r) of a residual r.
 
     >>> condyle.optimal.Activation.weighted([1.0, 0.0])
     Weighted([1.0, 0.0])
@@ -2012,43 +2026,54 @@ class Activation:
 
     @staticmethod
     def quadratic() -> Activation:
-        """½ Σ rᵢ²."""
+        """The quadratic cost ½ Σ rᵢ²."""
 
     @staticmethod
     def weighted(w: ArrayLike) -> Activation:
-        """½ Σ wᵢ rᵢ²."""
+        """The weighted quadratic cost ½ Σ wᵢ rᵢ²."""
 
     @staticmethod
     def barrier(lower: ArrayLike, upper: ArrayLike) -> Activation:
-        """½ Σ (excess of rᵢ over its bounds)²; infinite bounds are none."""
+        """The quadratic barrier ½ Σ (excess of rᵢ over its bounds)²; an infinite bound is no bound."""
 
     @staticmethod
     def weighted_barrier(lower: ArrayLike, upper: ArrayLike, w: ArrayLike) -> Activation:
-        """½ Σ wᵢ (excess of rᵢ over its bounds)²; Crocoddyl has the square of wᵢ in its value."""
+        """The weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl has the square of wᵢ in its
+        value.
+        """
 
     @staticmethod
     def smooth1(epsilon: float = 1.0) -> Activation:
-        """Σ √(ε + rᵢ²): nearly Σ |rᵢ|."""
+        """The smooth cost Σ √(ε + rᵢ²), nearly Σ |rᵢ|."""
 
     @staticmethod
     def smooth2(epsilon: float = 1.0) -> Activation:
-        """√(ε + ‖r‖²): nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least eigenvalue of the
-        exact one.
+        """The smooth cost √(ε + ‖r‖²), nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least
+        eigenvalue of the exact one.
         """
 
 @final
 class AugmentedLagrangian:
-    """The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s and for
-    `ConstrainedAction`s.
+    """The augmented Lagrangian method around `Fddp`, as ProxDDP's: for robots with `Limit`s and for `ConstrainedAction`s.
 
-    repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
+    It repeats: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
     y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 
-    problem: what is solved; the solver allocates for its shape once.
-    inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen, `time_budget` is for all.
-    settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
-        gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
-        `penalty_max`, `penalty_factor` (by which it rises).
+    `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
+    ended as "infeasible" or "not_finite"; `shift` moves them on. A solution is "converged" when the residuals of
+    `outcome` are below the tolerances, and "infeasible" if the penalty reached its limit and the limits do not hold.
+    Its cost contains the terms of the limits, that of `outcome` does not; its trace and gains are those of the last
+    inner solve.
+
+    problem: the problem to solve; all memory is made for its shape, once.
+    inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
+        of the whole solve.
+    settings: any of these, by name.
+        `tolerance`: the largest distance of a limit from its bounds that is accepted.
+        `tolerance_dual`: the largest entry of the gradient of the Lagrangian that is accepted.
+        `max_solves`: the number of inner solves at most.
+        `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
+        factor by which it rises.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -2069,15 +2094,12 @@ class AugmentedLagrangian:
     ) -> AugmentedLagrangian: ...
     @property
     def outcome(self) -> Outcome:
-        """What the last solve says of the limits, an `Outcome`."""
+        """The state of the limits after the last solve, an `Outcome`."""
 
     def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
-        """Solves the problem from a warm start and multipliers of zero, and returns a `Solution`. Other threads run
-        meanwhile.
+        """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
-        Its status is "converged" when the residuals of `outcome` are below the tolerances, and "infeasible" if the
-        penalty reached its limit and the limits do not hold. Its cost contains the terms of the limits, that of
-        `outcome` does not; its trace and gains are those of the last inner solve.
+        Other threads run meanwhile.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
@@ -2086,18 +2108,19 @@ class AugmentedLagrangian:
         """
 
     def resume(self) -> Solution:
-        """Solves the problem from the last solution, its multipliers and its penalty; returns a `Solution`.
-
-        The initial state may be another one, or the problem be shifted. After a solve that ended as "infeasible" or
-        "not_finite" the multipliers are zero.
+        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
         Raises `ProblemError` as `solve`.
         """
 
     def shift(self, last: int) -> None:
-        """Moves the horizon of the problem on by a knot, and the last solution with its multipliers, as `Fddp.shift`.
+        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
+        with it.
 
-        last: the index of the model that serves the last knot.
+        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
+        last one is served by a model of the problem, with those that it has for all knots.
+
+        last: the index of that model.
 
         Raises `ProblemError` if there is no such model.
         """
@@ -2190,33 +2213,38 @@ class Cost:
 
 @final
 class Fddp:
-    """Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+    """The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the rules and constants of
+    Crocoddyl.
 
-    Where controls are bounded, these are those of its box solvers.
+    Where controls are bounded, these are the rules of its box solvers.
 
-    problem: what is solved; the solver allocates for its shape once.
-    settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
-        `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP);
-        `implicit`, whether robots' knots come to the sweep as equations of inverse dynamics where that is possible
-        (default: yes; the same steps in less time); and
-        any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
-        `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
-        `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit"),
-        `segments` (of the horizon on which a sweep works at the same time, in as many threads as there are; 1 unless
-        given, for one thread. Results are the same but for rounding, and to the last bit for any number of threads),
-        `threads` (on which derivatives of a robot are computed, 1 unless given; the same to the last bit).
+    problem: the problem to solve; all memory is made for its shape, once.
+    settings: any of these, by name.
+        `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose trials are plain rollouts.
+        `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
+        `implicit`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
+        (default: yes): the same steps in less time.
+        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
+        `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
+        there are; 1 unless given. The results differ by rounding, and not at all with the number of threads.
+        `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given. The results are
+        the same to the last bit.
+        `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
+        `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
+        the method.
     """
 
     def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
     def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
-        """Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
+        """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
+
+        Other threads run meanwhile.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
 
-        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises. How the solve
-        ended is the solution's status.
+        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
         """
 
     def resume(self) -> Solution:
@@ -2226,10 +2254,11 @@ class Fddp:
         """
 
     def shift(self, last: int) -> None:
-        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
+        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
+        with it.
 
-        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the last one
-        is served by a model of the problem, with those that it has for all knots.
+        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
+        last one is served by a model of the problem, with those that it has for all knots.
 
         last: the index of that model.
 
@@ -2274,10 +2303,11 @@ class FreeDynamics:
 
 @final
 class FrictionCone:
-    """Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: lower ≤ A f ≤ upper.
+    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    mu: μ; facets: the pyramid's sides; inner: whether it lies inside of the cone; rotation: the surface's axes (its
-    normal is z) along the contact's, (3, 3); least, greatest: of the normal force (N).
+    mu: μ; facets: the number of the pyramid's sides; inner: whether the pyramid lies inside of the cone; rotation: the
+    surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
+    default 0 and infinite.
 
     >>> condyle.optimal.FrictionCone(0.5).rows()[0]
     array([ 1. ,  0. , -0.5])
@@ -2293,7 +2323,7 @@ class FrictionCone:
         greatest: float = ...,
     ) -> FrictionCone: ...
     def rows(self) -> _Array:
-        """A, (facets + 1, 3)."""
+        """The matrix A, (facets + 1, 3)."""
 
     def bounds(self) -> tuple[_Array, _Array]:
         """The least and greatest values of A f."""
@@ -2349,7 +2379,7 @@ class InverseDynamics:
 
 @final
 class Limit:
-    """A residual r of a robot within bounds, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
 
     Limits hold at the beginning of a knot. To `Fddp` alone they are costs for leaving the bounds.
 
@@ -2369,7 +2399,8 @@ class Limit:
 
 @final
 class Lqr:
-    """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
+    """An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
+    u ≤ upper.
 
     A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
     bound; without R and B it has no controls, as at a terminal knot.
@@ -2418,7 +2449,8 @@ class Problem:
         """
 
     def to_json(self) -> str:
-        """The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
+        """The problem and its robot as JSON, with the present initial state, weights and stages. An infinite bound is
+        null.
 
         Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
         robots.
@@ -2453,10 +2485,10 @@ class Problem:
 
 @final
 class Residual:
-    """A vector r(x, u) of a robot that a `Cost` makes small and that a `Limit` bounds.
+    """A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 
     A frame is given by its name or number, a contact by the name that it has in `ContactDynamics` or `ImpulseDynamics`.
-    What a method does not ask for, a reference, a target or a rotation, is zero or the identity.
+    A target that is not given is zero, a rotation the identity.
 
     >>> from condyle.optimal import Residual
     >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -2465,67 +2497,73 @@ class Residual:
 
     @staticmethod
     def state(reference: ArrayLike) -> Residual:
-        """r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
+        """The deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
 
     @staticmethod
     def control(reference: ArrayLike) -> Residual:
-        """r = u − reference, nu numbers."""
+        """The deviation of the controls from a reference, r = u − reference, nu numbers."""
 
     @staticmethod
     def control_gravity() -> Residual:
-        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
+        """The efforts and forces beyond those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers."""
 
     @staticmethod
     def joint_effort(reference: ArrayLike) -> Residual:
-        """r = τ − reference, the efforts of all joints, nv numbers."""
+        """The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
 
     @staticmethod
     def joint_acceleration(reference: ArrayLike) -> Residual:
-        """r = q̈ − reference, nv numbers."""
+        """The deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers."""
 
     @staticmethod
     def center_of_mass(target: ArrayLike) -> Residual:
-        """r = c − target, 3 numbers in the world, of the centre of mass (m)."""
+        """The deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m)."""
 
     @staticmethod
     def centroidal_momentum(target: ArrayLike | None = None) -> Residual:
-        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
+        """The deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along the
+        world's axes, linear first.
+        """
 
     @staticmethod
     def frame_placement(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix."""
+        """The deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is a
+        homogeneous 4 × 4 matrix.
+        """
 
     @staticmethod
     def frame_translation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """r = p − target, 3 numbers in the world, of the origin of a frame of the model (m)."""
+        """The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m)."""
 
     @staticmethod
     def frame_rotation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
+        """The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix."""
 
     @staticmethod
     def frame_velocity(
         model: Model, frame: str | int, target: ArrayLike | None = None, reference: ArrayLike = "local"
     ) -> Residual:
-        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
-        'local_world_aligned'.
+        """The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
+        'world' or 'local_world_aligned'.
         """
 
     @staticmethod
     def contact_force(contact: str, target: ArrayLike | None = None) -> Residual:
-        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
+        """The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
+        numbers; target has 6.
+        """
 
     @staticmethod
     def friction_cone(contact: str, cone: FrictionCone) -> Residual:
-        """r = A f of a contact's force f, within the bounds of the cone."""
+        """The rows r = A f of a friction cone, for a contact's force f."""
 
     @staticmethod
     def wrench_cone(contact: str, cone: WrenchCone) -> Residual:
-        """r = A w of a rigid contact's wrench w, within the bounds of the cone."""
+        """The rows r = A w of a wrench cone, for a rigid contact's wrench w."""
 
     @staticmethod
     def center_of_pressure(contact: str, size: _Size, rotation: ArrayLike | None = None) -> Residual:
-        """Four numbers of a rigid contact that are not above 0 while the centre of pressure is inside a rectangle.
+        """The centre of pressure of a rigid contact in a rectangle: four numbers, none above 0 while it is inside.
 
         size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
         (3, 3).
@@ -2533,11 +2571,12 @@ class Residual:
 
     @staticmethod
     def impulse_center_of_mass() -> Residual:
-        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass (m/s)."""
+        """The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
 
 @final
 class WrenchCone:
-    """Friction, the centre of pressure within a rectangle, and the yaw moment: lower ≤ A w ≤ upper.
+    """The wrench cone of a rectangular sole: friction, centre of pressure within the rectangle, and yaw moment, lower ≤ A
+    w ≤ upper.
 
     friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 
@@ -2548,7 +2587,7 @@ class WrenchCone:
 
     def __new__(cls, friction: FrictionCone, size: _Size) -> WrenchCone: ...
     def rows(self) -> _Array:
-        """A, (facets + 13, 6)."""
+        """The matrix A, (facets + 13, 6)."""
 
     def bounds(self) -> tuple[_Array, _Array]:
         """The least and greatest values of A w."""
@@ -2556,8 +2595,8 @@ class WrenchCone:
 def joint_torque_regressor(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """Y(q, v, a) with τ = Y π: (nv, 10 (nbodies − 1)), `rnea` as a linear function of `Model.inertial_parameters`; O(n
-    depth).
+    """The joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
+    `Model.inertial_parameters`; O(n depth).
 
     q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
 
@@ -2569,14 +2608,14 @@ def joint_torque_regressor(
     """
 
 def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """y(q, v) with T = y · π: 10 (nbodies − 1) numbers, `kinetic_energy` as a linear function of
-    `Model.inertial_parameters`, without the rotors; O(n).
+    """The kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without the
+    rotors, as a linear function of `Model.inertial_parameters`; O(n).
 
     q: nq numbers; v: nv.
     """
 
 def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """τ = −d v − f tanh(v/ε): the efforts of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
+    """The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
     O(n).
 
     v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
@@ -2589,15 +2628,15 @@ def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | N
     """
 
 def passive_torque_derivative(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`: nv numbers, the diagonal of a matrix without other
-    entries; O(n).
+    """The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
+    other entries; O(n).
 
     v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
     """
 
 def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """y(q) with V = y · π: 10 (nbodies − 1) numbers, `potential_energy` as a linear function of
-    `Model.inertial_parameters`; O(n).
+    """The potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a linear
+    function of `Model.inertial_parameters`; O(n).
 
     q: nq numbers.
     """
@@ -2616,9 +2655,6 @@ def humanoid() -> Model:
     <condyle.Model 'humanoid': 33 bodies, nq = 39, nv = 38>
     """
 
-def _model_from_bytes(data: bytes) -> Model:
-    """The model that a pickle holds."""
-
 def quadruped() -> Model:
     """A quadruped of twelve joints on a free-flyer, nq = 19, nv = 18, with point feet `LF_foot`, `LH_foot`, `RF_foot`,
     `RH_foot`.
@@ -2629,7 +2665,7 @@ def quadruped() -> Model:
 
 @final
 class Simulation:
-    """A robot's state, and all that is needed to move it on.
+    """A simulation of a robot: its state, and the memory to move it on.
 
     Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
     external forces stay as they are during a step.
@@ -2672,25 +2708,25 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """The sum of the steps since the state was set (s)."""
+        """The time since the state was set: the sum of the steps (s)."""
 
     @property
     def v(self) -> _Array:
         """The velocity, nv numbers."""
 
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
-        """Puts the robot at position q (nq numbers) with velocity v (nv), and the clock to 0."""
+        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0."""
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
-        """One step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach
-        the tolerance (a shorter step helps); or 'not_finite': then the step was not taken.
+        """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
+        tolerance (a shorter step helps); or 'not_finite', and then the step was not taken.
 
         tau: nv numbers (N m, N); f_ext: as for `rnea`.
         """
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
-        """So many steps, with a control law that is called before each of them; ends early when one fails, with its
-        status.
+        """A number of steps, with a control law that is called before each of them. Returns the status of the last step,
+        and ends early when a step fails.
 
         control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
             efforts, then other threads run meanwhile.

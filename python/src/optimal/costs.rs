@@ -1,11 +1,11 @@
 //! The terms of costs, and limits: a residual with what is wanted of it.
 
-use super::numbers;
 use super::residuals::Residual;
+use crate::arrays::numbers;
 use condyle::optimal::robot;
 use pyo3::prelude::*;
 
-/// How much a residual r costs.
+/// The cost a(r) of a residual r.
 ///
 /// >>> condyle.optimal.Activation.weighted([1.0, 0.0])
 /// Weighted([1.0, 0.0])
@@ -14,41 +14,42 @@ pub(crate) struct Activation(robot::Activation);
 
 #[pymethods]
 impl Activation {
-    /// ½ Σ rᵢ².
+    /// The quadratic cost ½ Σ rᵢ².
     #[staticmethod]
     fn quadratic() -> Self {
         Self(robot::Activation::Quadratic)
     }
 
-    /// ½ Σ wᵢ rᵢ².
+    /// The weighted quadratic cost ½ Σ wᵢ rᵢ².
     #[staticmethod]
     fn weighted(w: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(robot::Activation::Weighted(numbers("w", w)?)))
     }
 
-    /// ½ Σ (excess of rᵢ over its bounds)²; infinite bounds are none.
+    /// The quadratic barrier ½ Σ (excess of rᵢ over its bounds)²; an infinite bound is no bound.
     #[staticmethod]
     fn barrier(lower: &Bound<'_, PyAny>, upper: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (lower, upper) = (numbers("lower", lower)?, numbers("upper", upper)?);
         Ok(Self(robot::Activation::Barrier { lower, upper }))
     }
 
-    /// ½ Σ wᵢ (excess of rᵢ over its bounds)²; Crocoddyl has the square of wᵢ in its value.
+    /// The weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl has the square of wᵢ in its
+    /// value.
     #[staticmethod]
     fn weighted_barrier(lower: &Bound<'_, PyAny>, upper: &Bound<'_, PyAny>, w: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (lower, upper, weights) = (numbers("lower", lower)?, numbers("upper", upper)?, numbers("w", w)?);
         Ok(Self(robot::Activation::WeightedBarrier { lower, upper, weights }))
     }
 
-    /// Σ √(ε + rᵢ²): nearly Σ |rᵢ|.
+    /// The smooth cost Σ √(ε + rᵢ²), nearly Σ |rᵢ|.
     #[staticmethod]
     #[pyo3(signature = (epsilon=1.0))]
     fn smooth1(epsilon: f64) -> Self {
         Self(robot::Activation::Smooth1 { epsilon })
     }
 
-    /// √(ε + ‖r‖²): nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least eigenvalue of the
-    /// exact one.
+    /// The smooth cost √(ε + ‖r‖²), nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least
+    /// eigenvalue of the exact one.
     #[staticmethod]
     #[pyo3(signature = (epsilon=1.0))]
     fn smooth2(epsilon: f64) -> Self {
@@ -97,7 +98,7 @@ impl Cost {
     }
 }
 
-/// A residual r of a robot within bounds, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+/// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
 ///
 /// Limits hold at the beginning of a knot. To `Fddp` alone they are costs for leaving the bounds.
 ///

@@ -1,17 +1,16 @@
 //! Residuals, and the cones that some of them look at.
 
-use super::numbers;
-use crate::arrays::{matrix, output, pose, three, vector};
+use crate::arrays::{Give, array, numbers, pose, rotation, three};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
 use condyle::{Force, Mat3, Motion};
 use pyo3::prelude::*;
 
-/// A vector r(x, u) of a robot that a `Cost` makes small and that a `Limit` bounds.
+/// A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 ///
 /// A frame is given by its name or number, a contact by the name that it has in `ContactDynamics` or `ImpulseDynamics`.
-/// What a method does not ask for, a reference, a target or a rotation, is zero or the identity.
+/// A target that is not given is zero, a rotation the identity.
 ///
 /// >>> from condyle.optimal import Residual
 /// >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -22,50 +21,52 @@ pub(crate) struct Residual(pub(super) robot::Residual);
 
 #[pymethods]
 impl Residual {
-    /// r = x ⊖ reference, 2 nv numbers; reference = (q, v).
+    /// The deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v).
     #[staticmethod]
     fn state(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(robot::Residual::State { reference: numbers("reference", reference)? }))
     }
 
-    /// r = u − reference, nu numbers.
+    /// The deviation of the controls from a reference, r = u − reference, nu numbers.
     #[staticmethod]
     fn control(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(robot::Residual::Control { reference: numbers("reference", reference)? }))
     }
 
-    /// r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still.
+    /// The efforts and forces beyond those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers.
     #[staticmethod]
     fn control_gravity() -> Self {
         Self(robot::Residual::ControlGravity)
     }
 
-    /// r = τ − reference, the efforts of all joints, nv numbers.
+    /// The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers.
     #[staticmethod]
     fn joint_effort(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(robot::Residual::JointEffort { reference: numbers("reference", reference)? }))
     }
 
-    /// r = q̈ − reference, nv numbers.
+    /// The deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers.
     #[staticmethod]
     fn joint_acceleration(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(robot::Residual::JointAcceleration { reference: numbers("reference", reference)? }))
     }
 
-    /// r = c − target, 3 numbers in the world, of the centre of mass (m).
+    /// The deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m).
     #[staticmethod]
     fn center_of_mass(target: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(robot::Residual::CenterOfMass { target: three("target", target)? }))
     }
 
-    /// r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass.
+    /// The deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along the
+    /// world's axes, linear first.
     #[staticmethod]
     #[pyo3(signature = (target=None))]
     fn centroidal_momentum(target: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::CentroidalMomentum { target: Force::from(six("target", target)?) }))
+        Ok(Self(robot::Residual::CentroidalMomentum { target: Force::from(six(target)?) }))
     }
 
-    /// r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix.
+    /// The deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is a
+    /// homogeneous 4 × 4 matrix.
     #[staticmethod]
     fn frame_placement(
         model: &Bound<'_, Model>,
@@ -76,7 +77,7 @@ impl Residual {
         Ok(Self(robot::Residual::FramePlacement { frame, target }))
     }
 
-    /// r = p − target, 3 numbers in the world, of the origin of a frame of the model (m).
+    /// The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m).
     #[staticmethod]
     fn frame_translation(
         model: &Bound<'_, Model>,
@@ -87,15 +88,15 @@ impl Residual {
         Ok(Self(robot::Residual::FrameTranslation { frame, target }))
     }
 
-    /// r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix.
+    /// The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix.
     #[staticmethod]
     fn frame_rotation(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (frame, target) = (frame_index(&model.get().inner, frame)?, rotation("target", Some(target))?);
+        let (frame, target) = (frame_index(&model.get().inner, frame)?, rotation("target", target)?);
         Ok(Self(robot::Residual::FrameRotation { frame, target }))
     }
 
-    /// r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
-    /// 'local_world_aligned'.
+    /// The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
+    /// 'world' or 'local_world_aligned'.
     #[staticmethod]
     #[pyo3(signature = (model, frame, target=None, reference="local"))]
     fn frame_velocity(
@@ -105,41 +106,42 @@ impl Residual {
         reference: &str,
     ) -> PyResult<Self> {
         let model = &model.get().inner;
-        let (frame, target) = (frame_index(model, frame)?, Motion::from(six("target", target)?));
+        let (frame, target) = (frame_index(model, frame)?, Motion::from(six(target)?));
         let reference = Reference::read("reference", reference, model)?;
         Ok(Self(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
-    /// r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6.
+    /// The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
+    /// numbers; target has 6.
     #[staticmethod]
     #[pyo3(signature = (contact, target=None))]
     fn contact_force(contact: String, target: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::ContactForce { contact, target: Force::from(six("target", target)?) }))
+        Ok(Self(robot::Residual::ContactForce { contact, target: Force::from(six(target)?) }))
     }
 
-    /// r = A f of a contact's force f, within the bounds of the cone.
+    /// The rows r = A f of a friction cone, for a contact's force f.
     #[staticmethod]
     fn friction_cone(contact: String, cone: &Bound<'_, FrictionCone>) -> Self {
         Self(robot::Residual::FrictionCone { contact, cone: cone.get().0.clone() })
     }
 
-    /// r = A w of a rigid contact's wrench w, within the bounds of the cone.
+    /// The rows r = A w of a wrench cone, for a rigid contact's wrench w.
     #[staticmethod]
     fn wrench_cone(contact: String, cone: &Bound<'_, WrenchCone>) -> Self {
         Self(robot::Residual::WrenchCone { contact, cone: cone.get().0.clone() })
     }
 
-    /// Four numbers of a rigid contact that are not above 0 while the centre of pressure is inside a rectangle.
+    /// The centre of pressure of a rigid contact in a rectangle: four numbers, none above 0 while it is inside.
     ///
     /// size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
     /// (3, 3).
     #[staticmethod]
     #[pyo3(signature = (contact, size, rotation=None))]
     fn center_of_pressure(contact: String, size: [f64; 2], rotation: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::CenterOfPressure { contact, rotation: self::rotation("rotation", rotation)?, size }))
+        Ok(Self(robot::Residual::CenterOfPressure { contact, rotation: surface(rotation)?, size }))
     }
 
-    /// r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass (m/s).
+    /// The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s).
     #[staticmethod]
     fn impulse_center_of_mass() -> Self {
         Self(robot::Residual::ImpulseCenterOfMass)
@@ -153,7 +155,7 @@ impl Residual {
 }
 
 impl Residual {
-    /// The bounds that the residual has by itself: those of a cone, or of a centre of pressure.
+    /// The bounds that a residual has of its own: those of a cone, or of a centre of pressure.
     pub(super) fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         match &self.0 {
             robot::Residual::FrictionCone { cone, .. } => Some(cone.bounds()),
@@ -164,10 +166,11 @@ impl Residual {
     }
 }
 
-/// Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: lower ≤ A f ≤ upper.
+/// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 ///
-/// mu: μ; facets: the pyramid's sides; inner: whether it lies inside of the cone; rotation: the surface's axes (its
-/// normal is z) along the contact's, (3, 3); least, greatest: of the normal force (N).
+/// mu: μ; facets: the number of the pyramid's sides; inner: whether the pyramid lies inside of the cone; rotation: the
+/// surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
+/// default 0 and infinite.
 ///
 /// >>> condyle.optimal.FrictionCone(0.5).rows()[0]
 /// array([ 1. ,  0. , -0.5])
@@ -186,13 +189,13 @@ impl FrictionCone {
         least: f64,
         greatest: f64,
     ) -> PyResult<Self> {
-        let rotation = self::rotation("rotation", rotation)?;
+        let rotation = surface(rotation)?;
         Ok(Self(robot::FrictionCone { rotation, mu, facets, inner, least, greatest }))
     }
 
-    /// A, (facets + 1, 3).
+    /// The matrix A, (facets + 1, 3).
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        rows(py, &self.0.rows())
+        self.0.rows().give(py, None)
     }
 
     /// The least and greatest values of A f.
@@ -201,7 +204,8 @@ impl FrictionCone {
     }
 }
 
-/// Friction, the centre of pressure within a rectangle, and the yaw moment: lower ≤ A w ≤ upper.
+/// The wrench cone of a rectangular sole: friction, centre of pressure within the rectangle, and yaw moment, lower ≤ A
+/// w ≤ upper.
 ///
 /// friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 ///
@@ -218,9 +222,9 @@ impl WrenchCone {
         Self(robot::WrenchCone { friction: friction.get().0.clone(), size })
     }
 
-    /// A, (facets + 13, 6).
+    /// The matrix A, (facets + 13, 6).
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        rows(py, &self.0.rows())
+        self.0.rows().give(py, None)
     }
 
     /// The least and greatest values of A w.
@@ -229,30 +233,20 @@ impl WrenchCone {
     }
 }
 
-/// Rows of inequalities, and their bounds.
-fn rows<'py, const N: usize>(py: Python<'py>, rows: &[[f64; N]]) -> PyResult<Bound<'py, PyAny>> {
-    output(py, None, &[rows.len(), N], |out| out.copy_from_slice(&rows.concat()))
-}
-
+/// Least and greatest values as arrays.
 fn pair<'py>(
     py: Python<'py>,
     (lower, upper): (Vec<f64>, Vec<f64>),
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-    let give = |x: &[f64]| output(py, None, &[x.len()], |out| out.copy_from_slice(x));
-    Ok((give(&lower)?, give(&upper)?))
+    Ok((lower.give(py, None)?, upper.give(py, None)?))
 }
 
-/// A rotation as a 3 × 3 matrix; the identity if there is none.
-fn rotation(argument: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Mat3<f64>> {
-    let Some(value) = value else { return Ok(Mat3::identity()) };
-    let m = matrix(argument, value, [3, 3])?;
-    let column = |c: usize| [m[c], m[3 + c], m[6 + c]].into();
-    Ok(Mat3 { x: column(0), y: column(1), z: column(2) })
+/// The axes of a surface along those of a contact; the same if none are given.
+fn surface(rotation: Option<&Bound<'_, PyAny>>) -> PyResult<Mat3<f64>> {
+    rotation.map_or_else(|| Ok(Mat3::identity()), |given| self::rotation("rotation", given))
 }
 
 /// Six numbers, linear first; zeros if there are none.
-fn six(argument: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
-    let Some(value) = value else { return Ok([0.0; 6]) };
-    let x = vector(argument, value, 6)?;
-    Ok(core::array::from_fn(|k| x[k]))
+fn six(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
+    target.map_or(Ok([0.0; 6]), |given| array("target", given))
 }
