@@ -185,19 +185,19 @@ QUADRUPED: str
 HUMANOID: str
 
 class Error(Exception):
-    """What is wrong with a robot's description or with a name in it."""
+    """An error of this package: the base of all others."""
 
 class ModelError(Error):
-    """A model cannot be built, or has no frame or joint of that name."""
+    """An error in a model that is to be built, or a frame or joint that a model does not have."""
 
 class NotPhysicalError(Error):
-    """No body of positive density has this inertia."""
+    """An inertia that no body of positive density has."""
 
 class ParseError(Error):
-    """A file cannot be read, is no XML, or does not describe a robot."""
+    """An error of a file that cannot be read, is no XML, or describes no robot."""
 
 class ProblemError(Error):
-    """An optimal control problem, a warm start or a setting makes no sense."""
+    """An error in an optimal control problem, a warm start or a setting."""
 
 def aba(
     model: Model,
@@ -480,8 +480,8 @@ def centroidal_map(
     """The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
     `CentroidalMap(Ag, Ig, com, Jcom)`.
 
-    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
-    arrays, such as an earlier result.
+    q: nq numbers. Bodies fixed to the world do not count. The results are not numbers if no moving body has a mass. out:
+    four arrays, such as an earlier result.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -499,8 +499,8 @@ def centroidal_map_rate(
     """The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
     `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 
-    q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
-    seven arrays, such as an earlier result.
+    q: nq numbers; v: nv. Bodies fixed to the world do not count. The results are not numbers if no moving body has a
+    mass. out: seven arrays, such as an earlier result.
     """
 
 def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
@@ -522,7 +522,7 @@ def centroidal_momentum_rate(
 def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """The centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
 
-    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
+    q: nq numbers. Bodies fixed to the world do not count. The result is not a number if no moving body has a mass.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -789,8 +789,8 @@ def constrained_dynamics_equations(
 
         M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 
-    What `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a `ConstraintSet`, whose
-    targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
+    These are the equations that `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a
+    `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
     bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
@@ -853,8 +853,8 @@ class Data:
     what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
     with another robot's model, a `ValueError`.
 
-    Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
-    registers, and on so many threads.
+    model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
+    several states side by side in vector registers.
 
     >>> arm = condyle.robots.arm7()
     >>> condyle.Data(arm)
@@ -1133,7 +1133,7 @@ class Cholesky:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1156,13 +1156,13 @@ class DivideConquer:
     """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
 
     The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-    a join of two pieces costs some six times as much as the elimination of a body. On two threads this is faster than
-    `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. With joints that share
+    a join of two pieces costs some six times as much as the elimination of a body. With two threads, and as many runs
+    as threads, it is faster than `aba` from some 200 bodies on; with one thread it never is. With joints that share
     coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
     The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
     algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 
-    model: the robot; grain: how many bodies a run has at most.
+    model: the robot; grain: the greatest number of bodies in a run.
 
     >>> arm = condyle.robots.arm7()
     >>> divided = condyle.DivideConquer(arm, grain=1)
@@ -1236,7 +1236,7 @@ class Ltdl:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -2132,7 +2132,7 @@ class ConstrainedAction:
     To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
 
     action: the action.
-    size: how many numbers g has.
+    size: the number of entries of g.
     calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
     calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
         space of the state. Without it, central differences of calc.
@@ -2193,7 +2193,7 @@ class ContactDynamics:
         limits_at: dict[int, Sequence[Limit]] | None = None,
     ) -> ContactDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """The smallest controls and forces that hold the robot still at the state x: nu controls of them."""
+        """The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers."""
 
 @final
 class Cost:
@@ -2618,8 +2618,8 @@ def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | N
     """The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
     O(n).
 
-    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
-    them: whoever wants them adds them to τ.
+    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function adds
+    them: add them to τ where they should act.
 
     >>> arm = condyle.robots.arm7()
     >>> v = np.ones(7)

@@ -13,7 +13,7 @@ named_tuples! {
 functions! {
 /// The centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
 ///
-/// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
+/// q: nq numbers. Bodies fixed to the world do not count. The result is not a number if no moving body has a mass.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -48,8 +48,8 @@ fn com_jacobian(model, data; q: Position; out) {
 /// The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
 /// `CentroidalMap(Ag, Ig, com, Jcom)`.
 ///
-/// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
-/// arrays, such as an earlier result.
+/// q: nq numbers. Bodies fixed to the world do not count. The results are not numbers if no moving body has a mass. out:
+/// four arrays, such as an earlier result.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -62,8 +62,8 @@ fn centroidal_map(model, data; q: Position; out) {
 /// The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
 /// `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 ///
-/// q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
-/// seven arrays, such as an earlier result.
+/// q: nq numbers; v: nv. Bodies fixed to the world do not count. The results are not numbers if no moving body has a
+/// mass. out: seven arrays, such as an earlier result.
 fn centroidal_map_rate(model, data; q: Position, v: Tangent; out) {
     condyle::centroidal_map_rate(model, data, &q, &v)
 }

@@ -229,8 +229,8 @@ fn constrained_dynamics_derivatives(model, data, constraints: ConstraintSet;
 ///
 ///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 ///
-/// What `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a `ConstraintSet`, whose
-/// targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
+/// These are the equations that `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a
+/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
 /// bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()

@@ -13,8 +13,8 @@ use pyo3::pyclass::boolean_struct::False;
 /// what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
 /// with another robot's model, a `ValueError`.
 ///
-/// Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
-/// registers, and on so many threads.
+/// model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
+/// several states side by side in vector registers.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.Data(arm)

@@ -32,7 +32,7 @@ macro_rules! factor {
 
             /// Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
             ///
-            /// If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+            /// Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
             fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
                 let M = matrix("M", M, [self.size, self.size])?.to_matrix();
                 self.inner.factorize(&M);
@@ -169,13 +169,13 @@ Cholesky {
 /// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-/// a join of two pieces costs some six times as much as the elimination of a body. On two threads this is faster than
-/// `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. With joints that share
+/// a join of two pieces costs some six times as much as the elimination of a body. With two threads, and as many runs
+/// as threads, it is faster than `aba` from some 200 bodies on; with one thread it never is. With joints that share
 /// coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
 /// The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
 /// algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 ///
-/// model: the robot; grain: how many bodies a run has at most.
+/// model: the robot; grain: the greatest number of bodies in a run.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> divided = condyle.DivideConquer(arm, grain=1)

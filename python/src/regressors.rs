@@ -39,8 +39,8 @@ fn potential_energy_regressor(model, data; q: Position; out) {
 /// The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
 /// O(n).
 ///
-/// v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
-/// them: whoever wants them adds them to τ.
+/// v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function adds
+/// them: add them to τ where they should act.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> v = np.ones(7)

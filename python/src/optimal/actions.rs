@@ -283,7 +283,7 @@ impl ContactDynamics {
         })?))
     }
 
-    /// The smallest controls and forces that hold the robot still at the state x: nu controls of them.
+    /// The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers.
     fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         self.0.hold(x, robot::ContactDynamics::quasi_static)
     }

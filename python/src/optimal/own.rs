@@ -212,7 +212,7 @@ impl ActionModel for Own {
 /// To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
 ///
 /// action: the action.
-/// size: how many numbers g has.
+/// size: the number of entries of g.
 /// calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
 /// calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
 ///     space of the state. Without it, central differences of calc.
