@@ -29,22 +29,27 @@ def our_cost(cost, model, terminal, contacts):
     kind, activation = residual["type"], our_activation(cost["activation"], residual)
     if terminal and kind in ("control", "friction_cone", "wrench_cone"):
         return None
+    return optimal.Cost(name, weight, our_residual(residual, model, contacts), activation)
+
+
+def our_residual(residual, model, contacts):
+    kind = residual["type"]
     if kind == "state":
-        return optimal.Cost.state(name, weight, residual["ref"], activation)
+        return optimal.Residual.state(residual["ref"])
     if kind == "control":
-        return optimal.Cost.control(name, weight, residual["ref"], activation)
+        return optimal.Residual.control(residual["ref"])
     if kind == "frame_placement":
-        return optimal.Cost.frame_placement(name, weight, model, residual["frame"], homogeneous(residual), activation)
+        return optimal.Residual.frame_placement(model, residual["frame"], homogeneous(residual))
     if kind == "frame_translation":
-        return optimal.Cost.frame_translation(name, weight, model, residual["frame"], residual["p"], activation)
+        return optimal.Residual.frame_translation(model, residual["frame"], residual["p"])
     if kind == "com":
-        return optimal.Cost.center_of_mass(name, weight, residual["p"], activation)
+        return optimal.Residual.center_of_mass(residual["p"])
     cone = optimal.FrictionCone(residual["mu"], residual["nf"], residual["inner"])
     contact = contacts[residual["frame"]]
     if kind == "friction_cone":
-        return optimal.Cost.friction_cone(name, weight, contact, cone, activation)
+        return optimal.Residual.friction_cone(contact, cone)
     assert kind == "wrench_cone", kind
-    return optimal.Cost.wrench_cone(name, weight, contact, optimal.WrenchCone(cone, residual["box"]), activation)
+    return optimal.Residual.wrench_cone(contact, optimal.WrenchCone(cone, residual["box"]))
 
 
 def our_contact(contact, gains):

@@ -1,5 +1,7 @@
 """Rigid-body dynamics with exact derivatives: the compiled part of `condyle`."""
 
+# Written by python/stubs.py from the extension module. Do not edit.
+
 import os
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, final
@@ -69,6 +71,7 @@ __all__ = [
     "ParseError",
     "Problem",
     "ProblemError",
+    "Residual",
     "Simulation",
     "WrenchCone",
     "__version__",
@@ -155,908 +158,46 @@ __all__ = [
 ]
 
 _Array: TypeAlias = NDArray[np.float64]
-_RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translation"]
+_Number: TypeAlias = HyperDual | float
+_Path: TypeAlias = str | os.PathLike[str]
+_Size: TypeAlias = tuple[float, float] | Sequence[float]
+_Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
 _Joints: TypeAlias = Sequence[tuple[Joint, ArrayLike | None]]
-_Method: TypeAlias = Literal["aba", "dense", "sparse"]
-_Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
-_Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
-_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translation"]
 _Reference: TypeAlias = Literal["local", "world", "local_world_aligned"]
 _Input: TypeAlias = (
     Literal["gravity", "armature", "damping"]
     | tuple[Literal["force", "inertia"], str | int]
     | tuple[Literal["friction"], float]
 )
+_Method: TypeAlias = Literal["aba", "dense", "sparse"]
+_Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
+_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
 _Action: TypeAlias = (
     FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction
 )
-_Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
-_RneaOut: TypeAlias = RneaDerivatives | tuple[_Array, _Array, _Array]
-_AbaOut: TypeAlias = AbaDerivatives | tuple[_Array, _Array, _Array, _Array]
-_MapOut: TypeAlias = CentroidalMap | tuple[_Array, _Array, _Array, _Array]
-_MapRateOut: TypeAlias = CentroidalMapRate | tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array]
 
 __version__: str
+WORLD: BodyId
 ARM7: str
 QUADRUPED: str
 HUMANOID: str
-WORLD: BodyId
 
 class Error(Exception):
-    """What is wrong with a robot's description or with a name in it."""
-
-class ParseError(Error):
-    """A file cannot be read, is no XML, or does not describe a robot."""
-
-class ProblemError(Error):
-    """An optimal control problem, a warm start or a setting makes no sense."""
+    """An error of this package: the base of all others."""
 
 class ModelError(Error):
-    """A model cannot be built, or has no frame or joint of that name."""
+    """An error in a model that is to be built, or a frame or joint that a model does not have."""
 
 class NotPhysicalError(Error):
-    """No body of positive density has this inertia."""
+    """An inertia that no body of positive density has."""
 
-@final
-class Model:
-    """A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
+class ParseError(Error):
+    """An error of a file that cannot be read, is no XML, or describes no robot."""
 
-    Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
-    Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
-    pickled.
-
-    >>> arm = condyle.robots.arm7()
-    >>> arm.nq, arm.nv, arm.names[:3]
-    (7, 7, ['universe', 'joint1', 'joint2'])
-    """
-
-    @staticmethod
-    def from_urdf(
-        path: str | os.PathLike[str],
-        root_joint: _RootJoint | None = None,
-        mimic: bool = False,
-        strict: bool = False,
-        packages: Sequence[str | os.PathLike[str]] | None = None,
-    ) -> Model:
-        """Reads a URDF file.
-
-        Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
-
-        path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
-        root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
-            'spherical' or 'translation'; None fixes the root link to the world.
-        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
-            their own.
-        strict: whether what is only odd (`warnings`) is an error.
-        packages: folders that have packages in them, or are packages; before those that the environment names in
-            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-    @staticmethod
-    def from_urdf_str(
-        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """Reads a URDF from a string; see `from_urdf`.
-
-        >>> text = condyle.robots.QUADRUPED
-        >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
-        18
-        """
-    @staticmethod
-    def from_mjcf(
-        path: str | os.PathLike[str], mimic: bool = False, strict: bool = False, weightless_meshes: bool = False
-    ) -> Model:
-        """Reads an MJCF file (MuJoCo), and the files that it includes.
-
-        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
-        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
-        bodies without mass, `name#1`, `name#2`, …, between them. What a tree of bodies cannot have is left out and
-        stands in `warnings`.
-
-        path: a path, as text or `os.PathLike`.
-        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being left out; its `polycoef`
-            must be linear.
-        strict: whether what is only odd, or left out (`warnings`), is an error.
-        weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and stands in
-            `warnings`, instead of being an error.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-    @staticmethod
-    def from_mjcf_str(text: str, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
-        """Reads an MJCF from a string, which may not include files; see `from_mjcf`.
-
-        >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
-        >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
-        2.0
-        """
-    @staticmethod
-    def from_sdf(
-        path: str | os.PathLike[str], root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """Reads an SDF file (Gazebo) with one model in it.
-
-        Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
-        parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
-
-        path: a path, as text or `os.PathLike`.
-        root_joint: as for `from_urdf`.
-        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
-        strict: whether what is only odd, or left out (`warnings`), is an error.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-    @staticmethod
-    def from_sdf_str(
-        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """Reads an SDF from a string; see `from_sdf`.
-
-        >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
-        >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
-        >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
-        6
-        """
-    @property
-    def warnings(self) -> list[str]:
-        """What is odd about the robot, though it could be loaded.
-
-        Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
-        """
-
-    @property
-    def singular_joints(self) -> list[int]:
-        """The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`."""
-
-    @property
-    def name(self) -> str:
-        """The robot's name."""
-    @property
-    def nq(self) -> int:
-        """How many numbers a position q has."""
-    @property
-    def nv(self) -> int:
-        """How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector."""
-    @property
-    def nbodies(self) -> int:
-        """How many bodies there are, the world included: the rows of f_ext and of what `forward_kinematics` returns."""
-    @property
-    def names(self) -> list[str]:
-        """The names of the joints, one for each body; 'universe' for the world."""
-    @property
-    def body_names(self) -> list[str]:
-        """The names of the links that the joints carry; 'universe' for the world."""
-    @property
-    def joint_types(self) -> list[str]:
-        """The kind of each joint: 'revolute', 'continuous', 'prismatic', 'helical', 'spherical', 'planar',
-        'translation' or 'free_flyer'; 'universe' for the world.
-        """
-    @property
-    def joints(self) -> list[Joint | None]:
-        """Each joint, as `Joint`; None for the world."""
-    @property
-    def parents(self) -> list[int]:
-        """The body on which each joint sits; 0 is the world."""
-    @property
-    def idx_qs(self) -> list[int]:
-        """Where each joint's position begins in q; that of a joint that mimics another is the other's."""
-    @property
-    def idx_vs(self) -> list[int]:
-        """Where each joint's velocity begins in v; that of a joint that mimics another is the other's."""
-    @property
-    def nqs(self) -> list[int]:
-        """How many numbers of q each joint has of its own: none if it mimics another; 0 for the world."""
-    @property
-    def nvs(self) -> list[int]:
-        """How many degrees of freedom each joint has of its own: none if it mimics another; 0 for the world."""
-    @property
-    def mimics(self) -> list[Mimic | None]:
-        """How each joint follows another one, as `Mimic(ratio, offset)`, or None if it does not."""
-    @property
-    def joint_placements(self) -> _Array:
-        """The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4)."""
-    @property
-    def inertias(self) -> list[Inertia]:
-        """The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame."""
-    @property
-    def inertial_parameters(self) -> _Array:
-        """π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
-        xy, yy, xz, yz, zz of the rotational inertia about the origin of the body's frame; what regressors are
-        multiplied with.
-        """
-    @property
-    def limits(self) -> Limits:
-        """The limits of position, velocity and effort, as `Limits`; infinite where there are none."""
-    @property
-    def damping(self) -> _Array:
-        """Viscous damping of each degree of freedom (N m s/rad, N s/m), nv numbers: used by no algorithm unasked."""
-    @property
-    def friction(self) -> _Array:
-        """Coulomb friction of each degree of freedom (N m, N), nv numbers: used by no algorithm unasked."""
-    @property
-    def armature(self) -> _Array:
-        """Inertia of the rotor as seen at each joint (kg m², kg), nv numbers, part of M in every algorithm."""
-    @property
-    def gravity(self) -> _Array:
-        """The acceleration of free fall, in the world's frame (m/s²), 3 numbers."""
-    @property
-    def total_mass(self) -> float:
-        """Mass of all bodies, of what is fixed to the world too (kg)."""
-    @property
-    def frames(self) -> list[Frame]:
-        """All frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the
-        joint's and the link's.
-        """
-    def frame(self, name: str) -> int:
-        """The number of the frame with this name: a link's, else the user's, else a joint's.
-
-        Raises `ModelError`, with the nearest name.
-        """
-    def joint(self, name: str) -> int:
-        """The number of the body that the joint with this name carries.
-
-        Raises `ModelError`, with the nearest name.
-        """
-    def with_gravity(self, gravity: ArrayLike) -> Model:
-        """The same robot under another gravity (m/s², 3 numbers, in the world's frame)."""
-    def with_armature(self, armature: ArrayLike) -> Model:
-        """The same robot with another armature, nv numbers (kg m², kg)."""
-    def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
-        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
-
-        >>> arm = condyle.robots.arm7()
-        >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
-        >>> heavier = arm.with_inertias(twice)
-        >>> heavier.total_mass == 2.0 * arm.total_mass
-        True
-        """
-    def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
-        """The same robot with some joints locked where they are at q.
-
-        Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
-        locked with it.
-
-        joints: a list of names or numbers of bodies.
-        q: nq numbers.
-
-        >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
-        ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
-
-        Raises `ModelError`.
-        """
-    def __copy__(self) -> Model:
-        """The model itself: it never changes."""
-    def __deepcopy__(self, memo: object) -> Model:
-        """The model itself: it never changes."""
-    def __reduce__(self) -> tuple[Any, ...]:
-        """For pickle."""
-
-@final
-class Data:
-    """Scratch and results of every algorithm, for one model: made once, used by one thread at a time.
-
-    It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
-    what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
-    with another robot's model, a `ValueError`.
-
-    Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
-    registers, and on so many threads.
-
-    >>> arm = condyle.robots.arm7()
-    >>> condyle.Data(arm)
-    <condyle.Data of 'arm7'>
-    """
-
-    def __new__(cls, model: Model, threads: int = 1) -> Data: ...
-
-def _model_from_bytes(data: bytes) -> Model:
-    """The model that a pickle holds."""
-
-def arm7() -> Model:
-    """A seven-axis arm with a fixed base, nq = nv = 7; its last frame is `tool`.
-
-    >>> condyle.robots.arm7()
-    <condyle.Model 'arm7': 7 bodies, nq = 7, nv = 7>
-    """
-
-def quadruped() -> Model:
-    """A quadruped of twelve joints on a free-flyer, nq = 19, nv = 18, with point feet `LF_foot`, `LH_foot`, `RF_foot`,
-    `RH_foot`.
-
-    >>> condyle.robots.quadruped()
-    <condyle.Model 'quadruped': 13 bodies, nq = 19, nv = 18>
-    """
-
-def humanoid() -> Model:
-    """A humanoid of thirty-two joints on a free-flyer, nq = 39, nv = 38, with soles `left_sole`, `right_sole`.
-
-    >>> condyle.robots.humanoid()
-    <condyle.Model 'humanoid': 33 bodies, nq = 39, nv = 38>
-    """
-
-def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Where all bodies are: (nbodies, 4, 4), the pose of each body in the world as a homogeneous matrix; O(n).
-
-    q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
-    A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> data = condyle.Data(quadruped)
-    >>> condyle.forward_kinematics(quadruped, data, condyle.neutral(quadruped)).shape
-    (14, 4, 4)
-    """
-
-def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
-    """oXf, the pose of a frame in the world: (4, 4), a homogeneous matrix that takes coordinates in the frame to
-    coordinates in the world; O(n).
-
-    q: nq numbers; frame: its name or number.
-
-    >>> arm = condyle.robots.arm7()
-    >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
-    >>> bool(tool[2, 3] > 0.5)  # stretched upwards
-    True
-    """
-
-def rnea_input_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    wrt: _Input,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at most O(n) a
-    column.
-
-    q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
-    (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
-    frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
-    `passive_torque`; f_ext: as for `rnea`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
-    >>> dtau_dg = condyle.rnea_input_derivative(arm, data, q, zero, zero, "gravity")
-    >>> np.allclose(dtau_dg @ [0.0, 0.0, -9.81], condyle.gravity(arm, data, q))  # τ is linear in g
-    True
-    """
-
-def aba_input_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    wrt: _Input,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at most O(n²) a
-    column.
-
-    q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
-    >>> da_df = condyle.aba_input_derivative(quadruped, data, q, zero, zero, ("force", "root_joint"))
-    >>> np.allclose(da_df, condyle.minv(quadruped, data, q)[:, :6])  # a force on the trunk is an effort of its joint
-    True
-    """
-
-def rnea_hessian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    lambda_: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: Sequence[_Array] | None = None,
-) -> RneaHessian:
-    """The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
-    (nv, nv); the other blocks are zero.
-
-    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-    derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
-    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, np.ones(7))
-    >>> np.allclose(hessian.dqdq, hessian.dqdq.T)
-    True
-    """
-
-def aba_hessian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    lambda_: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: Sequence[_Array] | None = None,
-) -> AbaHessian:
-    """The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
-    other blocks are zero.
-
-    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-    derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
-    """
-
-def rnea_second_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: Sequence[_Array] | None = None,
-) -> RneaSecondDerivatives:
-    """The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
-    `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
-
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
-    contracted with a vector, many times faster.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
-    >>> tensors = condyle.rnea_second_derivatives(arm, data, q, v, a)
-    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, weights)
-    >>> np.allclose(np.einsum("i,ijk->jk", weights, tensors.dqdq), hessian.dqdq)
-    True
-    """
-
-def frame_velocity_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """∂v/∂q of a frame's velocity, (6, nv), linear rows first; ∂v/∂(velocity) is its Jacobian.
-
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
-    >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
-    True
-    """
-
-def frame_acceleration_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: Sequence[_Array] | None = None,
-) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-    Jacobian.
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-    """
-
-def frame_classical_acceleration_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: Sequence[_Array] | None = None,
-) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-    Jacobian.
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-    """
-
-def body_velocity_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
-
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_acceleration_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: Sequence[_Array] | None = None,
-) -> tuple[_Array, _Array]:
-    """∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
-    `frame_acceleration_derivatives` of its own frame.
-
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def centroidal_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    out: Sequence[_Array] | None = None,
-) -> CentroidalDerivatives:
-    """The derivatives of the centroidal momentum, its rate and the centre of mass by q, v and a, exact, in O(n), as
-    `CentroidalDerivatives`.
-
-    q: nq numbers; v, a: nv. Gravity is not among the accelerations.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
-    >>> d = condyle.centroidal_derivatives(quadruped, data, q, zero, zero)
-    >>> np.allclose(d.drate_da, condyle.centroidal_map(quadruped, data, q).Ag)
-    True
-    """
-
-def energy_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    out: Sequence[_Array] | None = None,
-) -> EnergyDerivatives:
-    """The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
-    `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
-
-    q: nq numbers; v: nv.
-    """
-
-def static_torque_derivative(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """∂τ/∂q of `static_torque`, and without forces of `gravity`, (nv, nv); exact, in O(n depth).
-
-    q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
-    """
-
-def coriolis_derivatives(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    out: Sequence[_Array] | None = None,
-) -> CoriolisDerivatives:
-    """The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
-    `CoriolisDerivatives(dq, dv)`, each (nv, nv).
-
-    q: nq numbers; v: nv.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
-    >>> d = condyle.coriolis_derivatives(arm, data, q, v)
-    >>> np.allclose(d.dv, 2.0 * condyle.coriolis_matrix(arm, data, q, v))  # C v is quadratic in v
-    True
-    """
-
-def frame_jacobian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The Jacobian J of a frame, (6, nv), linear rows first: the frame's velocity is J v.
-
-    q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
-    the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
-    origin, along the world's axes.
-
-    >>> arm = condyle.robots.arm7()
-    >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
-    (6, 7)
-    """
-
-def frame_velocity(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The velocity of a frame, 6 numbers: of its body's point at the origin of the reference (m/s), then of its
-    rotation (rad/s); O(n).
-
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
-    >>> J = condyle.frame_jacobian(arm, data, q, "tool")
-    >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
-    True
-    """
-
-def frame_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
-    velocity, seen from the world, expressed in the reference; O(n).
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-    """
-
-def frame_classical_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of its body's point at the origin of the reference
-    (m/s²), then of its rotation (rad/s²); in 'local_world_aligned' p̈ of the frame's origin; O(n).
-
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
-    >>> J = condyle.frame_jacobian(arm, data, q, "tool", "local_world_aligned")
-    >>> dJ = condyle.frame_jacobian_rate(arm, data, q, v, "tool", "local_world_aligned")
-    >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
-    >>> np.allclose(acceleration, J @ a + dJ @ v)
-    True
-    """
-
-def frame_jacobian_rate(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    frame: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """dJ/dt, the rate of a frame's Jacobian along v, (6, nv), linear rows first.
-
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-    acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
-    frame.
-    """
-
-def body_jacobian(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The Jacobian J of a body, (6, nv), linear rows first: the body's velocity is J v.
-
-    q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
-    body's own frame.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q = condyle.Data(arm), [0.3] * 7
-    >>> J = condyle.frame_jacobian(arm, data, q, "link7")
-    >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
-    True
-    """
-
-def body_velocity(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
-
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
-    own frame; O(n).
-
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_classical_acceleration(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
-    frame; O(n).
-
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def body_jacobian_rate(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    body: str | int,
-    reference: _Reference = "local",
-    out: _Array | None = None,
-) -> _Array:
-    """dJ/dt, the rate of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
-
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-    """
-
-def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """c, the centre of mass of the moving bodies, 3 numbers, in the world's frame (m); O(n).
-
-    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
-    >>> bool(abs(com[1]) < 1e-12)  # left and right weigh the same
-    True
-    """
-
-def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """ċ, the velocity of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s); O(n).
-
-    q: nq numbers; v: nv.
-    """
-
-def com_acceleration(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
-) -> _Array:
-    """c̈, the acceleration of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s²), without
-    gravity; O(n).
-
-    q: nq numbers; v, a: nv.
-    """
-
-def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Jcom(q), the Jacobian of the centre of mass: (3, nv), ċ = Jcom v; O(n).
-
-    q: nq numbers. It is a part of `centroidal_map`.
-    """
-
-def centroidal_map(model: Model, data: Data, q: ArrayLike, out: _MapOut | None = None) -> CentroidalMap:
-    """The centroidal momentum matrix Ag(q), hg = Ag v, and what it needs, in O(n), as `CentroidalMap(Ag, Ig, com,
-    Jcom)`.
-
-    q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
-    arrays, such as an earlier result.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
-    >>> bool(abs(map.Ag[0, 0] - quadruped.total_mass) < 1e-9)  # pushed forwards, all goes forwards
-    True
-    """
-
-def centroidal_map_rate(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _MapRateOut | None = None
-) -> CentroidalMapRate:
-    """Ag(q), its rate along v, and the centroidal momentum hg = Ag v, in O(n), as
-    `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`; the rate of hg is Ag a + dAg v.
-
-    q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
-    seven arrays, such as an earlier result.
-    """
-
-def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """hg, the momentum of the moving bodies about their centre of mass, along the world's axes: 6 numbers (kg m/s, then
-    kg m²/s); O(n).
-
-    q: nq numbers; v: nv.
-    """
-
-def centroidal_momentum_rate(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
-) -> _Array:
-    """The rate of hg, along the world's axes: 6 numbers (N, then N m), the weight and the external forces about the
-    centre of mass; O(n).
-
-    q: nq numbers; v, a: nv.
-    """
-
-def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """T = ½ vᵀ M(q) v, the kinetic energy of the moving bodies and the rotors (J); O(n).
-
-    q: nq numbers; v: nv.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v = condyle.Data(arm), [0.3] * 7, np.full(7, 0.5)
-    >>> np.isclose(condyle.kinetic_energy(arm, data, q, v), 0.5 * v @ condyle.crba(arm, data, q) @ v).item()
-    True
-    """
-
-def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
-    """V = −m gᵀ c(q), the potential energy of the moving bodies under gravity (J), 0 at the world's origin; O(n).
-
-    q: nq numbers.
-    """
-
-def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """E = T + V, the mechanical energy (J); O(n).
-
-    q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
-    """
-
-def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
-    """What the equations of motion are made of, from one pass to the tips and one back, in O(n depth), as
-    `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
-
-    q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
-    `kinetic_energy` and `potential_energy`, up to rounding.
-
-    >>> arm = condyle.robots.arm7()
-    >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)
-    >>> terms.M.shape, terms.h.shape, terms.centroidal.Ag.shape
-    ((7, 7), (7,), (6, 7))
-    """
-
-def rnea(
-    model: Model,
-    data: Data,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: _Array | None = None,
-) -> _Array:
-    """τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n); nv
-    numbers (N m, N).
-
-    q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
-    expressed in its frame, row 0 being the world's.
-
-    >>> arm = condyle.robots.arm7()
-    >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
-    >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
-    True
-    """
+class ProblemError(Error):
+    """An error in an optimal control problem, a warm start or a setting."""
 
 def aba(
     model: Model,
@@ -1067,7 +208,7 @@ def aba(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, nv numbers (rad/s², m/s²); O(n).
+    """Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 
@@ -1075,6 +216,51 @@ def aba(
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
     >>> a = condyle.aba(quadruped, condyle.Data(quadruped), q, zero, zero)
     >>> bool(abs(a[2] + 9.81) < 1e-12)  # it falls
+    True
+    """
+
+def aba_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> AbaDerivatives:
+    """The acceleration of `aba` and its derivatives with respect to q, v and τ, exact, as
+    `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
+
+    q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
+    change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data = condyle.Data(arm)
+    >>> d = condyle.aba_derivatives(arm, data, [0.3] * 7, [0.1] * 7, [1.0] * 7)
+    >>> np.array_equal(d.da_dtau, condyle.minv(arm, data, [0.3] * 7))
+    True
+    """
+
+def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """The Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
+    >>> h, g = condyle.nonlinear_effects(arm, data, q, v), condyle.gravity(arm, data, q)
+    >>> np.allclose(condyle.coriolis_matrix(arm, data, q, v) @ v, h - g)
+    True
+    """
+
+def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """The joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+
+    q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
+
+    >>> arm = condyle.robots.arm7()
+    >>> M = condyle.crba(arm, condyle.Data(arm), [0.3] * 7)
+    >>> bool(np.linalg.eigvalsh(M).min() > 0.0)
     True
     """
 
@@ -1088,7 +274,7 @@ def forward_dynamics(
     method: _Method | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, nv numbers (rad/s², m/s²).
+    """Forward dynamics by a method of choice: the acceleration of `aba`, nv numbers (rad/s², m/s²).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', by a
     dense factor of M, O(n³); 'sparse', by one with the zeros of the tree, O(n d²) for depth d; None, the fastest:
@@ -1101,19 +287,19 @@ def forward_dynamics(
     True
     """
 
-def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """M(q), the joint-space inertia matrix: (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """The gravity efforts g(q), nv numbers, which hold the robot still: the efforts of `rnea` with v = a = 0.
 
-    q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
+    q: nq numbers.
 
-    >>> arm = condyle.robots.arm7()
-    >>> M = condyle.crba(arm, condyle.Data(arm), [0.3] * 7)
-    >>> bool(np.linalg.eigvalsh(M).min() > 0.0)
+    >>> quadruped = condyle.robots.quadruped()
+    >>> g = condyle.gravity(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(g[2] - 9.81 * quadruped.total_mass) < 1e-9)  # the base carries the weight
     True
     """
 
 def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """M(q)⁻¹: (nv, nv), symmetric, both triangles filled; without forming M.
+    """The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 
     q: nq numbers.
 
@@ -1124,158 +310,29 @@ def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _
     """
 
 def nonlinear_effects(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """h(q, v) = C(q, v) v + g(q): the efforts that keep the velocity as it is, nv numbers; `rnea` with a = 0.
+    """The nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 
     q: nq numbers; v: nv.
     """
 
-def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """g(q): the efforts that hold the robot still, nv numbers; `rnea` with v = a = 0.
-
-    q: nq numbers.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> g = condyle.gravity(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
-    >>> bool(abs(g[2] - 9.81 * quadruped.total_mass) < 1e-9)  # the base carries the weight
-    True
-    """
-
-def static_torque(
-    model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
+def rnea(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
 ) -> _Array:
-    """τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, nv numbers (N m, N); O(n).
+    """Inverse dynamics: the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a, nv numbers
+    (N m, N); O(n).
 
-    q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
-    """
-
-def constrained_dynamics(
-    model: Model,
-    data: Data,
-    constraints: ConstraintSet,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: Constrained | Sequence[_Array] | None = None,
-) -> Constrained:
-    """q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that make J q̈ + γ = 0: forward dynamics under
-    constraints, as `Constrained(a, lambda_, residual, redundant)`.
-
-    constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
-    other, or themselves at a singular posture, give finite numbers and a residual.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
-    >>> feet = [condyle.Constraint(foot, "point", kd=10.0) for foot in ("LF_foot", "RH_foot")]
-    >>> stance = condyle.ConstraintSet(quadruped, feet)
-    >>> a, forces, residual, redundant = condyle.constrained_dynamics(quadruped, data, stance, q, zero, zero)
-    >>> bool(residual < 1e-9), redundant, np.allclose(stance.jacobian() @ a, 0.0)
-    (True, 0.0, True)
-    """
-
-def constrained_dynamics_derivatives(
-    model: Model,
-    data: Data,
-    constraints: ConstraintSet,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: ConstrainedDerivatives | Sequence[_Array] | None = None,
-) -> ConstrainedDerivatives:
-    """`constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as `ConstrainedDerivatives`.
-
-    constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving
-    with the bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier
-    result.
+    q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
+    expressed in its frame, row 0 being the world's.
 
     >>> arm = condyle.robots.arm7()
-    >>> touch = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
-    >>> d = condyle.constrained_dynamics_derivatives(arm, condyle.Data(arm), touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
-    >>> np.allclose(touch.jacobian() @ d.da_dtau, 0.0)  # no effort moves the point
-    True
-    """
-
-def constrained_dynamics_equations(
-    model: Model,
-    data: Data,
-    constraints: ConstraintSet,
-    q: ArrayLike,
-    v: ArrayLike,
-    tau: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: ConstrainedEquations | Sequence[_Array] | None = None,
-) -> ConstrainedEquations:
-    """`constrained_dynamics` and the linear equations between changes of q, v, τ and of the q̈ and λ that follow, as
-    `ConstrainedEquations`:
-
-        M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
-
-    What `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a `ConstraintSet`, whose
-    targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
-    bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
-    >>> d = condyle.constrained_dynamics_equations(arm, data, touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
-    >>> np.allclose(d.M, condyle.crba(arm, data, [0.3] * 7))
-    True
-    """
-
-def impulse_dynamics(
-    model: Model,
-    data: Data,
-    constraints: ConstraintSet,
-    q: ArrayLike,
-    v: ArrayLike,
-    restitution: float = 0.0,
-    out: Impulse | Sequence[_Array] | None = None,
-) -> Impulse:
-    """v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact, as
-    `Impulse(v, lambda_, residual, redundant)`.
-
-    constraints: a `ConstraintSet`, of which gains, velocities and accelerations do not count; q: nq numbers; v: nv;
-    restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
-
-    >>> quadruped = condyle.robots.quadruped()
-    >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.Constraint("LF_foot", "point")])
-    >>> q, falling = condyle.neutral(quadruped), np.eye(18)[2] * -1.0
-    >>> after = condyle.impulse_dynamics(quadruped, condyle.Data(quadruped), touchdown, q, falling)
-    >>> bool(after.lambda_[2] > 0.0)  # the ground pushes upwards
-    True
-    """
-
-def impulse_dynamics_derivatives(
-    model: Model,
-    data: Data,
-    constraints: ConstraintSet,
-    q: ArrayLike,
-    v: ArrayLike,
-    restitution: float = 0.0,
-    out: ImpulseDerivatives | Sequence[_Array] | None = None,
-) -> ImpulseDerivatives:
-    """`impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
-    `ImpulseDerivatives`.
-
-    constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: as many arrays
-    as there are members, such as an earlier result.
-
-    >>> arm = condyle.robots.arm7()
-    >>> hit = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
-    >>> d = condyle.impulse_dynamics_derivatives(arm, condyle.Data(arm), hit, [0.3] * 7, [0.1] * 7)
-    >>> np.allclose(d.dv_dv @ d.dv_dv, d.dv_dv)  # an impact that sticks is a projection
-    True
-    """
-
-def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """C(q, v), the Coriolis matrix by Christoffel symbols: (nv, nv), C v = h − g, Ṁ = C + Cᵀ; O(n depth).
-
-    q: nq numbers; v: nv.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
-    >>> h, g = condyle.nonlinear_effects(arm, data, q, v), condyle.gravity(arm, data, q)
-    >>> np.allclose(condyle.coriolis_matrix(arm, data, q, v) @ v, h - g)
+    >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
+    >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
     True
     """
 
@@ -1286,7 +343,7 @@ def rnea_derivatives(
     v: ArrayLike,
     a: ArrayLike,
     f_ext: ArrayLike | None = None,
-    out: _RneaOut | None = None,
+    out: tuple[_Array, _Array, _Array] | list[_Array] | None = None,
 ) -> RneaDerivatives:
     """The derivatives of `rnea` with respect to q, v and a, exact, in O(n depth), as
     `RneaDerivatives(dtau_dq, dtau_dv, dtau_da)`, each (nv, nv).
@@ -1300,93 +357,259 @@ def rnea_derivatives(
     (7, 7)
     """
 
-def aba_derivatives(
+def static_torque(
+    model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
+) -> _Array:
+    """The efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N); O(n).
+
+    q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
+    """
+
+@final
+class BodyId:
+    """The identity of a body in a builder, as `ModelBuilder.body` and others return it. `WORLD` is always there."""
+
+@final
+class ModelBuilder:
+    """A builder that makes a `Model` body by body, parents first.
+
+    Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
+    joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
+    and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
+    the rows of f_ext count them.
+
+    name: the robot's.
+
+    >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
+    >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
+    >>> elbow = np.eye(4)
+    >>> elbow[2, 3] = -1.0
+    >>> robot = ModelBuilder("double pendulum")
+    >>> upper = robot.body("upper", WORLD, Joint.revolute([0.0, 1.0, 0.0]), inertia=rod)
+    >>> lower = robot.body("lower", upper, Joint.revolute([0.0, 1.0, 0.0]), elbow, rod, damping=0.1)
+    >>> robot.frame("tip", lower, elbow)
+    >>> robot.build()
+    <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
+    """
+
+    def __new__(cls, name: str) -> ModelBuilder: ...
+    def body(
+        self,
+        name: str,
+        parent: BodyId,
+        joint: Joint,
+        placement: ArrayLike | None = None,
+        inertia: Inertia | None = None,
+        *,
+        joint_name: str | None = None,
+        position: tuple[float, float] | None = None,
+        velocity: float | None = None,
+        effort: float | None = None,
+        damping: float = 0.0,
+        friction: float = 0.0,
+        armature: float = 0.0,
+    ) -> BodyId:
+        """Adds a body and its joint.
+
+        name: the body's, and the joint's unless it has a `joint_name` of its own.
+        parent: the body on which the joint sits.
+        placement: the joint's frame at position zero in the parent's frame.
+        inertia: in the body's frame, which is the joint's at position zero.
+        position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
+        velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
+        damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
+        armature: inertia of the rotor as seen at the joint (kg m², kg).
+        """
+
+    def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
+        """Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+
+        Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
+        `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
+        `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+
+        joints: a list of (joint, placement).
+        """
+
+    def spherical_zyx(
+        self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
+    ) -> BodyId:
+        """Adds a body on a ball joint that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+
+        M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
+        """
+
+    def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
+        """Adds inertia to a body, given in a frame that is at `placement` in the body's frame."""
+
+    def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
+        """Adds a frame at `placement` in the body's frame."""
+
+    def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
+        """Makes a joint follow another one, instead of having a coordinate of its own: its position is ratio q + offset.
+
+        follower, leader: the bodies that the joints carry.
+        """
+
+    def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
+        """Adds a whole robot, its world at `placement` in the frame of `parent`; `prefix` is put before all its names.
+
+        >>> from condyle import ModelBuilder, WORLD
+        >>> two = ModelBuilder("two arms")
+        >>> for side, y in ("left_", 0.4), ("right_", -0.4):
+        ...     at = np.eye(4)
+        ...     at[1, 3] = y
+        ...     two.append(WORLD, at, condyle.robots.arm7(), side)
+        >>> two.build().nv
+        14
+        """
+
+    def gravity(self, gravity: ArrayLike) -> None:
+        """Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). Without this it is (0, 0, −9.81)."""
+
+    def build(self) -> Model:
+        """Builds the model: checks everything and numbers the bodies depth first, siblings in the order in which they were
+        added. The builder cannot be used any more.
+
+        Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
+        """
+
+def centroidal_map(
+    model: Model, data: Data, q: ArrayLike, out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None
+) -> CentroidalMap:
+    """The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
+    `CentroidalMap(Ag, Ig, com, Jcom)`.
+
+    q: nq numbers. Bodies fixed to the world do not count. The results are not numbers if no moving body has a mass. out:
+    four arrays, such as an earlier result.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(map.Ag[0, 0] - quadruped.total_mass) < 1e-9)  # pushed forwards, all goes forwards
+    True
+    """
+
+def centroidal_map_rate(
     model: Model,
     data: Data,
     q: ArrayLike,
     v: ArrayLike,
-    tau: ArrayLike,
-    f_ext: ArrayLike | None = None,
-    out: _AbaOut | None = None,
-) -> AbaDerivatives:
-    """`aba` and its derivatives with respect to q, v and τ, exact, as `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv
-    numbers and three matrices (nv, nv).
+    out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> CentroidalMapRate:
+    """The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
+    `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 
-    q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
-    change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data = condyle.Data(arm)
-    >>> d = condyle.aba_derivatives(arm, data, [0.3] * 7, [0.1] * 7, [1.0] * 7)
-    >>> np.array_equal(d.da_dtau, condyle.minv(arm, data, [0.3] * 7))
-    True
+    q: nq numbers; v: nv. Bodies fixed to the world do not count. The results are not numbers if no moving body has a
+    mass. out: seven arrays, such as an earlier result.
     """
 
-def joint_torque_regressor(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
-) -> _Array:
-    """Y(q, v, a) with τ = Y π: (nv, 10 (nbodies − 1)), `rnea` as a linear function of `Model.inertial_parameters`; O(n
-    depth).
-
-    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
-
-    >>> arm = condyle.robots.arm7()
-    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
-    >>> Y = condyle.joint_torque_regressor(arm, data, q, v, a)
-    >>> np.allclose(Y @ arm.inertial_parameters, condyle.rnea(arm, data, q, v, a))
-    True
-    """
-
-def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """y(q, v) with T = y · π: 10 (nbodies − 1) numbers, `kinetic_energy` as a linear function of
-    `Model.inertial_parameters`, without the rotors; O(n).
+def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """The centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6 numbers
+    (kg m/s, then kg m²/s); O(n).
 
     q: nq numbers; v: nv.
     """
 
-def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """y(q) with V = y · π: 10 (nbodies − 1) numbers, `potential_energy` as a linear function of
-    `Model.inertial_parameters`; O(n).
+def centroidal_momentum_rate(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m). It equals the weight and
+    the external forces about the centre of mass; O(n).
+
+    q: nq numbers; v, a: nv.
+    """
+
+def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """The centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
+
+    q: nq numbers. Bodies fixed to the world do not count. The result is not a number if no moving body has a mass.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
+    >>> bool(abs(com[1]) < 1e-12)  # left and right weigh the same
+    True
+    """
+
+def com_acceleration(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3 numbers
+    (m/s²); O(n).
+
+    q: nq numbers; v, a: nv.
+    """
+
+def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """The Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
+
+    q: nq numbers. It is a part of `centroidal_map`.
+    """
+
+def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """The velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
+    """All terms of the equations of motion, from one pass to the tips and one back, in O(n depth), as
+    `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
+
+    q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
+    `kinetic_energy` and `potential_energy`, up to rounding.
+
+    >>> arm = condyle.robots.arm7()
+    >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)
+    >>> terms.M.shape, terms.h.shape, terms.centroidal.Ag.shape
+    ((7, 7), (7,), (6, 7))
+    """
+
+def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
+    """The kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, np.full(7, 0.5)
+    >>> np.isclose(condyle.kinetic_energy(arm, data, q, v), 0.5 * v @ condyle.crba(arm, data, q) @ v).item()
+    True
+    """
+
+def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
+    """The mechanical energy E = T + V (J); O(n).
+
+    q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
+    """
+
+def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
+    """The potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 
     q: nq numbers.
     """
 
-def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """τ = −d v − f tanh(v/ε): the efforts of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
-    O(n).
+def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
+    """The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
 
-    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
-    them: whoever wants them adds them to τ.
-
-    >>> arm = condyle.robots.arm7()
-    >>> v = np.ones(7)
-    >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
-    True
+    q0, q1: nq numbers.
     """
 
-def passive_torque_derivative(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`: nv numbers, the diagonal of a matrix without other
-    entries; O(n).
+def difference_jacobian(
+    model: Model, d: ArrayLike, argument: Literal["from", "to"], out: _Array | None = None
+) -> _Array:
+    """The Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. Of the positions it
+    needs only their difference.
 
-    v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
+    d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
     """
 
-def neutral(model: Model) -> _Array:
-    """The position in which every body is at its joint's frame, nq numbers: zeros, and rotations by nothing.
+def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
+    """The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
 
-    >>> condyle.neutral(condyle.robots.quadruped())[:7]
-    array([0., 0., 0., 0., 0., 0., 1.])
-    """
-
-def random_configuration(model: Model, seed: int | None = None) -> _Array:
-    """A position drawn uniformly, nq numbers: between its limits, within ±3 (rad, m) where a coordinate has none, over
-    the whole group for rotations.
-
-    seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
+    q0, q1: nq numbers.
     """
 
 def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """q ⊕ v: the position after moving with the velocity v for one unit of time, nq numbers.
+    """The position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
 
     q: nq numbers; v: nv.
 
@@ -1397,14 +620,16 @@ def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = Non
     True
     """
 
-def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
-    """q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one; nv numbers.
+def integrate_jacobian(
+    model: Model, v: ArrayLike, argument: Literal["position", "velocity"], out: _Array | None = None
+) -> _Array:
+    """The Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not depend on q.
 
-    q0, q1: nq numbers.
+    v: nv numbers; argument: 'position' for q or 'velocity' for v.
     """
 
 def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Array | None = None) -> _Array:
-    """q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity, nq numbers.
+    """The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
 
     q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
 
@@ -1412,15 +637,16 @@ def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Arra
     array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
     """
 
-def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
-    """‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+def neutral(model: Model) -> _Array:
+    """The neutral position, nq numbers: zeros, and the identity for rotations.
 
-    q0, q1: nq numbers.
+    >>> condyle.neutral(condyle.robots.quadruped())[:7]
+    array([0., 0., 0., 0., 0., 0., 1.])
     """
 
 def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
-    `out`.
+    """The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
+    stays as it is unless it is `out`.
 
     q: nq numbers.
 
@@ -1431,8 +657,15 @@ def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
     True
     """
 
+def random_configuration(model: Model, seed: int | None = None) -> _Array:
+    """A random position, nq numbers: uniform between its limits, within ±3 (rad, m) where a coordinate has no limits, and
+    over the whole group for rotations.
+
+    seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
+    """
+
 def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
-    """The columns of X, tangent vectors at q ⊕ v, taken to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+    """The columns of X, tangent vectors at q ⊕ v, moved to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 
     v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
     `transport` with −v.
@@ -1442,23 +675,6 @@ def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = Non
     >>> J = condyle.integrate_jacobian(quadruped, v, "position")
     >>> np.allclose(condyle.transport(quadruped, v, J), np.eye(18))
     True
-    """
-
-def integrate_jacobian(
-    model: Model, v: ArrayLike, argument: Literal["position", "velocity"], out: _Array | None = None
-) -> _Array:
-    """∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v: (nv, nv), block-diagonal, between tangent spaces; it does not depend on q.
-
-    v: nv numbers; argument: 'position' for q or 'velocity' for v.
-    """
-
-def difference_jacobian(
-    model: Model, d: ArrayLike, argument: Literal["from", "to"], out: _Array | None = None
-) -> _Array:
-    """∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁: (nv, nv), block-diagonal, between tangent spaces; of the positions it needs
-    their difference only.
-
-    d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
     """
 
 @final
@@ -1487,12 +703,14 @@ class ConstraintSet:
     def __new__(
         cls, model: Model, constraints: Sequence[Constraint], mu: float = 0.0, iterations: int = 1
     ) -> ConstraintSet: ...
-    def __len__(self) -> int: ...
     @property
     def rows(self) -> int:
-        """How many rows J has, and λ numbers."""
+        """The number of rows of J, and of numbers in λ."""
+
+    def __len__(self, /) -> int: ...
     def range(self, k: int) -> slice:
         """The rows of constraint k, as a slice."""
+
     def set_target(
         self,
         k: int,
@@ -1500,15 +718,485 @@ class ConstraintSet:
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
     ) -> None:
-        """Changes where constraint k wants its frame to be, and how it should move there: what is given, as in
-        `Constraint`.
+        """Changes the target of constraint k: where its frame should be and how it should move there. What is not given
+        stays as it is.
         """
+
     def jacobian(self, out: _Array | None = None) -> _Array:
-        """J, (rows, nv), as the last call left it."""
+        """The Jacobian J of the constraints, (rows, nv), at the state of the last call."""
+
+def constrained_dynamics(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: Constrained | Sequence[_Array] | None = None,
+) -> Constrained:
+    """Forward dynamics under constraints: the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that
+    make J q̈ + γ = 0, as `Constrained(a, lambda_, residual, redundant)`.
+
+    constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
+    other, or themselves at a singular posture, give finite numbers and a residual.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
+    >>> feet = [condyle.Constraint(foot, "point", kd=10.0) for foot in ("LF_foot", "RH_foot")]
+    >>> stance = condyle.ConstraintSet(quadruped, feet)
+    >>> a, forces, residual, redundant = condyle.constrained_dynamics(quadruped, data, stance, q, zero, zero)
+    >>> bool(residual < 1e-9), redundant, np.allclose(stance.jacobian() @ a, 0.0)
+    (True, 0.0, True)
+    """
+
+def constrained_dynamics_derivatives(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: ConstrainedDerivatives | Sequence[_Array] | None = None,
+) -> ConstrainedDerivatives:
+    """The result of `constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as
+    `ConstrainedDerivatives`.
+
+    constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving
+    with the bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier
+    result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> touch = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> d = condyle.constrained_dynamics_derivatives(arm, condyle.Data(arm), touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
+    >>> np.allclose(touch.jacobian() @ d.da_dtau, 0.0)  # no effort moves the point
+    True
+    """
+
+def constrained_dynamics_equations(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: ConstrainedEquations | Sequence[_Array] | None = None,
+) -> ConstrainedEquations:
+    """The result of `constrained_dynamics` and the linear equations between changes of q, v, τ and the changes of q̈ and λ
+    that follow, as `ConstrainedEquations`:
+
+        M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
+
+    These are the equations that `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a
+    `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
+    bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> d = condyle.constrained_dynamics_equations(arm, data, touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
+    >>> np.allclose(d.M, condyle.crba(arm, data, [0.3] * 7))
+    True
+    """
+
+def impulse_dynamics(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    restitution: float = 0.0,
+    out: Impulse | Sequence[_Array] | None = None,
+) -> Impulse:
+    """The velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as
+    `Impulse(v, lambda_, residual, redundant)`.
+
+    constraints: a `ConstraintSet`, of which gains, velocities and accelerations do not count; q: nq numbers; v: nv;
+    restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.Constraint("LF_foot", "point")])
+    >>> q, falling = condyle.neutral(quadruped), np.eye(18)[2] * -1.0
+    >>> after = condyle.impulse_dynamics(quadruped, condyle.Data(quadruped), touchdown, q, falling)
+    >>> bool(after.lambda_[2] > 0.0)  # the ground pushes upwards
+    True
+    """
+
+def impulse_dynamics_derivatives(
+    model: Model,
+    data: Data,
+    constraints: ConstraintSet,
+    q: ArrayLike,
+    v: ArrayLike,
+    restitution: float = 0.0,
+    out: ImpulseDerivatives | Sequence[_Array] | None = None,
+) -> ImpulseDerivatives:
+    """The result of `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
+    `ImpulseDerivatives`.
+
+    constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: as many arrays
+    as there are members, such as an earlier result.
+
+    >>> arm = condyle.robots.arm7()
+    >>> hit = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> d = condyle.impulse_dynamics_derivatives(arm, condyle.Data(arm), hit, [0.3] * 7, [0.1] * 7)
+    >>> np.allclose(d.dv_dv @ d.dv_dv, d.dv_dv)  # an impact that sticks is a projection
+    True
+    """
+
+@final
+class Data:
+    """The memory that algorithms compute in, for one model: made once, and used by one thread at a time.
+
+    It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
+    what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
+    with another robot's model, a `ValueError`.
+
+    model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
+    several states side by side in vector registers.
+
+    >>> arm = condyle.robots.arm7()
+    >>> condyle.Data(arm)
+    <condyle.Data of 'arm7'>
+    """
+
+    def __new__(cls, model: Model, threads: int = 1) -> Data: ...
+
+def aba_hessian(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    lambda_: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> AbaHessian:
+    """The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
+    other blocks are zero.
+
+    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+    derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+    """
+
+def aba_input_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    tau: ArrayLike,
+    wrt: _Input,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """The derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at
+    most O(n²) a column.
+
+    q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+    >>> da_df = condyle.aba_input_derivative(quadruped, data, q, zero, zero, ("force", "root_joint"))
+    >>> np.allclose(da_df, condyle.minv(quadruped, data, q)[:, :6])  # a force on the trunk is an effort of its joint
+    True
+    """
+
+def body_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: tuple[_Array, _Array] | list[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """The derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+    `frame_acceleration_derivatives` of its own frame.
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def body_velocity_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
+
+def centroidal_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> CentroidalDerivatives:
+    """The derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and a, exact, in
+    O(n), as `CentroidalDerivatives`.
+
+    q: nq numbers; v, a: nv. Gravity is not among the accelerations.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
+    >>> d = condyle.centroidal_derivatives(quadruped, data, q, zero, zero)
+    >>> np.allclose(d.drate_da, condyle.centroidal_map(quadruped, data, q).Ag)
+    True
+    """
+
+def coriolis_derivatives(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: tuple[_Array, _Array] | list[_Array] | None = None
+) -> CoriolisDerivatives:
+    """The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
+    `CoriolisDerivatives(dq, dv)`, each (nv, nv).
+
+    q: nq numbers; v: nv.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
+    >>> d = condyle.coriolis_derivatives(arm, data, q, v)
+    >>> np.allclose(d.dv, 2.0 * condyle.coriolis_matrix(arm, data, q, v))  # C v is quadratic in v
+    True
+    """
+
+def energy_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    out: tuple[_Array, _Array, _Array] | list[_Array] | None = None,
+) -> EnergyDerivatives:
+    """The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
+    `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
+
+    q: nq numbers; v: nv.
+    """
+
+def frame_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: tuple[_Array, _Array] | list[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """The derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative by
+    the joint accelerations is the frame's Jacobian.
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_classical_acceleration_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: tuple[_Array, _Array] | list[_Array] | None = None,
+) -> tuple[_Array, _Array]:
+    """The derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative
+    by the joint accelerations is the frame's Jacobian.
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_velocity_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. Its derivative by v is the frame's Jacobian.
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
+    >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
+    True
+    """
+
+def rnea_hessian(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    lambda_: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> RneaHessian:
+    """The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
+    (nv, nv); the other blocks are zero.
+
+    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
+    derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
+    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, np.ones(7))
+    >>> np.allclose(hessian.dqdq, hessian.dqdq.T)
+    True
+    """
+
+def rnea_input_derivative(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    wrt: _Input,
+    f_ext: ArrayLike | None = None,
+    out: _Array | None = None,
+) -> _Array:
+    """The derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at
+    most O(n) a column.
+
+    q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
+    (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
+    frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
+    `passive_torque`; f_ext: as for `rnea`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
+    >>> dtau_dg = condyle.rnea_input_derivative(arm, data, q, zero, zero, "gravity")
+    >>> np.allclose(dtau_dg @ [0.0, 0.0, -9.81], condyle.gravity(arm, data, q))  # τ is linear in g
+    True
+    """
+
+def rnea_second_derivatives(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    f_ext: ArrayLike | None = None,
+    out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
+) -> RneaSecondDerivatives:
+    """The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
+    `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
+
+    q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
+    contracted with a vector, many times faster.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
+    >>> tensors = condyle.rnea_second_derivatives(arm, data, q, v, a)
+    >>> hessian = condyle.rnea_hessian(arm, data, q, v, a, weights)
+    >>> np.allclose(np.einsum("i,ijk->jk", weights, tensors.dqdq), hessian.dqdq)
+    True
+    """
+
+def static_torque_derivative(
+    model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
+) -> _Array:
+    """The derivative ∂τ/∂q of `static_torque`, (nv, nv), and without forces that of `gravity`; exact, in O(n depth).
+
+    q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
+    """
+
+@final
+class Cholesky:
+    """The factor M = L Lᵀ of any symmetric positive definite matrix.
+
+    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
+    and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
+
+    n: the rows of M.
+
+    >>> factor = condyle.Cholesky(2)
+    >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
+    >>> factor.solve([8.0, 12.0])
+    array([1., 2.])
+    """
+
+    def __new__(cls, n: int) -> Cholesky: ...
+    @property
+    def lower(self) -> _Array:
+        """The factor L, lower triangular."""
+
+    def factorize(self, M: ArrayLike) -> None:
+        """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
+
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        """
+
+    def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
+        """The solution x of M x = b, as many numbers as M has rows.
+
+        b: as many numbers.
+        """
+
+    def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
+        """The solution X of M X = B, column by column.
+
+        B: a matrix of as many rows as M has.
+        """
+
+    def inverse(self, out: _Array | None = None) -> _Array:
+        """The inverse M⁻¹, both triangles filled."""
+
+@final
+class DivideConquer:
+    """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
+
+    The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
+    a join of two pieces costs some six times as much as the elimination of a body. With two threads, and as many runs
+    as threads, it is faster than `aba` from some 200 bodies on; with one thread it never is. With joints that share
+    coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
+    The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
+    algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
+
+    model: the robot; grain: the greatest number of bodies in a run.
+
+    >>> arm = condyle.robots.arm7()
+    >>> divided = condyle.DivideConquer(arm, grain=1)
+    >>> q, v, tau = [0.3] * 7, [0.1] * 7, [1.0] * 7
+    >>> np.allclose(divided.aba(arm, q, v, tau), condyle.aba(arm, condyle.Data(arm), q, v, tau))
+    True
+    >>> divided.size
+    AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, levels=4)
+    """
+
+    def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
+    @property
+    def size(self) -> AssemblySize:
+        """The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`."""
+
+    def aba(
+        self,
+        model: Model,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        f_ext: ArrayLike | None = None,
+        out: _Array | None = None,
+    ) -> _Array:
+        """The acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
+
+        model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
+        f_ext: as for `rnea`.
+        """
 
 @final
 class Ltdl:
-    """M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+    """The factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
+    diagonal.
 
     With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
     `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
@@ -1527,184 +1215,49 @@ class Ltdl:
     """
 
     def __new__(cls, model: Model) -> Ltdl: ...
-    def factorize(self, M: ArrayLike) -> None:
-        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+    @property
+    def diagonal(self) -> _Array:
+        """The diagonal D, in the `order` of the places."""
 
-        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
-        """
-    def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
-        """x with M x = b, as many numbers as M has rows.
-
-        b: as many numbers.
-        """
-    def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
-        """X with M X = B, column by column.
-
-        B: a matrix of as many rows as M has.
-        """
-    def inverse(self, out: _Array | None = None) -> _Array:
-        """M⁻¹, both triangles filled."""
     @property
     def nonzeros(self) -> int:
-        """How many entries of L and D may differ from zero, the ones on L's diagonal not counted."""
+        """The number of entries of L and D that may differ from zero, without the ones on L's diagonal."""
+
     @property
     def order(self) -> list[int]:
         """The coordinates in their order from the root to the tips: they are eliminated last to first.
 
         It is 0, 1, 2, … unless joints share coordinates.
         """
+
     def row(self, k: int) -> list[tuple[int, float]]:
         """Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value)."""
-    @property
-    def diagonal(self) -> _Array:
-        """D, in the `order` of the places."""
 
-@final
-class Cholesky:
-    """M = L Lᵀ of any symmetric positive definite matrix.
-
-    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
-    and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
-
-    n: the rows of M.
-
-    >>> factor = condyle.Cholesky(2)
-    >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
-    >>> factor.solve([8.0, 12.0])
-    array([1., 2.])
-    """
-
-    def __new__(cls, n: int) -> Cholesky: ...
     def factorize(self, M: ArrayLike) -> None:
-        """Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+        """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
         """
+
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
-        """x with M x = b, as many numbers as M has rows.
+        """The solution x of M x = b, as many numbers as M has rows.
 
         b: as many numbers.
         """
+
     def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
-        """X with M X = B, column by column.
+        """The solution X of M X = B, column by column.
 
         B: a matrix of as many rows as M has.
         """
+
     def inverse(self, out: _Array | None = None) -> _Array:
-        """M⁻¹, both triangles filled."""
-    @property
-    def lower(self) -> _Array:
-        """L, lower triangular."""
-
-@final
-class DivideConquer:
-    """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its scratch.
-
-    The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-    a join of two pieces costs some six times as much as the elimination of a body. On two threads this is faster than
-    `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. With joints that share
-    coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
-    The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
-    algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
-
-    model: the robot; grain: how many bodies a run has at most.
-
-    >>> arm = condyle.robots.arm7()
-    >>> divided = condyle.DivideConquer(arm, grain=1)
-    >>> q, v, tau = [0.3] * 7, [0.1] * 7, [1.0] * 7
-    >>> np.allclose(divided.aba(arm, q, v, tau), condyle.aba(arm, condyle.Data(arm), q, v, tau))
-    True
-    >>> divided.size
-    AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, levels=4)
-    """
-
-    def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
-    @property
-    def size(self) -> AssemblySize:
-        """How much work the assembly is, and how many levels wait for one another, as `AssemblySize`."""
-    def aba(
-        self,
-        model: Model,
-        q: ArrayLike,
-        v: ArrayLike,
-        tau: ArrayLike,
-        f_ext: ArrayLike | None = None,
-        out: _Array | None = None,
-    ) -> _Array:
-        """q̈, nv numbers: those of `aba`, up to rounding, in O(n) work and O(log n + grain) steps.
-
-        model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
-        f_ext: as for `rnea`.
-        """
-
-@final
-class Simulation:
-    """A robot's state, and all that is needed to move it on.
-
-    Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
-    external forces stay as they are during a step.
-
-    model: the robot; it stands still at `neutral`, at time 0.
-    integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
-        whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
-        is conserved to rounding.
-    dt: h, the length of a step (s).
-    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
-        none of either.
-    tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-    max_iterations: it gives up after so many iterations.
-
-    Raises `ModelError` if M is singular.
-
-    >>> from condyle.simulation import Simulation
-    >>> quadruped = condyle.robots.quadruped()
-    >>> simulation = Simulation(quadruped, dt=1e-3)
-    >>> def damper(now):
-    ...     now.tau[8] = -0.5 * now.v[8]
-    >>> simulation.run(100, damper)
-    'done'
-    >>> bool(abs(simulation.q[2] + 0.5 * 9.81 * 0.1**2) < 2e-3)  # it has fallen ½ g t²
-    True
-    """
-
-    def __new__(
-        cls,
-        model: Model,
-        integrator: _Integrator = "semi_implicit_euler",
-        dt: float = 1e-3,
-        passive: float | None = None,
-        tolerance: float = 1e-9,
-        max_iterations: int = 20,
-    ) -> Simulation: ...
-    @property
-    def q(self) -> _Array:
-        """The position, nq numbers."""
-    @property
-    def v(self) -> _Array:
-        """The velocity, nv numbers."""
-    @property
-    def time(self) -> float:
-        """The sum of the steps since the state was set (s)."""
-    def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
-        """Puts the robot at position q (nq numbers) with velocity v (nv), and the clock to 0."""
-    def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
-        """One step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach
-        the tolerance (a shorter step helps); or 'not_finite': then the step was not taken.
-
-        tau: nv numbers (N m, N); f_ext: as for `rnea`.
-        """
-    def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
-        """So many steps, with a control law that is called before each of them; ends early when one fails, with its
-        status.
-
-        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
-            efforts, then other threads run meanwhile.
-        """
+        """The inverse M⁻¹, both triangles filled."""
 
 @final
 class HyperDual:
-    """re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂, ε₁² = ε₂² = 0: a number that knows its derivatives in two directions,
-    and the second one by both.
+    """A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0: it knows its derivatives in two
+    directions, and the second derivative by both.
 
     Arrays of them are NumPy arrays of objects; arithmetic and NumPy's elementary functions work on these, and so do
     all functions of a model and a state, which then return such arrays. Comparisons look at `re`. `condyle.jacobian`,
@@ -1720,44 +1273,64 @@ class HyperDual:
 
     def __new__(cls, re: float, eps1: float = 0.0, eps2: float = 0.0, eps1eps2: float = 0.0) -> HyperDual: ...
     @property
-    def re(self) -> float:
-        """The value."""
-
-    @property
     def eps1(self) -> float:
         """The derivative in the first direction."""
+
+    @property
+    def eps1eps2(self) -> float:
+        """The second derivative by both."""
 
     @property
     def eps2(self) -> float:
         """The derivative in the second direction."""
 
     @property
-    def eps1eps2(self) -> float:
-        """The second derivative by both."""
+    def re(self) -> float:
+        """The value."""
 
-    def arctan2(self, x: HyperDual | float) -> HyperDual:
+    def __lt__(self, value: _Number, /) -> bool: ...
+    def __le__(self, value: _Number, /) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __ne__(self, value: object, /) -> bool: ...
+    def __gt__(self, value: _Number, /) -> bool: ...
+    def __ge__(self, value: _Number, /) -> bool: ...
+    def __add__(self, value: _Number, /) -> HyperDual: ...
+    def __radd__(self, value: _Number, /) -> HyperDual: ...
+    def __sub__(self, value: _Number, /) -> HyperDual: ...
+    def __rsub__(self, value: _Number, /) -> HyperDual: ...
+    def __mul__(self, value: _Number, /) -> HyperDual: ...
+    def __rmul__(self, value: _Number, /) -> HyperDual: ...
+    def __pow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
+    def __rpow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
+    def __neg__(self, /) -> HyperDual: ...
+    def __pos__(self, /) -> HyperDual: ...
+    def __abs__(self, /) -> HyperDual: ...
+    def __bool__(self, /) -> bool: ...
+    def __truediv__(self, value: _Number, /) -> HyperDual: ...
+    def __rtruediv__(self, value: _Number, /) -> HyperDual: ...
+    def arctan2(self, x: _Number) -> HyperDual:
         """The angle of the point (x, self) in the plane."""
 
-    def hypot(self, other: HyperDual | float) -> HyperDual:
-        """√(self² + other²)."""
+    def hypot(self, other: _Number) -> HyperDual:
+        """The hypotenuse √(self² + other²)."""
 
     def fabs(self) -> HyperDual:
-        """|self|."""
+        """The absolute value of self."""
 
     def sqrt(self) -> HyperDual:
-        """√self."""
+        """The square root of self."""
 
     def cbrt(self) -> HyperDual:
         """The cubic root of self."""
 
     def exp(self) -> HyperDual:
-        """e to the power of self."""
+        """The exponential of self, e to the power of self."""
 
     def exp2(self) -> HyperDual:
-        """2 to the power of self."""
+        """The power of 2 with exponent self."""
 
     def expm1(self) -> HyperDual:
-        """e to the power of self, minus 1."""
+        """The exponential of self, minus 1."""
 
     def log(self) -> HyperDual:
         """The natural logarithm of self."""
@@ -1807,30 +1380,83 @@ class HyperDual:
     def arctanh(self) -> HyperDual:
         """The number whose hyperbolic tangent is self."""
 
-    def __add__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __radd__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __sub__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __rsub__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __mul__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __rmul__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __truediv__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __rtruediv__(self, other: HyperDual | float, /) -> HyperDual: ...
-    def __pow__(self, exponent: HyperDual | float, mod: None = None, /) -> HyperDual: ...
-    def __rpow__(self, base: HyperDual | float, mod: None = None, /) -> HyperDual: ...
-    def __neg__(self) -> HyperDual: ...
-    def __pos__(self) -> HyperDual: ...
-    def __abs__(self) -> HyperDual: ...
-    def __bool__(self) -> bool: ...
-    def __lt__(self, other: HyperDual | float, /) -> bool: ...
-    def __le__(self, other: HyperDual | float, /) -> bool: ...
-    def __gt__(self, other: HyperDual | float, /) -> bool: ...
-    def __ge__(self, other: HyperDual | float, /) -> bool: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    def __ne__(self, other: object, /) -> bool: ...
+def check(inertia: Inertia) -> None:
+    """A check that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
+
+    Point masses, rods and plates are at the border, without volume, and are refused.
+
+    >>> from condyle import inertial_parameters
+    >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
+    Traceback (most recent call last):
+        ...
+    condyle.NotPhysicalError: mass is 0 kg
+    """
+
+def from_inertia(inertia: Inertia) -> _Array:
+    """The ten parameters π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
+    inertia about the origin, 10 numbers.
+
+    >>> from condyle import inertial_parameters
+    >>> I = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
+    >>> inertial_parameters.from_inertia(I)
+    array([2. , 0. , 0. , 1. , 0.6, 0. , 0.6, 0. , 0. , 0.1])
+    """
+
+def from_log_cholesky(theta: ArrayLike) -> Inertia:
+    """The `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of `log_cholesky`.
+
+    theta: 10 numbers; α within ±32 and dᵢ within ±64.
+    """
+
+def log_cholesky(inertia: Inertia) -> _Array:
+    """The log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Any ten numbers
+    are those of exactly one physical inertia.
+
+    α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). With them an identification needs no
+    constraints. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
+
+    Raises `NotPhysicalError`.
+
+    >>> from condyle import inertial_parameters
+    >>> pi = condyle.robots.arm7().inertial_parameters[:10]
+    >>> theta = inertial_parameters.log_cholesky(inertial_parameters.to_inertia(pi))
+    >>> np.allclose(inertial_parameters.from_inertia(inertial_parameters.from_log_cholesky(theta)), pi)
+    True
+    """
+
+def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
+    """The Jacobian ∂π/∂θ of the ten parameters by the log-Cholesky parameters, (10, 10), never singular.
+
+    theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the slope of the efforts in θ.
+
+    >>> from condyle import inertial_parameters
+    >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ
+    2.0
+    """
+
+def pseudo_inertia(inertia: Inertia) -> _Array:
+    """The pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and
+    kg.
+
+    Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
+    Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
+    (2018).
+
+    >>> from condyle import inertial_parameters
+    >>> J = inertial_parameters.pseudo_inertia(condyle.robots.arm7().inertias[3])
+    >>> bool(np.linalg.eigvalsh(J).min() > 0.0)
+    True
+    """
+
+def to_inertia(pi: ArrayLike) -> Inertia:
+    """The `Inertia` with the ten parameters π; the inverse of `from_inertia`.
+
+    pi: 10 numbers.
+    """
 
 @final
 class Joint:
-    """The kind of a joint, with what it needs to know.
+    """The kind of a joint, with its axis and pitch where it has them.
 
     | | q | v |
     | --- | --- | --- |
@@ -1847,218 +1473,552 @@ class Joint:
     1
     """
 
-    @staticmethod
-    def revolute(axis: ArrayLike) -> Joint:
-        """One angle about an axis: q = [θ], v = [θ̇]."""
-    @staticmethod
-    def continuous(axis: ArrayLike) -> Joint:
-        """One angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
-    @staticmethod
-    def prismatic(axis: ArrayLike) -> Joint:
-        """One length along an axis: q = [d], v = [ḋ]."""
-    @staticmethod
-    def helical(axis: ArrayLike, pitch: float) -> Joint:
-        """A screw: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
-    @staticmethod
-    def spherical() -> Joint:
-        """A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
-    @staticmethod
-    def planar() -> Joint:
-        """Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
-    @staticmethod
-    def translation() -> Joint:
-        """Three lengths: q = [x, y, z], v = q̇."""
-    @staticmethod
-    def free_flyer() -> Joint:
-        """A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame."""
-    @property
-    def nq(self) -> int:
-        """How many numbers the position has."""
-    @property
-    def nv(self) -> int:
-        """How many degrees of freedom it has: the numbers of its velocity."""
     @property
     def axis(self) -> _Array | None:
-        """The axis, 3 numbers in the body's frame, a unit vector in a model; None if the joint has none."""
+        """The axis, 3 numbers in the body's frame; a unit vector in a model. None if the joint has no axis."""
 
-@final
-class BodyId:
-    """Names a body of a builder: what `ModelBuilder.body` and others return. `WORLD` is always there."""
+    @property
+    def nq(self) -> int:
+        """The number of coordinates of its position."""
 
-@final
-class ModelBuilder:
-    """Makes a `Model`, body by body, parents first.
+    @property
+    def nv(self) -> int:
+        """The number of its degrees of freedom: of the numbers in its velocity."""
 
-    Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
-    joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
-    and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
-    the rows of f_ext count them.
+    @staticmethod
+    def revolute(axis: ArrayLike) -> Joint:
+        """A joint with one angle about an axis: q = [θ], v = [θ̇]."""
 
-    name: the robot's.
+    @staticmethod
+    def continuous(axis: ArrayLike) -> Joint:
+        """A joint with one angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
 
-    >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
-    >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
-    >>> elbow = np.eye(4)
-    >>> elbow[2, 3] = -1.0
-    >>> robot = ModelBuilder("double pendulum")
-    >>> upper = robot.body("upper", WORLD, Joint.revolute([0.0, 1.0, 0.0]), inertia=rod)
-    >>> lower = robot.body("lower", upper, Joint.revolute([0.0, 1.0, 0.0]), elbow, rod, damping=0.1)
-    >>> robot.frame("tip", lower, elbow)
-    >>> robot.build()
-    <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
+    @staticmethod
+    def prismatic(axis: ArrayLike) -> Joint:
+        """A joint with one length along an axis: q = [d], v = [ḋ]."""
+
+    @staticmethod
+    def helical(axis: ArrayLike, pitch: float) -> Joint:
+        """A screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
+
+    @staticmethod
+    def spherical() -> Joint:
+        """A ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
+
+    @staticmethod
+    def planar() -> Joint:
+        """A joint that moves in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
+
+    @staticmethod
+    def translation() -> Joint:
+        """A joint with three lengths: q = [x, y, z], v = q̇."""
+
+    @staticmethod
+    def free_flyer() -> Joint:
+        """A joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's
+        frame.
+        """
+
+def body_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
+    own frame; O(n).
+
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
-    def __new__(cls, name: str) -> ModelBuilder: ...
-    def body(
-        self,
-        name: str,
-        parent: BodyId,
-        joint: Joint,
-        placement: ArrayLike | None = None,
-        inertia: Inertia | None = None,
-        *,
-        joint_name: str | None = None,
-        position: tuple[float, float] | None = None,
-        velocity: float | None = None,
-        effort: float | None = None,
-        damping: float = 0.0,
-        friction: float = 0.0,
-        armature: float = 0.0,
-    ) -> BodyId:
-        """Adds a body and its joint.
+def body_classical_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
+    frame; O(n).
 
-        name: the body's, and the joint's unless it has a `joint_name` of its own.
-        parent: the body on which the joint sits.
-        placement: the joint's frame at position zero in the parent's frame.
-        inertia: in the body's frame, which is the joint's at position zero.
-        position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
-        velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
-        damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
-        armature: inertia of the rotor as seen at the joint (kg m², kg).
-        """
-    def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
-        """Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
-
-        Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
-        `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
-        `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
-
-        joints: a list of (joint, placement).
-        """
-    def spherical_zyx(
-        self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
-    ) -> BodyId:
-        """Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
-
-        M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
-        """
-    def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
-        """Fixes more inertia to a body, given in a frame that is at `placement` in the body's."""
-    def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
-        """Adds a frame at `placement` in the body's frame."""
-    def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
-        """Lets a joint follow another one, in place of a coordinate of its own: its position is ratio q + offset.
-
-        follower, leader: the bodies that the joints carry.
-        """
-    def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
-        """Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before
-        them.
-
-        >>> from condyle import ModelBuilder, WORLD
-        >>> two = ModelBuilder("two arms")
-        >>> for side, y in ("left_", 0.4), ("right_", -0.4):
-        ...     at = np.eye(4)
-        ...     at[1, 3] = y
-        ...     two.append(WORLD, at, condyle.robots.arm7(), side)
-        >>> two.build().nv
-        14
-        """
-    def gravity(self, gravity: ArrayLike) -> None:
-        """Sets the acceleration of free fall (m/s², 3 numbers, in the world's frame); (0, 0, −9.81) otherwise."""
-    def build(self) -> Model:
-        """Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and
-        freezes the model. The builder cannot be used any more.
-
-        Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
-        """
-
-def from_inertia(inertia: Inertia) -> _Array:
-    """π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational inertia about
-    the origin, 10 numbers.
-
-    >>> from condyle import inertial_parameters
-    >>> I = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
-    >>> inertial_parameters.from_inertia(I)
-    array([2. , 0. , 0. , 1. , 0.6, 0. , 0.6, 0. , 0. , 0.1])
+    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
-def to_inertia(pi: ArrayLike) -> Inertia:
-    """The `Inertia` with the ten parameters π; the inverse of `from_inertia`.
+def body_jacobian(
+    model: Model, data: Data, q: ArrayLike, body: str | int, reference: _Reference = "local", out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 
-    pi: 10 numbers.
-    """
+    q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
+    body's own frame.
 
-def pseudo_inertia(inertia: Inertia) -> _Array:
-    """J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and kg.
-
-    Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
-    Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
-    (2018).
-
-    >>> from condyle import inertial_parameters
-    >>> J = inertial_parameters.pseudo_inertia(condyle.robots.arm7().inertias[3])
-    >>> bool(np.linalg.eigvalsh(J).min() > 0.0)
+    >>> arm = condyle.robots.arm7()
+    >>> data, q = condyle.Data(arm), [0.3] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "link7")
+    >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
     True
     """
 
-def check(inertia: Inertia) -> None:
-    """Raises `NotPhysicalError` unless a body of positive density can have this inertia: J ≻ 0.
+def body_jacobian_rate(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
 
-    Point masses, rods and plates are at the border, without volume, and are refused.
-
-    >>> from condyle import inertial_parameters
-    >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
-    Traceback (most recent call last):
-        ...
-    condyle.NotPhysicalError: mass is 0 kg
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
-def log_cholesky(inertia: Inertia) -> _Array:
-    """θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃), the log-Cholesky parameters of a physical inertia: any ten
-    numbers, of which each tuple is another body.
+def body_velocity(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    body: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
 
-    α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). With them an identification needs no
-    constraints. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
+    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    """
 
-    Raises `NotPhysicalError`.
+def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """The pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 
-    >>> from condyle import inertial_parameters
-    >>> pi = condyle.robots.arm7().inertial_parameters[:10]
-    >>> theta = inertial_parameters.log_cholesky(inertial_parameters.to_inertia(pi))
-    >>> np.allclose(inertial_parameters.from_inertia(inertial_parameters.from_log_cholesky(theta)), pi)
+    q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
+    A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> data = condyle.Data(quadruped)
+    >>> condyle.forward_kinematics(quadruped, data, condyle.neutral(quadruped)).shape
+    (14, 4, 4)
+    """
+
+def frame_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
+    velocity as seen from the world, expressed in the reference; O(n).
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    """
+
+def frame_classical_acceleration(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the reference
+    (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the frame's
+    origin; O(n).
+
+    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "tool", "local_world_aligned")
+    >>> dJ = condyle.frame_jacobian_rate(arm, data, q, v, "tool", "local_world_aligned")
+    >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
+    >>> np.allclose(acceleration, J @ a + dJ @ v)
     True
     """
 
-def from_log_cholesky(theta: ArrayLike) -> Inertia:
-    """The `Inertia` with the log-Cholesky parameters θ, physical whatever they are; the inverse of `log_cholesky`.
+def frame_jacobian(
+    model: Model, data: Data, q: ArrayLike, frame: str | int, reference: _Reference = "local", out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 
-    theta: 10 numbers; α within ±32 and dᵢ within ±64.
+    q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
+    the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
+    origin, along the world's axes.
+
+    >>> arm = condyle.robots.arm7()
+    >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
+    (6, 7)
     """
 
-def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
-    """∂π/∂θ, (10, 10) and never singular: how the ten parameters change with the log-Cholesky parameters.
+def frame_jacobian_rate(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 
-    theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the slope of the efforts in θ.
-
-    >>> from condyle import inertial_parameters
-    >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ
-    2.0
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
+    acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
+    frame.
     """
+
+def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
+    """The pose oXf of a frame in the world: a homogeneous matrix (4, 4) that takes coordinates in the frame to coordinates
+    in the world; O(n).
+
+    q: nq numbers; frame: its name or number.
+
+    >>> arm = condyle.robots.arm7()
+    >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
+    >>> bool(tool[2, 3] > 0.5)  # stretched upwards
+    True
+    """
+
+def frame_velocity(
+    model: Model,
+    data: Data,
+    q: ArrayLike,
+    v: ArrayLike,
+    frame: str | int,
+    reference: _Reference = "local",
+    out: _Array | None = None,
+) -> _Array:
+    """The velocity of a frame, 6 numbers: that of the body's point at the origin of the reference (m/s), then the angular
+    velocity (rad/s); O(n).
+
+    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
+    >>> J = condyle.frame_jacobian(arm, data, q, "tool")
+    >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
+    True
+    """
+
+@final
+class Model:
+    """A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
+
+    Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
+    Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
+    pickled.
+
+    >>> arm = condyle.robots.arm7()
+    >>> arm.nq, arm.nv, arm.names[:3]
+    (7, 7, ['universe', 'joint1', 'joint2'])
+    """
+
+    @property
+    def armature(self) -> _Array:
+        """The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm."""
+
+    @property
+    def body_names(self) -> list[str]:
+        """The names of the links that the joints carry; 'universe' for the world."""
+
+    @property
+    def damping(self) -> _Array:
+        """The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
+        and where a `Simulation` is asked for it.
+        """
+
+    @property
+    def frames(self) -> list[Frame]:
+        """The frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the joint's
+        and the link's.
+        """
+
+    @property
+    def friction(self) -> _Array:
+        """The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and where
+        a `Simulation` is asked for it.
+        """
+
+    @property
+    def gravity(self) -> _Array:
+        """The acceleration of free fall, in the world's frame (m/s²), 3 numbers."""
+
+    @property
+    def idx_qs(self) -> list[int]:
+        """The index in q at which each joint's position begins; for a joint that mimics another, that of the other."""
+
+    @property
+    def idx_vs(self) -> list[int]:
+        """The index in v at which each joint's velocity begins; for a joint that mimics another, that of the other."""
+
+    @property
+    def inertial_parameters(self) -> _Array:
+        """The inertial parameters π, which regressors are multiplied with: ten numbers for each body but the world, 10
+        (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
+        inertia about the origin of the body's frame.
+        """
+
+    @property
+    def inertias(self) -> list[Inertia]:
+        """The inertia of each body in the body's frame, with all that fixed joints merge into it, as `Inertia`."""
+
+    @property
+    def joint_placements(self) -> _Array:
+        """The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4)."""
+
+    @property
+    def joint_types(self) -> list[str]:
+        """The kind of each joint: 'revolute', 'continuous', 'prismatic', 'helical', 'spherical', 'planar',
+        'translation' or 'free_flyer'; 'universe' for the world.
+        """
+
+    @property
+    def joints(self) -> list[Joint | None]:
+        """The joints, as `Joint`; None for the world."""
+
+    @property
+    def limits(self) -> Limits:
+        """The limits of position, velocity and effort, as `Limits`; infinite where there are none."""
+
+    @property
+    def mimics(self) -> list[Mimic | None]:
+        """The rule by which each joint follows another one, as `Mimic(ratio, offset)`; None for a joint that does not."""
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the joints, one for each body; 'universe' for the world."""
+
+    @property
+    def nbodies(self) -> int:
+        """The number of bodies, the world included: of the rows of f_ext and of the result of `forward_kinematics`."""
+
+    @property
+    def nq(self) -> int:
+        """The number of coordinates of a position q."""
+
+    @property
+    def nqs(self) -> list[int]:
+        """The number of coordinates that each joint has of its own: 0 if it mimics another joint, and 0 for the world."""
+
+    @property
+    def nv(self) -> int:
+        """The number of degrees of freedom: of the numbers in v, a, τ and in a tangent vector."""
+
+    @property
+    def nvs(self) -> list[int]:
+        """The number of degrees of freedom that each joint has of its own: 0 if it mimics another joint, and 0 for the
+        world.
+        """
+
+    @property
+    def parents(self) -> list[int]:
+        """The body on which each joint sits; 0 is the world."""
+
+    @property
+    def singular_joints(self) -> list[int]:
+        """The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`."""
+
+    @property
+    def total_mass(self) -> float:
+        """The mass of all bodies, with that of what is fixed to the world (kg)."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings: what is odd about the robot although it could be loaded.
+
+        Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
+        """
+
+    @staticmethod
+    def from_urdf(
+        path: _Path,
+        root_joint: _RootJoint | None = None,
+        mimic: bool = False,
+        strict: bool = False,
+        packages: Sequence[_Path] | None = None,
+    ) -> Model:
+        """A model from a URDF file.
+
+        Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
+
+        path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
+        root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
+            'spherical' or 'translation'; None fixes the root link to the world.
+        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
+            their own.
+        strict: whether what is only odd (`warnings`) is an error.
+        packages: folders that have packages in them, or are packages; before those that the environment names in
+            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+
+    @staticmethod
+    def from_urdf_str(
+        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
+    ) -> Model:
+        """A model from a URDF in a string; see `from_urdf`.
+
+        >>> text = condyle.robots.QUADRUPED
+        >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
+        18
+        """
+
+    @staticmethod
+    def from_mjcf(path: _Path, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
+        """A model from an MJCF file (MuJoCo) and the files that it includes.
+
+        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
+        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
+        bodies without mass, `name#1`, `name#2`, …, between them. What a tree of bodies cannot have is left out and
+        stands in `warnings`.
+
+        path: a path, as text or `os.PathLike`.
+        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being left out; its `polycoef`
+            must be linear.
+        strict: whether what is only odd, or left out (`warnings`), is an error.
+        weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and stands in
+            `warnings`, instead of being an error.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+
+    @staticmethod
+    def from_mjcf_str(text: str, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
+        """A model from an MJCF in a string, which may not include files; see `from_mjcf`.
+
+        >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
+        >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
+        2.0
+        """
+
+    @staticmethod
+    def from_sdf(path: _Path, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False) -> Model:
+        """A model from an SDF file (Gazebo) that holds one model.
+
+        Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
+        parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
+
+        path: a path, as text or `os.PathLike`.
+        root_joint: as for `from_urdf`.
+        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
+        strict: whether what is only odd, or left out (`warnings`), is an error.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`.
+        """
+
+    @staticmethod
+    def from_sdf_str(
+        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
+    ) -> Model:
+        """A model from an SDF in a string; see `from_sdf`.
+
+        >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
+        >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
+        >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
+        6
+        """
+
+    def frame(self, name: str) -> int:
+        """The number of the frame with this name: a link's, else the user's, else a joint's.
+
+        Raises `ModelError`, with the nearest name.
+        """
+
+    def joint(self, name: str) -> int:
+        """The number of the body that the joint with this name carries.
+
+        Raises `ModelError`, with the nearest name.
+        """
+
+    def with_gravity(self, gravity: ArrayLike) -> Model:
+        """The same robot under another gravity (m/s², 3 numbers, in the world's frame)."""
+
+    def with_armature(self, armature: ArrayLike) -> Model:
+        """The same robot with another armature, nv numbers (kg m², kg)."""
+
+    def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
+        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
+
+        >>> arm = condyle.robots.arm7()
+        >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
+        >>> heavier = arm.with_inertias(twice)
+        >>> heavier.total_mass == 2.0 * arm.total_mass
+        True
+        """
+
+    def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
+        """The same robot with some joints locked where they are at q.
+
+        Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
+        locked with it.
+
+        joints: a list of names or numbers of bodies.
+        q: nq numbers.
+
+        >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
+        ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
+
+        Raises `ModelError`.
+        """
+
+    def __copy__(self) -> Model:
+        """The model itself: it never changes."""
+
+    def __deepcopy__(self, memo: object) -> Model:
+        """The model itself: it never changes."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The parts of a pickle."""
+
+def _model_from_bytes(data: bytes) -> Model:
+    """The model that a pickle holds."""
+
+@final
+class Action:
+    """An action written in Python.
+
+    nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
+    calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
+        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+
+    >>> from condyle.optimal import Action, Fddp, Problem
+    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
+    >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+    >>> problem = Problem([1.0], [knot], [0] * 30, end)
+    >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
+    0.809017
+    """
+
+    def __new__(
+        cls,
+        nx: int,
+        nu: int,
+        calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
+        calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> Action: ...
 
 @final
 class Activation:
-    """How much a residual r costs.
+    """The cost a(r) of a residual r.
 
     >>> condyle.optimal.Activation.weighted([1.0, 0.0])
     Weighted([1.0, 0.0])
@@ -2066,330 +2026,244 @@ class Activation:
 
     @staticmethod
     def quadratic() -> Activation:
-        """½ Σ rᵢ²."""
+        """The quadratic cost ½ Σ rᵢ²."""
 
     @staticmethod
     def weighted(w: ArrayLike) -> Activation:
-        """½ Σ wᵢ rᵢ²."""
+        """The weighted quadratic cost ½ Σ wᵢ rᵢ²."""
 
     @staticmethod
     def barrier(lower: ArrayLike, upper: ArrayLike) -> Activation:
-        """½ Σ (excess of rᵢ over its bounds)²; infinite bounds are none."""
+        """The quadratic barrier ½ Σ (excess of rᵢ over its bounds)²; an infinite bound is no bound."""
 
     @staticmethod
     def weighted_barrier(lower: ArrayLike, upper: ArrayLike, w: ArrayLike) -> Activation:
-        """½ Σ wᵢ (excess of rᵢ over its bounds)²; Crocoddyl has the square of wᵢ in its value."""
+        """The weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl has the square of wᵢ in its
+        value.
+        """
 
     @staticmethod
     def smooth1(epsilon: float = 1.0) -> Activation:
-        """Σ √(ε + rᵢ²): nearly Σ |rᵢ|."""
+        """The smooth cost Σ √(ε + rᵢ²), nearly Σ |rᵢ|."""
 
     @staticmethod
     def smooth2(epsilon: float = 1.0) -> Activation:
-        """√(ε + ‖r‖²): nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least eigenvalue of the
-        exact one.
+        """The smooth cost √(ε + ‖r‖²), nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least
+        eigenvalue of the exact one.
         """
 
 @final
-class FrictionCone:
-    """Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: lower ≤ A f ≤ upper.
+class AugmentedLagrangian:
+    """The augmented Lagrangian method around `Fddp`, as ProxDDP's: for robots with `Limit`s and for `ConstrainedAction`s.
 
-    mu: μ; facets: the pyramid's sides; inner: whether it lies inside of the cone; rotation: the surface's axes (its
-    normal is z) along the contact's, (3, 3); least, greatest: of the normal force (N).
+    It repeats: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
+    y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 
-    >>> condyle.optimal.FrictionCone(0.5).rows()[0]
-    array([ 1. ,  0. , -0.5])
+    `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
+    ended as "infeasible" or "not_finite"; `shift` moves them on. A solution is "converged" when the residuals of
+    `outcome` are below the tolerances, and "infeasible" if the penalty reached its limit and the limits do not hold.
+    Its cost contains the terms of the limits, that of `outcome` does not; its trace and gains are those of the last
+    inner solve.
+
+    problem: the problem to solve; all memory is made for its shape, once.
+    inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
+        of the whole solve.
+    settings: any of these, by name.
+        `tolerance`: the largest distance of a limit from its bounds that is accepted.
+        `tolerance_dual`: the largest entry of the gradient of the Lagrangian that is accepted.
+        `max_solves`: the number of inner solves at most.
+        `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
+        factor by which it rises.
+
+    >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
+    >>> arm = condyle.robots.arm7()
+    >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+    >>> costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    >>> weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+    >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
+    >>> reach = Limit("reach", Residual.frame_translation(arm, "tool", [0.5, 0.1, 0.6]))  # exactly
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
+    >>> solver = AugmentedLagrangian(problem)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
+    >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
+    ('converged', True, True)
+    """
+
+    def __new__(
+        cls, problem: Problem, inner: dict[str, Any] | None = None, **settings: float
+    ) -> AugmentedLagrangian: ...
+    @property
+    def outcome(self) -> Outcome:
+        """The state of the limits after the last solve, an `Outcome`."""
+
+    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+        """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
+
+        Other threads run meanwhile.
+
+        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+
+        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+        """
+
+    def resume(self) -> Solution:
+        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+
+        Raises `ProblemError` as `solve`.
+        """
+
+    def shift(self, last: int) -> None:
+        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
+        with it.
+
+        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
+        last one is served by a model of the problem, with those that it has for all knots.
+
+        last: the index of that model.
+
+        Raises `ProblemError` if there is no such model.
+        """
+
+@final
+class ConstrainedAction:
+    """An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
+
+    To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+
+    action: the action.
+    size: the number of entries of g.
+    calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
+    calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
+        space of the state. Without it, central differences of calc.
+    lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
+
+    >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
+    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
+    >>> end = ConstrainedAction(Action(1, 0, lambda t, x, u: (None, 0.0)), 1, lambda t, x, u: x - 3.0)  # x = 3
+    >>> problem = Problem([0.0], [knot], [0] * 6, end)
+    >>> solver = AugmentedLagrangian(problem)
+    >>> solver.solve(np.zeros((7, 1)), np.zeros((6, 1))).us.round(6).ravel().tolist()
+    [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
     """
 
     def __new__(
         cls,
-        mu: float,
-        facets: int = 4,
-        inner: bool = False,
-        rotation: ArrayLike | None = None,
-        least: float = 0.0,
-        greatest: float = float("inf"),
-    ) -> FrictionCone: ...
-    def rows(self) -> _Array:
-        """A, (facets + 1, 3)."""
-
-    def bounds(self) -> tuple[_Array, _Array]:
-        """The least and greatest values of A f."""
+        action: _Action,
+        size: int,
+        calc: Callable[[int, _Array, _Array], ArrayLike],
+        calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> ConstrainedAction: ...
 
 @final
-class WrenchCone:
-    """Friction, the centre of pressure within a rectangle, and the yaw moment: lower ≤ A w ≤ upper.
+class ContactDynamics:
+    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
 
-    friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
+    model: the robot.
+    contacts: a dict of `Constraint`s by name; residuals call them by these names. May be empty.
+    dt: Δt in seconds.
+    costs: a list of `Cost`.
+    damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
+    costs_at, actuation, integrator, lower, upper, limits, limits_at: as of `FreeDynamics`.
 
-    >>> from condyle.optimal import FrictionCone, WrenchCone
-    >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
-    (17, 6)
+    Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
+    damping.
+
+    >>> from condyle.optimal import ContactDynamics
+    >>> quadruped = condyle.robots.quadruped()
+    >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
+    >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
     """
 
-    def __new__(cls, friction: FrictionCone, size: tuple[float, float] | Sequence[float]) -> WrenchCone: ...
-    def rows(self) -> _Array:
-        """A, (facets + 13, 6)."""
-
-    def bounds(self) -> tuple[_Array, _Array]:
-        """The least and greatest values of A w."""
+    def __new__(
+        cls,
+        model: Model,
+        contacts: dict[str, Constraint],
+        dt: float,
+        costs: Sequence[Cost],
+        damping: float = 0.0,
+        costs_at: dict[int, Sequence[Cost]] | None = None,
+        actuation: ArrayLike | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+        limits_at: dict[int, Sequence[Limit]] | None = None,
+    ) -> ContactDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers."""
 
 @final
 class Cost:
-    """A term of a cost: weight times an activation of a residual. The activation is quadratic unless given.
+    """A term of a cost: weight times an activation of a residual.
 
-    >>> condyle.optimal.Cost.control("effort", 1e-3, [0.0] * 7)
+    name: what `Problem.set_weight` and errors call it.
+    residual: a `Residual`.
+    activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
+        for other residuals.
+
+    >>> from condyle.optimal import Cost, Residual
+    >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
     <condyle.optimal.Cost 'effort', weight 0.001>
     """
 
-    @staticmethod
-    def state(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
-
-    @staticmethod
-    def control(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = u − reference, nu numbers."""
-
-    @staticmethod
-    def control_gravity(name: str, weight: float, activation: Activation | None = None) -> Cost:
-        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
-
-    @staticmethod
-    def joint_effort(name: str, weight: float, reference: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = τ − reference, the efforts of all joints, nv numbers."""
-
-    @staticmethod
-    def joint_acceleration(
-        name: str, weight: float, reference: ArrayLike, activation: Activation | None = None
-    ) -> Cost:
-        """r = q̈ − reference, nv numbers."""
-
-    @staticmethod
-    def center_of_mass(name: str, weight: float, target: ArrayLike, activation: Activation | None = None) -> Cost:
-        """r = c − target, 3 numbers in the world, of the centre of mass."""
-
-    @staticmethod
-    def centroidal_momentum(
-        name: str, weight: float, target: ArrayLike | None = None, activation: Activation | None = None
-    ) -> Cost:
-        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
-
-    @staticmethod
-    def frame_placement(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix."""
-
-    @staticmethod
-    def frame_translation(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = p − target, 3 numbers in the world, of the origin of a frame of the model."""
-
-    @staticmethod
-    def frame_rotation(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
-
-    @staticmethod
-    def frame_velocity(
-        name: str,
-        weight: float,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike | None = None,
-        reference: _Reference = "local",
-        activation: Activation | None = None,
-    ) -> Cost:
-        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
-        'local_world_aligned'.
-        """
-
-    @staticmethod
-    def contact_force(
-        name: str, weight: float, contact: str, target: ArrayLike | None = None, activation: Activation | None = None
-    ) -> Cost:
-        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
-
-    @staticmethod
-    def friction_cone(
-        name: str, weight: float, contact: str, cone: FrictionCone, activation: Activation | None = None
-    ) -> Cost:
-        """r = A f of a contact's force, and by default the barrier of the cone's bounds."""
-
-    @staticmethod
-    def wrench_cone(
-        name: str, weight: float, contact: str, cone: WrenchCone, activation: Activation | None = None
-    ) -> Cost:
-        """r = A w of a rigid contact's wrench, and by default the barrier of the cone's bounds."""
-
-    @staticmethod
-    def center_of_pressure(
-        name: str,
-        weight: float,
-        contact: str,
-        size: tuple[float, float] | Sequence[float],
-        rotation: ArrayLike | None = None,
-        activation: Activation | None = None,
-    ) -> Cost:
-        """Four numbers of a rigid contact that are not above 0 while the centre of pressure is inside a rectangle, and
-        by default the barrier above 0.
-
-        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
-        (3, 3).
-        """
-
-    @staticmethod
-    def impulse_center_of_mass(name: str, weight: float, activation: Activation | None = None) -> Cost:
-        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass."""
+    def __new__(cls, name: str, weight: float, residual: Residual, activation: Activation | None = None) -> Cost: ...
 
 @final
-class Limit:
-    """A residual r of a robot within bounds, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+class Fddp:
+    """The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the rules and constants of
+    Crocoddyl.
 
-    lower, upper: as many numbers as r has, infinite where there is no bound; a missing one is no bound. Without both
-    r = 0; entries where both are equal are equalities too. Limits hold at the beginning of a knot. To `Fddp` alone they
-    are costs for leaving the bounds.
+    Where controls are bounded, these are the rules of its box solvers.
 
-    >>> condyle.optimal.Limit.control("effort", [0.0] * 7, lower=[-30.0] * 7, upper=[30.0] * 7)
-    <condyle.optimal.Limit 'effort'>
+    problem: the problem to solve; all memory is made for its shape, once.
+    settings: any of these, by name.
+        `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose trials are plain rollouts.
+        `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
+        `implicit`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
+        (default: yes): the same steps in less time.
+        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
+        `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
+        there are; 1 unless given. The results differ by rounding, and not at all with the number of threads.
+        `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given. The results are
+        the same to the last bit.
+        `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
+        `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
+        the method.
     """
 
-    @staticmethod
-    def state(name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
-        """r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
+    def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
+    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+        """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
-    @staticmethod
-    def control(
-        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = u − reference, nu numbers."""
+        Other threads run meanwhile.
 
-    @staticmethod
-    def control_gravity(name: str, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
-        """r = τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still."""
+        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
 
-    @staticmethod
-    def joint_effort(
-        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = τ − reference, the efforts of all joints, nv numbers."""
-
-    @staticmethod
-    def joint_acceleration(
-        name: str, reference: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = q̈ − reference, nv numbers."""
-
-    @staticmethod
-    def center_of_mass(
-        name: str, target: ArrayLike, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = c − target, 3 numbers in the world, of the centre of mass."""
-
-    @staticmethod
-    def centroidal_momentum(
-        name: str, target: ArrayLike | None = None, lower: ArrayLike | None = None, upper: ArrayLike | None = None
-    ) -> Limit:
-        """r = h − target, 6 numbers along the world's axes, linear first, of the momentum about the centre of mass."""
-
-    @staticmethod
-    def frame_placement(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = log(target⁻¹ oMf), 6 numbers, of a frame of the model; target is a homogeneous 4 × 4 matrix."""
-
-    @staticmethod
-    def frame_translation(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = p − target, 3 numbers in the world, of the origin of a frame of the model."""
-
-    @staticmethod
-    def frame_rotation(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = log(targetᵀ R), 3 numbers, of the axes of a frame of the model; target is a 3 × 3 matrix."""
-
-    @staticmethod
-    def frame_velocity(
-        name: str,
-        model: Model,
-        frame: str | int,
-        target: ArrayLike | None = None,
-        reference: _Reference = "local",
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = v − target, 6 numbers, linear first, of a frame of the model; reference: 'local', 'world' or
-        'local_world_aligned'.
+        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
         """
 
-    @staticmethod
-    def contact_force(
-        name: str,
-        contact: str,
-        target: ArrayLike | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Limit:
-        """r = λ − target, the force or impulse of a contact along its rows' axes: 3 or 6 numbers; target has 6."""
+    def resume(self) -> Solution:
+        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
-    @staticmethod
-    def friction_cone(name: str, contact: str, cone: FrictionCone) -> Limit:
-        """r = A f of a contact's force, within the cone's bounds."""
-
-    @staticmethod
-    def wrench_cone(name: str, contact: str, cone: WrenchCone) -> Limit:
-        """r = A w of a rigid contact's wrench, within the cone's bounds."""
-
-    @staticmethod
-    def center_of_pressure(
-        name: str,
-        contact: str,
-        size: tuple[float, float] | Sequence[float],
-        rotation: ArrayLike | None = None,
-    ) -> Limit:
-        """The centre of pressure of a rigid contact inside a rectangle: four numbers not above 0.
-
-        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
-        (3, 3).
+        Raises `ProblemError` as `solve`.
         """
 
-    @staticmethod
-    def impulse_center_of_mass(name: str, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> Limit:
-        """r = J_c (v⁺ − v), 3 numbers: by how much an impact changes the velocity of the centre of mass."""
+    def shift(self, last: int) -> None:
+        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
+        with it.
+
+        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
+        last one is served by a model of the problem, with those that it has for all knots.
+
+        last: the index of that model.
+
+        Raises `ProblemError` if there is no such model.
+        """
 
 @final
 class FreeDynamics:
@@ -2428,42 +2302,31 @@ class FreeDynamics:
         """The efforts that hold the robot still at the state x, nu numbers."""
 
 @final
-class ContactDynamics:
-    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
+class FrictionCone:
+    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    model: the robot.
-    contacts: a dict of `Constraint`s by name; residuals call them by these names. May be empty.
-    dt: Δt in seconds.
-    costs: a list of `Cost`.
-    damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-    costs_at, actuation, integrator, lower, upper, limits, limits_at: as of `FreeDynamics`.
+    mu: μ; facets: the number of the pyramid's sides; inner: whether the pyramid lies inside of the cone; rotation: the
+    surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
+    default 0 and infinite.
 
-    Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
-    damping.
-
-    >>> from condyle.optimal import ContactDynamics
-    >>> quadruped = condyle.robots.quadruped()
-    >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
-    >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
+    >>> condyle.optimal.FrictionCone(0.5).rows()[0]
+    array([ 1. ,  0. , -0.5])
     """
 
     def __new__(
         cls,
-        model: Model,
-        contacts: dict[str, Constraint],
-        dt: float,
-        costs: Sequence[Cost],
-        damping: float = 0.0,
-        costs_at: dict[int, Sequence[Cost]] | None = None,
-        actuation: ArrayLike | None = None,
-        integrator: _Scheme = "semi_implicit_euler",
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-        limits: Sequence[Limit] | None = None,
-        limits_at: dict[int, Sequence[Limit]] | None = None,
-    ) -> ContactDynamics: ...
-    def quasi_static(self, x: ArrayLike) -> _Array:
-        """The smallest controls and forces that hold the robot still at the state x: nu controls of them."""
+        mu: float,
+        facets: int = 4,
+        inner: bool = False,
+        rotation: ArrayLike | None = None,
+        least: float = 0.0,
+        greatest: float = ...,
+    ) -> FrictionCone: ...
+    def rows(self) -> _Array:
+        """The matrix A, (facets + 1, 3)."""
+
+    def bounds(self) -> tuple[_Array, _Array]:
+        """The least and greatest values of A f."""
 
 @final
 class ImpulseDynamics:
@@ -2497,7 +2360,7 @@ class InverseDynamics:
 
     model: the robot.
     dt: Δt in seconds.
-    costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
+    costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
     integrator, lower, upper, limits: as of `FreeDynamics`.
 
     Raises `ProblemError` for a cost or a limit that does not fit.
@@ -2515,8 +2378,29 @@ class InverseDynamics:
     ) -> InverseDynamics: ...
 
 @final
+class Limit:
+    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+
+    Limits hold at the beginning of a knot. To `Fddp` alone they are costs for leaving the bounds.
+
+    name: what errors call it.
+    residual: a `Residual`.
+    lower, upper: as many numbers as r has, infinite where there is no bound; None is no bound. If both are None, a cone
+        or a centre of pressure has its own bounds, and any other r is 0. Entries where both are equal are equalities.
+
+    >>> from condyle.optimal import Limit, Residual
+    >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
+    <condyle.optimal.Limit 'effort'>
+    """
+
+    def __new__(
+        cls, name: str, residual: Residual, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+    ) -> Limit: ...
+
+@final
 class Lqr:
-    """Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
+    """An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
+    u ≤ upper.
 
     A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
     bound; without R and B it has no controls, as at a terminal knot.
@@ -2540,66 +2424,6 @@ class Lqr:
     ) -> Lqr: ...
 
 @final
-class Action:
-    """An action written in Python.
-
-    nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
-    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
-        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
-    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-
-    >>> from condyle.optimal import Action, Fddp, Problem
-    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
-    >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
-    >>> problem = Problem([1.0], [knot], [0] * 30, end)
-    >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
-    0.809017
-    """
-
-    def __new__(
-        cls,
-        nx: int,
-        nu: int,
-        calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
-        calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> Action: ...
-
-@final
-class ConstrainedAction:
-    """An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
-
-    To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
-
-    action: the action.
-    size: how many numbers g has.
-    calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
-    calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
-        space of the state. Without it, central differences of calc.
-    lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
-
-    >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
-    >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
-    >>> end = ConstrainedAction(Action(1, 0, lambda t, x, u: (None, 0.0)), 1, lambda t, x, u: x - 3.0)  # x = 3
-    >>> problem = Problem([0.0], [knot], [0] * 6, end)
-    >>> solver = AugmentedLagrangian(problem)
-    >>> solver.solve(np.zeros((7, 1)), np.zeros((6, 1))).us.round(6).ravel().tolist()
-    [0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
-    """
-
-    def __new__(
-        cls,
-        action: _Action,
-        size: int,
-        calc: Callable[[int, _Array, _Array], ArrayLike],
-        calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-    ) -> ConstrainedAction: ...
-
-@final
 class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
@@ -2612,13 +2436,11 @@ class Problem:
     Raises `ProblemError` if they do not fit together.
     """
 
-    def __new__(
-        cls,
-        x0: ArrayLike,
-        models: Sequence[_Action],
-        stages: Sequence[int],
-        terminal: _Action,
-    ) -> Problem: ...
+    def __new__(cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int], terminal: _Action) -> Problem: ...
+    @property
+    def horizon(self) -> int:
+        """The number of knots before the terminal one, N."""
+
     @staticmethod
     def from_json(text: str) -> Problem:
         """A problem of a robot from the text that `to_json` gave.
@@ -2627,15 +2449,12 @@ class Problem:
         """
 
     def to_json(self) -> str:
-        """The problem and its robot as JSON, with the present initial state, weights and stages; no bound is null.
+        """The problem and its robot as JSON, with the present initial state, weights and stages. An infinite bound is
+        null.
 
         Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
         robots.
         """
-
-    @property
-    def horizon(self) -> int:
-        """The number of knots before the terminal one, N."""
 
     def set_x0(self, x0: ArrayLike) -> None:
         """Sets the initial state, nx numbers, as an MPC does before each solve.
@@ -2657,6 +2476,7 @@ class Problem:
 
         Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
         """
+
     def rollout(self, us: _Controls) -> _Array:
         """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
@@ -2664,110 +2484,250 @@ class Problem:
         """
 
 @final
-class Fddp:
-    """Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+class Residual:
+    """A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 
-    Where controls are bounded, these are those of its box solvers.
+    A frame is given by its name or number, a contact by the name that it has in `ContactDynamics` or `ImpulseDynamics`.
+    A target that is not given is zero, a rotation the identity.
 
-    problem: what is solved; the solver allocates for its shape once.
-    settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
-        `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP);
-        `implicit`, whether robots' knots come to the sweep as equations of inverse dynamics where that is possible
-        (default: yes; the same steps in less time); and
-        any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
-        `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
-        `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit"),
-        `segments` (of the horizon on which a sweep works at the same time, in as many threads as there are; 1 unless
-        given, for one thread. Results are the same but for rounding, and to the last bit for any number of threads),
-        `threads` (on which derivatives of a robot are computed, 1 unless given; the same to the last bit).
+    >>> from condyle.optimal import Residual
+    >>> Residual.center_of_mass([0.4, 0.2, 0.5])
+    <condyle.optimal.Residual {"center_of_mass":{"target":{"x":0.4,"y":0.2,"z":0.5}}}>
     """
 
-    def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
-    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
-        """Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
+    @staticmethod
+    def state(reference: ArrayLike) -> Residual:
+        """The deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
 
-        xs: states, (N + 1, nx); they need not satisfy the dynamics.
-        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+    @staticmethod
+    def control(reference: ArrayLike) -> Residual:
+        """The deviation of the controls from a reference, r = u − reference, nu numbers."""
 
-        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises. How the solve
-        ended is the solution's status.
+    @staticmethod
+    def control_gravity() -> Residual:
+        """The efforts and forces beyond those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers."""
+
+    @staticmethod
+    def joint_effort(reference: ArrayLike) -> Residual:
+        """The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
+
+    @staticmethod
+    def joint_acceleration(reference: ArrayLike) -> Residual:
+        """The deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers."""
+
+    @staticmethod
+    def center_of_mass(target: ArrayLike) -> Residual:
+        """The deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m)."""
+
+    @staticmethod
+    def centroidal_momentum(target: ArrayLike | None = None) -> Residual:
+        """The deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along the
+        world's axes, linear first.
         """
-    def resume(self) -> Solution:
-        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
-        Raises `ProblemError` as `solve`.
+    @staticmethod
+    def frame_placement(model: Model, frame: str | int, target: ArrayLike) -> Residual:
+        """The deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is a
+        homogeneous 4 × 4 matrix.
         """
-    def shift(self, last: int) -> None:
-        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
 
-        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the last one
-        is served by a model of the problem, with those that it has for all knots.
+    @staticmethod
+    def frame_translation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
+        """The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m)."""
 
-        last: the index of that model.
+    @staticmethod
+    def frame_rotation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
+        """The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix."""
 
-        Raises `ProblemError` if there is no such model.
+    @staticmethod
+    def frame_velocity(
+        model: Model, frame: str | int, target: ArrayLike | None = None, reference: ArrayLike = "local"
+    ) -> Residual:
+        """The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
+        'world' or 'local_world_aligned'.
         """
+
+    @staticmethod
+    def contact_force(contact: str, target: ArrayLike | None = None) -> Residual:
+        """The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
+        numbers; target has 6.
+        """
+
+    @staticmethod
+    def friction_cone(contact: str, cone: FrictionCone) -> Residual:
+        """The rows r = A f of a friction cone, for a contact's force f."""
+
+    @staticmethod
+    def wrench_cone(contact: str, cone: WrenchCone) -> Residual:
+        """The rows r = A w of a wrench cone, for a rigid contact's wrench w."""
+
+    @staticmethod
+    def center_of_pressure(contact: str, size: _Size, rotation: ArrayLike | None = None) -> Residual:
+        """The centre of pressure of a rigid contact in a rectangle: four numbers, none above 0 while it is inside.
+
+        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
+        (3, 3).
+        """
+
+    @staticmethod
+    def impulse_center_of_mass() -> Residual:
+        """The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
 
 @final
-class AugmentedLagrangian:
-    """The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s and for
-    `ConstrainedAction`s.
+class WrenchCone:
+    """The wrench cone of a rectangular sole: friction, centre of pressure within the rectangle, and yaw moment, lower ≤ A
+    w ≤ upper.
 
-    repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
-    y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
+    friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 
-    problem: what is solved; the solver allocates for its shape once.
-    inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen, `time_budget` is for all.
-    settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
-        gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
-        `penalty_max`, `penalty_factor` (by which it rises).
+    >>> from condyle.optimal import FrictionCone, WrenchCone
+    >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
+    (17, 6)
+    """
 
-    >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem
+    def __new__(cls, friction: FrictionCone, size: _Size) -> WrenchCone: ...
+    def rows(self) -> _Array:
+        """The matrix A, (facets + 13, 6)."""
+
+    def bounds(self) -> tuple[_Array, _Array]:
+        """The least and greatest values of A w."""
+
+def joint_torque_regressor(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
+    `Model.inertial_parameters`; O(n depth).
+
+    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
+
     >>> arm = condyle.robots.arm7()
-    >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
-    >>> costs = [Cost.state("rest", 1e-1, x0), Cost.control("effort", 1e-3, np.zeros(7))]
-    >>> weak = Limit.control("weak", np.zeros(7), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
-    >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
-    >>> reach = Limit.frame_translation("reach", arm, "tool", [0.5, 0.1, 0.6])  # exactly
-    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
-    >>> solver = AugmentedLagrangian(problem)
-    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
-    >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
-    ('converged', True, True)
+    >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
+    >>> Y = condyle.joint_torque_regressor(arm, data, q, v, a)
+    >>> np.allclose(Y @ arm.inertial_parameters, condyle.rnea(arm, data, q, v, a))
+    True
+    """
+
+def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+    """The kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without the
+    rotors, as a linear function of `Model.inertial_parameters`; O(n).
+
+    q: nq numbers; v: nv.
+    """
+
+def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
+    """The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
+    O(n).
+
+    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function adds
+    them: add them to τ where they should act.
+
+    >>> arm = condyle.robots.arm7()
+    >>> v = np.ones(7)
+    >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
+    True
+    """
+
+def passive_torque_derivative(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
+    """The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
+    other entries; O(n).
+
+    v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
+    """
+
+def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
+    """The potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a linear
+    function of `Model.inertial_parameters`; O(n).
+
+    q: nq numbers.
+    """
+
+def arm7() -> Model:
+    """A seven-axis arm with a fixed base, nq = nv = 7; its last frame is `tool`.
+
+    >>> condyle.robots.arm7()
+    <condyle.Model 'arm7': 7 bodies, nq = 7, nv = 7>
+    """
+
+def humanoid() -> Model:
+    """A humanoid of thirty-two joints on a free-flyer, nq = 39, nv = 38, with soles `left_sole`, `right_sole`.
+
+    >>> condyle.robots.humanoid()
+    <condyle.Model 'humanoid': 33 bodies, nq = 39, nv = 38>
+    """
+
+def quadruped() -> Model:
+    """A quadruped of twelve joints on a free-flyer, nq = 19, nv = 18, with point feet `LF_foot`, `LH_foot`, `RF_foot`,
+    `RH_foot`.
+
+    >>> condyle.robots.quadruped()
+    <condyle.Model 'quadruped': 13 bodies, nq = 19, nv = 18>
+    """
+
+@final
+class Simulation:
+    """A simulation of a robot: its state, and the memory to move it on.
+
+    Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
+    external forces stay as they are during a step.
+
+    model: the robot; it stands still at `neutral`, at time 0.
+    integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
+        whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
+        is conserved to rounding.
+    dt: h, the length of a step (s).
+    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
+        none of either.
+    tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
+    max_iterations: it gives up after so many iterations.
+
+    Raises `ModelError` if M is singular.
+
+    >>> from condyle.simulation import Simulation
+    >>> quadruped = condyle.robots.quadruped()
+    >>> simulation = Simulation(quadruped, dt=1e-3)
+    >>> def damper(now):
+    ...     now.tau[8] = -0.5 * now.v[8]
+    >>> simulation.run(100, damper)
+    'done'
+    >>> bool(abs(simulation.q[2] + 0.5 * 9.81 * 0.1**2) < 2e-3)  # it has fallen ½ g t²
+    True
     """
 
     def __new__(
-        cls, problem: Problem, inner: dict[str, Any] | None = None, **settings: float
-    ) -> AugmentedLagrangian: ...
-    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
-        """Solves the problem from a warm start and multipliers of zero, and returns a `Solution`. Other threads run
-        meanwhile.
-
-        Its status is "converged" when the residuals of `outcome` are below the tolerances, and "infeasible" if the
-        penalty reached its limit and the limits do not hold. Its cost contains the terms of the limits, that of
-        `outcome` does not; its trace and gains are those of the last inner solve.
-
-        xs: states, (N + 1, nx); they need not satisfy the dynamics.
-        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
-
-        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
-        """
-    def resume(self) -> Solution:
-        """Solves the problem from the last solution, its multipliers and its penalty; returns a `Solution`.
-
-        The initial state may be another one, or the problem be shifted. After a solve that ended as "infeasible" or
-        "not_finite" the multipliers are zero.
-
-        Raises `ProblemError` as `solve`.
-        """
-    def shift(self, last: int) -> None:
-        """Moves the horizon of the problem on by a knot, and the last solution with its multipliers, as `Fddp.shift`.
-
-        last: the index of the model that serves the last knot.
-
-        Raises `ProblemError` if there is no such model.
-        """
+        cls,
+        model: Model,
+        integrator: _Integrator = "semi_implicit_euler",
+        dt: float = 0.001,
+        passive: float | None = None,
+        tolerance: float = 1e-09,
+        max_iterations: int = 20,
+    ) -> Simulation: ...
     @property
-    def outcome(self) -> Outcome:
-        """What the last solve says of the limits, an `Outcome`."""
+    def q(self) -> _Array:
+        """The position, nq numbers."""
+
+    @property
+    def time(self) -> float:
+        """The time since the state was set: the sum of the steps (s)."""
+
+    @property
+    def v(self) -> _Array:
+        """The velocity, nv numbers."""
+
+    def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
+        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0."""
+
+    def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
+        """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
+        tolerance (a shorter step helps); or 'not_finite', and then the step was not taken.
+
+        tau: nv numbers (N m, N); f_ext: as for `rnea`.
+        """
+
+    def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
+        """A number of steps, with a control law that is called before each of them. Returns the status of the last step,
+        and ends early when a step fails.
+
+        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
+            efforts, then other threads run meanwhile.
+        """

@@ -12,7 +12,7 @@ Function = Callable[[NDArray[Any]], Any]
 
 
 def _state(model: Model, x: ArrayLike) -> tuple[NDArray[np.float64], int]:
-    """The numbers of a state, and how many directions it has."""
+    """The numbers of a state, and the number of its directions."""
     numbers = np.asarray(x, dtype=np.float64)
     if numbers.ndim != 1 or len(numbers) < model.nq:
         raise ValueError(f"x: expected a vector of at least {model.nq} numbers, found shape {numbers.shape}")
@@ -20,13 +20,13 @@ def _state(model: Model, x: ArrayLike) -> tuple[NDArray[np.float64], int]:
 
 
 def _moved(model: Model, x: NDArray[np.float64], delta: NDArray[Any]) -> NDArray[Any]:
-    """x ⊕ δ, on numbers that know the directions of δ."""
+    """The sum x ⊕ δ, of numbers that know the directions of δ."""
     q, others = x[: model.nq], x[model.nq :]
     return np.concatenate([integrate(model, q, delta[: model.nv]), others + delta[model.nv :]])
 
 
 def _directions(n: int, first: int | None, second: int | None) -> NDArray[Any]:
-    """δ = 0, whose first and second infinitesimal change are those of so many of its entries."""
+    """The change δ = 0 of n entries, one of which has the first infinitesimal part, and one the second."""
     return np.array([HyperDual(0.0, eps1=float(k == first), eps2=float(k == second)) for k in range(n)], dtype=object)
 
 
@@ -35,7 +35,7 @@ def _number(value: Any) -> HyperDual:
 
 
 def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ, exact, as `(value, J)`: m numbers, and (m, nv + others).
+    """The value f(x) and the Jacobian ∂f(x ⊕ δ)/∂δ, exact, as `(value, J)`: m numbers, and (m, nv + others).
 
     x: a position of nq numbers, then any others, of which only the position moves by `integrate`. f takes an array like
     x, of `HyperDual`s, and returns a vector; it is called once for every two directions.
@@ -59,7 +59,7 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
 
 
 def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64]]:
-    """f(x) and its gradient ∂f(x ⊕ δ)/∂δ, exact, as `(value, gradient)`: a number, and nv + others.
+    """The value f(x) and the gradient ∂f(x ⊕ δ)/∂δ, exact, as `(value, gradient)`: a number, and nv + others.
 
     x: as for `jacobian`. f returns a number; it is called once for every two directions.
 
@@ -74,7 +74,7 @@ def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np
 
 
 def hessian(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """f(x), its gradient and its Hessian ∂²f(x ⊕ δ)/∂δ∂δ, exact, as `(value, gradient, H)`.
+    """The value f(x), the gradient and the Hessian ∂²f(x ⊕ δ)/∂δ∂δ, exact, as `(value, gradient, H)`.
 
     x: as for `jacobian`. f returns a number; it is called once for every pair of directions, n (n + 1)/2 times.
 

@@ -1,213 +1,212 @@
-"""What functions return when it is more than an array: named tuples."""
+"""The results of functions that are more than an array, and some arguments: named tuples."""
 
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+_Array: TypeAlias = NDArray[np.float64]
 
 
 class RneaDerivatives(NamedTuple):
     """The derivatives of τ = rnea(q, v, a), each (nv, nv)."""
 
-    dtau_dq: NDArray[np.float64]
+    dtau_dq: _Array
     """∂τ/∂q in the tangent space: the change of τ when q moves to integrate(q, δ), per δ."""
-    dtau_dv: NDArray[np.float64]
+    dtau_dv: _Array
     """∂τ/∂v."""
-    dtau_da: NDArray[np.float64]
+    dtau_da: _Array
     """∂τ/∂a = M(q), armature included."""
 
 
 class AbaDerivatives(NamedTuple):
     """q̈ = aba(q, v, τ) and its derivatives, each (nv, nv)."""
 
-    a: NDArray[np.float64]
+    a: _Array
     """q̈ itself, nv numbers."""
-    da_dq: NDArray[np.float64]
+    da_dq: _Array
     """∂q̈/∂q in the tangent space: the change of q̈ when q moves to integrate(q, δ), per δ."""
-    da_dv: NDArray[np.float64]
+    da_dv: _Array
     """∂q̈/∂v."""
-    da_dtau: NDArray[np.float64]
+    da_dtau: _Array
     """∂q̈/∂τ = M(q)⁻¹."""
 
 
 class RneaHessian(NamedTuple):
     """The Hessian of λᵀ rnea(q, v, a), each block (nv, nv)."""
 
-    dqdq: NDArray[np.float64]
-    """By q and q, symmetric."""
-    dvdq: NDArray[np.float64]
-    """By v and q: entry [j, k] by v_j and q_k."""
-    dvdv: NDArray[np.float64]
-    """By v and v, symmetric."""
-    dadq: NDArray[np.float64]
-    """By a and q: entry [j, k] by a_j and q_k."""
+    dqdq: _Array
+    """The block by q and q, symmetric."""
+    dvdq: _Array
+    """The block by v and q: entry [j, k] by v_j and q_k."""
+    dvdv: _Array
+    """The block by v and v, symmetric."""
+    dadq: _Array
+    """The block by a and q: entry [j, k] by a_j and q_k."""
 
 
 class AbaHessian(NamedTuple):
     """The Hessian of λᵀ aba(q, v, τ), each block (nv, nv)."""
 
-    dqdq: NDArray[np.float64]
-    """By q and q, symmetric."""
-    dvdq: NDArray[np.float64]
-    """By v and q: entry [j, k] by v_j and q_k."""
-    dvdv: NDArray[np.float64]
-    """By v and v, symmetric."""
-    dtaudq: NDArray[np.float64]
-    """By τ and q: entry [j, k] by τ_j and q_k."""
+    dqdq: _Array
+    """The block by q and q, symmetric."""
+    dvdq: _Array
+    """The block by v and q: entry [j, k] by v_j and q_k."""
+    dvdv: _Array
+    """The block by v and v, symmetric."""
+    dtaudq: _Array
+    """The block by τ and q: entry [j, k] by τ_j and q_k."""
 
 
 class RneaSecondDerivatives(NamedTuple):
     """The second derivatives of τ = rnea(q, v, a), each (nv, nv, nv): member[i] is a block of the Hessian of τ_i."""
 
-    dqdq: NDArray[np.float64]
-    """By q and q."""
-    dvdq: NDArray[np.float64]
-    """By v and q: entry [i, j, k] by v_j and q_k."""
-    dvdv: NDArray[np.float64]
-    """By v and v."""
-    dadq: NDArray[np.float64]
-    """By a and q: entry [i, j, k] by a_j and q_k."""
+    dqdq: _Array
+    """The blocks by q and q."""
+    dvdq: _Array
+    """The blocks by v and q: entry [i, j, k] by v_j and q_k."""
+    dvdv: _Array
+    """The blocks by v and v."""
+    dadq: _Array
+    """The blocks by a and q: entry [i, j, k] by a_j and q_k."""
 
 
 class CentroidalDerivatives(NamedTuple):
     """The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c; axes of the world."""
 
-    dh_dq: NDArray[np.float64]
+    dh_dq: _Array
     """∂hg/∂q, (6, nv), linear rows first."""
-    dh_dv: NDArray[np.float64]
+    dh_dv: _Array
     """∂hg/∂v = Ag, (6, nv)."""
-    drate_dq: NDArray[np.float64]
+    drate_dq: _Array
     """∂dhg/∂q, (6, nv)."""
-    drate_dv: NDArray[np.float64]
+    drate_dv: _Array
     """∂dhg/∂v, (6, nv)."""
-    drate_da: NDArray[np.float64]
+    drate_da: _Array
     """∂dhg/∂a = Ag, (6, nv)."""
-    dcom_dq: NDArray[np.float64]
+    dcom_dq: _Array
     """∂c/∂q = ∂ċ/∂v = ∂c̈/∂a, (3, nv)."""
-    dvcom_dq: NDArray[np.float64]
+    dvcom_dq: _Array
     """∂ċ/∂q, (3, nv)."""
-    dacom_dq: NDArray[np.float64]
+    dacom_dq: _Array
     """∂c̈/∂q, (3, nv)."""
-    dacom_dv: NDArray[np.float64]
+    dacom_dv: _Array
     """∂c̈/∂v, (3, nv)."""
 
 
 class EnergyDerivatives(NamedTuple):
     """The derivatives of kinetic energy T and potential energy V, nv numbers each."""
 
-    dT_dq: NDArray[np.float64]  # noqa: N815
+    dT_dq: _Array  # noqa: N815
     """∂T/∂q."""
-    dT_dv: NDArray[np.float64]  # noqa: N815
+    dT_dv: _Array  # noqa: N815
     """∂T/∂v = M v, the generalised momentum."""
-    dV_dq: NDArray[np.float64]  # noqa: N815
+    dV_dq: _Array  # noqa: N815
     """∂V/∂q = g(q)."""
 
 
 class CoriolisDerivatives(NamedTuple):
     """The derivatives of C(q, v) v, each (nv, nv)."""
 
-    dq: NDArray[np.float64]
-    """By q."""
-    dv: NDArray[np.float64]
-    """By v."""
+    dq: _Array
+    """The derivative by q."""
+    dv: _Array
+    """The derivative by v."""
 
 
 class Constrained(NamedTuple):
-    """What `constrained_dynamics` gives."""
+    """The result of `constrained_dynamics`."""
 
-    a: NDArray[np.float64]
+    a: _Array
     """q̈, nv numbers (rad/s², m/s²)."""
-    lambda_: NDArray[np.float64]
+    lambda_: _Array
     """λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m)."""
     residual: float
     """The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied."""
     redundant: float
-    """How many rows of J depend on rows before them, up to rounding: they have no force of their own."""
+    """The number of rows of J that depend on rows before them, up to rounding: they have no force of their own."""
 
 
 class ConstrainedDerivatives(NamedTuple):
-    """What `constrained_dynamics_derivatives` gives; ∂/∂q is taken in the tangent space."""
+    """The result of `constrained_dynamics_derivatives`: that of `constrained_dynamics` and its derivatives.
 
-    a: NDArray[np.float64]
-    """q̈ itself, nv numbers."""
-    lambda_: NDArray[np.float64]
-    """λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m)."""
+    ∂/∂q is taken in the tangent space.
+    """
+
+    a: _Array
+    lambda_: _Array
     residual: float
-    """The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied."""
     redundant: float
-    """How many rows of J depend on rows before them, up to rounding: they have no force of their own."""
-    da_dq: NDArray[np.float64]
+    da_dq: _Array
     """∂q̈/∂q, (nv, nv)."""
-    da_dv: NDArray[np.float64]
+    da_dv: _Array
     """∂q̈/∂v, (nv, nv)."""
-    da_dtau: NDArray[np.float64]
+    da_dtau: _Array
     """∂q̈/∂τ, (nv, nv), symmetric."""
-    dlambda_dq: NDArray[np.float64]
+    dlambda_dq: _Array
     """∂λ/∂q, (rows, nv)."""
-    dlambda_dv: NDArray[np.float64]
+    dlambda_dv: _Array
     """∂λ/∂v, (rows, nv)."""
-    dlambda_dtau: NDArray[np.float64]
+    dlambda_dtau: _Array
     """∂λ/∂τ, (rows, nv)."""
-    inertia: NDArray[np.float64]
+    inertia: _Array
     """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia that the robot shows to its constraints."""
 
 
 class ConstrainedEquations(NamedTuple):
-    """What `constrained_dynamics_equations` gives; ∂/∂q is taken in the tangent space."""
+    """The result of `constrained_dynamics_equations`: that of `constrained_dynamics`, and its equations.
 
-    a: NDArray[np.float64]
-    """q̈ itself, nv numbers."""
-    lambda_: NDArray[np.float64]
-    """λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m)."""
+    ∂/∂q is taken in the tangent space.
+    """
+
+    a: _Array
+    lambda_: _Array
     residual: float
-    """The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied."""
     redundant: float
-    """How many rows of J depend on rows before them, up to rounding: they have no force of their own."""
-    M: NDArray[np.float64]
+    M: _Array
     """M, (nv, nv), armature included."""
-    dtau_dq: NDArray[np.float64]
+    dtau_dq: _Array
     """∂(M q̈ + h − Jᵀ λ)/∂q, (nv, nv)."""
-    dtau_dv: NDArray[np.float64]
+    dtau_dv: _Array
     """∂h/∂v, (nv, nv)."""
-    dgamma_dq: NDArray[np.float64]
+    dgamma_dq: _Array
     """∂(J q̈ + γ)/∂q, (rows, nv)."""
-    dgamma_dv: NDArray[np.float64]
+    dgamma_dv: _Array
     """∂γ/∂v, (rows, nv)."""
 
 
 class Impulse(NamedTuple):
-    """What `impulse_dynamics` gives."""
+    """The result of `impulse_dynamics`."""
 
-    v: NDArray[np.float64]
+    v: _Array
     """v⁺, the velocity after the impact, nv numbers (rad/s, m/s)."""
-    lambda_: NDArray[np.float64]
+    lambda_: _Array
     """Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s)."""
     residual: float
     """The largest number in J (v⁺ + ε v) (m/s, rad/s)."""
     redundant: float
-    """How many rows of J depend on rows before them, up to rounding: they have no force of their own."""
+    """The number of rows of J that depend on rows before them, up to rounding: they have no force of their own."""
 
 
 class ImpulseDerivatives(NamedTuple):
-    """What `impulse_dynamics_derivatives` gives; ∂/∂q is taken in the tangent space."""
+    """The result of `impulse_dynamics_derivatives`: that of `impulse_dynamics` and its derivatives.
 
-    v: NDArray[np.float64]
-    """v⁺ itself, nv numbers."""
-    lambda_: NDArray[np.float64]
-    """Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s)."""
+    ∂/∂q is taken in the tangent space.
+    """
+
+    v: _Array
+    lambda_: _Array
     residual: float
-    """The largest number in J (v⁺ + ε v) (m/s, rad/s)."""
     redundant: float
-    """How many rows of J depend on rows before them, up to rounding: they have no force of their own."""
-    dv_dq: NDArray[np.float64]
+    dv_dq: _Array
     """∂v⁺/∂q, (nv, nv)."""
-    dv_dv: NDArray[np.float64]
+    dv_dv: _Array
     """∂v⁺/∂v, (nv, nv)."""
-    dlambda_dq: NDArray[np.float64]
+    dlambda_dq: _Array
     """∂Λ/∂q, (rows, nv)."""
-    dlambda_dv: NDArray[np.float64]
+    dlambda_dv: _Array
     """∂Λ/∂v, (rows, nv)."""
-    inertia: NDArray[np.float64]
+    inertia: _Array
     """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia that the robot shows to its constraints."""
 
 
@@ -223,15 +222,15 @@ class Constraint(NamedTuple):
     frame: str | int
     """The frame that is held."""
     kind: Literal["point", "rigid"]
-    """Its origin, three rows; or the whole frame, six rows, linear first."""
+    """What is held: the frame's origin, three rows; or the whole frame, six rows, linear first."""
     other: str | int | None = None
-    """The frame that it is held to; the world if there is none."""
+    """The frame to which it is held; None is the world."""
     reference: Literal["local", "local_world_aligned"] = "local"
-    """Along which axes rows and forces are: the frame's or the world's."""
+    """The axes of rows and forces: the frame's or the world's."""
     kp: float = 0.0
-    """How fast an error of position decays (1/s²)."""
+    """The gain of an error of position (1/s²)."""
     kd: float = 0.0
-    """How fast an error of velocity decays (1/s)."""
+    """The gain of an error of velocity (1/s)."""
     placement: ArrayLike | None = None
     """The wanted pose of the frame in the other frame, (4, 4); of a point, the translation alone."""
     velocity: ArrayLike | None = None
@@ -241,43 +240,43 @@ class Constraint(NamedTuple):
 
 
 class CentroidalMap(NamedTuple):
-    """What depends on the position in hg = Ag(q) v; the axes are the world's."""
+    """The parts of hg = Ag(q) v that depend on the position; the axes are the world's."""
 
-    Ag: NDArray[np.float64]
+    Ag: _Array
     """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
-    Ig: NDArray[np.float64]
+    Ig: _Array
     """The inertia of all moving bodies about their centre of mass, as if they were one, (6, 6): [m 1, 0; 0, Ī]."""
-    com: NDArray[np.float64]
+    com: _Array
     """c, the centre of mass in the world's frame (m), 3 numbers."""
-    Jcom: NDArray[np.float64]
+    Jcom: _Array
     """The Jacobian of c, (3, nv): ċ = Jcom v."""
 
 
 class CentroidalMapRate(NamedTuple):
-    """hg = Ag(q) v, and what its rate Ag a + dAg v depends on; the axes are the world's."""
+    """The centroidal momentum hg = Ag(q) v and the parts of its rate Ag a + dAg v; the axes are the world's."""
 
-    Ag: NDArray[np.float64]
+    Ag: _Array
     """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
-    dAg: NDArray[np.float64]  # noqa: N815
+    dAg: _Array  # noqa: N815
     """dAg/dt along the velocity, (6, nv)."""
-    hg: NDArray[np.float64]
+    hg: _Array
     """The momentum about the centre of mass, along the axes of the world (kg m/s, kg m²/s), 6 numbers."""
-    Ig: NDArray[np.float64]
+    Ig: _Array
     """The inertia of all moving bodies about their centre of mass, as if they were one, (6, 6): [m 1, 0; 0, Ī]."""
-    com: NDArray[np.float64]
+    com: _Array
     """c, the centre of mass in the world's frame (m), 3 numbers."""
-    com_velocity: NDArray[np.float64]
+    com_velocity: _Array
     """ċ, its velocity (m/s), 3 numbers."""
-    Jcom: NDArray[np.float64]
+    Jcom: _Array
     """The Jacobian of c, (3, nv): ċ = Jcom v."""
 
 
 class AllTerms(NamedTuple):
-    """What the equations of motion M a + h = τ are made of, momentum and energies."""
+    """The terms of the equations of motion M a + h = τ, momentum and energies."""
 
-    M: NDArray[np.float64]
+    M: _Array
     """M(q), (nv, nv), as of `crba`."""
-    h: NDArray[np.float64]
+    h: _Array
     """h(q, v), nv numbers, as of `nonlinear_effects`."""
     centroidal: CentroidalMapRate
     """Momentum, its map and the map's rate, centre of mass, as of `centroidal_map_rate`."""
@@ -293,10 +292,10 @@ class Frame(NamedTuple):
     name: str
     """The name of the link or joint."""
     kind: Literal["link", "joint", "user"]
-    """Where it comes from."""
+    """The source of the frame."""
     body: int
     """The body to which it is fixed; 0 is the world."""
-    placement: NDArray[np.float64]
+    placement: _Array
     """Its pose in the body's frame, a homogeneous (4, 4) matrix."""
 
 
@@ -304,13 +303,13 @@ class Inertia(NamedTuple):
     """The inertia of a body, along the axes of its frame."""
 
     mass: float
-    """Mass (kg)."""
-    com: NDArray[np.float64]
-    """Centre of mass in the body's frame (m), 3 numbers; zeros if there is no mass."""
-    about_com: NDArray[np.float64]
-    """Rotational inertia about the centre of mass (kg m²), (3, 3): what a URDF gives."""
-    rotational: NDArray[np.float64]
-    """Rotational inertia about the origin of the body's frame (kg m²), (3, 3): of the two, the one that is read."""
+    """The mass (kg)."""
+    com: _Array
+    """The centre of mass in the body's frame (m), 3 numbers; zeros if there is no mass."""
+    about_com: _Array
+    """The rotational inertia about the centre of mass (kg m²), (3, 3), as a URDF gives it."""
+    rotational: _Array
+    """The rotational inertia about the origin of the body's frame (kg m²), (3, 3): of the two, the one that is read."""
 
     @classmethod
     def from_com(cls, mass: float, com: ArrayLike, about_com: ArrayLike) -> "Inertia":
@@ -329,62 +328,46 @@ class Inertia(NamedTuple):
 
 
 class AssemblySize(NamedTuple):
-    """What the assembly of a `DivideConquer` costs, counted."""
+    """The work of the assembly of a `DivideConquer`, counted."""
 
     bodies: int
-    """Moving bodies: each is eliminated once."""
+    """The number of moving bodies: each is eliminated once."""
     runs: int
-    """Pieces within which bodies are eliminated one after the other."""
+    """The number of pieces within which bodies are eliminated one after the other."""
     longest_run: int
-    """Bodies in the largest of them."""
+    """The number of bodies in the largest of them."""
     joins: int
-    """Pairs of pieces that are joined, one below the other."""
+    """The number of pairs of pieces that are joined, one below the other."""
     gathers: int
-    """Pairs of pieces that are added up, both on one body."""
+    """The number of pairs of pieces that are added up, both on one body."""
     levels: int
-    """How many pieces, from a run to the whole, wait for one another."""
+    """The number of pieces, from a run to the whole, that wait for one another."""
 
 
 class Limits(NamedTuple):
     """Limits of position, velocity and effort; infinite where there are none."""
 
-    lower: NDArray[np.float64]
+    lower: _Array
     """Least position (rad, m), nq numbers."""
-    upper: NDArray[np.float64]
+    upper: _Array
     """Greatest position (rad, m), nq numbers."""
-    velocity: NDArray[np.float64]
+    velocity: _Array
     """Greatest speed (rad/s, m/s), nv numbers."""
-    effort: NDArray[np.float64]
+    effort: _Array
     """Greatest effort (N m, N), nv numbers."""
 
 
 class Mimic(NamedTuple):
-    """How a joint follows another one: its position is ratio * q + offset of the other's coordinate."""
+    """The rule by which a joint follows another one: its position is ratio * q + offset, q being that of the other."""
 
     ratio: float
-    """Ratio."""
+    """The ratio (1; m/rad, rad/m)."""
     offset: float
-    """Offset (rad, m)."""
-
-
-# to users they are members of `condyle`, and are pickled as such
-for _class in (
-    RneaDerivatives,
-    AbaDerivatives,
-    CentroidalMap,
-    CentroidalMapRate,
-    AllTerms,
-    AssemblySize,
-    Frame,
-    Inertia,
-    Limits,
-    Mimic,
-):
-    _class.__module__ = "condyle"
+    """The offset (rad, m)."""
 
 
 class Iteration(NamedTuple):
-    """What happened in one iteration of a solver."""
+    """A record of one iteration of a solver."""
 
     iteration: int
     """Its number, from 0."""
@@ -409,7 +392,7 @@ class Iteration(NamedTuple):
 
 
 class Timings(NamedTuple):
-    """Where the time of a solve went (s)."""
+    """The time that the parts of a solve took (s)."""
 
     calc: float
     """Dynamics and cost of the warm start."""
@@ -429,13 +412,13 @@ class Solution(NamedTuple):
     Where knots differ in nu, what belongs to controls is a list of N arrays instead of one array.
     """
 
-    xs: NDArray[np.float64]
+    xs: _Array
     """States, (N + 1, nx)."""
-    us: NDArray[np.float64] | list[NDArray[np.float64]]
+    us: _Array | list[_Array]
     """Controls, (N, nu)."""
-    K: NDArray[np.float64] | list[NDArray[np.float64]]
+    K: _Array | list[_Array]
     """Feedback gains of the last sweep, (N, nu, ndx): u + K (x ⊖ x̄) is the control near the trajectory."""
-    k: NDArray[np.float64] | list[NDArray[np.float64]]
+    k: _Array | list[_Array]
     """Feed-forward of the last sweep, (N, nu)."""
     cost: float
     """Cost of the trajectory."""
@@ -444,15 +427,15 @@ class Solution(NamedTuple):
     feasible: bool
     """Whether the trajectory satisfies the dynamics."""
     status: Literal["converged", "max_iterations", "time_limit", "regularisation_limit", "infeasible", "not_finite"]
-    """How the solve ended."""
+    """The end of the solve in a word."""
     trace: list[Iteration]
     """A record per iteration."""
     timings: Timings
-    """Where the time went."""
+    """The time that its parts took."""
 
 
 class Outcome(NamedTuple):
-    """What a solve of `AugmentedLagrangian` says beside its `Solution`."""
+    """The state of the limits after a solve of `AugmentedLagrangian`, beside its `Solution`."""
 
     cost: float
     """The cost without the terms of the limits."""
@@ -460,26 +443,38 @@ class Outcome(NamedTuple):
     """The largest distance of a limit's number from its bounds, or gap of the dynamics."""
     dual: float
     """The largest entry of the gradient of the Lagrangian by the controls, projected on their bounds."""
-    multipliers: list[NDArray[np.float64]]
+    multipliers: list[_Array]
     """The multipliers of each knot, limit after limit: positive at an upper bound, negative at a lower one."""
     penalty: float
     """1/μ at the end."""
     solves: int
-    """Inner solves."""
+    """The number of inner solves."""
     iterations: int
-    """Iterations of all of them."""
+    """The number of iterations of all of them."""
 
 
 class Control(NamedTuple):
-    """What a control law sees before a step of a `Simulation`, and what it sets."""
+    """The state that a control law sees before a step of a `Simulation`, and the efforts and forces that it sets."""
 
     time: float
     """The time at which the step begins (s)."""
-    q: NDArray[np.float64]
+    q: _Array
     """The position, nq numbers."""
-    v: NDArray[np.float64]
+    v: _Array
     """The velocity, nv numbers."""
-    tau: NDArray[np.float64]
+    tau: _Array
     """The joint efforts during the step, nv numbers (N m, N); 0 when the law is called, which sets them in place."""
-    f_ext: NDArray[np.float64]
+    f_ext: _Array
     """The force on each body during the step, (nbodies, 6), at its origin and in its frame; likewise."""
+
+
+# where users find them, and pickle too
+_MODULES = {
+    "Iteration": "optimal",
+    "Timings": "optimal",
+    "Solution": "optimal",
+    "Outcome": "optimal",
+    "Control": "simulation",
+}
+for _class in [_item for _item in globals().values() if isinstance(_item, type) and issubclass(_item, tuple)]:
+    _class.__module__ = f"condyle.{_MODULES[_class.__name__]}" if _class.__name__ in _MODULES else "condyle"

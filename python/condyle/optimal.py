@@ -1,12 +1,13 @@
 """Optimal control over a horizon: a robot's motion that costs least, by FDDP.
 
 >>> import condyle, numpy as np
->>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem
+>>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
 >>> arm = condyle.robots.arm7()
 >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
->>> rest = Cost.state("rest", 1e-1, x0)
->>> running = FreeDynamics(arm, 0.05, [rest, Cost.control("effort", 1e-4, np.zeros(7))])
->>> terminal = FreeDynamics(arm, None, [rest, Cost.frame_translation("reach", 1e3, arm, "tool", [0.4, 0.2, 0.5])])
+>>> rest = Cost("rest", 1e-1, Residual.state(x0))
+>>> running = FreeDynamics(arm, 0.05, [rest, Cost("effort", 1e-4, Residual.control(np.zeros(7)))])
+>>> reach = Cost("reach", 1e3, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))
+>>> terminal = FreeDynamics(arm, None, [rest, reach])
 >>> problem = Problem(x0, [running], [0] * 20, terminal)
 >>> solution = Fddp(problem).solve(np.tile(x0, (21, 1)), np.tile(running.quasi_static(x0), (20, 1)))
 >>> solution.status, solution.xs.shape
@@ -33,6 +34,7 @@ from ._condyle import (
     Lqr,
     Problem,
     ProblemError,
+    Residual,
     WrenchCone,
 )
 from ._types import Iteration, Outcome, Solution, Timings
@@ -55,6 +57,7 @@ __all__ = [
     "Outcome",
     "Problem",
     "ProblemError",
+    "Residual",
     "Solution",
     "Timings",
     "WrenchCone",

@@ -1,4 +1,4 @@
-"""Robots of our own, embedded in the package, so that examples and tests need no file.
+"""Robots that are embedded in the package, so that examples and tests need no file.
 
 `arm7()`, `quadruped()` and `humanoid()` are models; `ARM7`, `QUADRUPED` and `HUMANOID` are their URDF texts.
 """

@@ -1,4 +1,4 @@
-"""Robots that move by themselves: (q, v) from one instant to the next, on the joints' own groups.
+"""Simulations of robots: (q, v) from one instant to the next, on the joints' own groups.
 
 >>> import condyle, numpy as np
 >>> from condyle.simulation import Simulation

@@ -7,13 +7,13 @@ use crate::functions::{any, functions, regular};
 use pyo3::prelude::*;
 
 named_tuples! {
-    RneaDerivatives { dtau_dq, dtau_dv, dtau_da }
-    AbaDerivatives { a, da_dq, da_dv, da_dtau }
+    RneaDerivatives<'_> { dtau_dq, dtau_dv, dtau_da }
+    AbaDerivatives<'_> { a, da_dq, da_dv, da_dtau }
 }
 
 functions! {
-/// τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n); nv
-/// numbers (N m, N).
+/// Inverse dynamics: the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a, nv numbers
+/// (N m, N); O(n).
 ///
 /// q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
 /// expressed in its frame, row 0 being the world's.
@@ -27,7 +27,7 @@ fn rnea(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; 
 }
 batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) { b.rnea(model, q, v, a, f_ext) }
 
-/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, nv numbers (rad/s², m/s²); O(n).
+/// Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 ///
@@ -42,7 +42,7 @@ fn aba(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None;
 }
 batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) { b.aba(model, q, v, tau, f_ext) }
 
-/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, nv numbers (rad/s², m/s²).
+/// Forward dynamics by a method of choice: the acceleration of `aba`, nv numbers (rad/s², m/s²).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', by a
 /// dense factor of M, O(n³); 'sparse', by one with the zeros of the tree, O(n d²) for depth d; None, the fastest:
@@ -59,7 +59,7 @@ fn forward_dynamics(model, data;
     condyle::forward_dynamics(model, data, &q, &v, &tau, &f_ext, method)
 }
 
-/// M(q), the joint-space inertia matrix: (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+/// The joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
 ///
 /// q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
 ///
@@ -72,7 +72,7 @@ fn crba(model, data; q: Position; out) {
 }
 batch b: any(q: Position) { b.crba(model, q) }
 
-/// M(q)⁻¹: (nv, nv), symmetric, both triangles filled; without forming M.
+/// The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 ///
 /// q: nq numbers.
 ///
@@ -86,7 +86,7 @@ fn minv(model, data; q: Position; out) {
 }
 batch b: regular(q: Position) { b.minv(model, q) }
 
-/// h(q, v) = C(q, v) v + g(q): the efforts that keep the velocity as it is, nv numbers; `rnea` with a = 0.
+/// The nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 ///
 /// q: nq numbers; v: nv.
 fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
@@ -94,7 +94,7 @@ fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) { b.nonlinear_effects(model, q, v) }
 
-/// g(q): the efforts that hold the robot still, nv numbers; `rnea` with v = a = 0.
+/// The gravity efforts g(q), nv numbers, which hold the robot still: the efforts of `rnea` with v = a = 0.
 ///
 /// q: nq numbers.
 ///
@@ -107,14 +107,14 @@ fn gravity(model, data; q: Position; out) {
 }
 batch b: any(q: Position) { b.gravity(model, q) }
 
-/// τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, nv numbers (N m, N); O(n).
+/// The efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N); O(n).
 ///
 /// q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
 fn static_torque(model, data; q: Position, f_ext: Forces = None; out) {
     condyle::static_torque(model, data, &q, &f_ext)
 }
 
-/// C(q, v), the Coriolis matrix by Christoffel symbols: (nv, nv), C v = h − g, Ṁ = C + Cᵀ; O(n depth).
+/// The Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 ///
 /// q: nq numbers; v: nv.
 ///
@@ -142,8 +142,8 @@ fn rnea_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_ext: For
 }
 batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) { b.rnea_derivatives(model, q, v, a, f_ext) }
 
-/// `aba` and its derivatives with respect to q, v and τ, exact, as `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv
-/// numbers and three matrices (nv, nv).
+/// The acceleration of `aba` and its derivatives with respect to q, v and τ, exact, as
+/// `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
 /// change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.

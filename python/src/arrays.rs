@@ -4,15 +4,13 @@
 //! `ValueError`. Out: a new array, or the caller's. Matrices are column-major in nalgebra and row-major here. Arrays of
 //! hyper-dual numbers are arrays of objects, see `hyper_dual.rs`.
 
-use crate::data::Data;
-use condyle::{Force, Inertia, Mat3, Model, Motion, Scalar, Se3, Vec3};
+use condyle::{Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
 use numpy::ndarray::Dimension;
 use numpy::{Element, Ix1, Ix2, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyFloat, PyType};
+use pyo3::types::PyFloat;
 use std::fmt::Write;
 use std::ops::Deref;
 
@@ -36,8 +34,6 @@ pub(crate) trait Number: Scalar {
         shape: &[usize],
         fill: impl FnOnce(&mut [Self]),
     ) -> PyResult<Bound<'py, PyAny>>;
-    /// The algorithms' scratch.
-    fn scratch<'d>(data: &'d mut Data, model: &Model) -> &'d mut condyle::Data<Self>;
 }
 
 impl Number for f64 {
@@ -60,9 +56,6 @@ impl Number for f64 {
         fill: impl FnOnce(&mut [Self]),
     ) -> PyResult<Bound<'py, PyAny>> {
         output(py, out, shape, fill)
-    }
-    fn scratch<'d>(data: &'d mut Data, _: &Model) -> &'d mut condyle::Data<Self> {
-        &mut data.inner
     }
 }
 
@@ -186,7 +179,7 @@ fn type_name(value: &Bound<'_, PyAny>) -> String {
 
 /// An array, as Python will see it.
 pub(crate) trait Array {
-    /// What it is made of.
+    /// The type of its numbers.
     type Number: Number;
     /// Its shape.
     fn shape(&self) -> impl AsRef<[usize]>;
@@ -204,7 +197,7 @@ impl<S: Number> Array for [S] {
     }
 }
 
-/// Column-major in Rust, row-major in Python.
+/// A matrix: column-major in Rust, row-major in Python.
 impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C, S> {
     type Number = N;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -238,6 +231,29 @@ impl<S: Number> Array for Se3<S> {
     }
 }
 
+/// Rows of one length.
+impl<S: Number, const N: usize> Array for [[S; N]] {
+    type Number = S;
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [self.len(), N]
+    }
+    fn write(&self, x: &mut [S]) {
+        x.copy_from_slice(self.as_flattened());
+    }
+}
+
+/// A matrix that is stored by columns.
+impl<S: Number> Array for Mat3<S> {
+    type Number = S;
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [3, 3]
+    }
+    fn write(&self, x: &mut [S]) {
+        let Self { x: a, y: b, z: c } = self;
+        x.copy_from_slice(&[a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z]);
+    }
+}
+
 /// Homogeneous matrices, one for each body.
 impl<S: Number> Array for [Se3<S>] {
     type Number = S;
@@ -251,7 +267,7 @@ impl<S: Number> Array for [Se3<S>] {
     }
 }
 
-/// [m 1, 0; 0, Ī]: of a whole robot about its centre of mass.
+/// The inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī].
 impl<S: Number> Array for Inertia<S> {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -266,7 +282,7 @@ impl<S: Number> Array for Inertia<S> {
     }
 }
 
-/// Those that are a row of numbers.
+/// Types that are a row of numbers.
 macro_rules! rows {
     ($($type:ident: $n:literal),*) => {$(
         impl<S: Number> Array for $type<S> {
@@ -282,7 +298,7 @@ macro_rules! rows {
 }
 rows!(Vec3: 3, Motion: 6, Force: 6);
 
-/// What a function can return: an array, a number, or a tuple of them.
+/// A value that a function can return: an array, a number, or a tuple of them.
 pub(crate) trait Give {
     /// Gives it to Python, in the caller's `out` if there is one.
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>>;
@@ -300,20 +316,45 @@ impl Give for f64 {
     }
 }
 
-/// A struct of the library as the named tuple of `condyle._types` with the same name and members.
+/// The derivatives of an acceleration by q and by v.
+impl<S: Number> Give for (DMatrix<S>, DMatrix<S>) {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        let mut out = members(out, &["da_dq", "da_dv"])?.into_iter();
+        let mut give = |matrix: &DMatrix<S>| matrix.give(py, out.next().flatten().as_ref());
+        Ok((give(&self.0)?, give(&self.1)?).into_pyobject(py)?.into_any())
+    }
+}
+
+/// A class of `condyle._types`, looked up once.
+macro_rules! class {
+    ($py:expr, $name:expr) => {{
+        static CLASS: pyo3::sync::PyOnceLock<Py<pyo3::types::PyType>> = pyo3::sync::PyOnceLock::new();
+        CLASS.import($py, "condyle._types", $name)
+    }};
+}
+pub(crate) use class;
+
+/// A named tuple of `condyle._types`, made of members that are given by name, in those of `out` if there is one.
+macro_rules! give_named {
+    ($py:ident, $out:ident, $class:expr, { $($name:expr => $member:expr),* }) => {{
+        let mut out = $crate::arrays::members($out, &[$($name),*])?.into_iter();
+        let members = [$($member.give($py, out.next().flatten().as_ref())?),*];
+        $crate::arrays::class!($py, $class)?.call1(pyo3::types::PyTuple::new($py, members)?)
+    }};
+}
+pub(crate) use give_named;
+
+/// Implementations of `Give` for structs of the library: each becomes the named tuple of the same name, with the
+/// members that stand here, some of them under other names.
 macro_rules! named_tuples {
-    ($($type:ident { $($member:ident),* })*) => {$(
-        impl<S: $crate::arrays::Number> $crate::arrays::Give for condyle::$type<'_, S>
-        where
-            S: $crate::arrays::Give,
-        {
+    (@name $member:ident) => { stringify!($member) };
+    (@name $member:ident as $name:ident) => { stringify!($name) };
+    ($($type:ident $(<$life:lifetime>)? { $($member:ident $(as $name:ident)?),* })*) => {$(
+        impl<S: $crate::arrays::Number + $crate::arrays::Give> $crate::arrays::Give for condyle::$type<$($life,)? S> {
             fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-                static CLASS: pyo3::sync::PyOnceLock<Py<pyo3::types::PyType>> = pyo3::sync::PyOnceLock::new();
-                let names = [$(stringify!($member)),*];
-                let mut out = $crate::arrays::members(out, &names)?.into_iter();
-                let members = [$(self.$member.give(py, out.next().flatten().as_ref())?),*];
-                let members = pyo3::types::PyTuple::new(py, members)?;
-                $crate::arrays::named_tuple(py, &CLASS, stringify!($type))?.call1(members)
+                $crate::arrays::give_named!(py, out, stringify!($type), {
+                    $($crate::arrays::named_tuples!(@name $member $(as $name)?) => self.$member),*
+                })
             }
         }
     )*};
@@ -341,22 +382,42 @@ pub(crate) fn pose(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Se3<f64
     Ok(Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3)))
 }
 
+/// The numbers of a vector of length N.
+pub(crate) fn array<const N: usize>(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; N]> {
+    let x = vector(argument, value, N)?;
+    Ok(core::array::from_fn(|k| x[k]))
+}
+
 /// Three numbers.
 pub(crate) fn three(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3<f64>> {
-    let x = vector(argument, value, 3)?;
-    Ok(Vec3::new(x[0], x[1], x[2]))
+    Ok(array::<3>(argument, value)?.into())
 }
 
-/// Gives the rows of a small matrix out.
-pub(crate) fn give_rows<'py, const N: usize>(py: Python<'py>, rows: [Vec3<f64>; N]) -> PyResult<Bound<'py, PyAny>> {
-    output(py, None, &[N, 3], |x| x.as_chunks_mut().0.iter_mut().zip(rows).for_each(|(x, row)| *x = row.to_array()))
+/// A rotation that is given as a 3 × 3 matrix.
+pub(crate) fn rotation(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Mat3<f64>> {
+    let m = matrix(argument, value, [3, 3])?;
+    let column = |c: usize| [m[c], m[3 + c], m[6 + c]].into();
+    Ok(Mat3 { x: column(0), y: column(1), z: column(2) })
 }
 
-/// One of the named tuples of `condyle._types`.
-pub(crate) fn named_tuple<'py>(
-    py: Python<'py>,
-    lock: &'static PyOnceLock<Py<PyType>>,
-    name: &str,
-) -> PyResult<&'py Bound<'py, PyType>> {
-    lock.import(py, "condyle._types", name)
+/// The numbers of a vector of any length.
+pub(crate) fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let length = value.len().map_err(|_| PyValueError::new_err(format!("{argument}: expected a list of numbers")))?;
+    Ok(vector(argument, value, length)?.to_vec())
+}
+
+/// Least and greatest values of some numbers, infinite where none is given; none if neither is given.
+pub(crate) fn bounds(
+    length: usize,
+    lower: Option<&Bound<'_, PyAny>>,
+    upper: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<[Vec<f64>; 2]>> {
+    if lower.is_none() && upper.is_none() {
+        return Ok(None);
+    }
+    let bound = |name, given: Option<&Bound<'_, PyAny>>, none| match given {
+        Some(numbers) => PyResult::Ok(vector(name, numbers, length)?.to_vec()),
+        None => Ok(vec![none; length]),
+    };
+    Ok(Some([bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?]))
 }

@@ -1,15 +1,14 @@
 //! Many states in one call: arguments with one axis more, for the states, and results likewise.
 //!
-//! An argument without that axis is shared by all states. What the library computes in lanes goes there at once, with the
-//! interpreter's lock released (`Batched`); everything else is called state after state.
+//! An argument without that axis is shared by all states. What the library computes in lanes goes there at once, with
+//! the interpreter's lock released, and its result is a `PerState`; everything else is called state after state.
 
-use crate::arrays::{Array, Input, matrix, named_tuple, output};
+use crate::arrays::{Array, Give, Input, give_named, matrix, output};
 use condyle::{BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices, Scalar};
 use numpy::{Ix2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyTuple, PyType};
+use pyo3::types::{PyDict, PyTuple};
 
 /// The number of states of an argument that has `axes` of them for a single one: none if it is given for a single one.
 pub(crate) fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<usize>> {
@@ -24,7 +23,8 @@ pub(crate) fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<u
     Ok(shape.ok().filter(|shape| shape.len() == axes + 1).map(|shape| shape[0]))
 }
 
-/// How many states a call is for, from what its arguments are given for; none if all are given for a single one.
+/// The number of states that a call is for, from what its arguments are given for; none if all are given for a single
+/// one.
 pub(crate) fn agreed(arguments: &[(&str, Option<usize>)]) -> PyResult<Option<usize>> {
     let mut all = arguments.iter().filter_map(|(name, states)| Some((name, (*states)?)));
     let Some((first, n)) = all.next() else { return Ok(None) };
@@ -72,7 +72,7 @@ pub(crate) fn forces<S: Scalar>(numbers: &[S]) -> Vec<Force<S>> {
     numbers.as_chunks::<6>().0.iter().map(|&six| six.into()).collect()
 }
 
-/// The results for all states in one, from those for each.
+/// The results for all states as one array or tuple, from those for each state.
 pub(crate) fn stack<'py>(
     py: Python<'py>,
     results: Vec<Bound<'py, PyAny>>,
@@ -100,60 +100,42 @@ pub(crate) fn stack<'py>(
     }
 }
 
-/// What a batch of the library returns.
-pub(crate) trait Batched {
-    /// Gives it to Python, in the caller's `out` if there is one.
-    fn give_all<'py>(
-        &self,
-        py: Python<'py>,
-        states: usize,
-        out: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>>;
+/// The result of a batch of the library, for so many states.
+pub(crate) struct PerState<T> {
+    pub(crate) result: T,
+    pub(crate) states: usize,
 }
 
-impl Batched for &[f64] {
-    fn give_all<'py>(
-        &self,
-        py: Python<'py>,
-        states: usize,
-        out: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        output(py, out, &[states, self.len() / states.max(1)], |x| x.copy_from_slice(self))
+impl Give for PerState<&[f64]> {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        let shape = [self.states, self.result.len() / self.states.max(1)];
+        output(py, out, &shape, |x| x.copy_from_slice(self.result))
     }
 }
 
-impl Batched for Matrices<'_, f64> {
-    fn give_all<'py>(
-        &self,
-        py: Python<'py>,
-        states: usize,
-        out: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let n = self.iter().next().map_or(0, |matrix| matrix.nrows());
-        output(py, out, &[states, n, n], |x| {
-            self.iter().zip(x.chunks_exact_mut((n * n).max(1))).for_each(|(matrix, x)| matrix.write(x));
+impl Give for PerState<Matrices<'_, f64>> {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        let n = self.result.iter().next().map_or(0, |matrix| matrix.nrows());
+        output(py, out, &[self.states, n, n], |x| {
+            self.result.iter().zip(x.chunks_exact_mut((n * n).max(1))).for_each(|(matrix, x)| matrix.write(x));
         })
     }
 }
 
-macro_rules! batched {
-    ($($type:ident as $name:literal { $($member:ident),* })*) => {$(
-        impl Batched for $type<'_, f64> {
-            fn give_all<'py>(
-                &self,
-                py: Python<'py>,
-                states: usize,
-                out: Option<&Bound<'py, PyAny>>,
-            ) -> PyResult<Bound<'py, PyAny>> {
-                static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-                let mut out = crate::arrays::members(out, &[$(stringify!($member)),*])?.into_iter();
-                let members = [$(self.$member.give_all(py, states, out.next().flatten().as_ref())?),*];
-                named_tuple(py, &CLASS, $name)?.call1(PyTuple::new(py, members)?)
+/// Implementations of `Give` for results of several members, as the named tuple of a single state.
+macro_rules! per_state {
+    ($($batch:ident as $class:literal { $($member:ident),* })*) => {$(
+        impl Give for PerState<$batch<'_, f64>> {
+            fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+                let Self { result, states } = self;
+                give_named!(py, out, $class, {
+                    $(stringify!($member) => PerState { result: result.$member, states: *states }),*
+                })
             }
         }
     )*};
 }
-batched! {
+per_state! {
     BatchRneaDerivatives as "RneaDerivatives" { dtau_dq, dtau_dv, dtau_da }
     BatchAbaDerivatives as "AbaDerivatives" { a, da_dq, da_dv, da_dtau }
 }

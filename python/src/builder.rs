@@ -1,119 +1,27 @@
-//! Models made body by body: joints, and the builder.
+//! Models made body by body.
 
-use crate::arrays::{Give, pose, three};
+use crate::arrays::{pose, three};
 use crate::exceptions::exception;
 use crate::inertial_parameters::read_inertia;
-use crate::model::{Model, kind};
+use crate::joint::Joint;
+use crate::model::Model;
 use condyle::{Inertia, JointOptions, Mimic, Se3};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The kind of a joint, with what it needs to know.
-///
-/// | | q | v |
-/// | --- | --- | --- |
-/// | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
-/// | `continuous` | 2: cos θ, sin θ | 1 |
-/// | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
-/// | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
-/// | `translation` | 3 | 3 |
-/// | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
-///
-/// An axis is a vector in the body's frame, of any length but 0.
-///
-/// >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
-/// 1
-#[pyclass(frozen, module = "condyle")]
-pub(crate) struct Joint(pub(crate) condyle::Joint);
-
-#[pymethods]
-impl Joint {
-    /// One angle about an axis: q = [θ], v = [θ̇].
-    #[staticmethod]
-    fn revolute(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(condyle::Joint::Revolute { axis: three("axis", axis)? }))
-    }
-
-    /// One angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇].
-    #[staticmethod]
-    fn continuous(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(condyle::Joint::Continuous { axis: three("axis", axis)? }))
-    }
-
-    /// One length along an axis: q = [d], v = [ḋ].
-    #[staticmethod]
-    fn prismatic(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(condyle::Joint::Prismatic { axis: three("axis", axis)? }))
-    }
-
-    /// A screw: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it.
-    #[staticmethod]
-    fn helical(axis: &Bound<'_, PyAny>, pitch: f64) -> PyResult<Self> {
-        Ok(Self(condyle::Joint::Helical { axis: three("axis", axis)?, pitch }))
-    }
-
-    /// A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
-    #[staticmethod]
-    fn spherical() -> Self {
-        Self(condyle::Joint::Spherical)
-    }
-
-    /// Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇].
-    #[staticmethod]
-    fn planar() -> Self {
-        Self(condyle::Joint::Planar)
-    }
-
-    /// Three lengths: q = [x, y, z], v = q̇.
-    #[staticmethod]
-    fn translation() -> Self {
-        Self(condyle::Joint::Translation)
-    }
-
-    /// A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame.
-    #[staticmethod]
-    fn free_flyer() -> Self {
-        Self(condyle::Joint::FreeFlyer)
-    }
-
-    /// How many numbers the position has.
-    #[getter]
-    fn nq(&self) -> usize {
-        self.0.nq()
-    }
-
-    /// How many degrees of freedom it has: the numbers of its velocity.
-    #[getter]
-    fn nv(&self) -> usize {
-        self.0.nv()
-    }
-
-    /// The axis, 3 numbers in the body's frame, a unit vector in a model; None if the joint has none.
-    #[getter]
-    fn axis<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        self.0.axis().map(|axis| axis.give(py, None)).transpose()
-    }
-
-    /// The kind and the axis.
-    fn __repr__(&self) -> String {
-        let axis = self.0.axis().map_or(String::new(), |a| format!(" about or along {:?}", a.to_array()));
-        format!("<condyle.Joint {}{axis}>", kind(self.0))
-    }
-}
-
-/// Names a body of a builder: what `ModelBuilder.body` and others return. `WORLD` is always there.
+/// The identity of a body in a builder, as `ModelBuilder.body` and others return it. `WORLD` is always there.
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct BodyId {
     inner: condyle::BodyId,
-    /// Of which builder; none of the world.
+    /// The number of its builder; none for the world.
     builder: Option<u64>,
 }
 
 #[pymethods]
 impl BodyId {
-    /// Whether it is the world.
+    /// The word for the world, or for any other body.
     fn __repr__(&self) -> &'static str {
         if self.builder.is_none() { "condyle.WORLD" } else { "<condyle.BodyId>" }
     }
@@ -125,7 +33,7 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
     WORLD.get_or_try_init(py, || Py::new(py, BodyId { inner: condyle::WORLD, builder: None }))
 }
 
-/// Makes a `Model`, body by body, parents first.
+/// A builder that makes a `Model` body by body, parents first.
 ///
 /// Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
 /// joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
@@ -146,9 +54,9 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
 /// <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
 #[pyclass(module = "condyle")]
 pub(crate) struct ModelBuilder {
-    /// None once the model is built.
+    /// The library's builder; none once the model is built.
     inner: Option<condyle::ModelBuilder>,
-    /// Equal for no two of them.
+    /// A number that no other builder has.
     number: u64,
 }
 
@@ -196,7 +104,10 @@ impl ModelBuilder {
     /// velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
     /// damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
     /// armature: inertia of the rotor as seen at the joint (kg m², kg).
-    #[pyo3(signature = (name, parent, joint, placement=None, inertia=None, *, joint_name=None, position=None, velocity=None, effort=None, damping=0.0, friction=0.0, armature=0.0))]
+    #[pyo3(signature = (
+        name, parent, joint, placement=None, inertia=None, *, joint_name=None, position=None, velocity=None,
+        effort=None, damping=0.0, friction=0.0, armature=0.0
+    ))]
     fn body(
         &mut self,
         name: &str,
@@ -248,7 +159,7 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+    /// Adds a body on a ball joint that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
     ///
     /// M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
     #[pyo3(signature = (name, parent, placement=None, inertia=None))]
@@ -265,7 +176,7 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Fixes more inertia to a body, given in a frame that is at `placement` in the body's.
+    /// Adds inertia to a body, given in a frame that is at `placement` in the body's frame.
     fn merge(
         &mut self,
         body: &Bound<'_, BodyId>,
@@ -286,7 +197,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Lets a joint follow another one, in place of a coordinate of its own: its position is ratio q + offset.
+    /// Makes a joint follow another one, instead of having a coordinate of its own: its position is ratio q + offset.
     ///
     /// follower, leader: the bodies that the joints carry.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
@@ -302,8 +213,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before
-    /// them.
+    /// Adds a whole robot, its world at `placement` in the frame of `parent`; `prefix` is put before all its names.
     ///
     /// >>> from condyle import ModelBuilder, WORLD
     /// >>> two = ModelBuilder("two arms")
@@ -326,15 +236,15 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Sets the acceleration of free fall (m/s², 3 numbers, in the world's frame); (0, 0, −9.81) otherwise.
+    /// Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). Without this it is (0, 0, −9.81).
     fn gravity(&mut self, gravity: &Bound<'_, PyAny>) -> PyResult<()> {
         let gravity = three("gravity", gravity)?;
         self.builder()?.gravity(gravity);
         Ok(())
     }
 
-    /// Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and
-    /// freezes the model. The builder cannot be used any more.
+    /// Builds the model: checks everything and numbers the bodies depth first, siblings in the order in which they were
+    /// added. The builder cannot be used any more.
     ///
     /// Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
     fn build(&mut self) -> PyResult<Model> {

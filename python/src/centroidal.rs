@@ -5,15 +5,15 @@ use crate::functions::functions;
 use pyo3::prelude::*;
 
 named_tuples! {
-    CentroidalMap { Ag, Ig, com, Jcom }
-    CentroidalMapRate { Ag, dAg, hg, Ig, com, com_velocity, Jcom }
-    AllTerms { M, h, centroidal, kinetic_energy, potential_energy }
+    CentroidalMap<'_> { Ag, Ig, com, Jcom }
+    CentroidalMapRate<'_> { Ag, dAg, hg, Ig, com, com_velocity, Jcom }
+    AllTerms<'_> { M, h, centroidal, kinetic_energy, potential_energy }
 }
 
 functions! {
-/// c, the centre of mass of the moving bodies, 3 numbers, in the world's frame (m); O(n).
+/// The centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
 ///
-/// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass.
+/// q: nq numbers. Bodies fixed to the world do not count. The result is not a number if no moving body has a mass.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -23,33 +23,33 @@ fn com(model, data; q: Position; out) {
     condyle::forward_kinematics(model, data, &q).com()
 }
 
-/// ċ, the velocity of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s); O(n).
+/// The velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
 ///
 /// q: nq numbers; v: nv.
 fn com_velocity(model, data; q: Position, v: Tangent; out) {
     condyle::forward_velocities(model, data, &q, &v).com_velocity()
 }
 
-/// c̈, the acceleration of the centre of mass of the moving bodies, 3 numbers, in the world's frame (m/s²), without
-/// gravity; O(n).
+/// The acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3 numbers
+/// (m/s²); O(n).
 ///
 /// q: nq numbers; v, a: nv.
 fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
     condyle::forward_accelerations(model, data, &q, &v, &a).com_acceleration()
 }
 
-/// Jcom(q), the Jacobian of the centre of mass: (3, nv), ċ = Jcom v; O(n).
+/// The Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 ///
 /// q: nq numbers. It is a part of `centroidal_map`.
 fn com_jacobian(model, data; q: Position; out) {
     condyle::centroidal_map(model, data, &q).Jcom
 }
 
-/// The centroidal momentum matrix Ag(q), hg = Ag v, and what it needs, in O(n), as `CentroidalMap(Ag, Ig, com,
-/// Jcom)`.
+/// The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
+/// `CentroidalMap(Ag, Ig, com, Jcom)`.
 ///
-/// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. out: four
-/// arrays, such as an earlier result.
+/// q: nq numbers. Bodies fixed to the world do not count. The results are not numbers if no moving body has a mass. out:
+/// four arrays, such as an earlier result.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -59,32 +59,32 @@ fn centroidal_map(model, data; q: Position; out) {
     condyle::centroidal_map(model, data, &q)
 }
 
-/// Ag(q), its rate along v, and the centroidal momentum hg = Ag v, in O(n), as
-/// `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`; the rate of hg is Ag a + dAg v.
+/// The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
+/// `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 ///
-/// q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass. out:
-/// seven arrays, such as an earlier result.
+/// q: nq numbers; v: nv. Bodies fixed to the world do not count. The results are not numbers if no moving body has a
+/// mass. out: seven arrays, such as an earlier result.
 fn centroidal_map_rate(model, data; q: Position, v: Tangent; out) {
     condyle::centroidal_map_rate(model, data, &q, &v)
 }
 
-/// hg, the momentum of the moving bodies about their centre of mass, along the world's axes: 6 numbers (kg m/s, then
-/// kg m²/s); O(n).
+/// The centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6 numbers
+/// (kg m/s, then kg m²/s); O(n).
 ///
 /// q: nq numbers; v: nv.
 fn centroidal_momentum(model, data; q: Position, v: Tangent; out) {
     condyle::forward_velocities(model, data, &q, &v).centroidal_momentum()
 }
 
-/// The rate of hg, along the world's axes: 6 numbers (N, then N m), the weight and the external forces about the
-/// centre of mass; O(n).
+/// The rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m). It equals the weight and
+/// the external forces about the centre of mass; O(n).
 ///
 /// q: nq numbers; v, a: nv.
 fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; out) {
     condyle::forward_accelerations(model, data, &q, &v, &a).centroidal_momentum_rate()
 }
 
-/// T = ½ vᵀ M(q) v, the kinetic energy of the moving bodies and the rotors (J); O(n).
+/// The kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
 ///
 /// q: nq numbers; v: nv.
 ///
@@ -96,21 +96,21 @@ fn kinetic_energy(model, data; q: Position, v: Tangent) {
     condyle::forward_velocities(model, data, &q, &v).kinetic_energy()
 }
 
-/// V = −m gᵀ c(q), the potential energy of the moving bodies under gravity (J), 0 at the world's origin; O(n).
+/// The potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 ///
 /// q: nq numbers.
 fn potential_energy(model, data; q: Position) {
     condyle::forward_kinematics(model, data, &q).potential_energy()
 }
 
-/// E = T + V, the mechanical energy (J); O(n).
+/// The mechanical energy E = T + V (J); O(n).
 ///
 /// q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
 fn mechanical_energy(model, data; q: Position, v: Tangent) {
     condyle::forward_velocities(model, data, &q, &v).mechanical_energy()
 }
 
-/// What the equations of motion are made of, from one pass to the tips and one back, in O(n depth), as
+/// All terms of the equations of motion, from one pass to the tips and one back, in O(n depth), as
 /// `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
 ///
 /// q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,

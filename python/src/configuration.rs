@@ -1,7 +1,8 @@
 //! The space of positions, and its tangent vectors.
 
 use crate::arrays::Give;
-use crate::functions::{functions, wrong_word};
+use crate::exceptions::wrong_word;
+use crate::functions::functions;
 use crate::model::Model;
 use condyle::{DifferenceArgument, IntegrateArgument, Scalar};
 use nalgebra::DMatrix;
@@ -9,8 +10,8 @@ use pyo3::prelude::*;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// A position drawn uniformly, nq numbers: between its limits, within ±3 (rad, m) where a coordinate has none, over
-/// the whole group for rotations.
+/// A random position, nq numbers: uniform between its limits, within ±3 (rad, m) where a coordinate has no limits, and
+/// over the whole group for rotations.
 ///
 /// seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
 #[pyfunction]
@@ -21,7 +22,7 @@ pub(crate) fn random_configuration<'py>(model: &Bound<'py, Model>, seed: Option<
 }
 
 functions! {
-/// The position in which every body is at its joint's frame, nq numbers: zeros, and rotations by nothing.
+/// The neutral position, nq numbers: zeros, and the identity for rotations.
 ///
 /// >>> condyle.neutral(condyle.robots.quadruped())[:7]
 /// array([0., 0., 0., 0., 0., 0., 1.])
@@ -29,7 +30,7 @@ fn neutral(model;) {
     condyle::neutral(model)
 }
 
-/// q ⊕ v: the position after moving with the velocity v for one unit of time, nq numbers.
+/// The position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
 ///
 /// q: nq numbers; v: nv.
 ///
@@ -44,7 +45,7 @@ fn integrate(model; q: Position, v: Tangent; out) {
     moved
 }
 
-/// q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one; nv numbers.
+/// The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
 ///
 /// q0, q1: nq numbers.
 fn difference(model; q0: Position, q1: Position; out) {
@@ -53,7 +54,7 @@ fn difference(model; q0: Position, q1: Position; out) {
     v
 }
 
-/// q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity, nq numbers.
+/// The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
 ///
 /// q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
 ///
@@ -65,15 +66,15 @@ fn interpolate(model; q0: Position, q1: Position, t: Real; out) {
     q
 }
 
-/// ‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+/// The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
 ///
 /// q0, q1: nq numbers.
 fn distance(model; q0: Position, q1: Position) {
     condyle::distance(model, &q0, &q1, &mut vec![Scalar::zero(); model.nv()])
 }
 
-/// q with its quaternions and pairs (cos, sin) brought back to length 1, nq numbers; q itself stays unless it is
-/// `out`.
+/// The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
+/// stays as it is unless it is `out`.
 ///
 /// q: nq numbers.
 ///
@@ -88,7 +89,7 @@ fn normalize(model; q: Position; out) {
     q
 }
 
-/// The columns of X, tangent vectors at q ⊕ v, taken to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+/// The columns of X, tangent vectors at q ⊕ v, moved to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 ///
 /// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
 /// `transport` with −v.
@@ -104,7 +105,7 @@ fn transport(model; v: Tangent, X: Tangents; out) {
     moved
 }
 
-/// ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v: (nv, nv), block-diagonal, between tangent spaces; it does not depend on q.
+/// The Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not depend on q.
 ///
 /// v: nv numbers; argument: 'position' for q or 'velocity' for v.
 fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
@@ -118,8 +119,8 @@ fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
     J
 }
 
-/// ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁: (nv, nv), block-diagonal, between tangent spaces; of the positions it needs
-/// their difference only.
+/// The Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. Of the positions it
+/// needs only their difference.
 ///
 /// d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
 fn difference_jacobian(model; d: Tangent, argument: Word; out) {

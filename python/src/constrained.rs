@@ -1,44 +1,32 @@
 //! Dynamics under constraints: the library's types and functions one to one.
 
-use crate::arrays::{Give, Number, members, named_tuple, pose, vector};
-use crate::data::{Data, scratch};
-use crate::exceptions::exception;
-use crate::functions::{Argument, Coefficient, Forces, Position, Reference, Tangent, regular, wrong_word};
+use crate::arrays::{Give, array, named_tuples, pose};
+use crate::data::{Holds, Scratch};
+use crate::exceptions::{exception, wrong_word};
+use crate::functions::{Argument, Reference, functions, regular};
 use crate::hyper_dual::Hyper;
-use crate::model::{Model, frame_index};
-use condyle::{Constraint, Error, Motion, Proximal, Scalar, Target};
+use crate::model::{MadeFor, Model, frame_index};
+use condyle::{Constraint, Motion, Proximal, Scalar, Target};
 use nalgebra::DMatrix;
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PySlice, PyTuple, PyType};
+use pyo3::types::PySlice;
 
-/// A struct of the library as the named tuple of `condyle._types` with the same name and members, but that λ is
-/// `lambda_`.
-macro_rules! results {
-    ($($type:ident { $($member:ident),* })*) => {$(
-        impl<S: Number + Give> Give for condyle::$type<'_, S> {
-            fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-                static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-                let names = [$(stringify!($member)),*].map(|name| if name == "lambda" { "lambda_" } else { name });
-                let mut out = members(out, &names)?.into_iter();
-                let members = [$(self.$member.give(py, out.next().flatten().as_ref())?),*];
-                named_tuple(py, &CLASS, stringify!($type))?.call1(PyTuple::new(py, members)?)
-            }
-        }
-    )*};
-}
-results! {
-    Constrained { a, lambda, residual, redundant }
-    ConstrainedDerivatives {
-        a, lambda, residual, redundant, da_dq, da_dv, da_dtau, dlambda_dq, dlambda_dv, dlambda_dtau, inertia
+named_tuples! {
+    Constrained<'_> { a, lambda as lambda_, residual, redundant }
+    ConstrainedDerivatives<'_> {
+        a, lambda as lambda_, residual, redundant, da_dq, da_dv, da_dtau, dlambda_dq, dlambda_dv, dlambda_dtau, inertia
     }
-    ConstrainedEquations { a, lambda, residual, redundant, M, dtau_dq, dtau_dv, dgamma_dq, dgamma_dv }
-    Impulse { v, lambda, residual, redundant }
-    ImpulseDerivatives { v, lambda, residual, redundant, dv_dq, dv_dv, dlambda_dq, dlambda_dv, inertia }
+    ConstrainedEquations<'_> {
+        a, lambda as lambda_, residual, redundant, M, dtau_dq, dtau_dv, dgamma_dq, dgamma_dv
+    }
+    Impulse<'_> { v, lambda as lambda_, residual, redundant }
+    ImpulseDerivatives<'_> {
+        v, lambda as lambda_, residual, redundant, dv_dq, dv_dv, dlambda_dq, dlambda_dv, inertia
+    }
 }
 
-/// A `Constraint` of `condyle._types`.
+/// A `Constraint` of `condyle._types` as the library has it.
 pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::Constraint> {
     let optional = |name: &str| given.getattr(name).map(|x| (!x.is_none()).then_some(x));
     let frame = frame_index(model, &given.getattr("frame")?)?;
@@ -56,7 +44,7 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
     Ok(constraint)
 }
 
-/// Changes what is given of a target.
+/// Changes those parts of a target that are given.
 fn aim(
     target: &mut Target<f64>,
     placement: Option<&Bound<'_, PyAny>>,
@@ -70,8 +58,7 @@ fn aim(
         [("velocity", velocity, &mut target.velocity), ("acceleration", acceleration, &mut target.acceleration)]
     {
         if let Some(given) = given {
-            let x = vector(name, given, 6)?;
-            *motion = Motion::from(core::array::from_fn(|k| x[k]));
+            *motion = Motion::from(array(name, given)?);
         }
     }
     Ok(())
@@ -99,12 +86,12 @@ fn aim(
 #[pyclass(module = "condyle")]
 pub(crate) struct ConstraintSet {
     inner: condyle::ConstraintSet<f64>,
-    /// For hyper-dual numbers, once they were asked for since the targets last changed.
+    /// The set for hyper-dual numbers, made when it is first needed after the targets changed.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
-    /// With their present targets.
+    /// The constraints with their present targets.
     constraints: Vec<Constraint>,
     nv: usize,
-    structure: u64,
+    made_for: MadeFor,
 }
 
 impl ConstraintSet {
@@ -115,31 +102,29 @@ impl ConstraintSet {
     }
 }
 
-/// The set for one kind of number.
-trait Constrain: Number {
-    fn set<'s>(
-        set: &'s mut ConstraintSet,
-        model: &condyle::Model,
-    ) -> Result<&'s mut condyle::ConstraintSet<Self>, Error>;
-}
-
-impl Constrain for f64 {
-    fn set<'s>(set: &'s mut ConstraintSet, _: &condyle::Model) -> Result<&'s mut condyle::ConstraintSet<Self>, Error> {
-        Ok(&mut set.inner)
+impl Scratch for ConstraintSet {
+    const ARGUMENT: &'static str = "constraints";
+    fn made_for(&self) -> &MadeFor {
+        &self.made_for
     }
 }
 
-impl Constrain for Hyper {
-    fn set<'s>(
-        set: &'s mut ConstraintSet,
-        model: &condyle::Model,
-    ) -> Result<&'s mut condyle::ConstraintSet<Self>, Error> {
-        if set.dual.is_none() {
-            let mut dual = condyle::ConstraintSet::new(model, &set.constraints)?;
-            dual.proximal = set.inner.proximal;
-            set.dual = Some(Box::new(dual));
+impl Holds<f64> for ConstraintSet {
+    type Held = condyle::ConstraintSet<f64>;
+    fn held(&mut self, _: &condyle::Model) -> PyResult<&mut condyle::ConstraintSet<f64>> {
+        Ok(&mut self.inner)
+    }
+}
+
+impl Holds<Hyper> for ConstraintSet {
+    type Held = condyle::ConstraintSet<Hyper>;
+    fn held(&mut self, model: &condyle::Model) -> PyResult<&mut condyle::ConstraintSet<Hyper>> {
+        if self.dual.is_none() {
+            let mut dual = condyle::ConstraintSet::new(model, &self.constraints).map_err(exception)?;
+            dual.proximal = self.inner.proximal;
+            self.dual = Some(Box::new(dual));
         }
-        Ok(set.dual.as_mut().expect("was just made"))
+        Ok(self.dual.as_mut().expect("was just made"))
     }
 }
 
@@ -151,19 +136,19 @@ impl ConstraintSet {
         if !(mu.is_finite() && mu >= 0.0) {
             return Err(PyValueError::new_err(format!("mu: expected a number of at least 0, found {mu}")));
         }
-        let Model { inner: model, structure } = model.get();
+        let (made_for, model) = (MadeFor::new(model.get()), &model.get().inner);
         let constraints = constraints.iter().map(|c| constraint(model, c)).collect::<PyResult<Vec<_>>>()?;
         let mut inner = condyle::ConstraintSet::new(model, &constraints).map_err(exception)?;
         inner.proximal = Proximal { mu, iterations };
-        Ok(Self { inner, dual: None, constraints, nv: model.nv(), structure: *structure })
+        Ok(Self { inner, dual: None, constraints, nv: model.nv(), made_for })
     }
 
-    /// How many constraints there are.
+    /// The number of constraints.
     fn __len__(&self) -> usize {
         self.inner.len()
     }
 
-    /// How many rows J has, and λ numbers.
+    /// The number of rows of J, and of numbers in λ.
     #[getter]
     fn rows(&self) -> usize {
         self.inner.rows()
@@ -175,8 +160,8 @@ impl ConstraintSet {
         Ok(PySlice::new(py, range.start as isize, range.end as isize, 1))
     }
 
-    /// Changes where constraint k wants its frame to be, and how it should move there: what is given, as in
-    /// `Constraint`.
+    /// Changes the target of constraint k: where its frame should be and how it should move there. What is not given
+    /// stays as it is.
     #[pyo3(signature = (k, placement=None, velocity=None, acceleration=None))]
     fn set_target(
         &mut self,
@@ -192,7 +177,7 @@ impl ConstraintSet {
         Ok(())
     }
 
-    /// J, (rows, nv), as the last call left it.
+    /// The Jacobian J of the constraints, (rows, nv), at the state of the last call.
     #[pyo3(signature = (out=None))]
     fn jacobian<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let mut J = DMatrix::zeros(self.inner.rows(), self.nv);
@@ -201,61 +186,9 @@ impl ConstraintSet {
     }
 }
 
-/// The set for a call, if it is this model's and free.
-fn set<'py>(model: &Model, constraints: &Bound<'py, ConstraintSet>) -> PyResult<PyRefMut<'py, ConstraintSet>> {
-    let busy = "constraints: in use by another call; give each thread a ConstraintSet of its own";
-    let set = constraints.try_borrow_mut().map_err(|_| PyRuntimeError::new_err(busy))?;
-    if set.structure != model.structure {
-        let name = model.inner.name();
-        return Err(PyValueError::new_err(format!("constraints: made for another model, not for this '{name}'")));
-    }
-    Ok(set)
-}
-
-/// Declares functions of a model, a `Data` and a set of constraints.
-macro_rules! constrained {
-    ($(
-        $(#[$doc:meta])*
-        fn $name:ident($model:ident, $data:ident, $constraints:ident;
-            $($arg:ident: $kind:ident $(= $default:tt)?),*; $out:ident) $body:block
-    )*) => {$(
-        $(#[$doc])*
-        #[pyfunction]
-        #[pyo3(signature = ($model, $data, $constraints, $($arg $(= $default)?,)* $out=None))]
-        pub(crate) fn $name<'a, 'py: 'a>(
-            $model: &'a Bound<'py, Model>,
-            $data: &'a Bound<'py, Data>,
-            $constraints: &'a Bound<'py, ConstraintSet>,
-            $($arg: <$kind as Argument<'a, 'py>>::Given,)*
-            $out: Option<&'a Bound<'py, PyAny>>,
-        ) -> PyResult<Bound<'py, PyAny>> {
-            let (py, robot) = ($model.py(), $model.get());
-            let (mut scratch, mut set) = (scratch(robot, $data)?, set(robot, $constraints)?);
-            let $model = &robot.inner;
-            regular($model)?;
-            let dual = [$(<$kind as Argument<'_, '_>>::is_dual(&$arg)),*].contains(&true);
-            // the same source for doubles and for hyper-dual numbers
-            macro_rules! call {
-                ($S:ty) => {{
-                    let $data = <$S>::scratch(&mut scratch, $model);
-                    let $constraints = <$S>::set(&mut set, $model).map_err(exception)?;
-                    let result = {
-                        $(let $arg = <$kind as Argument<'_, '_>>::read_at::<$S>(
-                            stringify!($arg), &$arg, $model, None,
-                        )?;)*
-                        $body
-                    };
-                    result.give(py, $out)
-                }};
-            }
-            if dual { call!(Hyper) } else { call!(f64) }
-        }
-    )*};
-}
-
-constrained! {
-/// q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that make J q̈ + γ = 0: forward dynamics under
-/// constraints, as `Constrained(a, lambda_, residual, redundant)`.
+functions! {
+/// Forward dynamics under constraints: the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that
+/// make J q̈ + γ = 0, as `Constrained(a, lambda_, residual, redundant)`.
 ///
 /// constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
 /// other, or themselves at a singular posture, give finite numbers and a residual.
@@ -267,12 +200,14 @@ constrained! {
 /// >>> a, forces, residual, redundant = condyle.constrained_dynamics(quadruped, data, stance, q, zero, zero)
 /// >>> bool(residual < 1e-9), redundant, np.allclose(stance.jacobian() @ a, 0.0)
 /// (True, 0.0, True)
-fn constrained_dynamics(model, data, constraints;
+fn constrained_dynamics(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None; out) {
+    regular(model)?;
     condyle::constrained_dynamics(model, data, constraints, &q, &v, &tau, &f_ext)
 }
 
-/// `constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as `ConstrainedDerivatives`.
+/// The result of `constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as
+/// `ConstrainedDerivatives`.
 ///
 /// constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving
 /// with the bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier
@@ -283,18 +218,19 @@ fn constrained_dynamics(model, data, constraints;
 /// >>> d = condyle.constrained_dynamics_derivatives(arm, condyle.Data(arm), touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
 /// >>> np.allclose(touch.jacobian() @ d.da_dtau, 0.0)  # no effort moves the point
 /// True
-fn constrained_dynamics_derivatives(model, data, constraints;
+fn constrained_dynamics_derivatives(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None; out) {
+    regular(model)?;
     condyle::constrained_dynamics_derivatives(model, data, constraints, &q, &v, &tau, &f_ext)
 }
 
-/// `constrained_dynamics` and the linear equations between changes of q, v, τ and of the q̈ and λ that follow, as
-/// `ConstrainedEquations`:
+/// The result of `constrained_dynamics` and the linear equations between changes of q, v, τ and the changes of q̈ and λ
+/// that follow, as `ConstrainedEquations`:
 ///
 ///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 ///
-/// What `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a `ConstraintSet`, whose
-/// targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
+/// These are the equations that `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a
+/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
 /// bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
@@ -302,12 +238,13 @@ fn constrained_dynamics_derivatives(model, data, constraints;
 /// >>> d = condyle.constrained_dynamics_equations(arm, data, touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
 /// >>> np.allclose(d.M, condyle.crba(arm, data, [0.3] * 7))
 /// True
-fn constrained_dynamics_equations(model, data, constraints;
+fn constrained_dynamics_equations(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None; out) {
+    regular(model)?;
     condyle::constrained_dynamics_equations(model, data, constraints, &q, &v, &tau, &f_ext)
 }
 
-/// v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact, as
+/// The velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as
 /// `Impulse(v, lambda_, residual, redundant)`.
 ///
 /// constraints: a `ConstraintSet`, of which gains, velocities and accelerations do not count; q: nq numbers; v: nv;
@@ -319,11 +256,13 @@ fn constrained_dynamics_equations(model, data, constraints;
 /// >>> after = condyle.impulse_dynamics(quadruped, condyle.Data(quadruped), touchdown, q, falling)
 /// >>> bool(after.lambda_[2] > 0.0)  # the ground pushes upwards
 /// True
-fn impulse_dynamics(model, data, constraints; q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
+fn impulse_dynamics(model, data, constraints: ConstraintSet;
+    q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
+    regular(model)?;
     condyle::impulse_dynamics(model, data, constraints, &q, &v, Scalar::splat(restitution))
 }
 
-/// `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
+/// The result of `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
 /// `ImpulseDerivatives`.
 ///
 /// constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: as many arrays
@@ -334,8 +273,9 @@ fn impulse_dynamics(model, data, constraints; q: Position, v: Tangent, restituti
 /// >>> d = condyle.impulse_dynamics_derivatives(arm, condyle.Data(arm), hit, [0.3] * 7, [0.1] * 7)
 /// >>> np.allclose(d.dv_dv @ d.dv_dv, d.dv_dv)  # an impact that sticks is a projection
 /// True
-fn impulse_dynamics_derivatives(model, data, constraints;
+fn impulse_dynamics_derivatives(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
+    regular(model)?;
     condyle::impulse_dynamics_derivatives(model, data, constraints, &q, &v, Scalar::splat(restitution))
 }
 }

@@ -1,31 +1,32 @@
-//! The scratch of the algorithms.
+//! The scratch of the algorithms, and how a call takes it.
 
 use crate::hyper_dual::Hyper;
-use crate::model::Model;
+use crate::model::{MadeFor, Model};
+use pyo3::PyClass;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::pyclass::boolean_struct::False;
 
-/// Scratch and results of every algorithm, for one model: made once, used by one thread at a time.
+/// The memory that algorithms compute in, for one model: made once, and used by one thread at a time.
 ///
 /// It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
 /// what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
 /// with another robot's model, a `ValueError`.
 ///
-/// Functions called with many states at once, q of shape (N, nq), compute several of them side by side in vector
-/// registers, and on so many threads.
+/// model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
+/// several states side by side in vector registers.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.Data(arm)
 /// <condyle.Data of 'arm7'>
 #[pyclass(module = "condyle")]
 pub(crate) struct Data {
-    pub(crate) inner: condyle::Data<f64>,
-    structure: u64,
-    name: String,
+    inner: condyle::Data<f64>,
+    made_for: MadeFor,
     threads: usize,
-    /// For hyper-dual numbers, once they were asked for.
-    pub(crate) dual: Option<Box<condyle::Data<Hyper>>>,
-    /// For as many states as were asked for at most.
+    /// The scratch for hyper-dual numbers, made when it is first needed.
+    dual: Option<Box<condyle::Data<Hyper>>>,
+    /// The batch for as many states as one call has had at most.
     batch: Option<Box<condyle::Batch>>,
 }
 
@@ -37,19 +38,19 @@ impl Data {
         if threads == 0 {
             return Err(PyValueError::new_err("threads: expected at least 1, found 0"));
         }
-        let Model { inner, structure } = model.get();
-        let (structure, name) = (*structure, inner.name().to_owned());
-        Ok(Self { inner: condyle::Data::new(inner), structure, name, threads, dual: None, batch: None })
+        let model = model.get();
+        let (inner, made_for) = (condyle::Data::new(&model.inner), MadeFor::new(model));
+        Ok(Self { inner, made_for, threads, dual: None, batch: None })
     }
 
     /// The robot's name.
     fn __repr__(&self) -> String {
-        format!("<condyle.Data of '{}'>", self.name)
+        format!("<condyle.Data of '{}'>", self.made_for.name)
     }
 }
 
 impl Data {
-    /// Room for so many states.
+    /// A batch with room for so many states.
     pub(crate) fn batch(&mut self, model: &condyle::Model, states: usize) -> &mut condyle::Batch {
         let enough = self.batch.take().filter(|batch| batch.capacity() >= states);
         let threads = self.threads;
@@ -57,14 +58,49 @@ impl Data {
     }
 }
 
-/// The scratch for a call, if it is this model's and free.
-pub(crate) fn scratch<'py>(model: &Model, data: &Bound<'py, Data>) -> PyResult<PyRefMut<'py, Data>> {
-    let data = data
-        .try_borrow_mut()
-        .map_err(|_| PyRuntimeError::new_err("data: in use by another call; give each thread a Data of its own"))?;
-    if data.structure != model.structure {
-        let (made, given) = (&data.name, model.inner.name());
-        return Err(PyValueError::new_err(format!("data: made for another model ('{made}'), not for this '{given}'")));
+impl Scratch for Data {
+    const ARGUMENT: &'static str = "data";
+    fn made_for(&self) -> &MadeFor {
+        &self.made_for
     }
-    Ok(data)
+}
+
+impl Holds<f64> for Data {
+    type Held = condyle::Data<f64>;
+    fn held(&mut self, _: &condyle::Model) -> PyResult<&mut condyle::Data<f64>> {
+        Ok(&mut self.inner)
+    }
+}
+
+impl Holds<Hyper> for Data {
+    type Held = condyle::Data<Hyper>;
+    fn held(&mut self, model: &condyle::Model) -> PyResult<&mut condyle::Data<Hyper>> {
+        Ok(self.dual.get_or_insert_with(|| Box::new(condyle::Data::new(model))))
+    }
+}
+
+/// An argument that a call computes in: made for one model, and used by one call at a time.
+pub(crate) trait Scratch: PyClass<Frozen = False> {
+    /// The name of the argument.
+    const ARGUMENT: &'static str;
+    /// The models that it serves.
+    fn made_for(&self) -> &MadeFor;
+}
+
+/// Scratch for one kind of number.
+pub(crate) trait Holds<S>: Scratch {
+    /// The library's own type of it.
+    type Held;
+    /// The library's scratch, made now if it is not there yet.
+    fn held(&mut self, model: &condyle::Model) -> PyResult<&mut Self::Held>;
+}
+
+/// Takes scratch for a call, if it is free and of this model.
+pub(crate) fn take<'py, T: Scratch>(model: &Model, scratch: &Bound<'py, T>) -> PyResult<PyRefMut<'py, T>> {
+    let scratch = scratch.try_borrow_mut().map_err(|_| {
+        let (argument, class) = (T::ARGUMENT, T::NAME);
+        PyRuntimeError::new_err(format!("{argument}: in use by another call; give each thread a {class} of its own"))
+    })?;
+    scratch.made_for().check(T::ARGUMENT, model)?;
+    Ok(scratch)
 }

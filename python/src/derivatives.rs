@@ -1,24 +1,24 @@
 //! Derivatives beyond the first ones of `rnea` and `aba`: the library's functions one to one.
 
-use crate::arrays::{Array, Give, Number, members, named_tuple, named_tuples};
+use crate::arrays::{Array, Number, named_tuples};
 use crate::functions::{functions, regular};
-use condyle::{Model, RneaSecondDerivatives, Scalar};
+use crate::kinematics::motions;
+use condyle::{RneaSecondDerivatives, Scalar};
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyTuple, PyType};
 
 named_tuples! {
-    RneaHessian { dqdq, dvdq, dvdv, dadq }
-    AbaHessian { dqdq, dvdq, dvdv, dtaudq }
-    CentroidalDerivatives {
+    RneaHessian<'_> { dqdq, dvdq, dvdv, dadq }
+    AbaHessian<'_> { dqdq, dvdq, dvdv, dtaudq }
+    CentroidalDerivatives<'_> {
         dh_dq, dh_dv, drate_dq, drate_dv, drate_da, dcom_dq, dvcom_dq, dacom_dq, dacom_dv
     }
-    EnergyDerivatives { dT_dq, dT_dv, dV_dq }
-    CoriolisDerivatives { dq, dv }
+    EnergyDerivatives<'_> { dT_dq, dT_dv, dV_dq }
+    CoriolisDerivatives<'_> { dq, dv }
+    RneaSecondDerivatives { dqdq, dvdq, dvdv, dadq }
 }
 
-/// Matrices of one shape, one after the other.
+/// Matrices of one shape, as an array with one axis more.
 impl<S: Number> Array for [DMatrix<S>] {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -31,36 +31,9 @@ impl<S: Number> Array for [DMatrix<S>] {
     }
 }
 
-impl<S: Number> Give for RneaSecondDerivatives<S> {
-    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let mut out = members(out, &["dqdq", "dvdq", "dvdv", "dadq"])?.into_iter();
-        let tensors = [&self.dqdq, &self.dvdq, &self.dvdv, &self.dadq];
-        let tensors = tensors.map(|tensor| tensor[..].give(py, out.next().flatten().as_ref()));
-        let tensors = tensors.into_iter().collect::<PyResult<Vec<_>>>()?;
-        named_tuple(py, &CLASS, "RneaSecondDerivatives")?.call1(PyTuple::new(py, tensors)?)
-    }
-}
-
-/// The derivatives of an acceleration by q and by v.
-struct Both<S>(DMatrix<S>, DMatrix<S>);
-
-impl<S: Number> Give for Both<S> {
-    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        let mut out = members(out, &["da_dq", "da_dv"])?.into_iter();
-        let mut give = |matrix: &DMatrix<S>| matrix.give(py, out.next().flatten().as_ref());
-        let both = [give(&self.0)?, give(&self.1)?];
-        Ok(PyTuple::new(py, both)?.into_any())
-    }
-}
-
-fn six<S: Number>(model: &Model) -> DMatrix<S> {
-    DMatrix::from_element(6, model.nv(), S::zero())
-}
-
 functions! {
-/// ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at most O(n) a
-/// column.
+/// The derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at
+/// most O(n) a column.
 ///
 /// q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
 /// (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
@@ -78,8 +51,8 @@ fn rnea_input_derivative(model, data; q: Position, v: Tangent, a: Tangent, wrt: 
     dtau
 }
 
-/// ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at most O(n²) a
-/// column.
+/// The derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at
+/// most O(n²) a column.
 ///
 /// q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
 ///
@@ -137,8 +110,10 @@ fn rnea_second_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_e
     condyle::rnea_second_derivatives(model, data, &q, &v, &a, &f_ext, &mut tensors);
     tensors
 }
+}
 
-/// ∂v/∂q of a frame's velocity, (6, nv), linear rows first; ∂v/∂(velocity) is its Jacobian.
+motions! {
+/// The derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. Its derivative by v is the frame's Jacobian.
 ///
 /// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
 ///
@@ -146,60 +121,38 @@ fn rnea_second_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_e
 /// >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
 /// >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
 /// True
-fn frame_velocity_derivative(model, data;
-    q: Position, v: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
-    let mut dv_dq = six(model);
-    condyle::forward_velocities(model, data, &q, &v).frame_velocity_derivative(frame, reference, &mut dv_dq);
-    dv_dq
-}
+fn frame_velocity_derivative(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq);
 
-/// ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-/// Jacobian.
+/// The derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative by
+/// the joint accelerations is the frame's Jacobian.
 ///
 /// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-fn frame_acceleration_derivatives(model, data;
-    q: Position, v: Tangent, a: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
-    let (mut da_dq, mut da_dv) = (six(model), six(model));
-    let motion = condyle::forward_accelerations(model, data, &q, &v, &a);
-    motion.frame_acceleration_derivatives(frame, reference, &mut da_dq, &mut da_dv);
-    Both(da_dq, da_dv)
-}
+fn frame_acceleration_derivatives(frame: FrameOf)
+    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv);
 
-/// ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv); ∂a/∂(acceleration) is its
-/// Jacobian.
+/// The derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative
+/// by the joint accelerations is the frame's Jacobian.
 ///
 /// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-fn frame_classical_acceleration_derivatives(model, data;
-    q: Position, v: Tangent, a: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
-    let (mut da_dq, mut da_dv) = (six(model), six(model));
-    let motion = condyle::forward_accelerations(model, data, &q, &v, &a);
-    motion.frame_classical_acceleration_derivatives(frame, reference, &mut da_dq, &mut da_dv);
-    Both(da_dq, da_dv)
-}
+fn frame_classical_acceleration_derivatives(frame: FrameOf)
+    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv);
 
-/// ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+/// The derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_velocity_derivative(model, data; q: Position, v: Tangent, body: BodyOf, reference: Reference = "local"; out) {
-    let mut dv_dq = six(model);
-    condyle::forward_velocities(model, data, &q, &v).body_velocity_derivative(body, reference, &mut dv_dq);
-    dv_dq
-}
+fn body_velocity_derivative(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq);
 
-/// ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+/// The derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
 /// `frame_acceleration_derivatives` of its own frame.
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_acceleration_derivatives(model, data;
-    q: Position, v: Tangent, a: Tangent, body: BodyOf, reference: Reference = "local"; out) {
-    let (mut da_dq, mut da_dv) = (six(model), six(model));
-    let motion = condyle::forward_accelerations(model, data, &q, &v, &a);
-    motion.body_acceleration_derivatives(body, reference, &mut da_dq, &mut da_dv);
-    Both(da_dq, da_dv)
+fn body_acceleration_derivatives(body: BodyOf)
+    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv);
 }
 
-/// The derivatives of the centroidal momentum, its rate and the centre of mass by q, v and a, exact, in O(n), as
-/// `CentroidalDerivatives`.
+functions! {
+/// The derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and a, exact, in
+/// O(n), as `CentroidalDerivatives`.
 ///
 /// q: nq numbers; v, a: nv. Gravity is not among the accelerations.
 ///
@@ -220,7 +173,7 @@ fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
     condyle::energy_derivatives(model, data, &q, &v)
 }
 
-/// ∂τ/∂q of `static_torque`, and without forces of `gravity`, (nv, nv); exact, in O(n depth).
+/// The derivative ∂τ/∂q of `static_torque`, (nv, nv), and without forces that of `gravity`; exact, in O(n depth).
 ///
 /// q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
 fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out) {

@@ -2,21 +2,26 @@
 
 use condyle::Error as Cause;
 use pyo3::create_exception;
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
-create_exception!(condyle, Error, PyException, "What is wrong with a robot's description or with a name in it.");
-create_exception!(condyle, ParseError, Error, "A file cannot be read, is no XML, or does not describe a robot.");
+create_exception!(condyle, Error, PyException, "An error of this package: the base of all others.");
 create_exception!(
     condyle,
-    ProblemError,
+    ParseError,
     Error,
-    "An optimal control problem, a warm start or a setting makes no sense."
+    "An error of a file that cannot be read, is no XML, or describes no robot."
 );
-create_exception!(condyle, ModelError, Error, "A model cannot be built, or has no frame or joint of that name.");
-create_exception!(condyle, NotPhysicalError, Error, "No body of positive density has this inertia.");
+create_exception!(condyle, ProblemError, Error, "An error in an optimal control problem, a warm start or a setting.");
+create_exception!(
+    condyle,
+    ModelError,
+    Error,
+    "An error in a model that is to be built, or a frame or joint that a model does not have."
+);
+create_exception!(condyle, NotPhysicalError, Error, "An inertia that no body of positive density has.");
 
-/// A library error as one of our exceptions.
+/// An error of the library as one of the package's exceptions.
 pub(crate) fn exception(error: Cause) -> PyErr {
     match error {
         Cause::File { .. }
@@ -27,4 +32,14 @@ pub(crate) fn exception(error: Cause) -> PyErr {
         | Cause::Strict { .. } => ParseError::new_err(error.to_string()),
         _ => ModelError::new_err(error.to_string()),
     }
+}
+
+/// An error of `condyle::optimal` as a `ProblemError`.
+pub(crate) fn problem_error(error: condyle::optimal::Error) -> PyErr {
+    ProblemError::new_err(error.to_string())
+}
+
+/// The error for a word that is none of those that an argument may be.
+pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
+    PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
 }

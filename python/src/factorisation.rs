@@ -1,15 +1,13 @@
 //! Factors of the inertia matrix, and forward dynamics by divide and conquer: the library's types one to one.
 
-use crate::arrays::{Give, matrix, named_tuple, vector};
+use crate::arrays::{Give, class, matrix, vector};
 use crate::functions::{Argument, Forces, Position, Tangent, regular, rows};
-use crate::model::Model;
+use crate::model::{MadeFor, Model};
 use nalgebra::DMatrix;
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::PyType;
 
-/// The verbs that both factors have, beside what makes and shows them.
+/// A factor of a matrix: the methods that both kinds have, beside those that make and show it.
 macro_rules! factor {
     ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
         $(#[$doc])*
@@ -17,7 +15,7 @@ macro_rules! factor {
         pub(crate) struct $class {
             inner: condyle::$class<f64>,
             size: usize,
-            /// Whether there is a factor.
+            /// Whether `factorize` was called.
             done: bool,
         }
 
@@ -32,9 +30,9 @@ macro_rules! factor {
         impl $class {
             $($own)*
 
-            /// Makes the factor of M, a symmetric positive definite matrix; see the class for the cost.
+            /// Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
             ///
-            /// If M is not positive definite, what is solved with it is not finite, or wrong. Nothing is checked.
+            /// Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
             fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
                 let M = matrix("M", M, [self.size, self.size])?.to_matrix();
                 self.inner.factorize(&M);
@@ -42,7 +40,7 @@ macro_rules! factor {
                 Ok(())
             }
 
-            /// x with M x = b, as many numbers as M has rows.
+            /// The solution x of M x = b, as many numbers as M has rows.
             ///
             /// b: as many numbers.
             #[pyo3(signature = (b, out=None))]
@@ -57,7 +55,7 @@ macro_rules! factor {
                 x.give(b.py(), out)
             }
 
-            /// X with M X = B, column by column.
+            /// The solution X of M X = B, column by column.
             ///
             /// B: a matrix of as many rows as M has.
             #[pyo3(signature = (B, out=None))]
@@ -72,7 +70,7 @@ macro_rules! factor {
                 X.give(B.py(), out)
             }
 
-            /// M⁻¹, both triangles filled.
+            /// The inverse M⁻¹, both triangles filled.
             #[pyo3(signature = (out=None))]
             fn inverse<'py>(
                 &self,
@@ -88,7 +86,8 @@ macro_rules! factor {
 }
 
 factor! {
-/// M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+/// The factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
+/// diagonal.
 ///
 /// With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
 /// `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
@@ -111,7 +110,7 @@ Ltdl {
         Self { inner: condyle::Ltdl::new(model), size: model.nv(), done: false }
     }
 
-    /// How many entries of L and D may differ from zero, the ones on L's diagonal not counted.
+    /// The number of entries of L and D that may differ from zero, without the ones on L's diagonal.
     #[getter]
     fn nonzeros(&self) -> usize {
         self.inner.nonzeros()
@@ -133,7 +132,7 @@ Ltdl {
         Ok(self.factor()?.row(k).collect())
     }
 
-    /// D, in the `order` of the places.
+    /// The diagonal D, in the `order` of the places.
     #[getter]
     fn diagonal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.factor()?.diagonal().collect::<Vec<_>>().give(py, None)
@@ -142,7 +141,7 @@ Ltdl {
 }
 
 factor! {
-/// M = L Lᵀ of any symmetric positive definite matrix.
+/// The factor M = L Lᵀ of any symmetric positive definite matrix.
 ///
 /// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
 /// and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
@@ -159,7 +158,7 @@ Cholesky {
         Self { inner: condyle::Cholesky::new(n), size: n, done: false }
     }
 
-    /// L, lower triangular.
+    /// The factor L, lower triangular.
     #[getter]
     fn lower<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.factor()?.lower().lower_triangle().give(py, None)
@@ -167,16 +166,16 @@ Cholesky {
 }
 }
 
-/// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its scratch.
+/// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-/// a join of two pieces costs some six times as much as the elimination of a body. On two threads this is faster than
-/// `aba` from some 200 bodies on, with runs of n over the number of threads, and on one never. With joints that share
+/// a join of two pieces costs some six times as much as the elimination of a body. With two threads, and as many runs
+/// as threads, it is faster than `aba` from some 200 bodies on; with one thread it never is. With joints that share
 /// coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
 /// The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
 /// algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 ///
-/// model: the robot; grain: how many bodies a run has at most.
+/// model: the robot; grain: the greatest number of bodies in a run.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> divided = condyle.DivideConquer(arm, grain=1)
@@ -188,27 +187,26 @@ Cholesky {
 #[pyclass(module = "condyle")]
 pub(crate) struct DivideConquer {
     inner: condyle::DivideConquer<f64>,
-    structure: u64,
+    made_for: MadeFor,
 }
 
 #[pymethods]
 impl DivideConquer {
     #[new]
     fn new(model: &Bound<'_, Model>, grain: usize) -> Self {
-        let Model { inner, structure } = model.get();
-        Self { inner: condyle::DivideConquer::new(inner, grain), structure: *structure }
+        let model = model.get();
+        Self { inner: condyle::DivideConquer::new(&model.inner, grain), made_for: MadeFor::new(model) }
     }
 
-    /// How much work the assembly is, and how many levels wait for one another, as `AssemblySize`.
+    /// The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`.
     #[getter]
     fn size<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let s = self.inner.size();
         let numbers = (s.bodies, s.runs, s.longest_run, s.joins, s.gathers, s.levels);
-        named_tuple(py, &CLASS, "AssemblySize")?.call1(numbers)
+        class!(py, "AssemblySize")?.call1(numbers)
     }
 
-    /// q̈, nv numbers: those of `aba`, up to rounding, in O(n) work and O(log n + grain) steps.
+    /// The acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
     ///
     /// model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
     /// f_ext: as for `rnea`.
@@ -222,10 +220,8 @@ impl DivideConquer {
         f_ext: Option<&Bound<'py, PyAny>>,
         out: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (py, Model { inner: model, structure }) = (model.py(), model.get());
-        if *structure != self.structure {
-            return Err(PyValueError::new_err(format!("model: planned for another model, not for '{}'", model.name())));
-        }
+        self.made_for.check("DivideConquer", model.get())?;
+        let (py, model) = (model.py(), &model.get().inner);
         regular(model)?;
         let a = {
             let (q, v) = (Position::read("q", q, model)?, Tangent::read("v", v, model)?);

@@ -9,15 +9,15 @@
 //! }
 //! ```
 //!
-//! Each argument is of a kind, a type below that says how it is read; the last expression is what Python gets, an array
-//! or a tuple of arrays, or with `out` what was given as such. The call borrows its `Data` before it looks at any other
-//! argument, so that a second use of the same one, from wherever, is an error; it gives its inputs back before it writes
-//! to `out`, which may be one of them. Positions, tangent vectors and forces may be given for many states, with one axis
-//! more: then so are the results, see `batch.rs`.
+//! Each argument is of a kind, a type below that says how it is read; the last expression is what Python gets, an
+//! array or a tuple of arrays, or with `out` what was given as such. Scratch other than `data` stands after it, with its
+//! type. The call takes its scratch before it looks at any other argument, so that a second use of the same one, from
+//! wherever, is an error; it gives its inputs back before it writes to `out`, which may be one of them. Positions,
+//! tangent vectors and forces may be given for many states, with one axis more: then so are the results, see `batch.rs`.
 
 use crate::arrays::{Input, Number};
 use crate::batch;
-use crate::exceptions::ModelError;
+use crate::exceptions::{ModelError, wrong_word};
 use crate::hyper_dual;
 use crate::model::{body_index, frame_index};
 use condyle::{Force, Method, Model, ReferenceFrame};
@@ -28,65 +28,41 @@ use pyo3::prelude::*;
 
 /// A kind of argument.
 pub(crate) trait Argument<'a, 'py> {
-    /// What Python gives.
+    /// The value that Python gives.
     type Given;
-    /// What the library takes.
+    /// The value that the library takes.
     type Read<S: Number>;
-    /// What the library takes for many states.
+    /// The value that the library takes for many states.
     type All;
     /// Reads the argument of this name of a function of this model.
     fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read<f64>> {
         Self::read_at(name, &given, model, None)
     }
-    /// The same for one of many states, if it is given for many, and for any number.
+    /// Reads the argument for one of many states, if it is given for many, and for any kind of number.
     fn read_at<S: Number>(
         name: &str,
         given: &Self::Given,
         model: &Model,
         state: Option<usize>,
     ) -> PyResult<Self::Read<S>>;
-    /// Whether there are hyper-dual numbers in it.
+    /// Whether it contains hyper-dual numbers.
     fn is_dual(_given: &Self::Given) -> bool {
         false
     }
-    /// For how many states it is given; none for a single one, or if it is no part of a state.
+    /// The number of states that it is given for; none if it is given for a single one, or is no part of a state.
     fn states(_given: &Self::Given) -> PyResult<Option<usize>> {
         Ok(None)
     }
-    /// Reads it for so many states.
+    /// Reads the argument for so many states.
     fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All>;
 }
 
-/// A position: nq numbers.
-pub(crate) enum Position {}
-/// A velocity, an acceleration, efforts or a tangent vector: nv numbers.
-pub(crate) enum Tangent {}
-/// Tangent vectors side by side: a matrix of nv rows.
-pub(crate) enum Tangents {}
-/// A force on each body, (nbodies, 6), or None.
-pub(crate) enum Forces {}
-/// The name or number of a frame.
-pub(crate) enum FrameOf {}
-/// The name of a joint or the number of a body.
-pub(crate) enum BodyOf {}
-/// In which axes, and at which point: a word.
-pub(crate) enum Reference {}
-/// How forward dynamics is computed: a word, or None.
-pub(crate) enum MethodOf {}
-/// An input of the dynamics beside q, v, a and τ: a word, or a word with a body or a number.
-pub(crate) enum InputOf {}
-/// A number.
-pub(crate) enum Real {}
-/// A number that belongs to no state.
-pub(crate) enum Coefficient {}
-/// A positive speed.
-pub(crate) enum Speed {}
-/// A word, which the function itself understands.
-pub(crate) enum Word {}
-
-/// Kinds that are one vector a state.
+/// Kinds of argument that are one vector a state, with the length of the vector.
 macro_rules! vectors {
-    ($($kind:ident: $length:ident),*) => {$(
+    ($($(#[$doc:meta])* $kind:ident: $length:ident),*) => {$(
+        $(#[$doc])*
+        pub(crate) enum $kind {}
+
         impl<'a, 'py: 'a> Argument<'a, 'py> for $kind {
             type Given = &'a Bound<'py, PyAny>;
             type Read<S: Number> = S::Input<'py, Ix1>;
@@ -111,7 +87,15 @@ macro_rules! vectors {
         }
     )*};
 }
-vectors!(Position: nq, Tangent: nv);
+vectors! {
+    /// A position: nq numbers.
+    Position: nq,
+    /// A velocity, an acceleration, efforts or a tangent vector: nv numbers.
+    Tangent: nv
+}
+
+/// A force on each body, (nbodies, 6), or None.
+pub(crate) enum Forces {}
 
 impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     type Given = Option<&'a Bound<'py, PyAny>>;
@@ -139,11 +123,17 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     }
 }
 
-/// Kinds that all states share: how one is read from what Python gives.
+/// Kinds of argument that all states share, with what reads one.
 macro_rules! shared {
-    ($($kind:ident<$S:ident>: $given:ty => $read:ty {
-        |$name:pat_param, $from:pat_param, $model:pat_param| $body:expr $(, $is_dual:expr)?
-    })*) => {$(
+    ($(
+        $(#[$doc:meta])*
+        $kind:ident<$S:ident>: $given:ty => $read:ty {
+            |$name:pat_param, $from:pat_param, $model:pat_param| $body:expr $(, $is_dual:expr)?
+        }
+    )*) => {$(
+        $(#[$doc])*
+        pub(crate) enum $kind {}
+
         impl<'a, 'py: 'a> Argument<'a, 'py> for $kind {
             type Given = $given;
             type Read<$S: Number> = $read;
@@ -166,15 +156,19 @@ macro_rules! shared {
     )*};
 }
 shared! {
+    /// Tangent vectors side by side: a matrix of nv rows.
     Tangents<S>: &'a Bound<'py, PyAny> => DMatrix<S> { |name, given, model| rows(name, given, model.nv()),
         |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
+    /// The name or number of a frame.
     FrameOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| frame_index(model, given) }
 
+    /// The name of a joint or the number of a body.
     BodyOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| {
         body_index("body: expected a joint's name", model, given, 0)
     } }
 
+    /// The axes and the point of a motion: a word.
     Reference<S>: &'a str => ReferenceFrame { |name, given, _| match *given {
         "local" => Ok(ReferenceFrame::Local),
         "world" => Ok(ReferenceFrame::World),
@@ -182,6 +176,7 @@ shared! {
         other => Err(wrong_word(name, "'local', 'world' or 'local_world_aligned'", other)),
     } }
 
+    /// The method of forward dynamics: a word, or None.
     MethodOf<S>: Option<&'a str> => Option<Method> { |name, given, _| match *given {
         None => Ok(None),
         Some("aba") => Ok(Some(Method::ArticulatedBody)),
@@ -190,6 +185,7 @@ shared! {
         Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
     } }
 
+    /// An input of the dynamics beside q, v, a and τ: a word, or a word with a body or a number.
     InputOf<S>: &'a Bound<'py, PyAny> => condyle::Input { |name, given, model| {
         use condyle::Input;
         if let Ok((word, of)) = given.extract::<(String, Bound<'py, PyAny>)>() {
@@ -212,17 +208,21 @@ shared! {
         }
     } }
 
+    /// A number.
     Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
         |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
+    /// A number that belongs to no state.
     Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given) }
 
+    /// A positive speed.
     Speed<S>: f64 => f64 { |name, given, _| positive_speed(name, *given) }
 
+    /// A word, which the function itself understands.
     Word<S>: &'a str => &'a str { |_, given, _| Ok(*given) }
 }
 
-/// A number that must be a positive speed.
+/// A number that is checked to be a positive speed.
 pub(crate) fn positive_speed(name: &str, found: f64) -> PyResult<f64> {
     if found > 0.0 {
         return Ok(found);
@@ -237,17 +237,12 @@ pub(crate) fn rows<S: Number>(name: &str, given: &Bound<'_, PyAny>, rows: usize)
     Ok(DMatrix::from_row_slice(rows, columns, &S::read::<Ix2>(name, given, &[rows, columns])?))
 }
 
-/// That a word is none of those that are understood.
-pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
-    PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
-}
-
-/// That nothing need hold.
+/// The check of a function that works for every robot.
 pub(crate) fn any(_: &Model) -> PyResult<()> {
     Ok(())
 }
 
-/// That the inertia matrix of a robot has an inverse.
+/// The check of a function that needs the inverse of the inertia matrix.
 pub(crate) fn regular(model: &Model) -> PyResult<()> {
     match model.warnings().iter().find(|w| matches!(w, condyle::Warning::Singular { .. })) {
         None => Ok(()),
@@ -255,51 +250,56 @@ pub(crate) fn regular(model: &Model) -> PyResult<()> {
     }
 }
 
-/// Declares functions of a model, and of a `Data` if `data` stands after it; see above.
+/// Declarations of functions of a model, of a `Data` if `data` stands after it, and of other scratch after that; see
+/// above.
 macro_rules! functions {
     ($(
         $(#[$doc:meta])*
-        fn $name:ident($model:ident $(, $data:ident)?;
+        fn $name:ident($model:ident $(, $data:ident $(, $scratch:ident: $Scratch:ident)?)?;
             $($arg:ident: $kind:ident $(= $default:tt)?),* $(; $out:ident)?) $body:block
         $(batch $batch:ident: $check:ident($($all:ident: $all_kind:ident),*) $in_lanes:block)?
     )*) => {$(
         $(#[$doc])*
         #[pyfunction]
-        #[pyo3(signature = ($model, $($data,)? $($arg $(= $default)?,)* $($out = None)?))]
+        #[pyo3(signature = ($model, $($data, $($scratch,)?)? $($arg $(= $default)?,)* $($out = None)?))]
         pub(crate) fn $name<'a, 'py: 'a>(
             $model: &'a Bound<'py, $crate::model::Model>,
-            $($data: &'a Bound<'py, $crate::data::Data>,)?
+            $($data: &'a Bound<'py, $crate::data::Data>, $($scratch: &'a Bound<'py, $Scratch>,)?)?
             $($arg: <$crate::functions::$kind as $crate::functions::Argument<'a, 'py>>::Given,)*
             $($out: Option<&'a Bound<'py, PyAny>>,)?
         ) -> PyResult<Bound<'py, PyAny>> {
-            use $crate::arrays::Give as _;
+            #[allow(unused_imports)] // by functions without a `Data` or without arguments
+            use $crate::{arrays::Give as _, batch, data::Holds, functions as kinds, functions::Argument};
             let (py, robot) = ($model.py(), $model.get());
-            $(let mut scratch = $crate::data::scratch(robot, $data)?;)?
+            $(
+                let mut data = $crate::data::take(robot, $data)?;
+                $(let mut scratch = $crate::data::take(robot, $scratch)?;)?
+            )?
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            let dual = [$(<$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::is_dual(&$arg)),*].contains(&true);
-            let states = [$((stringify!($arg), <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::states(&$arg)?)),*];
-            let states = $crate::batch::agreed(&states)?;
+            let dual = [$(<kinds::$kind as Argument<'_, '_>>::is_dual(&$arg)),*].contains(&true);
+            let states = [$((stringify!($arg), <kinds::$kind as Argument<'_, '_>>::states(&$arg)?)),*];
+            let states = batch::agreed(&states)?;
             $(if let (Some(states), false) = (states, dual) {
-                use $crate::batch::Batched as _;
                 $check($model)?;
-                $(let $all = <$crate::functions::$all_kind as $crate::functions::Argument<'_, '_>>::read_all(
-                    stringify!($all), &$all, $model, states,
-                )?;)*
-                let $batch = scratch.batch($model, states);
-                let in_lanes = {
+                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all, $model, states)?;)*
+                let $batch = data.batch($model, states);
+                let result = {
                     $(let $all = &$all[..];)*
                     py.detach(|| $in_lanes)
                 };
-                return in_lanes.give_all(py, states, out);
+                return batch::PerState { result, states }.give(py, out);
             })?
             // the same source for doubles and for hyper-dual numbers
             macro_rules! call {
                 ($S:ty, $state:expr, $to:expr) => {{
-                    $(let $data = <$S as $crate::arrays::Number>::scratch(&mut scratch, $model);)?
+                    $(
+                        let $data = Holds::<$S>::held(&mut *data, $model)?;
+                        $(let $scratch = Holds::<$S>::held(&mut *scratch, $model)?;)?
+                    )?
                     let result = {
-                        $(let $arg = <$crate::functions::$kind as $crate::functions::Argument<'_, '_>>::read_at::<$S>(
+                        $(let $arg = <kinds::$kind as Argument<'_, '_>>::read_at::<$S>(
                             stringify!($arg), &$arg, $model, $state,
                         )?;)*
                         $body
@@ -315,7 +315,7 @@ macro_rules! functions {
                 None => call(None, out),
                 Some(states) => {
                     let results = (0..states).map(|k| call(Some(k), None)).collect::<PyResult<Vec<_>>>()?;
-                    $crate::batch::stack(py, results, out)
+                    batch::stack(py, results, out)
                 }
             }
         }

@@ -1,8 +1,7 @@
 //! Hyper-dual numbers as Python objects, which NumPy's arrays of objects calculate with.
 
 use crate::arrays::{Give, Number, check_shape};
-use crate::data::Data;
-use condyle::{Model, Scalar};
+use condyle::Scalar;
 use num_dual::{DualNum, HyperDual64};
 use numpy::ndarray::Dimension;
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
@@ -10,11 +9,11 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// What the library calculates with.
+/// The type of hyper-dual number that the library computes with.
 pub(crate) type Hyper = HyperDual64;
 
-/// re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂, ε₁² = ε₂² = 0: a number that knows its derivatives in two directions,
-/// and the second one by both.
+/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0: it knows its derivatives in two
+/// directions, and the second derivative by both.
 ///
 /// Arrays of them are NumPy arrays of objects; arithmetic and NumPy's elementary functions work on these, and so do
 /// all functions of a model and a state, which then return such arrays. Comparisons look at `re`. `condyle.jacobian`,
@@ -29,7 +28,7 @@ pub(crate) type Hyper = HyperDual64;
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct HyperDual(Hyper);
 
-/// The other number of an operation: hyper-dual or real, but no array, which has operations of its own.
+/// The other number of an operation: hyper-dual or real. It is no array: an array has operations of its own.
 pub(crate) struct Operand(Hyper);
 
 impl<'py> FromPyObject<'_, 'py> for Operand {
@@ -135,18 +134,18 @@ impl HyperDual {
     fn arctan2(&self, x: Operand) -> Self {
         Self(Scalar::atan2(self.0, x.0))
     }
-    /// √(self² + other²).
+    /// The hypotenuse √(self² + other²).
     fn hypot(&self, other: Operand) -> Self {
         Self(DualNum::sqrt(&(self.0 * self.0 + other.0 * other.0)))
     }
-    /// |self|.
+    /// The absolute value of self.
     fn fabs(&self) -> Self {
         self.__abs__()
     }
 
     // elementary functions, by NumPy's names
 
-    /// √self.
+    /// The square root of self.
     fn sqrt(&self) -> Self {
         Self(DualNum::sqrt(&self.0))
     }
@@ -154,15 +153,15 @@ impl HyperDual {
     fn cbrt(&self) -> Self {
         Self(DualNum::cbrt(&self.0))
     }
-    /// e to the power of self.
+    /// The exponential of self, e to the power of self.
     fn exp(&self) -> Self {
         Self(DualNum::exp(&self.0))
     }
-    /// 2 to the power of self.
+    /// The power of 2 with exponent self.
     fn exp2(&self) -> Self {
         Self(DualNum::exp2(&self.0))
     }
-    /// e to the power of self, minus 1.
+    /// The exponential of self, minus 1.
     fn expm1(&self) -> Self {
         Self(DualNum::exp_m1(&self.0))
     }
@@ -232,7 +231,7 @@ impl HyperDual {
     }
 }
 
-/// Whether there is a hyper-dual number in an argument.
+/// Whether an argument contains a hyper-dual number.
 pub(crate) fn within(given: &Bound<'_, PyAny>) -> bool {
     if given.cast::<PyUntypedArray>().is_ok_and(|array| array.dtype().kind() != b'O') {
         return false;
@@ -275,9 +274,6 @@ impl Number for Hyper {
             flat.set_item(k, HyperDual(x))?;
         }
         Ok(array)
-    }
-    fn scratch<'d>(data: &'d mut Data, model: &Model) -> &'d mut condyle::Data<Self> {
-        data.dual.get_or_insert_with(|| Box::new(condyle::Data::new(model)))
     }
 }
 

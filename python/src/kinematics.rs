@@ -1,11 +1,35 @@
 //! Where bodies and frames are and how they move: the library's functions one to one.
 
 use crate::functions::functions;
-use nalgebra::DMatrix;
 use pyo3::prelude::*;
 
+/// Declarations of functions of a frame or of a body. Each calls the method of the same name of what a pass gives: the
+/// method returns a motion, or fills matrices of shape (6, nv), and the function returns these.
+macro_rules! motions {
+    (@call $model:ident, $motion:expr, $name:ident($of:ident, $reference:ident)) => { $motion.$name($of, $reference) };
+    (@call $model:ident, $motion:expr, $name:ident($of:ident, $reference:ident) $($matrix:ident)+) => {{
+        $(let mut $matrix = nalgebra::DMatrix::from_element(6, $model.nv(), condyle::Scalar::zero());)+
+        $motion.$name($of, $reference, $(&mut $matrix),+);
+        ($($matrix),+)
+    }};
+    ($(
+        $(#[$doc:meta])*
+        fn $name:ident($of:ident: $Of:ident) after $pass:ident($($arg:ident: $kind:ident),*)
+            $(fills ($($matrix:ident),+))?;
+    )*) => {
+        $crate::functions::functions! {$(
+            $(#[$doc])*
+            fn $name(model, data; $($arg: $kind,)* $of: $Of, reference: Reference = "local"; out) {
+                let motion = condyle::$pass(model, data, $(&$arg),*);
+                $crate::kinematics::motions!(@call model, motion, $name($of, reference) $($($matrix)+)?)
+            }
+        )*}
+    };
+}
+pub(crate) use motions;
+
 functions! {
-/// Where all bodies are: (nbodies, 4, 4), the pose of each body in the world as a homogeneous matrix; O(n).
+/// The pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 ///
 /// q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
 /// A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
@@ -19,8 +43,8 @@ fn forward_kinematics(model, data; q: Position; out) {
     (0..model.bodies().len()).map(|body| placements.body(body)).collect::<Vec<_>>()
 }
 
-/// oXf, the pose of a frame in the world: (4, 4), a homogeneous matrix that takes coordinates in the frame to
-/// coordinates in the world; O(n).
+/// The pose oXf of a frame in the world: a homogeneous matrix (4, 4) that takes coordinates in the frame to coordinates
+/// in the world; O(n).
 ///
 /// q: nq numbers; frame: its name or number.
 ///
@@ -31,8 +55,10 @@ fn forward_kinematics(model, data; q: Position; out) {
 fn frame_placement(model, data; q: Position, frame: FrameOf; out) {
     condyle::forward_kinematics(model, data, &q).frame(frame)
 }
+}
 
-/// The Jacobian J of a frame, (6, nv), linear rows first: the frame's velocity is J v.
+motions! {
+/// The Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 ///
 /// q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
 /// the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
@@ -41,14 +67,10 @@ fn frame_placement(model, data; q: Position, frame: FrameOf; out) {
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
 /// (6, 7)
-fn frame_jacobian(model, data; q: Position, frame: FrameOf, reference: Reference = "local"; out) {
-    let mut J = DMatrix::zeros(6, model.nv());
-    condyle::forward_kinematics(model, data, &q).frame_jacobian(frame, reference, &mut J);
-    J
-}
+fn frame_jacobian(frame: FrameOf) after forward_kinematics(q: Position) fills (J);
 
-/// The velocity of a frame, 6 numbers: of its body's point at the origin of the reference (m/s), then of its
-/// rotation (rad/s); O(n).
+/// The velocity of a frame, 6 numbers: that of the body's point at the origin of the reference (m/s), then the angular
+/// velocity (rad/s); O(n).
 ///
 /// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
 ///
@@ -57,21 +79,17 @@ fn frame_jacobian(model, data; q: Position, frame: FrameOf, reference: Reference
 /// >>> J = condyle.frame_jacobian(arm, data, q, "tool")
 /// >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
 /// True
-fn frame_velocity(model, data; q: Position, v: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
-    condyle::forward_velocities(model, data, &q, &v).frame_velocity(frame, reference)
-}
+fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent);
 
 /// The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
-/// velocity, seen from the world, expressed in the reference; O(n).
+/// velocity as seen from the world, expressed in the reference; O(n).
 ///
 /// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-fn frame_acceleration(model, data;
-    q: Position, v: Tangent, a: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
-    condyle::forward_accelerations(model, data, &q, &v, &a).frame_acceleration(frame, reference)
-}
+fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
 
-/// The classical acceleration of a frame, 6 numbers: v̇ + ω × v of its body's point at the origin of the reference
-/// (m/s²), then of its rotation (rad/s²); in 'local_world_aligned' p̈ of the frame's origin; O(n).
+/// The classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the reference
+/// (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the frame's
+/// origin; O(n).
 ///
 /// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
 ///
@@ -82,23 +100,16 @@ fn frame_acceleration(model, data;
 /// >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
 /// >>> np.allclose(acceleration, J @ a + dJ @ v)
 /// True
-fn frame_classical_acceleration(model, data;
-    q: Position, v: Tangent, a: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
-    condyle::forward_accelerations(model, data, &q, &v, &a).frame_classical_acceleration(frame, reference)
-}
+fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
 
-/// dJ/dt, the rate of a frame's Jacobian along v, (6, nv), linear rows first.
+/// The rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 ///
 /// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
 /// acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
 /// frame.
-fn frame_jacobian_rate(model, data; q: Position, v: Tangent, frame: FrameOf, reference: Reference = "local"; out) {
-    let mut dJ = DMatrix::zeros(6, model.nv());
-    condyle::forward_velocities(model, data, &q, &v).frame_jacobian_rate(frame, reference, &mut dJ);
-    dJ
-}
+fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ);
 
-/// The Jacobian J of a body, (6, nv), linear rows first: the body's velocity is J v.
+/// The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 ///
 /// q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
 /// body's own frame.
@@ -108,43 +119,27 @@ fn frame_jacobian_rate(model, data; q: Position, v: Tangent, frame: FrameOf, ref
 /// >>> J = condyle.frame_jacobian(arm, data, q, "link7")
 /// >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
 /// True
-fn body_jacobian(model, data; q: Position, body: BodyOf, reference: Reference = "local"; out) {
-    let mut J = DMatrix::zeros(6, model.nv());
-    condyle::forward_kinematics(model, data, &q).body_jacobian(body, reference, &mut J);
-    J
-}
+fn body_jacobian(body: BodyOf) after forward_kinematics(q: Position) fills (J);
 
 /// The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_velocity(model, data; q: Position, v: Tangent, body: BodyOf, reference: Reference = "local"; out) {
-    condyle::forward_velocities(model, data, &q, &v).body_velocity(body, reference)
-}
+fn body_velocity(body: BodyOf) after forward_velocities(q: Position, v: Tangent);
 
 /// The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
 /// own frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_acceleration(model, data;
-    q: Position, v: Tangent, a: Tangent, body: BodyOf, reference: Reference = "local"; out) {
-    condyle::forward_accelerations(model, data, &q, &v, &a).body_acceleration(body, reference)
-}
+fn body_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
 
 /// The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
 /// frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_classical_acceleration(model, data;
-    q: Position, v: Tangent, a: Tangent, body: BodyOf, reference: Reference = "local"; out) {
-    condyle::forward_accelerations(model, data, &q, &v, &a).body_classical_acceleration(body, reference)
-}
+fn body_classical_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
 
-/// dJ/dt, the rate of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+/// The rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_jacobian_rate(model, data; q: Position, v: Tangent, body: BodyOf, reference: Reference = "local"; out) {
-    let mut dJ = DMatrix::zeros(6, model.nv());
-    condyle::forward_velocities(model, data, &q, &v).body_jacobian_rate(body, reference, &mut dJ);
-    dJ
-}
+fn body_jacobian_rate(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dJ);
 }

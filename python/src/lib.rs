@@ -1,10 +1,14 @@
 //! The Python package `condyle`: its extension module `condyle._condyle`.
 //!
-//! `arrays` takes NumPy arrays in and gives them out, `functions` is what all calls have in common, `model` shows a robot
-//! and `builder` makes one, `data` is the algorithms' scratch; `algorithms`, `centroidal`, `configuration`, `constrained`,
-//! `derivatives`, `factorisation`, `kinematics` and `regressors` are what the library has, one to one, and
-//! `inertial_parameters`, `optimal` and `simulation` are what the modules of these names show. The doc comments here are
-//! the docstrings that Python sees; `condyle/_condyle.pyi` repeats them for editors, and a test holds the two together.
+//! No module uses one that stands after it here:
+//! - `exceptions` and `arrays`: what the package raises, and NumPy arrays in and out; `hyper_dual` numbers;
+//! - `joint`, `inertial_parameters`, `model`, `robots`, `builder`: robots, and how they are made;
+//! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
+//! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
+//!   `regressors`, `simulation`: the library's functions and types, one to one;
+//! - `optimal`: the module `condyle.optimal`.
+//!
+//! The doc comments here are the docstrings that Python sees; `stubs.py` writes them into `condyle/_condyle.pyi`.
 #![allow(non_snake_case)]
 #![allow(clippy::too_many_arguments)] // a function in Python has as many as it needs
 
@@ -22,6 +26,7 @@ mod factorisation;
 mod functions;
 mod hyper_dual;
 mod inertial_parameters;
+mod joint;
 mod kinematics;
 mod model;
 mod optimal;
@@ -42,7 +47,7 @@ mod _condyle {
         rnea_derivatives, static_torque,
     };
     #[pymodule_export]
-    use builder::{BodyId, Joint, ModelBuilder};
+    use builder::{BodyId, ModelBuilder};
     #[pymodule_export]
     use centroidal::{
         centroidal_map, centroidal_map_rate, centroidal_momentum, centroidal_momentum_rate, com, com_acceleration,
@@ -78,17 +83,19 @@ mod _condyle {
         check, from_inertia, from_log_cholesky, log_cholesky, log_cholesky_jacobian, pseudo_inertia, to_inertia,
     };
     #[pymodule_export]
+    use joint::Joint;
+    #[pymodule_export]
     use kinematics::{
         body_acceleration, body_classical_acceleration, body_jacobian, body_jacobian_rate, body_velocity,
         forward_kinematics, frame_acceleration, frame_classical_acceleration, frame_jacobian, frame_jacobian_rate,
         frame_placement, frame_velocity,
     };
     #[pymodule_export]
-    use model::Model;
+    use model::{Model, model_from_bytes};
     #[pymodule_export]
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, Fddp, FreeDynamics,
-        FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, WrenchCone,
+        FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{
@@ -96,7 +103,7 @@ mod _condyle {
         potential_energy_regressor,
     };
     #[pymodule_export]
-    use robots::{arm7, humanoid, model_from_bytes, quadruped};
+    use robots::{arm7, humanoid, quadruped};
     #[pymodule_export]
     use simulation::Simulation;
 

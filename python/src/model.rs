@@ -1,19 +1,17 @@
 //! A robot as Python sees it.
 
-use crate::arrays::{Give, named_tuple, three, vector};
-use crate::builder;
+use crate::arrays::{Give, class, three, vector};
 use crate::exceptions::{ModelError, exception};
 use crate::inertial_parameters::{give_inertia, read_inertia};
-use crate::robots::{MAGIC, root};
-use condyle::{FrameKind, Joint, MjcfOptions, SdfOptions, UrdfOptions, inertial_parameters};
+use crate::joint::{Joint, kind, root};
+use condyle::{FrameKind, MjcfOptions, SdfOptions, UrdfOptions, inertial_parameters};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyBytes, PyType};
+use pyo3::types::PyBytes;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 
-/// A robot: bodies, joints, frames, inertias, limits. Frozen, and free to be shared between threads.
+/// A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 ///
 /// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
 /// Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
@@ -25,8 +23,30 @@ use std::path::PathBuf;
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct Model {
     pub(crate) inner: condyle::Model,
-    /// Equal for models of the same bodies and joints, which can share a `Data`.
-    pub(crate) structure: u64,
+    /// A hash that is equal for models of the same bodies and joints, which can share a `Data`.
+    structure: u64,
+}
+
+/// The models that something was made for: one, and all others of the same bodies and joints.
+pub(crate) struct MadeFor {
+    structure: u64,
+    /// The name of the model that it was made for.
+    pub(crate) name: String,
+}
+
+impl MadeFor {
+    pub(crate) fn new(model: &Model) -> Self {
+        Self { structure: model.structure, name: model.inner.name().to_owned() }
+    }
+
+    /// Raises a `ValueError` if the model is another one; `argument` names what was made.
+    pub(crate) fn check(&self, argument: &str, model: &Model) -> PyResult<()> {
+        if self.structure == model.structure {
+            return Ok(());
+        }
+        let (made, given) = (&self.name, model.inner.name());
+        Err(PyValueError::new_err(format!("{argument}: made for another model ('{made}'), not for this '{given}'")))
+    }
 }
 
 impl From<condyle::Model> for Model {
@@ -36,20 +56,6 @@ impl From<condyle::Model> for Model {
             (&b.joint_name, b.parent, kind(b.joint), b.idx_q, b.idx_v, b.mimic.is_some()).hash(&mut hasher);
         }
         Self { structure: hasher.finish(), inner }
-    }
-}
-
-pub(crate) fn kind(joint: Joint) -> &'static str {
-    match joint {
-        Joint::Revolute { .. } => "revolute",
-        Joint::Continuous { .. } => "continuous",
-        Joint::Prismatic { .. } => "prismatic",
-        Joint::Helical { .. } => "helical",
-        Joint::Spherical => "spherical",
-        Joint::Planar => "planar",
-        Joint::Translation => "translation",
-        Joint::FreeFlyer => "free_flyer",
-        _ => "other",
     }
 }
 
@@ -74,7 +80,7 @@ pub(crate) fn body_index(
     numbered(expected, body, least, model.bodies().len())
 }
 
-/// A number from `least` to below `count`.
+/// An index from `least` to below `count`.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
     let index: isize = given.extract()?;
     usize::try_from(index)
@@ -84,7 +90,7 @@ fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize
 }
 
 impl Model {
-    /// Of each joint that has coordinates of its own; 0 of the others.
+    /// A number for each joint that has coordinates of its own; 0 for the others.
     fn of_joints(&self, get: impl Fn(&condyle::Body) -> usize) -> Vec<usize> {
         let count = |(i, b): (usize, &condyle::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
         self.inner.bodies().iter().enumerate().map(count).collect()
@@ -97,7 +103,7 @@ impl Model {
 
 #[pymethods]
 impl Model {
-    /// Reads a URDF file.
+    /// A model from a URDF file.
     ///
     /// Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
     ///
@@ -125,7 +131,7 @@ impl Model {
         Ok(condyle::Model::from_urdf(path, &options).map_err(exception)?.into())
     }
 
-    /// Reads a URDF from a string; see `from_urdf`.
+    /// A model from a URDF in a string; see `from_urdf`.
     ///
     /// >>> text = condyle.robots.QUADRUPED
     /// >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
@@ -137,7 +143,7 @@ impl Model {
         Ok(condyle::Model::from_urdf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// Reads an MJCF file (MuJoCo), and the files that it includes.
+    /// A model from an MJCF file (MuJoCo) and the files that it includes.
     ///
     /// q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
     /// in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
@@ -159,7 +165,7 @@ impl Model {
         Ok(condyle::Model::from_mjcf(path, &options).map_err(exception)?.into())
     }
 
-    /// Reads an MJCF from a string, which may not include files; see `from_mjcf`.
+    /// A model from an MJCF in a string, which may not include files; see `from_mjcf`.
     ///
     /// >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
     /// >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
@@ -171,7 +177,7 @@ impl Model {
         Ok(condyle::Model::from_mjcf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// Reads an SDF file (Gazebo) with one model in it.
+    /// A model from an SDF file (Gazebo) that holds one model.
     ///
     /// Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
     /// parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
@@ -189,7 +195,7 @@ impl Model {
         Ok(condyle::Model::from_sdf(path, &options).map_err(exception)?.into())
     }
 
-    /// Reads an SDF from a string; see `from_sdf`.
+    /// A model from an SDF in a string; see `from_sdf`.
     ///
     /// >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
     /// >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
@@ -202,7 +208,7 @@ impl Model {
         Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// What is odd about the robot, though it could be loaded.
+    /// Warnings: what is odd about the robot although it could be loaded.
     ///
     /// Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
     #[getter]
@@ -222,19 +228,19 @@ impl Model {
         self.inner.name()
     }
 
-    /// How many numbers a position q has.
+    /// The number of coordinates of a position q.
     #[getter]
     fn nq(&self) -> usize {
         self.inner.nq()
     }
 
-    /// How many degrees of freedom there are: the numbers of v, a, τ and of a tangent vector.
+    /// The number of degrees of freedom: of the numbers in v, a, τ and in a tangent vector.
     #[getter]
     fn nv(&self) -> usize {
         self.inner.nv()
     }
 
-    /// How many bodies there are, the world included: the rows of f_ext and of what `forward_kinematics` returns.
+    /// The number of bodies, the world included: of the rows of f_ext and of the result of `forward_kinematics`.
     #[getter]
     fn nbodies(&self) -> usize {
         self.inner.bodies().len()
@@ -261,11 +267,11 @@ impl Model {
         types
     }
 
-    /// Each joint, as `Joint`; None for the world.
+    /// The joints, as `Joint`; None for the world.
     #[getter]
-    fn joints(&self) -> Vec<Option<builder::Joint>> {
+    fn joints(&self) -> Vec<Option<Joint>> {
         let bodies = self.inner.bodies().iter().enumerate();
-        bodies.map(|(i, b)| (i > 0).then_some(builder::Joint(b.joint))).collect()
+        bodies.map(|(i, b)| (i > 0).then_some(Joint(b.joint))).collect()
     }
 
     /// The body on which each joint sits; 0 is the world.
@@ -274,35 +280,35 @@ impl Model {
         self.of_bodies(|b| b.parent)
     }
 
-    /// Where each joint's position begins in q; that of a joint that mimics another is the other's.
+    /// The index in q at which each joint's position begins; for a joint that mimics another, that of the other.
     #[getter]
     fn idx_qs(&self) -> Vec<usize> {
         self.of_bodies(|b| b.idx_q)
     }
 
-    /// Where each joint's velocity begins in v; that of a joint that mimics another is the other's.
+    /// The index in v at which each joint's velocity begins; for a joint that mimics another, that of the other.
     #[getter]
     fn idx_vs(&self) -> Vec<usize> {
         self.of_bodies(|b| b.idx_v)
     }
 
-    /// How many numbers of q each joint has of its own: none if it mimics another; 0 for the world.
+    /// The number of coordinates that each joint has of its own: 0 if it mimics another joint, and 0 for the world.
     #[getter]
     fn nqs(&self) -> Vec<usize> {
         self.of_joints(|b| b.joint.nq())
     }
 
-    /// How many degrees of freedom each joint has of its own: none if it mimics another; 0 for the world.
+    /// The number of degrees of freedom that each joint has of its own: 0 if it mimics another joint, and 0 for the
+    /// world.
     #[getter]
     fn nvs(&self) -> Vec<usize> {
         self.of_joints(|b| b.joint.nv())
     }
 
-    /// How each joint follows another one, as `Mimic(ratio, offset)`, or None if it does not.
+    /// The rule by which each joint follows another one, as `Mimic(ratio, offset)`; None for a joint that does not.
     #[getter]
     fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
-        static MIMIC: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let class = named_tuple(py, &MIMIC, "Mimic")?;
+        let class = class!(py, "Mimic")?;
         let mimic = |b: &condyle::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
         self.inner.bodies().iter().map(mimic).collect()
     }
@@ -313,15 +319,15 @@ impl Model {
         self.of_bodies(|b| b.placement).give(py, None)
     }
 
-    /// The inertia of each body, with all that fixed joints merge into it, as `Inertia`, in the body's frame.
+    /// The inertia of each body in the body's frame, with all that fixed joints merge into it, as `Inertia`.
     #[getter]
     fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
         self.inner.bodies().iter().map(|b| give_inertia(py, b.inertia)).collect()
     }
 
-    /// π, ten numbers for each body but the world, 10 (nbodies − 1) in all: mass, mass times centre of mass, and xx,
-    /// xy, yy, xz, yz, zz of the rotational inertia about the origin of the body's frame; what regressors are
-    /// multiplied with.
+    /// The inertial parameters π, which regressors are multiplied with: ten numbers for each body but the world, 10
+    /// (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
+    /// inertia about the origin of the body's frame.
     #[getter]
     fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let bodies = self.inner.bodies()[1..].iter();
@@ -332,9 +338,8 @@ impl Model {
     /// The limits of position, velocity and effort, as `Limits`; infinite where there are none.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        static LIMITS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let limits = self.inner.limits();
-        named_tuple(py, &LIMITS, "Limits")?.call1((
+        class!(py, "Limits")?.call1((
             limits.lower.give(py, None)?,
             limits.upper.give(py, None)?,
             limits.velocity.give(py, None)?,
@@ -342,19 +347,21 @@ impl Model {
         ))
     }
 
-    /// Viscous damping of each degree of freedom (N m s/rad, N s/m), nv numbers: used by no algorithm unasked.
+    /// The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
+    /// and where a `Simulation` is asked for it.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.inner.damping().give(py, None)
     }
 
-    /// Coulomb friction of each degree of freedom (N m, N), nv numbers: used by no algorithm unasked.
+    /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and where
+    /// a `Simulation` is asked for it.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.inner.friction().give(py, None)
     }
 
-    /// Inertia of the rotor as seen at each joint (kg m², kg), nv numbers, part of M in every algorithm.
+    /// The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm.
     #[getter]
     fn armature<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.inner.armature().give(py, None)
@@ -366,18 +373,17 @@ impl Model {
         self.inner.gravity().give(py, None)
     }
 
-    /// Mass of all bodies, of what is fixed to the world too (kg).
+    /// The mass of all bodies, with that of what is fixed to the world (kg).
     #[getter]
     fn total_mass(&self) -> f64 {
         self.inner.total_mass()
     }
 
-    /// All frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the
-    /// joint's and the link's.
+    /// The frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the joint's
+    /// and the link's.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        static FRAME: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let class = named_tuple(py, &FRAME, "Frame")?;
+        let class = class!(py, "Frame")?;
         let frame = |f: &condyle::Frame| {
             let kind = match f.kind {
                 FrameKind::Link => "link",
@@ -452,7 +458,7 @@ impl Model {
         Ok(self.inner.lock(&joints, &q).map_err(exception)?.into())
     }
 
-    /// One line: the robot's name and size.
+    /// The robot's name and size in one line.
     fn __repr__(&self) -> String {
         let m = &self.inner;
         format!("<condyle.Model '{}': {} bodies, nq = {}, nv = {}>", m.name(), m.bodies().len() - 1, m.nq(), m.nv())
@@ -474,7 +480,7 @@ impl Model {
         slf
     }
 
-    /// For pickle.
+    /// The parts of a pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let py = slf.py();
         let bytes = postcard::to_extend(&slf.get().inner, MAGIC.as_bytes().to_vec())
@@ -482,4 +488,20 @@ impl Model {
         let make = py.import("condyle._condyle")?.getattr("_model_from_bytes")?;
         Ok((make, (PyBytes::new(py, &bytes),)))
     }
+}
+
+/// The beginning of a pickled model: the library's version, since the form may change from one to the next.
+const MAGIC: &str = concat!("condyle ", env!("CARGO_PKG_VERSION"), "\n");
+
+/// The model that a pickle holds.
+#[pyfunction]
+#[pyo3(name = "_model_from_bytes")]
+pub(crate) fn model_from_bytes(data: &[u8]) -> PyResult<Model> {
+    let Some(model) = data.strip_prefix(MAGIC.as_bytes()) else {
+        let version = env!("CARGO_PKG_VERSION");
+        return Err(ModelError::new_err(format!("the pickle is not of condyle {version}, or of no model")));
+    };
+    let model: condyle::Model =
+        postcard::from_bytes(model).map_err(|e| ModelError::new_err(format!("the pickle is damaged: {e}")))?;
+    Ok(model.into())
 }

@@ -6,8 +6,8 @@ use condyle::Scalar;
 use pyo3::prelude::*;
 
 functions! {
-/// Y(q, v, a) with τ = Y π: (nv, 10 (nbodies − 1)), `rnea` as a linear function of `Model.inertial_parameters`; O(n
-/// depth).
+/// The joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
+/// `Model.inertial_parameters`; O(n depth).
 ///
 /// q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
 ///
@@ -20,27 +20,27 @@ fn joint_torque_regressor(model, data; q: Position, v: Tangent, a: Tangent; out)
     condyle::joint_torque_regressor(model, data, &q, &v, &a)
 }
 
-/// y(q, v) with T = y · π: 10 (nbodies − 1) numbers, `kinetic_energy` as a linear function of
-/// `Model.inertial_parameters`, without the rotors; O(n).
+/// The kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without the
+/// rotors, as a linear function of `Model.inertial_parameters`; O(n).
 ///
 /// q: nq numbers; v: nv.
 fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
     condyle::kinetic_energy_regressor(model, data, &q, &v)
 }
 
-/// y(q) with V = y · π: 10 (nbodies − 1) numbers, `potential_energy` as a linear function of
-/// `Model.inertial_parameters`; O(n).
+/// The potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a linear
+/// function of `Model.inertial_parameters`; O(n).
 ///
 /// q: nq numbers.
 fn potential_energy_regressor(model, data; q: Position; out) {
     condyle::potential_energy_regressor(model, data, &q)
 }
 
-/// τ = −d v − f tanh(v/ε): the efforts of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
+/// The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
 /// O(n).
 ///
-/// v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function knows of
-/// them: whoever wants them adds them to τ.
+/// v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function adds
+/// them: add them to τ where they should act.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> v = np.ones(7)
@@ -52,8 +52,8 @@ fn passive_torque(model; v: Tangent, smoothing: Speed; out) {
     tau
 }
 
-/// ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`: nv numbers, the diagonal of a matrix without other
-/// entries; O(n).
+/// The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
+/// other entries; O(n).
 ///
 /// v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
 fn passive_torque_derivative(model; v: Tangent, smoothing: Speed; out) {

@@ -1,40 +1,8 @@
-//! Where models come from, apart from files: the robots of our own, and pickles.
+//! Robots of our own.
 
-use crate::exceptions::ModelError;
-use crate::functions::wrong_word;
 use crate::model::Model;
-use condyle::{Joint, robots};
+use condyle::robots;
 use pyo3::prelude::*;
-
-/// The joint between the world and a root link.
-pub(crate) fn root(root_joint: Option<&str>) -> PyResult<Option<Joint>> {
-    match root_joint {
-        None => Ok(None),
-        Some("free_flyer") => Ok(Some(Joint::FreeFlyer)),
-        Some("planar") => Ok(Some(Joint::Planar)),
-        Some("spherical") => Ok(Some(Joint::Spherical)),
-        Some("translation") => Ok(Some(Joint::Translation)),
-        Some(other) => {
-            Err(wrong_word("root_joint", "None, 'free_flyer', 'planar', 'spherical' or 'translation'", other))
-        }
-    }
-}
-
-/// What a pickled model begins with: the library's version, since the form may change from one to the next.
-pub(crate) const MAGIC: &str = concat!("condyle ", env!("CARGO_PKG_VERSION"), "\n");
-
-/// The model that a pickle holds.
-#[pyfunction]
-#[pyo3(name = "_model_from_bytes")]
-pub(crate) fn model_from_bytes(data: &[u8]) -> PyResult<Model> {
-    let Some(model) = data.strip_prefix(MAGIC.as_bytes()) else {
-        let version = env!("CARGO_PKG_VERSION");
-        return Err(ModelError::new_err(format!("the pickle is not of condyle {version}, or of no model")));
-    };
-    let model: condyle::Model =
-        postcard::from_bytes(model).map_err(|e| ModelError::new_err(format!("the pickle is damaged: {e}")))?;
-    Ok(model.into())
-}
 
 /// A seven-axis arm with a fixed base, nq = nv = 7; its last frame is `tool`.
 ///

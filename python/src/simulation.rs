@@ -1,19 +1,18 @@
 //! Robots that move by themselves, as Python sees them: the module `condyle.simulation`.
 
-use crate::arrays::{Give, matrix, named_tuple, output, vector};
-use crate::functions::{Argument, Forces, Position, Tangent, positive_speed, regular, wrong_word};
+use crate::arrays::{Give, class, output};
+use crate::exceptions::wrong_word;
+use crate::functions::{Argument, Forces, Position, Tangent, positive_speed, regular};
 use crate::model::Model;
 use condyle::simulation as rust;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::PyType;
 use rust::{Integrator, Settings, Status};
 
 type Steps<'m> = rust::Simulation<'m, f64>;
 
 self_cell::self_cell!(
-    /// A simulation, and the model that it is of.
+    /// A simulation together with its model.
     struct Owned {
         owner: Py<Model>,
         #[covariant]
@@ -21,7 +20,7 @@ self_cell::self_cell!(
     }
 );
 
-/// A robot's state, and all that is needed to move it on.
+/// A simulation of a robot: its state, and the memory to move it on.
 ///
 /// Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
 /// external forces stay as they are during a step.
@@ -61,7 +60,9 @@ fn word(status: Status) -> &'static str {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (model, integrator="semi_implicit_euler", dt=1e-3, passive=None, tolerance=1e-9, max_iterations=20))]
+    #[pyo3(signature = (
+        model, integrator="semi_implicit_euler", dt=1e-3, passive=None, tolerance=1e-9, max_iterations=20
+    ))]
     fn new(
         model: &Bound<'_, Model>,
         integrator: &str,
@@ -98,13 +99,13 @@ impl Simulation {
         self.0.borrow_dependent().v().give(py, None)
     }
 
-    /// The sum of the steps since the state was set (s).
+    /// The time since the state was set: the sum of the steps (s).
     #[getter]
     fn time(&self) -> f64 {
         self.0.borrow_dependent().time()
     }
 
-    /// Puts the robot at position q (nq numbers) with velocity v (nv), and the clock to 0.
+    /// Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
     fn set_state(&mut self, q: &Bound<'_, PyAny>, v: &Bound<'_, PyAny>) -> PyResult<()> {
         let model = &self.0.borrow_owner().get().inner;
         let (q, v) = (Position::read("q", q, model)?, Tangent::read("v", v, model)?);
@@ -112,8 +113,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// One step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach
-    /// the tolerance (a shorter step helps); or 'not_finite': then the step was not taken.
+    /// A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
+    /// tolerance (a shorter step helps); or 'not_finite', and then the step was not taken.
     ///
     /// tau: nv numbers (N m, N); f_ext: as for `rnea`.
     #[pyo3(signature = (tau, f_ext=None))]
@@ -123,21 +124,20 @@ impl Simulation {
         Ok(word(self.0.with_dependent_mut(|_, simulation| simulation.step(&tau, &f_ext))))
     }
 
-    /// So many steps, with a control law that is called before each of them; ends early when one fails, with its
-    /// status.
+    /// A number of steps, with a control law that is called before each of them. Returns the status of the last step,
+    /// and ends early when a step fails.
     ///
     /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
     ///     efforts, then other threads run meanwhile.
     #[pyo3(signature = (steps, control=None))]
     fn run(slf: &Bound<'_, Self>, steps: usize, control: Option<&Bound<'_, PyAny>>) -> PyResult<&'static str> {
-        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let py = slf.py();
         let Some(control) = control else {
             let mut this = slf.try_borrow_mut()?;
             let owned = &mut this.0;
             return Ok(word(py.detach(|| owned.with_dependent_mut(|_, simulation| simulation.run(steps, |_| {})))));
         };
-        let class = named_tuple(py, &CLASS, "Control")?;
+        let class = class!(py, "Control")?;
         let model = slf.try_borrow()?.0.borrow_owner().clone_ref(py);
         let (nv, bodies) = (model.get().inner.nv(), model.get().inner.bodies().len());
         let mut status = Status::Done;
@@ -152,8 +152,8 @@ impl Simulation {
                 let expected = "expected a function that sets the numbers of `tau` and `f_ext` and returns None";
                 return Err(PyTypeError::new_err(format!("control: {expected}")));
             }
-            let (tau, rows) = (vector("tau", &tau, nv)?, matrix("f_ext", &f_ext, [bodies, 6])?);
-            let f_ext: Vec<condyle::Force<f64>> = rows.as_chunks::<6>().0.iter().map(|&row| row.into()).collect();
+            let robot = &model.get().inner;
+            let (tau, f_ext) = (Tangent::read("tau", &tau, robot)?, Forces::read("f_ext", Some(&f_ext), robot)?);
             let mut this = slf.try_borrow_mut()?;
             status = this.0.with_dependent_mut(|_, simulation| simulation.step(&tau, &f_ext));
             if !status.is_done() {

@@ -33,6 +33,8 @@ def argument(name: str, robot: Robot, states: int) -> Any:
             return rng.standard_normal((*shape, model.nbodies, 6))
         case "frame" | "body":
             return 1
+        case "constraints":
+            return condyle.ConstraintSet(model, [condyle.Constraint(len(model.frames) - 1, "point")])
         case "by" | "argument" | "of":
             return None
     return inspect.Parameter.empty
@@ -79,6 +81,7 @@ def test_as_one_by_one(name: str, robot: Robot) -> None:
 
 def test_most_functions_are_compared() -> None:
     assert len(functions()) > 40
+    assert "constrained_dynamics" in functions()
 
 
 def test_arguments_are_shared(robot: Robot) -> None:

@@ -86,7 +86,9 @@ def test_divide_and_conquer(robot: Robot, grain: int) -> None:
 
 def test_divide_and_conquer_refuses(quadruped: Robot) -> None:
     model, _, q, v, _, tau, _ = quadruped
-    with pytest.raises(ValueError, match="^model: planned for another model, not for 'quadruped'$"):
+    with pytest.raises(
+        ValueError, match=r"^DivideConquer: made for another model \('arm7'\), not for this 'quadruped'$"
+    ):
         condyle.DivideConquer(condyle.robots.arm7(), 1).aba(model, q, v, tau)
     with pytest.raises(ValueError, match=r"^tau: expected shape \(18,\), found \(17,\)$"):
         condyle.DivideConquer(model, 1).aba(model, q, v, tau[1:])

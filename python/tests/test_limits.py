@@ -22,6 +22,7 @@ from condyle.optimal import (
     Limit,
     Problem,
     ProblemError,
+    Residual,
 )
 
 ARM = condyle.robots.arm7()
@@ -33,12 +34,12 @@ PRIMAL, DUAL, DIFFERENCES = 1e-7, 1e-6, 1e-5
 
 
 def reach() -> tuple[Problem, np.ndarray, np.ndarray]:
-    costs = [Cost.state("rest", 1e-1, X0), Cost.control("effort", 1e-3, np.zeros(7))]
-    weak = Limit.control("weak", np.zeros(7), np.full(7, -WEAK), np.full(7, WEAK))
+    costs = [Cost("rest", 1e-1, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    weak = Limit("weak", Residual.control(np.zeros(7)), np.full(7, -WEAK), np.full(7, WEAK))
     knot = FreeDynamics(ARM, DT, costs, limits=[weak], limits_at={KNOTS - 1: []})
     free = np.full(7, np.inf)
-    stop = Limit.state("stop", X0, np.r_[-free, np.zeros(7)], np.r_[free, np.zeros(7)])
-    end = FreeDynamics(ARM, None, [], limits=[Limit.frame_translation("reach", ARM, "tool", TARGET), stop])
+    stop = Limit("stop", Residual.state(X0), np.r_[-free, np.zeros(7)], np.r_[free, np.zeros(7)])
+    end = FreeDynamics(ARM, None, [], limits=[Limit("reach", Residual.frame_translation(ARM, "tool", TARGET)), stop])
     problem = Problem(X0, [knot], [0] * KNOTS, end)
     return problem, np.tile(X0, (KNOTS + 1, 1)), np.tile(knot.quasi_static(X0), (KNOTS, 1))
 
@@ -117,9 +118,11 @@ def test_settings_reach_both_solvers() -> None:
 
 
 def test_what_cannot_be_held_is_said() -> None:
-    far = Limit.frame_translation("far", ARM, "tool", [3.0, 0.0, 0.0])
-    knot = FreeDynamics(ARM, DT, [Cost.control("effort", 1e-3, np.zeros(7))])
-    problem = Problem(X0, [knot], [0] * 3, FreeDynamics(ARM, None, [Cost.state("rest", 1.0, X0)], limits=[far]))
+    far = Limit("far", Residual.frame_translation(ARM, "tool", [3.0, 0.0, 0.0]))
+    knot = FreeDynamics(ARM, DT, [Cost("effort", 1e-3, Residual.control(np.zeros(7)))])
+    problem = Problem(
+        X0, [knot], [0] * 3, FreeDynamics(ARM, None, [Cost("rest", 1.0, Residual.state(X0))], limits=[far])
+    )
     solver = AugmentedLagrangian(problem, penalty_max=1e3, inner={"max_iterations": 20})
     assert solver.solve(np.tile(X0, (4, 1)), np.zeros((3, 7))).status == "infeasible"
     assert solver.outcome.primal > 1.0
@@ -133,11 +136,11 @@ def test_feet_do_not_slip() -> None:
     feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
     contacts = {f: condyle.Constraint(f, "point", reference="local_world_aligned", kd=20.0) for f in feet}
     cone = FrictionCone(0.3, least=5.0)
-    grips = [Limit.friction_cone(foot, foot, cone) for foot in feet]
-    costs = [Cost.state("rest", 1e-1, x0), Cost.control("effort", 1e-3, np.zeros(12))]
+    grips = [Limit(foot, Residual.friction_cone(foot, cone)) for foot in feet]
+    costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(12)))]
     stance = ContactDynamics(quadruped, contacts, 0.02, costs, limits=grips)
     com = condyle.centroidal_map(quadruped, condyle.Data(quadruped), q).com
-    ahead = Limit.center_of_mass("ahead", com + np.array([0.04, 0.0, 0.0]))
+    ahead = Limit("ahead", Residual.center_of_mass(com + np.array([0.04, 0.0, 0.0])))
     problem = Problem(x0, [stance], [0] * 12, FreeDynamics(quadruped, None, [], limits=[ahead]))
     solver = sharp(problem)
     solution = solver.solve(np.tile(x0, (13, 1)), np.tile(stance.quasi_static(x0), (12, 1)))
@@ -152,19 +155,19 @@ def test_feet_do_not_slip() -> None:
 
 
 def test_what_does_not_fit_is_refused_by_name() -> None:
-    effort = Limit.joint_effort("effort", np.zeros(7), upper=np.ones(7))
+    effort = Limit("effort", Residual.joint_effort(np.zeros(7)), upper=np.ones(7))
     with pytest.raises(ProblemError, match="limit `effort`: there is no effort at this knot"):
         FreeDynamics(ARM, None, [], limits=[effort])
     with pytest.raises(ProblemError, match="limit `effort` of knot 3: another limit has this name"):
         FreeDynamics(ARM, DT, [], limits_at={3: [effort, effort]})
     with pytest.raises(ProblemError, match="limit `com`: its lower bound has 2 numbers, expected 3"):
-        InverseDynamics(ARM, DT, [], limits=[Limit.center_of_mass("com", np.zeros(3), lower=np.zeros(2))])
-    turn = Limit.frame_rotation("turn", ARM, "tool", np.eye(3), lower=[0, 1, 0], upper=[0, -1, 0])
+        InverseDynamics(ARM, DT, [], limits=[Limit("com", Residual.center_of_mass(np.zeros(3)), lower=np.zeros(2))])
+    turn = Limit("turn", Residual.frame_rotation(ARM, "tool", np.eye(3)), lower=[0, 1, 0], upper=[0, -1, 0])
     with pytest.raises(ProblemError, match="limit `turn`: entry 1 must be at least 1 and at most -1"):
         FreeDynamics(ARM, None, [], limits=[turn])
     feet = {"foot": condyle.Constraint("LF_foot", "point")}
     with pytest.raises(ProblemError, match="limit `push`: there is no contact `hand` at this knot; there is `foot`"):
-        ImpulseDynamics(condyle.robots.quadruped(), feet, [], limits=[Limit.contact_force("push", "hand")])
+        ImpulseDynamics(condyle.robots.quadruped(), feet, [], limits=[Limit("push", Residual.contact_force("hand"))])
     assert repr(effort) == "<condyle.optimal.Limit 'effort'>"
 
 
@@ -173,7 +176,7 @@ def test_constraints_of_ones_own_are_limits() -> None:
     problem, xs, us = reach()
     expected = sharp(problem)
     solution = expected.solve(xs, us)
-    costs = [Cost.state("rest", 0.3, X0), Cost.control("effort", 1e-3, np.zeros(7))]
+    costs = [Cost("rest", 0.3, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
     plain = FreeDynamics(ARM, DT, costs)
     some = {"lower": np.full(3, -WEAK), "upper": np.full(3, WEAK)}
 

@@ -17,9 +17,12 @@ from condyle.optimal import (
     FrictionCone,
     ImpulseDynamics,
     InverseDynamics,
+    Limit,
     Lqr,
     Problem,
     ProblemError,
+    Residual,
+    WrenchCone,
 )
 
 ARM = condyle.robots.arm7()
@@ -31,7 +34,7 @@ OPTIMUM = 1e-8
 
 
 def end() -> FreeDynamics:
-    return FreeDynamics(ARM, None, [Cost.state("end", 1.0, X0)])
+    return FreeDynamics(ARM, None, [Cost("end", 1.0, Residual.state(X0))])
 
 
 def test_written_derivatives_and_differences_find_one_optimum() -> None:
@@ -70,7 +73,9 @@ def test_what_an_action_raises_is_raised(calc: Any, error: type[Exception]) -> N
 
 
 def test_weights_change_between_solves() -> None:
-    knot = FreeDynamics(ARM, 0.05, [Cost.state("rest", 1.0, X0), Cost.control("effort", 1e-3, np.zeros(7))])
+    knot = FreeDynamics(
+        ARM, 0.05, [Cost("rest", 1.0, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    )
     problem = Problem(X0, [knot], [0] * 5, end())
     start = np.tile(X0, (6, 1)), np.tile(knot.quasi_static(X0), (5, 1))
     before = Fddp(problem).solve(*start).cost
@@ -82,7 +87,7 @@ def test_weights_change_between_solves() -> None:
 
 def test_knots_may_have_costs_of_their_own() -> None:
     def effort(weight: float) -> list[Cost]:
-        return [Cost.control("effort", weight, np.zeros(7))]
+        return [Cost("effort", weight, Residual.control(np.zeros(7)))]
 
     def solve(models: list[Any], stages: list[int]) -> float:
         problem = Problem(X0, models, stages, end())
@@ -95,8 +100,8 @@ def test_knots_may_have_costs_of_their_own() -> None:
 
 def test_controls_of_unlike_knots_are_lists() -> None:
     feet = {foot: condyle.Constraint(foot, "point") for foot in ("LF_foot", "RH_foot")}
-    rest = Cost.state("rest", 1.0, STANDING)
-    stance = ContactDynamics(QUADRUPED, feet, 0.01, [rest, Cost.control("effort", 1e-2, np.zeros(12))])
+    rest = Cost("rest", 1.0, Residual.state(STANDING))
+    stance = ContactDynamics(QUADRUPED, feet, 0.01, [rest, Cost("effort", 1e-2, Residual.control(np.zeros(12)))])
     impact = ImpulseDynamics(QUADRUPED, feet, [rest], damping=1e-9)
     problem = Problem(STANDING, [stance, impact], [0, 1, 0], FreeDynamics(QUADRUPED, None, [rest]))
     hold = stance.quasi_static(STANDING)
@@ -109,25 +114,55 @@ def test_controls_of_unlike_knots_are_lists() -> None:
 
 
 def test_accelerations_may_be_the_controls() -> None:
-    knot = InverseDynamics(ARM, 0.1, [Cost.joint_effort("effort", 1e-2, np.zeros(7))])
+    knot = InverseDynamics(ARM, 0.1, [Cost("effort", 1e-2, Residual.joint_effort(np.zeros(7)))])
     problem = Problem(X0, [knot], [0], end())
     np.testing.assert_allclose(problem.rollout(np.ones((1, 7)))[1, 7:], 0.1)
+
+
+def test_residuals_are_values() -> None:
+    reach = Residual.frame_translation(ARM, "tool", [0.4, 0.2, 0.5])
+    assert reach == Residual.frame_translation(ARM, ARM.frame("tool"), np.array([0.4, 0.2, 0.5]))
+    assert reach != Residual.frame_translation(ARM, "tool", [0.4, 0.2, 0.6])
+    assert reach != Residual.center_of_mass([0.4, 0.2, 0.5])
+    assert repr(Residual.control([1.0])) == '<condyle.optimal.Residual {"control":{"reference":[1.0]}}>'
+    # one residual may serve many terms, at a knot and between knots
+    terms = [Cost("far", 1.0, reach), Cost("near", 10.0, reach, Activation.smooth2(1e-2))]
+    problem = Problem(X0, [FreeDynamics(ARM, 0.1, terms)], [0], FreeDynamics(ARM, None, [terms[0]]))
+    assert problem.to_json().count('"frame_translation"') == 3
+
+
+def test_cones_have_bounds_of_their_own() -> None:
+    feet = {"foot": condyle.Constraint("LF_foot", "rigid")}
+    cone, box = FrictionCone(0.7, greatest=200.0), [0.2, 0.1]
+    for residual, (lower, upper) in (
+        (Residual.friction_cone("foot", cone), cone.bounds()),
+        (Residual.wrench_cone("foot", WrenchCone(cone, box)), WrenchCone(cone, box).bounds()),
+        (Residual.center_of_pressure("foot", box), (np.full(4, -np.inf), np.zeros(4))),
+    ):
+
+        def text(cost: Cost, limit: Limit) -> str:
+            stance = ContactDynamics(QUADRUPED, feet, 0.01, [cost], limits=[limit])
+            return Problem(STANDING, [stance], [0], FreeDynamics(QUADRUPED, None, [])).to_json()
+
+        told = text(Cost("c", 1.0, residual, Activation.barrier(lower, upper)), Limit("l", residual, lower, upper))
+        assert text(Cost("c", 1.0, residual), Limit("l", residual)) == told
+        assert text(Cost("c", 1.0, residual, Activation.quadratic()), Limit("l", residual)) != told
 
 
 def test_what_does_not_fit_is_refused_by_name() -> None:
     feet = {"foot": condyle.Constraint("LF_foot", "point")}
     twice = {"one": condyle.Constraint("LF_foot", "point"), "two": condyle.Constraint("LF_foot", "rigid")}
-    cone = Cost.friction_cone("grip", 1.0, "hand", FrictionCone(0.7))
+    cone = Cost("grip", 1.0, Residual.friction_cone("hand", FrictionCone(0.7)))
     with pytest.raises(ProblemError, match="cost `grip`: there is no contact `hand` at this knot; there is `foot`"):
         ContactDynamics(QUADRUPED, feet, 0.01, [cone])
     with pytest.raises(ProblemError, match="together they are singular without damping"):
         ContactDynamics(QUADRUPED, twice, 0.01, [])
     with pytest.raises(ProblemError, match="cost `effort`: its reference has 6 numbers, expected 7"):
-        FreeDynamics(ARM, 0.01, [Cost.control("effort", 1.0, np.zeros(6))])
+        FreeDynamics(ARM, 0.01, [Cost("effort", 1.0, Residual.control(np.zeros(6)))])
     with pytest.raises(ProblemError, match="its ε is 0"):
-        FreeDynamics(ARM, 0.01, [Cost.control("effort", 1.0, np.zeros(7), Activation.smooth1(0.0))])
+        FreeDynamics(ARM, 0.01, [Cost("effort", 1.0, Residual.control(np.zeros(7)), Activation.smooth1(0.0))])
     with pytest.raises(condyle.ModelError, match="unknown frame `hand`"):
-        Cost.frame_translation("reach", 1.0, ARM, "hand", np.zeros(3))
+        Cost("reach", 1.0, Residual.frame_translation(ARM, "hand", np.zeros(3)))
     with pytest.raises(ValueError, match="integrator: expected"):
         FreeDynamics(ARM, 0.01, [], integrator="explicit_euler")  # type: ignore[arg-type]
     with pytest.raises(ProblemError, match=r"`x0\[0\]` is NaN"):
@@ -140,12 +175,12 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
 
 def every_kind_of_knot(landing: bool = False) -> Problem:
     feet = {foot: condyle.Constraint(foot, "point", kd=20.0) for foot in ("LF_foot", "RH_foot")}
-    cone = Cost.friction_cone("cone", 1e-2, "LF_foot", FrictionCone(0.7, greatest=200.0))
-    rest, still = Cost.state("rest", 1.0, STANDING), Cost.control("still", 1e-2, np.zeros(12))
+    cone = Cost("cone", 1e-2, Residual.friction_cone("LF_foot", FrictionCone(0.7, greatest=200.0)))
+    rest, still = Cost("rest", 1.0, Residual.state(STANDING)), Cost("still", 1e-2, Residual.control(np.zeros(12)))
     lower = np.full(12, -30.0)
     models = [
         ContactDynamics(QUADRUPED, feet, 0.02, [rest, still, cone], costs_at={1: [rest, still]}, lower=lower),
-        ImpulseDynamics(QUADRUPED, feet, [Cost.impulse_center_of_mass("landing", 1e-3)], restitution=0.1),
+        ImpulseDynamics(QUADRUPED, feet, [Cost("landing", 1e-3, Residual.impulse_center_of_mass())], restitution=0.1),
         FreeDynamics(QUADRUPED, 0.02, [still], actuation=np.eye(18)[:, 6:], integrator="runge_kutta_2"),
     ]
     end = ImpulseDynamics(QUADRUPED, feet, [rest]) if landing else FreeDynamics(QUADRUPED, None, [rest])
@@ -166,7 +201,7 @@ def test_a_problem_in_a_file(again: Any, landing: bool) -> None:
 
 
 def test_what_no_file_can_hold() -> None:
-    rest = Cost.state("rest", 1.0, X0)
+    rest = Cost("rest", 1.0, Residual.state(X0))
     knot, last = FreeDynamics(ARM, 0.1, [rest]), FreeDynamics(ARM, None, [rest])
     own = Action(14, 0, lambda t, x, u: (x, 0.0))
     with pytest.raises(ProblemError, match=r"models\[1\]: expected an action of a robot"):
@@ -188,8 +223,8 @@ def test_costs_of_a_knot_move_with_it() -> None:
 
     def follow(time: int) -> list[Cost]:
         point = [0.4, 0.01 * time, 0.5]
-        reach = Cost.frame_translation("reach", 10.0 + time, ARM, "tool", point)
-        return [Cost.state("rest", 1e-1, X0), Cost.control("effort", 1e-3, np.zeros(7)), reach]
+        reach = Cost("reach", 10.0 + time, Residual.frame_translation(ARM, "tool", point))
+        return [Cost("rest", 1e-1, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7))), reach]
 
     def end_costs(time: int) -> list[Cost]:
         rest, _, reach = follow(time)
@@ -218,7 +253,7 @@ def test_costs_of_a_knot_move_with_it() -> None:
     with pytest.raises(ProblemError, match="knot 13: expected 0 to 12"):
         moving.set_costs(13, [])
     with pytest.raises(ProblemError, match="cost `cone`"):
-        moving.set_costs(3, [Cost.friction_cone("cone", 1.0, "hand", FrictionCone(0.7))])
+        moving.set_costs(3, [Cost("cone", 1.0, Residual.friction_cone("hand", FrictionCone(0.7)))])
     own = Problem([0.0], [Action(1, 1, lambda t, x, u: (x + u, 0.0))], [0], Action(1, 0, lambda t, x, u: (None, 0.0)))
     with pytest.raises(ProblemError, match="knot 0: expected an action of a robot"):
         own.set_costs(0, [])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, ProblemError
+from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, ProblemError, Residual
 
 KNOTS = 12
 
@@ -12,9 +12,11 @@ KNOTS = 12
 def reach():
     arm = condyle.robots.arm7()
     x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
-    rest = Cost.state("rest", 1e-1, x0)
-    running = FreeDynamics(arm, 0.05, [rest, Cost.control("effort", 1e-4, np.zeros(7))])
-    terminal = FreeDynamics(arm, None, [rest, Cost.frame_translation("reach", 1e3, arm, "tool", [0.4, 0.2, 0.5])])
+    rest = Cost("rest", 1e-1, Residual.state(x0))
+    running = FreeDynamics(arm, 0.05, [rest, Cost("effort", 1e-4, Residual.control(np.zeros(7)))])
+    terminal = FreeDynamics(
+        arm, None, [rest, Cost("reach", 1e3, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))]
+    )
     problem = Problem(x0, [running], [0] * KNOTS, terminal)
     return problem, np.tile(x0, (KNOTS + 1, 1)), np.tile(running.quasi_static(x0), (KNOTS, 1))
 

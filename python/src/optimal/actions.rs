@@ -1,61 +1,67 @@
-//! Actions of robots; those of one's own are in `own.rs`.
+//! Actions of robots.
 
-use super::costs::Cost;
-use super::limits::Limit;
-use super::own::{Action, ConstrainedAction, Fault, Lqr};
-use super::{exception, rust};
-use crate::arrays::{Give, matrix, vector};
+use super::costs::{Cost, Limit};
+use crate::arrays::{Give, bounds, matrix, vector};
 use crate::constrained::constraint;
-use crate::functions::wrong_word;
-use crate::model::Model as Robot;
+use crate::exceptions::{problem_error, wrong_word};
+use crate::model::Model;
+use condyle::optimal as rust;
 use nalgebra::DMatrix;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rust::ActionModel;
 use rust::robot::{self, Actuation, ControlBounds, Dynamics, Integrator, Knot};
-use rust::{ActionModel, NumDiff};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A robot's action as data, if it can be put into a file.
+/// A robot's action as data, which can be put into a file.
 #[derive(Clone)]
 pub(super) struct Described {
     pub robot: Arc<condyle::Model>,
     pub knot: Knot,
 }
 
-/// A robot's action, as it is and as data.
-struct RobotAction<A> {
+/// A robot's action, ready to be computed and as data.
+pub(super) struct RobotAction<A> {
     action: A,
     described: Described,
 }
 
 impl<A: ActionModel + Clone> RobotAction<A> {
-    fn new(robot: &Bound<'_, Robot>, knot: impl FnOnce(&condyle::Model) -> PyResult<Knot>) -> PyResult<Self> {
+    fn new(robot: &Bound<'_, Model>, knot: impl FnOnce(&condyle::Model) -> PyResult<Knot>) -> PyResult<Self> {
         let robot = Arc::new(robot.get().inner.clone());
         let described = Described { knot: knot(&robot)?, robot };
         let action: Box<dyn Any> = described.build()?;
         Ok(Self { action: *action.downcast().expect("the class asks for its own kind of knot"), described })
     }
 
-    fn boxed(&self) -> Boxed {
-        Boxed {
-            action: Box::new(self.action.clone()),
-            kind: self.described.kind(),
-            described: Some(self.described.clone()),
-        }
+    /// A copy for a problem.
+    pub(super) fn boxed(&self) -> Boxed {
+        Boxed { action: Box::new(self.action.clone()), described: Some(self.described.clone()) }
+    }
+
+    /// The controls that hold the robot still at the state x, from what computes them.
+    fn hold<'py>(
+        &self,
+        x: &Bound<'py, PyAny>,
+        quasi_static: impl FnOnce(&mut A, &[f64]) -> Vec<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let model = &self.described.robot;
+        let state = vector("x", x, model.nq() + model.nv())?;
+        quasi_static(&mut self.action.clone(), &state).give(x.py(), None)
     }
 }
 
 impl Described {
-    /// With its action.
+    /// The action that the data describe.
     pub(super) fn boxed(self) -> PyResult<Boxed> {
-        Ok(Boxed { action: self.build()?, kind: self.kind(), described: Some(self) })
+        Ok(Boxed { action: self.build()?, described: Some(self) })
     }
 
     fn build(&self) -> PyResult<Box<dyn ActionModel>> {
-        self.knot.build(&self.robot).map_err(exception)
+        self.knot.build(&self.robot).map_err(problem_error)
     }
 
     /// Changes the weights of the terms called `name`.
@@ -64,7 +70,7 @@ impl Described {
         all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
     }
 
-    /// Knot t becomes knot t − 1.
+    /// Moves the costs and limits of knot t to knot t − 1.
     pub(super) fn shift(&mut self) {
         fn moved<T>(at: &mut BTreeMap<usize, T>) {
             *at = std::mem::take(at).into_iter().filter_map(|(t, own)| Some((t.checked_sub(1)?, own))).collect();
@@ -72,129 +78,47 @@ impl Described {
         moved(&mut self.knot.costs_at);
         moved(&mut self.knot.limits_at);
     }
-
-    fn kind(&self) -> Model {
-        match self.knot.dynamics {
-            Dynamics::Free { .. } | Dynamics::End => Model::Free,
-            Dynamics::Contact { .. } => Model::Contact,
-            Dynamics::Impulse { .. } => Model::Impulse,
-            Dynamics::Inverse { .. } => Model::Inverse,
-        }
-    }
 }
 
-/// An action of a problem.
+/// An action for a problem, and the same as data if it can be put into a file.
 pub(super) struct Boxed {
     pub action: Box<dyn ActionModel>,
-    pub kind: Model,
     pub described: Option<Described>,
 }
 
-/// What kind of action a model of a problem is.
-#[derive(Clone, Copy)]
-pub(super) enum Model {
-    Free,
-    Contact,
-    Impulse,
-    Inverse,
-    Own,
-}
-
-impl Model {
-    /// Changes a weight of model k, or of the terminal one; says whether there is such a term.
-    pub(super) fn set_weight(self, problem: &mut rust::Problem, k: Option<usize>, name: &str, weight: f64) -> bool {
-        self.change(problem, k, |robot| robot.set_weight(name, weight)).unwrap_or(false)
-    }
-
-    /// Changes a robot's model k, or the terminal one, if it is one, whatever constraints are around it.
-    pub(super) fn change<T>(
-        self,
-        problem: &mut rust::Problem,
-        k: Option<usize>,
-        change: impl FnOnce(&mut dyn RobotKnot) -> T,
-    ) -> Option<T> {
-        fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
-            match k {
-                Some(k) => problem.model_mut(k),
-                None => problem.terminal_mut(),
-            }
+/// The action of type A that is model k of a problem, or the terminal model, or that stands inside of constraints
+/// there.
+pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
+    fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
+        match k {
+            Some(k) => problem.model_mut(k),
+            None => problem.terminal_mut(),
         }
-        fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
-            if find::<A>(problem, k).is_some() {
-                return find(problem, k);
-            }
-            let mut around = find::<rust::Constrained>(problem, k)?;
-            while around.action_mut::<A>().is_none() {
-                around = around.action_mut()?;
-            }
-            around.action_mut()
-        }
-        let knot: &mut dyn RobotKnot = match self {
-            Self::Free => inside::<robot::FreeDynamics>(problem, k)?,
-            Self::Contact => inside::<robot::ContactDynamics>(problem, k)?,
-            Self::Impulse => inside::<robot::ImpulseDynamics>(problem, k)?,
-            Self::Inverse => inside::<robot::InverseDynamics>(problem, k)?,
-            Self::Own => return None,
-        };
-        Some(change(knot))
     }
+    if find::<A>(problem, k).is_some() {
+        return find(problem, k);
+    }
+    let mut around = find::<rust::Constrained>(problem, k)?;
+    while around.action_mut::<A>().is_none() {
+        around = around.action_mut()?;
+    }
+    around.action_mut()
 }
 
-/// What all knots of robots have.
-pub(super) trait RobotKnot {
-    fn set_weight(&mut self, name: &str, weight: f64) -> bool;
-    fn set_costs(&mut self, t: usize, costs: Vec<robot::Cost>) -> Result<(), rust::Error>;
-}
-
-macro_rules! robot_knots {
-    ($($knot:ident),*) => {$(
-        impl RobotKnot for robot::$knot {
-            fn set_weight(&mut self, name: &str, weight: f64) -> bool {
-                self.set_weight(name, weight)
-            }
-
-            fn set_costs(&mut self, t: usize, costs: Vec<robot::Cost>) -> Result<(), rust::Error> {
-                self.set_costs(t, costs)
-            }
-        }
-    )*};
-}
-robot_knots!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics);
-
-/// A copy of any action.
-pub(super) fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<Boxed> {
-    if let Ok(free) = model.cast::<FreeDynamics>() {
-        return Ok(free.get().0.boxed());
-    }
-    if let Ok(contact) = model.cast::<ContactDynamics>() {
-        return Ok(contact.get().0.boxed());
-    }
-    if let Ok(impulse) = model.cast::<ImpulseDynamics>() {
-        return Ok(impulse.get().0.boxed());
-    }
-    if let Ok(inverse) = model.cast::<InverseDynamics>() {
-        return Ok(inverse.get().0.boxed());
-    }
-    let own = |action| Boxed { action, kind: Model::Own, described: None };
-    if let Ok(lqr) = model.cast::<Lqr>() {
-        return Ok(own(Box::new(lqr.get().0.clone())));
-    }
-    if let Ok(constrained) = model.cast::<ConstrainedAction>() {
-        let (py, constrained) = (model.py(), constrained.get());
-        let Boxed { action, kind, .. } = boxed(constrained.action.bind(py), faults)?;
-        let constraint = constrained.constraint(py, &*action);
-        faults.push(constraint.fault.clone());
-        let action = Box::new(rust::Constrained::new(action, Box::new(constraint)));
-        return Ok(Boxed { action, kind, described: None });
-    }
-    let Ok(action) = model.cast::<Action>() else {
-        let found = model.get_type().name()?;
-        return Err(PyTypeError::new_err(format!("models: expected an action, found '{found}'")));
+/// A change of a robot's action in a problem, see `inside`; none if the action is not of a robot.
+macro_rules! change {
+    ($problem:expr, $k:expr, |$knot:ident| $change:expr) => {
+        change!($problem, $k, |$knot| $change; FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics)
     };
-    let written = action.get().copy(model.py());
-    faults.push(written.fault.clone());
-    Ok(own(if written.calc_diff.is_some() { Box::new(written) } else { Box::new(NumDiff(written)) }))
+    ($problem:expr, $k:expr, |$knot:ident| $change:expr; $($class:ident),*) => {
+        $(if let Some($knot) = $crate::optimal::actions::inside::<condyle::optimal::robot::$class>($problem, $k) {
+            Some($change)
+        } else)* {
+            None
+        }
+    };
 }
+pub(super) use change;
 
 fn integrator(name: &str) -> PyResult<Integrator> {
     match name {
@@ -209,7 +133,8 @@ fn integrator(name: &str) -> PyResult<Integrator> {
     }
 }
 
-/// S, if one is given: otherwise every joint but a free-flyer at the root is driven; and the number of controls.
+/// The matrix S if one is given, or none, which drives every joint but a free-flyer at the root; and the number of
+/// controls.
 fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult<(Option<DMatrix<f64>>, usize)> {
     let Some(map) = map else { return Ok((None, Actuation::joints(model).nu())) };
     let shape: Vec<usize> = map.getattr("shape").and_then(|shape| shape.extract()).unwrap_or_default();
@@ -239,22 +164,6 @@ fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Ve
         Ok(robot::Contact::new(&name.extract::<String>()?, constraint(model, &given)?))
     };
     contacts.iter().map(contact).collect()
-}
-
-/// Bounds on nu controls, if there are any.
-pub(super) fn bounds(
-    nu: usize,
-    lower: Option<&Bound<'_, PyAny>>,
-    upper: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Option<[Vec<f64>; 2]>> {
-    let bound = |name, given: Option<&Bound<'_, PyAny>>, none: f64| match given {
-        Some(numbers) => Ok(vector(name, numbers, nu)?.to_vec()),
-        None => PyResult::Ok(vec![none; nu]),
-    };
-    if lower.is_none() && upper.is_none() {
-        return Ok(None);
-    }
-    Ok(Some([bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?]))
 }
 
 /// A knot as data.
@@ -287,14 +196,17 @@ fn knot(
 ///
 /// Raises `ProblemError` for a cost, a limit or drives that do not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct FreeDynamics(RobotAction<robot::FreeDynamics>);
+pub(crate) struct FreeDynamics(pub(super) RobotAction<robot::FreeDynamics>);
 
 #[pymethods]
 impl FreeDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None, limits=None, limits_at=None))]
+    #[pyo3(signature = (
+        model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None,
+        limits=None, limits_at=None
+    ))]
     fn new(
-        model: &Bound<'_, Robot>,
+        model: &Bound<'_, Model>,
         dt: Option<f64>,
         costs: Vec<PyRef<'_, Cost>>,
         costs_at: At<'_, Cost>,
@@ -318,10 +230,8 @@ impl FreeDynamics {
     }
 
     /// The efforts that hold the robot still at the state x, nu numbers.
-    fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let model = &self.0.described.robot;
-        let x = vector("x", x, model.nq() + model.nv())?;
-        self.0.action.clone().quasi_static(&x).give(py, None)
+    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        self.0.hold(x, robot::FreeDynamics::quasi_static)
     }
 }
 
@@ -342,14 +252,17 @@ impl FreeDynamics {
 /// >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
 /// >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct ContactDynamics(RobotAction<robot::ContactDynamics>);
+pub(crate) struct ContactDynamics(pub(super) RobotAction<robot::ContactDynamics>);
 
 #[pymethods]
 impl ContactDynamics {
     #[new]
-    #[pyo3(signature = (model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None, limits=None, limits_at=None))]
+    #[pyo3(signature = (
+        model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler",
+        lower=None, upper=None, limits=None, limits_at=None
+    ))]
     fn new(
-        model: &Bound<'_, Robot>,
+        model: &Bound<'_, Model>,
         contacts: &Bound<'_, PyDict>,
         dt: f64,
         costs: Vec<PyRef<'_, Cost>>,
@@ -370,11 +283,9 @@ impl ContactDynamics {
         })?))
     }
 
-    /// The smallest controls and forces that hold the robot still at the state x: nu controls of them.
-    fn quasi_static<'py>(&self, py: Python<'py>, x: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let model = &self.0.described.robot;
-        let x = vector("x", x, model.nq() + model.nv())?;
-        self.0.action.clone().quasi_static(&x).give(py, None)
+    /// The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers.
+    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        self.0.hold(x, robot::ContactDynamics::quasi_static)
     }
 }
 
@@ -391,14 +302,14 @@ impl ContactDynamics {
 ///
 /// Raises `ProblemError` as `ContactDynamics` does.
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct ImpulseDynamics(RobotAction<robot::ImpulseDynamics>);
+pub(crate) struct ImpulseDynamics(pub(super) RobotAction<robot::ImpulseDynamics>);
 
 #[pymethods]
 impl ImpulseDynamics {
     #[new]
     #[pyo3(signature = (model, contacts, costs, restitution=0.0, damping=0.0, limits=None))]
     fn new(
-        model: &Bound<'_, Robot>,
+        model: &Bound<'_, Model>,
         contacts: &Bound<'_, PyDict>,
         costs: Vec<PyRef<'_, Cost>>,
         restitution: f64,
@@ -417,19 +328,19 @@ impl ImpulseDynamics {
 ///
 /// model: the robot.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`; `Cost.joint_effort` looks at τ.
+/// costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
 /// integrator, lower, upper, limits: as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a cost or a limit that does not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct InverseDynamics(RobotAction<robot::InverseDynamics>);
+pub(crate) struct InverseDynamics(pub(super) RobotAction<robot::InverseDynamics>);
 
 #[pymethods]
 impl InverseDynamics {
     #[new]
     #[pyo3(signature = (model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None, limits=None))]
     fn new(
-        model: &Bound<'_, Robot>,
+        model: &Bound<'_, Model>,
         dt: f64,
         costs: Vec<PyRef<'_, Cost>>,
         integrator: &str,

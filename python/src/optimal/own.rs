@@ -1,8 +1,7 @@
 //! Actions of one's own: given as matrices, or written in Python.
 
-use super::actions::bounds;
-use super::rust;
-use crate::arrays::{matrix, vector};
+use crate::arrays::{bounds, matrix, vector};
+use condyle::optimal as rust;
 use nalgebra::DMatrix;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
@@ -11,10 +10,11 @@ use pyo3::types::PyDict;
 use rust::{ActionModel, LqNode};
 use std::sync::{Arc, Mutex};
 
-/// What an action written in Python raised during a solve.
+/// The first error that an action written in Python raised during a solve.
 pub(super) type Fault = Arc<Mutex<Option<PyErr>>>;
 
-/// Linear dynamics with a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤ u ≤ upper.
+/// An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
+/// u ≤ upper.
 ///
 /// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
 /// bound; without R and B it has no controls, as at a terminal knot.
@@ -48,31 +48,26 @@ impl Lqr {
             (None, None) => 0,
         };
         let mut node = LqNode::zeros(nx, nu);
-        for (name, given, to, shape) in [
-            ("A", Some(A), &mut node.A, [nx, nx]),
-            ("B", B, &mut node.B, [nx, nu]),
-            ("Q", Q, &mut node.Q, [nx, nx]),
-            ("S", S, &mut node.S, [nx, nu]),
-            ("R", R, &mut node.R, [nu, nu]),
-        ] {
-            if let Some(given) = given {
-                *to = matrix(name, given, shape)?.to_matrix();
-            }
-        }
-        for (name, given, to) in [
-            ("f", f, &mut node.f),
-            ("q", q, &mut node.q),
-            ("r", r, &mut node.r),
-            ("lower", lower, &mut node.lower),
-            ("upper", upper, &mut node.upper),
-        ] {
-            if let Some(given) = given {
-                let length = to.len();
-                to.copy_from_slice(&vector(name, given, length)?);
-            }
+        let parts = [("B", B), ("f", f), ("Q", Q), ("S", S), ("R", R), ("q", q), ("r", r)];
+        for (name, given) in [("A", Some(A)), ("lower", lower), ("upper", upper)].into_iter().chain(parts) {
+            given.map_or(Ok(()), |given| write(&mut node, name, given))?;
         }
         Ok(Self(rust::Lqr::new(node)))
     }
+}
+
+/// Writes the part of a node that has this name.
+fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
+    let LqNode { A, B, Q, S, R, f, q, r, lower, upper, .. } = node;
+    let vectors = [("f", f), ("q", q), ("r", r), ("lower", lower), ("upper", upper)];
+    let matrices = [("A", A), ("B", B), ("Q", Q), ("S", S), ("R", R)];
+    if let Some((_, to)) = vectors.into_iter().find(|(known, _)| *known == name) {
+        let length = to.len();
+        to.copy_from_slice(&vector(name, given, length)?);
+    } else if let Some((_, to)) = matrices.into_iter().find(|(known, _)| *known == name) {
+        to.copy_from(&matrix(name, given, to.shape().into())?.to_matrix());
+    }
+    Ok(())
 }
 
 /// An action written in Python.
@@ -127,7 +122,7 @@ impl Action {
     }
 }
 
-/// An `Action` as the solver calls it. What it raises becomes a cost that is not a number, and is raised after the solve.
+/// An `Action` as the solver calls it. An error becomes a cost that is not a number, and is raised after the solve.
 pub(super) struct Own {
     nx: usize,
     nu: usize,
@@ -137,7 +132,7 @@ pub(super) struct Own {
     pub(super) fault: Fault,
 }
 
-/// What came without an error, which otherwise is kept if it is the first one.
+/// The value of a result; an error is kept if it is the first one.
 fn keep<T>(fault: &Fault, result: PyResult<T>) -> Option<T> {
     match result {
         Ok(value) => Some(value),
@@ -148,7 +143,7 @@ fn keep<T>(fault: &Fault, result: PyResult<T>) -> Option<T> {
     }
 }
 
-/// A function of (t, x, u).
+/// The result of a Python function of (t, x, u).
 fn call<'py>(py: Python<'py>, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
     f.bind(py).call1((t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
 }
@@ -167,29 +162,13 @@ impl Own {
     fn try_calc_diff(&self, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) -> PyResult<()> {
         Python::attach(|py| {
             let given = call(py, f, t, x, u)?.cast_into::<PyDict>()?;
-            let LqNode { A, B, Q, S, R, q, r, .. } = node;
             for (name, entry) in given.iter() {
                 let name: String = name.extract()?;
-                let (to, shape): (&mut DMatrix<f64>, _) = match name.as_str() {
-                    "A" => (&mut *A, [self.nx, self.nx]),
-                    "B" => (&mut *B, [self.nx, self.nu]),
-                    "Q" => (&mut *Q, [self.nx, self.nx]),
-                    "S" => (&mut *S, [self.nx, self.nu]),
-                    "R" => (&mut *R, [self.nu, self.nu]),
-                    "q" => {
-                        q.copy_from_slice(&vector("q", &entry, self.nx)?);
-                        continue;
-                    }
-                    "r" => {
-                        r.copy_from_slice(&vector("r", &entry, self.nu)?);
-                        continue;
-                    }
-                    other => {
-                        let what = format!("calc_diff: expected A, B, Q, S, R, q or r, found '{other}'");
-                        return Err(PyValueError::new_err(what));
-                    }
-                };
-                to.copy_from(&matrix(&name, &entry, shape)?.to_matrix());
+                if !["A", "B", "Q", "S", "R", "q", "r"].contains(&name.as_str()) {
+                    let what = format!("calc_diff: expected A, B, Q, S, R, q or r, found '{name}'");
+                    return Err(PyValueError::new_err(what));
+                }
+                write(node, &name, &entry)?;
             }
             Ok(())
         })
@@ -233,7 +212,7 @@ impl ActionModel for Own {
 /// To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
 ///
 /// action: the action.
-/// size: how many numbers g has.
+/// size: the number of entries of g.
 /// calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
 /// calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
 ///     space of the state. Without it, central differences of calc.
@@ -272,7 +251,7 @@ impl ConstrainedAction {
 }
 
 impl ConstrainedAction {
-    /// What holds its action.
+    /// The constraint around its action.
     pub(super) fn constraint(&self, py: Python<'_>, action: &dyn ActionModel) -> Written {
         Written {
             calc: self.calc.clone_ref(py),
@@ -284,13 +263,13 @@ impl ConstrainedAction {
     }
 }
 
-/// The constraint of a `ConstrainedAction` as the solver calls it. What it raises becomes a value that is not a number,
-/// and is raised after the solve.
+/// The constraint of a `ConstrainedAction` as the solver calls it. An error becomes a value that is not a number, and
+/// is raised after the solve.
 pub(super) struct Written {
     calc: Py<PyAny>,
     calc_diff: Option<Py<PyAny>>,
     bounds: [Vec<f64>; 2],
-    /// Of ∂g/∂x and ∂g/∂u.
+    /// The numbers of columns of ∂g/∂x and ∂g/∂u.
     columns: [usize; 2],
     pub(super) fault: Fault,
 }

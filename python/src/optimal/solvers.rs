@@ -1,87 +1,53 @@
 //! The solvers, and what they give back.
 
-use super::{Problem, common_nu, controls, exception, lock, rust};
-use crate::arrays::{matrix, named_tuple, output};
-use nalgebra::DMatrix;
+use super::problem::{Problem, common_nu, controls, lock};
+use crate::arrays::{Array, Give, class, matrix, output};
+use crate::exceptions::{problem_error, wrong_word};
+use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyList, PyTuple, PyType};
+use pyo3::types::{PyDict, PyList, PyTuple};
 use std::sync::Mutex;
+use std::time::Duration;
 
-fn no_setting(name: &str) -> PyErr {
-    PyValueError::new_err(format!("settings: there is no setting '{name}'"))
+/// Sets those fields of a `Settings` that are given by name; some have a function that reads them.
+macro_rules! set {
+    ($settings:expr, $given:expr, { $($field:ident $(by $read:ident)?),* }) => {
+        for (name, value) in $given.into_iter().flatten() {
+            match name.extract::<String>()?.as_str() {
+                $(stringify!($field) => $settings.$field = set!(value $(, $read)?),)*
+                other => return Err(PyValueError::new_err(format!("settings: there is no setting '{other}'"))),
+            }
+        }
+    };
+    ($value:ident) => { $value.extract()? };
+    ($value:ident, $read:ident) => { $read(&$value)? };
 }
 
-/// Changes the settings of FDDP that are given.
+/// Sets the settings of FDDP that are given.
 fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
-    for (name, value) in given.into_iter().flatten() {
-        let name: String = name.extract()?;
-        let number = match name.as_str() {
-            "max_iterations" => {
-                s.max_iterations = value.extract()?;
-                continue;
-            }
-            "second_order" => {
-                s.second_order = value.extract()?;
-                continue;
-            }
-            "implicit" => {
-                s.implicit = value.extract()?;
-                continue;
-            }
-            "segments" => {
-                s.segments = value.extract()?;
-                continue;
-            }
-            "threads" => {
-                s.threads = value.extract()?;
-                continue;
-            }
-            "step_lengths" => {
-                s.step_lengths = value.extract()?;
-                continue;
-            }
-            "method" => {
-                s.method = match value.extract::<String>()?.as_str() {
-                    "fddp" => rust::Method::Fddp,
-                    "ddp" => rust::Method::Ddp,
-                    other => {
-                        return Err(PyValueError::new_err(format!(
-                            "method: expected 'fddp' or 'ddp', found '{other}'"
-                        )));
-                    }
-                };
-                continue;
-            }
-            "time_budget" => {
-                let seconds: Option<f64> = value.extract()?;
-                let duration = |s| std::time::Duration::try_from_secs_f64(s);
-                let duration = seconds.map(duration).transpose().map_err(|_| {
-                    PyValueError::new_err(format!("time_budget: expected at least 0 seconds, found {seconds:?}"))
-                })?;
-                s.time_budget = duration;
-                continue;
-            }
-            "tolerance" => &mut s.tolerance,
-            "tolerance_bounded" => &mut s.tolerance_bounded,
-            "accept" => &mut s.accept,
-            "accept_ascent" => &mut s.accept_ascent,
-            "flat" => &mut s.flat,
-            "regularisation_start" => &mut s.regularisation_start,
-            "regularisation_min" => &mut s.regularisation_min,
-            "regularisation_max" => &mut s.regularisation_max,
-            "regularisation_factor" => &mut s.regularisation_factor,
-            "regularisation_decrease_above" => &mut s.regularisation_decrease_above,
-            "regularisation_increase_below" => &mut s.regularisation_increase_below,
-            _ => return Err(no_setting(&name)),
-        };
-        *number = value.extract()?;
+    fn method(given: &Bound<'_, PyAny>) -> PyResult<rust::Method> {
+        match given.extract::<String>()?.as_str() {
+            "fddp" => Ok(rust::Method::Fddp),
+            "ddp" => Ok(rust::Method::Ddp),
+            other => Err(wrong_word("method", "'fddp' or 'ddp'", other)),
+        }
     }
+    fn duration(given: &Bound<'_, PyAny>) -> PyResult<Option<Duration>> {
+        let seconds: Option<f64> = given.extract()?;
+        let wrong = |_| PyValueError::new_err(format!("time_budget: expected at least 0 seconds, found {seconds:?}"));
+        seconds.map(Duration::try_from_secs_f64).transpose().map_err(wrong)
+    }
+    set!(s, given, {
+        method by method, second_order, implicit, max_iterations, time_budget by duration, segments, threads,
+        tolerance, tolerance_bounded, step_lengths, accept, accept_ascent, flat,
+        regularisation_start, regularisation_min, regularisation_max, regularisation_factor,
+        regularisation_decrease_above, regularisation_increase_below
+    });
     Ok(())
 }
 
-/// A solve, from a warm start (xs, us) if there is one; other threads run meanwhile.
+/// A solve, from a warm start (xs, us) if one is given. Other threads run meanwhile.
 fn run<'py, S: Send>(
     py: Python<'py>,
     problem: &Py<Problem>,
@@ -98,50 +64,92 @@ fn run<'py, S: Send>(
         u = controls(&inner, us)?;
     }
     let (inner, solver) = (&mut *inner, &mut *solver);
-    let solution = py.detach(|| solve(solver, inner, &x, &u)).map_err(exception)?;
+    let solution = py.detach(|| solve(solver, inner, &x, &u)).map_err(problem_error)?;
     problem.get().raise()?;
     give(py, inner, solution)
 }
 
-/// Moves a problem on by a knot, and a solver's solution with it.
-fn shift<S>(
-    problem: &Py<Problem>,
-    solver: &Mutex<S>,
-    last: usize,
-    solution: impl Fn(&mut S, &mut rust::Problem) -> Result<(), rust::Error>,
-) -> PyResult<()> {
-    let mut inner = lock("problem", &problem.get().inner)?;
-    let mut solver = lock("solver", solver)?;
-    inner.shift(last).map_err(exception)?;
-    problem.get().describe_shift()?;
-    solution(&mut solver, &mut inner).map_err(exception)?;
-    problem.get().raise()
+/// A solver: the methods that both kinds have, beside those that make and show it.
+macro_rules! solver {
+    ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
+        $(#[$doc])*
+        #[pyclass(frozen, module = "condyle.optimal")]
+        pub(crate) struct $class {
+            problem: Py<Problem>,
+            solver: Mutex<rust::$class>,
+        }
+
+        #[pymethods]
+        impl $class {
+            $($own)*
+
+            /// Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
+            ///
+            /// Other threads run meanwhile.
+            ///
+            /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
+            /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+            ///
+            /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+            fn solve<'py>(
+                &self,
+                py: Python<'py>,
+                xs: &Bound<'_, PyAny>,
+                us: &Bound<'_, PyAny>,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                run(py, &self.problem, &self.solver, Some([xs, us]), rust::$class::solve)
+            }
+
+            /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+            ///
+            /// Raises `ProblemError` as `solve`.
+            fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+                run(py, &self.problem, &self.solver, None, |solver, problem, _, _| solver.resume(problem))
+            }
+
+            /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
+            /// with it.
+            ///
+            /// `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
+            /// last one is served by a model of the problem, with those that it has for all knots.
+            ///
+            /// last: the index of that model.
+            ///
+            /// Raises `ProblemError` if there is no such model.
+            fn shift(&self, last: usize) -> PyResult<()> {
+                let mut problem = lock("problem", &self.problem.get().inner)?;
+                let mut solver = lock("solver", &self.solver)?;
+                problem.shift(last).map_err(problem_error)?;
+                self.problem.get().describe_shift()?;
+                solver.shift(&mut problem).map_err(problem_error)?;
+                self.problem.get().raise()
+            }
+        }
+    };
 }
 
-/// Differential dynamic programming, feasibility-driven or not, with Crocoddyl's rules and constants.
+solver! {
+/// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the rules and constants of
+/// Crocoddyl.
 ///
-/// Where controls are bounded, these are those of its box solvers.
+/// Where controls are bounded, these are the rules of its box solvers.
 ///
-/// problem: what is solved; the solver allocates for its shape once.
-/// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
-///     `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP);
-///     `implicit`, whether robots' knots come to the sweep as equations of inverse dynamics where that is possible
-///     (default: yes; the same steps in less time); and
-///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
-///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
-///     `time_budget` (s; a solve without time to go on returns what it has, with the status "time_limit"),
-///     `segments` (of the horizon on which a sweep works at the same time, in as many threads as there are; 1 unless
-///     given, for one thread. Results are the same but for rounding, and to the last bit for any number of threads),
-///     `threads` (on which derivatives of a robot are computed, 1 unless given; the same to the last bit).
-#[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct Fddp {
-    problem: Py<Problem>,
-    solver: Mutex<rust::Fddp>,
-}
-
-#[pymethods]
-impl Fddp {
+/// problem: the problem to solve; all memory is made for its shape, once.
+/// settings: any of these, by name.
+///     `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose trials are plain rollouts.
+///     `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
+///     `implicit`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
+///     (default: yes): the same steps in less time.
+///     `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
+///     `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
+///     there are; 1 unless given. The results differ by rounding, and not at all with the number of threads.
+///     `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given. The results are
+///     the same to the last bit.
+///     `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
+///     `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
+///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
+///     the method.
+Fddp {
     #[new]
     #[pyo3(signature = (problem, **settings))]
     fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
@@ -149,70 +157,44 @@ impl Fddp {
         set(&mut solver.settings, settings)?;
         Ok(Self { problem: problem.unbind(), solver: Mutex::new(solver) })
     }
-
-    /// Solves the problem from a warm start, and returns a `Solution`. Other threads run meanwhile.
-    ///
-    /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
-    /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
-    ///
-    /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises. How the solve
-    /// ended is the solution's status.
-    fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        run(py, &self.problem, &self.solver, Some([xs, us]), |solver, problem, xs, us| solver.solve(problem, xs, us))
-    }
-
-    /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
-    ///
-    /// Raises `ProblemError` as `solve`.
-    fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        run(py, &self.problem, &self.solver, None, |solver, problem, _, _| solver.resume(problem))
-    }
-
-    /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution with it.
-    ///
-    /// `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the last one
-    /// is served by a model of the problem, with those that it has for all knots.
-    ///
-    /// last: the index of that model.
-    ///
-    /// Raises `ProblemError` if there is no such model.
-    fn shift(&self, last: usize) -> PyResult<()> {
-        shift(&self.problem, &self.solver, last, rust::Fddp::shift)
-    }
+}
 }
 
-/// The method of multipliers around `Fddp`, an augmented Lagrangian as ProxDDP's: for robots with `Limit`s and for
-/// `ConstrainedAction`s.
+solver! {
+/// The augmented Lagrangian method around `Fddp`, as ProxDDP's: for robots with `Limit`s and for `ConstrainedAction`s.
 ///
-/// repeat: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
+/// It repeats: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
 /// y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 ///
-/// problem: what is solved; the solver allocates for its shape once.
-/// inner: a dict of the settings of `Fddp` for the inner solves; their tolerances are chosen, `time_budget` is for all.
-/// settings: any of `tolerance` (how far a limit may be from its bounds), `tolerance_dual` (how large an entry of the
-///     gradient of the Lagrangian may be), `max_solves` (inner solves), `penalty_start` (1/μ of the first),
-///     `penalty_max`, `penalty_factor` (by which it rises).
+/// `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
+/// ended as "infeasible" or "not_finite"; `shift` moves them on. A solution is "converged" when the residuals of
+/// `outcome` are below the tolerances, and "infeasible" if the penalty reached its limit and the limits do not hold.
+/// Its cost contains the terms of the limits, that of `outcome` does not; its trace and gains are those of the last
+/// inner solve.
 ///
-/// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem
+/// problem: the problem to solve; all memory is made for its shape, once.
+/// inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
+///     of the whole solve.
+/// settings: any of these, by name.
+///     `tolerance`: the largest distance of a limit from its bounds that is accepted.
+///     `tolerance_dual`: the largest entry of the gradient of the Lagrangian that is accepted.
+///     `max_solves`: the number of inner solves at most.
+///     `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
+///     factor by which it rises.
+///
+/// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()
 /// >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
-/// >>> costs = [Cost.state("rest", 1e-1, x0), Cost.control("effort", 1e-3, np.zeros(7))]
-/// >>> weak = Limit.control("weak", np.zeros(7), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+/// >>> costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+/// >>> weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
 /// >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
-/// >>> reach = Limit.frame_translation("reach", arm, "tool", [0.5, 0.1, 0.6])  # exactly
+/// >>> reach = Limit("reach", Residual.frame_translation(arm, "tool", [0.5, 0.1, 0.6]))  # exactly
 /// >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
 /// >>> solver = AugmentedLagrangian(problem)
 /// >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
 /// >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
 /// ('converged', True, True)
-#[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct AugmentedLagrangian {
-    problem: Py<Problem>,
-    solver: Mutex<rust::AugmentedLagrangian>,
-}
-
-#[pymethods]
-impl AugmentedLagrangian {
+AugmentedLagrangian {
     #[new]
     #[pyo3(signature = (problem, inner=None, **settings))]
     fn new(
@@ -222,74 +204,25 @@ impl AugmentedLagrangian {
     ) -> PyResult<Self> {
         let mut solver = rust::AugmentedLagrangian::new(&*lock("problem", &problem.get().inner)?);
         set(&mut solver.inner, inner)?;
-        let s = &mut solver.settings;
-        for (name, value) in settings.into_iter().flatten() {
-            let name: String = name.extract()?;
-            let number = match name.as_str() {
-                "max_solves" => {
-                    s.max_solves = value.extract()?;
-                    continue;
-                }
-                "tolerance" => &mut s.tolerance,
-                "tolerance_dual" => &mut s.tolerance_dual,
-                "penalty_start" => &mut s.penalty_start,
-                "penalty_max" => &mut s.penalty_max,
-                "penalty_factor" => &mut s.penalty_factor,
-                _ => return Err(no_setting(&name)),
-            };
-            *number = value.extract()?;
-        }
+        set!(solver.settings, settings, {
+            max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor
+        });
         Ok(Self { problem: problem.unbind(), solver: Mutex::new(solver) })
     }
 
-    /// Solves the problem from a warm start and multipliers of zero, and returns a `Solution`. Other threads run
-    /// meanwhile.
-    ///
-    /// Its status is "converged" when the residuals of `outcome` are below the tolerances, and "infeasible" if the
-    /// penalty reached its limit and the limits do not hold. Its cost contains the terms of the limits, that of
-    /// `outcome` does not; its trace and gains are those of the last inner solve.
-    ///
-    /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
-    /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
-    ///
-    /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
-    fn solve<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        run(py, &self.problem, &self.solver, Some([xs, us]), |solver, problem, xs, us| solver.solve(problem, xs, us))
-    }
-
-    /// Solves the problem from the last solution, its multipliers and its penalty; returns a `Solution`.
-    ///
-    /// The initial state may be another one, or the problem be shifted. After a solve that ended as "infeasible" or
-    /// "not_finite" the multipliers are zero.
-    ///
-    /// Raises `ProblemError` as `solve`.
-    fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        run(py, &self.problem, &self.solver, None, |solver, problem, _, _| solver.resume(problem))
-    }
-
-    /// Moves the horizon of the problem on by a knot, and the last solution with its multipliers, as `Fddp.shift`.
-    ///
-    /// last: the index of the model that serves the last knot.
-    ///
-    /// Raises `ProblemError` if there is no such model.
-    fn shift(&self, last: usize) -> PyResult<()> {
-        shift(&self.problem, &self.solver, last, rust::AugmentedLagrangian::shift)
-    }
-
-    /// What the last solve says of the limits, an `Outcome`.
+    /// The state of the limits after the last solve, an `Outcome`.
     #[getter]
     fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        static OUTCOME: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         let solver = lock("solver", &self.solver)?;
         let o = solver.outcome();
-        let array = |y: &Vec<f64>| output(py, None, &[y.len()], |out| out.copy_from_slice(y));
-        let multipliers = o.multipliers.iter().map(array).collect::<PyResult<Vec<_>>>()?;
-        let outcome = named_tuple(py, &OUTCOME, "Outcome")?;
-        outcome.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations))
+        let multipliers = o.multipliers.iter().map(|y| y.give(py, None)).collect::<PyResult<Vec<_>>>()?;
+        class!(py, "Outcome")?.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations))
     }
 }
+}
 
-/// An array for all knots if they have as many controls, or else a list of arrays; `numbers` are of one knot.
+/// An array for all knots if they have the same number of controls, otherwise a list of arrays; `numbers` writes those
+/// of one knot.
 fn by_knot<'py>(
     py: Python<'py>,
     problem: &rust::Problem,
@@ -308,21 +241,10 @@ fn by_knot<'py>(
     Ok(PyList::new(py, arrays.collect::<PyResult<Vec<_>>>()?)?.into_any())
 }
 
-fn row_major(K: &DMatrix<f64>, out: &mut [f64]) {
-    for r in 0..K.nrows() {
-        for c in 0..K.ncols() {
-            out[r * K.ncols() + c] = K[(r, c)];
-        }
-    }
-}
-
 /// A solution as Python sees it.
 fn give<'py>(py: Python<'py>, problem: &rust::Problem, s: &rust::Solution) -> PyResult<Bound<'py, PyAny>> {
     let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
-    static ITERATION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    static TIMINGS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    static SOLUTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    let iteration = named_tuple(py, &ITERATION, "Iteration")?;
+    let iteration = class!(py, "Iteration")?;
     let record = |i: &rust::Iteration| {
         iteration.call1((
             i.iteration,
@@ -348,11 +270,11 @@ fn give<'py>(py: Python<'py>, problem: &rust::Problem, s: &rust::Solution) -> Py
     };
     let t = &s.timings;
     let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
-    let timings = named_tuple(py, &TIMINGS, "Timings")?.call1(PyTuple::new(py, timings)?)?;
-    named_tuple(py, &SOLUTION, "Solution")?.call1((
+    let timings = class!(py, "Timings")?.call1(PyTuple::new(py, timings)?)?;
+    class!(py, "Solution")?.call1((
         output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
         by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.u(t)))?,
-        by_knot(py, problem, &[ndx], |t, out| row_major(&s.K[t], out))?,
+        by_knot(py, problem, &[ndx], |t, out| s.K[t].write(out))?,
         by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.k[t].as_slice()))?,
         s.cost,
         s.gap,

@@ -10,7 +10,7 @@ import pytest
 from example_robot_data.robots_loader import ROBOTS
 
 import condyle
-from condyle.optimal import Activation, Cost, Fddp, FreeDynamics, Problem
+from condyle.optimal import Activation, Cost, Fddp, FreeDynamics, Problem, Residual
 
 # Crocoddyl repeats its own trace under a perturbation of 1e-12 to within 1e-6: less cannot be asked for.
 COST = 1e-6
@@ -73,15 +73,19 @@ def our_problem(bounded=False):
     run, end = SPEC["running"], SPEC["terminal"]
 
     def pose(weight):
-        return Cost.frame_placement("pose", weight, model, SPEC["frame"], TARGET)
+        return Cost("pose", weight, Residual.frame_placement(model, SPEC["frame"], TARGET))
 
     running = FreeDynamics(
         model,
         SPEC["dt"],
-        [pose(run["pose"]), Cost.state("state", run["state"], X0), Cost.control("u", run["control"], np.zeros(NV))],
+        [
+            pose(run["pose"]),
+            Cost("state", run["state"], Residual.state(X0)),
+            Cost("u", run["control"], Residual.control(np.zeros(NV))),
+        ],
         **({"lower": LOWER, "upper": UPPER} if bounded else {}),
     )
-    velocity = Cost.state("velocity", end["velocity"], X0, Activation.weighted(ONLY_VELOCITY))
+    velocity = Cost("velocity", end["velocity"], Residual.state(X0), Activation.weighted(ONLY_VELOCITY))
     terminal = FreeDynamics(model, None, [pose(end["pose"]), velocity])
     return running, Problem(X0, [running], [0] * SPEC["knots"], terminal)
 

@@ -15,6 +15,7 @@ from condyle.optimal import (
     FrictionCone,
     ImpulseDynamics,
     Problem,
+    Residual,
     WrenchCone,
 )
 
@@ -88,74 +89,66 @@ def placement(axes=None, p=(0.1, 0.2, 0.3)):
 
 
 def state(r, nu):
-    return (
-        crocoddyl.ResidualModelState(r.state, r.goal, nu),
-        lambda a: Cost.state("term", 1.0, r.goal, a),
-        2 * r.ours.nv,
-    )
+    return crocoddyl.ResidualModelState(r.state, r.goal, nu), 1.0, Residual.state(r.goal), 2 * r.ours.nv
 
 
 def com(r, nu):
     target = np.array([0.1, -0.1, 0.5])
-    return (
-        crocoddyl.ResidualModelCoMPosition(r.state, target, nu),
-        lambda a: Cost.center_of_mass("term", 1.0, target, a),
-        3,
-    )
+    return crocoddyl.ResidualModelCoMPosition(r.state, target, nu), 1.0, Residual.center_of_mass(target), 3
 
 
 def momentum(r, nu):
     target = np.linspace(-1.0, 1.0, 6)
     made = crocoddyl.ResidualModelCentroidalMomentum(r.state, target, nu)
-    return made, lambda a: Cost.centroidal_momentum("term", 1.0, target, a), 6
+    return made, 1.0, Residual.centroidal_momentum(target), 6
 
 
 def rotation(r, nu):
     R, foot = placement().rotation, r.feet[0]
     made = crocoddyl.ResidualModelFrameRotation(r.state, r.frame(foot), R, nu)
-    return made, lambda a: Cost.frame_rotation("term", 1.0, r.ours, foot, R, a), 3
+    return made, 1.0, Residual.frame_rotation(r.ours, foot, R), 3
 
 
 def pose(r, nu):
     foot = r.feet[0]
     made = crocoddyl.ResidualModelFramePlacement(r.state, r.frame(foot), placement(), nu)
-    return made, lambda a: Cost.frame_placement("term", 1.0, r.ours, foot, placement().homogeneous, a), 6
+    return made, 1.0, Residual.frame_placement(r.ours, foot, placement().homogeneous), 6
 
 
 def translation(r, nu):
     foot, target = r.feet[0], np.array([0.1, 0.2, 0.3])
     made = crocoddyl.ResidualModelFrameTranslation(r.state, r.frame(foot), target, nu)
-    return made, lambda a: Cost.frame_translation("term", 1.0, r.ours, foot, target, a), 3
+    return made, 1.0, Residual.frame_translation(r.ours, foot, target), 3
 
 
 def velocity(axes, word):
     def make(r, nu):
         foot, target = r.feet[0], np.linspace(0.2, 0.4, 6)
         made = crocoddyl.ResidualModelFrameVelocity(r.state, r.frame(foot), pin.Motion(target), axes, nu)
-        return made, lambda a: Cost.frame_velocity("term", 1.0, r.ours, foot, target, word, a), 6
+        return made, 1.0, Residual.frame_velocity(r.ours, foot, target, word), 6
 
     return make
 
 
 def control(r, nu):
-    return crocoddyl.ResidualModelControl(r.state, np.ones(nu)), lambda a: Cost.control("term", 1.0, np.ones(nu), a), nu
+    return crocoddyl.ResidualModelControl(r.state, np.ones(nu)), 1.0, Residual.control(np.ones(nu)), nu
 
 
 def acceleration(r, nu):
     target = np.ones(r.ours.nv)
     made = crocoddyl.ResidualModelJointAcceleration(r.state, target, nu)
-    return made, lambda a: Cost.joint_acceleration("term", 1e-3, target, a), r.ours.nv
+    return made, 1e-3, Residual.joint_acceleration(target), r.ours.nv
 
 
 def gravity(r, nu):
-    return crocoddyl.ResidualModelControlGrav(r.state, nu), lambda a: Cost.control_gravity("term", 1.0, a), r.ours.nv
+    return crocoddyl.ResidualModelControlGrav(r.state, nu), 1.0, Residual.control_gravity(), r.ours.nv
 
 
 def force(r, nu):
     foot, target = r.feet[1], np.linspace(1.0, 2.0, 6)
     target[r.rows :] = 0.0
     made = crocoddyl.ResidualModelContactForce(r.state, r.frame(foot), pin.Force(target), r.rows, nu, True)
-    return made, lambda a: Cost.contact_force("term", 1e-3, foot, target, a), r.rows
+    return made, 1e-3, Residual.contact_force(foot, target), r.rows
 
 
 def friction(r, nu):
@@ -163,7 +156,7 @@ def friction(r, nu):
     cone = crocoddyl.FrictionCone(R, 0.5, 6, True)
     made = crocoddyl.ResidualModelContactFrictionCone(r.state, r.frame(foot), cone, nu, True)
     ours = FrictionCone(0.5, 6, True, R)
-    return made, lambda a: Cost.friction_cone("term", 1e-3, foot, ours, a), 7
+    return made, 1e-3, Residual.friction_cone(foot, ours), 7
 
 
 def wrench(r, nu):
@@ -171,7 +164,7 @@ def wrench(r, nu):
     cone = crocoddyl.WrenchCone(R, 0.5, np.array([0.2, 0.1]), 4, False)
     made = crocoddyl.ResidualModelContactWrenchCone(r.state, r.frame(foot), cone, nu, True)
     ours = WrenchCone(FrictionCone(0.5, rotation=R), [0.2, 0.1])
-    return made, lambda a: Cost.wrench_cone("term", 1e-3, foot, ours, a), 17
+    return made, 1e-3, Residual.wrench_cone(foot, ours), 17
 
 
 def pressure(r, nu):
@@ -179,11 +172,11 @@ def pressure(r, nu):
     made = crocoddyl.ResidualModelContactCoPPosition(
         r.state, r.frame(foot), crocoddyl.CoPSupport(R, np.array([0.2, 0.1])), nu, True
     )
-    return made, lambda a: Cost.center_of_pressure("term", 1e-3, foot, [0.2, 0.1], R, a), 4
+    return made, 1e-3, Residual.center_of_pressure(foot, [0.2, 0.1], R), 4
 
 
 def jump(r, nu):
-    return crocoddyl.ResidualModelImpulseCoM(r.state), lambda a: Cost.impulse_center_of_mass("term", 1.0, a), 3
+    return crocoddyl.ResidualModelImpulseCoM(r.state), 1.0, Residual.impulse_center_of_mass(), 3
 
 
 # Not the velocity along the world's axes: Crocoddyl's Jacobian of it is not its derivative (0.3 off differences).
@@ -213,19 +206,17 @@ ACTIVATIONS = {
 
 def costs(r, nu, make, activation):
     """The same sum in both libraries: the term, and small ones that keep the problem convex."""
-    residual, ours, n = make(r, nu)
+    residual, weight, ours, n = make(r, nu)
     theirs_activation, ours_activation = ACTIVATIONS[activation](n)
-    term = ours(ours_activation)
-    weight = float(repr(term).rsplit("weight ", 1)[1].rstrip(">"))
     total = crocoddyl.CostModelSum(r.state, nu)
     total.addCost("term", crocoddyl.CostModelResidual(r.state, theirs_activation, residual), weight)
     rest = crocoddyl.CostModelResidual(r.state, crocoddyl.ResidualModelState(r.state, r.goal, nu))
     total.addCost("rest", rest, 1e-1)
-    mine = [term, Cost.state("rest", 1e-1, r.goal)]
+    mine = [Cost("term", weight, ours, ours_activation), Cost("rest", 1e-1, Residual.state(r.goal))]
     if nu:
         effort = crocoddyl.CostModelResidual(r.state, crocoddyl.ResidualModelControl(r.state, nu))
         total.addCost("effort", effort, 1e-2)
-        mine.append(Cost.control("effort", 1e-2, np.zeros(nu)))
+        mine.append(Cost("effort", 1e-2, Residual.control(np.zeros(nu))))
     return mine, total
 
 
@@ -241,7 +232,7 @@ def same_iterates(r, ours, theirs):
     solver = crocoddyl.SolverFDDP(shooting)
     solver.setCallbacks([log := crocoddyl.CallbackLogger()])
     solver.solve(xs, us, 3, False, 1e-9)
-    terminal = FreeDynamics(r.ours, None, [Cost.state("rest", 1.0, r.goal)])
+    terminal = FreeDynamics(r.ours, None, [Cost("rest", 1.0, Residual.state(r.goal))])
     problem = Problem(r.x0, [ours], [0] * KNOTS, terminal)
     solution = Fddp(problem, max_iterations=3).solve(np.array(xs), np.array(us))
     np.testing.assert_allclose([i.cost for i in solution.trace], np.array(log.costs), rtol=SAME)

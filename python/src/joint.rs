@@ -1,0 +1,128 @@
+//! Joints as Python sees them, and the words for them.
+
+use crate::arrays::{Give, three};
+use crate::exceptions::wrong_word;
+use pyo3::prelude::*;
+
+/// The kind of a joint, with its axis and pitch where it has them.
+///
+/// | | q | v |
+/// | --- | --- | --- |
+/// | `revolute`, `prismatic`, `helical` | 1 | 1: about, along the axis |
+/// | `continuous` | 2: cos θ, sin θ | 1 |
+/// | `spherical` | 4: quaternion x, y, z, w | 3: angular, in the body |
+/// | `planar` | 4: x, y, cos θ, sin θ | 3: ẋ, ẏ in the body, θ̇ |
+/// | `translation` | 3 | 3 |
+/// | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
+///
+/// An axis is a vector in the body's frame, of any length but 0.
+///
+/// >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
+/// 1
+#[pyclass(frozen, module = "condyle")]
+pub(crate) struct Joint(pub(crate) condyle::Joint);
+
+#[pymethods]
+impl Joint {
+    /// A joint with one angle about an axis: q = [θ], v = [θ̇].
+    #[staticmethod]
+    fn revolute(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Revolute { axis: three("axis", axis)? }))
+    }
+
+    /// A joint with one angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇].
+    #[staticmethod]
+    fn continuous(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Continuous { axis: three("axis", axis)? }))
+    }
+
+    /// A joint with one length along an axis: q = [d], v = [ḋ].
+    #[staticmethod]
+    fn prismatic(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Prismatic { axis: three("axis", axis)? }))
+    }
+
+    /// A screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it.
+    #[staticmethod]
+    fn helical(axis: &Bound<'_, PyAny>, pitch: f64) -> PyResult<Self> {
+        Ok(Self(condyle::Joint::Helical { axis: three("axis", axis)?, pitch }))
+    }
+
+    /// A ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
+    #[staticmethod]
+    fn spherical() -> Self {
+        Self(condyle::Joint::Spherical)
+    }
+
+    /// A joint that moves in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇].
+    #[staticmethod]
+    fn planar() -> Self {
+        Self(condyle::Joint::Planar)
+    }
+
+    /// A joint with three lengths: q = [x, y, z], v = q̇.
+    #[staticmethod]
+    fn translation() -> Self {
+        Self(condyle::Joint::Translation)
+    }
+
+    /// A joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's
+    /// frame.
+    #[staticmethod]
+    fn free_flyer() -> Self {
+        Self(condyle::Joint::FreeFlyer)
+    }
+
+    /// The number of coordinates of its position.
+    #[getter]
+    fn nq(&self) -> usize {
+        self.0.nq()
+    }
+
+    /// The number of its degrees of freedom: of the numbers in its velocity.
+    #[getter]
+    fn nv(&self) -> usize {
+        self.0.nv()
+    }
+
+    /// The axis, 3 numbers in the body's frame; a unit vector in a model. None if the joint has no axis.
+    #[getter]
+    fn axis<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.0.axis().map(|axis| axis.give(py, None)).transpose()
+    }
+
+    /// The kind and the axis.
+    fn __repr__(&self) -> String {
+        let axis = self.0.axis().map_or(String::new(), |a| format!(" about or along {:?}", a.to_array()));
+        format!("<condyle.Joint {}{axis}>", kind(self.0))
+    }
+}
+
+/// The word for the kind of a joint.
+pub(crate) fn kind(joint: condyle::Joint) -> &'static str {
+    match joint {
+        condyle::Joint::Revolute { .. } => "revolute",
+        condyle::Joint::Continuous { .. } => "continuous",
+        condyle::Joint::Prismatic { .. } => "prismatic",
+        condyle::Joint::Helical { .. } => "helical",
+        condyle::Joint::Spherical => "spherical",
+        condyle::Joint::Planar => "planar",
+        condyle::Joint::Translation => "translation",
+        condyle::Joint::FreeFlyer => "free_flyer",
+        _ => "other",
+    }
+}
+
+/// The joint between the world and a root link.
+pub(crate) fn root(root_joint: Option<&str>) -> PyResult<Option<condyle::Joint>> {
+    match root_joint {
+        None => Ok(None),
+        Some("free_flyer") => Ok(Some(condyle::Joint::FreeFlyer)),
+        Some("planar") => Ok(Some(condyle::Joint::Planar)),
+        Some("spherical") => Ok(Some(condyle::Joint::Spherical)),
+        Some("translation") => Ok(Some(condyle::Joint::Translation)),
+        Some(other) => {
+            Err(wrong_word("root_joint", "None, 'free_flyer', 'planar', 'spherical' or 'translation'", other))
+        }
+    }
+}

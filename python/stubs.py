@@ -1,0 +1,357 @@
+#!/usr/bin/env python3
+"""Writes condyle/_condyle.pyi: what editors and type checkers know of the extension module.
+
+    python3 python/stubs.py [--check]        with --check nothing is written; it fails if the file is out of date
+
+Names, signatures and docstrings are those of the installed module: they are written once, in the Rust sources. The
+module does not know the types; they stand in the tables below, by the names of arguments and of functions. A name
+without a type is an error, and so is an entry that nothing needs.
+
+The file is kept in the repository: a wheel is packed before its module can be imported, and type checkers read an
+editable installation, and the sources, without building them.
+"""
+
+import ast
+import inspect
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType, WrapperDescriptorType
+from typing import Any
+
+FILE = Path(__file__).parent / "condyle" / "_condyle.pyi"
+WIDTH = 120
+
+ALIASES = {
+    "_Array": "NDArray[np.float64]",
+    "_Number": "HyperDual | float",
+    "_Path": "str | os.PathLike[str]",
+    "_Size": "tuple[float, float] | Sequence[float]",
+    "_Controls": "ArrayLike | Sequence[ArrayLike]",
+    "_Joints": "Sequence[tuple[Joint, ArrayLike | None]]",
+    "_RootJoint": 'Literal["free_flyer", "planar", "spherical", "translation"]',
+    "_Reference": 'Literal["local", "world", "local_world_aligned"]',
+    "_Input": 'Literal["gravity", "armature", "damping"]'
+    ' | tuple[Literal["force", "inertia"], str | int] | tuple[Literal["friction"], float]',
+    "_Method": 'Literal["aba", "dense", "sparse"]',
+    "_Integrator": 'Literal["semi_implicit_euler", "runge_kutta_4", "variational"]',
+    "_Status": 'Literal["done", "not_converged", "not_finite"]',
+    "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
+    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction",
+}
+
+# The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
+ARGUMENTS = {
+    "ArrayLike": """
+        A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
+        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference""",
+    "ArrayLike | None": "ModelBuilder.append.placement ModelBuilder.merge.placement",
+    "Model": "model",
+    "Data": "data",
+    "ConstraintSet": "constraints",
+    "Sequence[Constraint]": "ConstraintSet.constraints",
+    "str": "contact joint_name name prefix text",
+    "str | int": "body frame",
+    "int": "facets grain iterations k knot last max_iterations n nu nx seed size steps threads",
+    "float": """
+        damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re
+        restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
+        ModelBuilder.friction ModelBuilder.velocity""",
+    "float | None": "FreeDynamics.dt",
+    "bool": "mimic strict weightless_meshes FrictionCone.inner",
+    "bytes": "_model_from_bytes.data",
+    "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
+    "_Reference": "reference",
+    "_Input": "wrt",
+    "_Method": "method",
+    'Literal["position", "velocity"]': "integrate_jacobian.argument",
+    'Literal["from", "to"]': "difference_jacobian.argument",
+    "_Path": "path",
+    "Sequence[_Path]": "packages",
+    "_RootJoint": "root_joint",
+    "BodyId": "follower leader parent ModelBuilder.body",
+    "Joint": "joint",
+    "_Joints": "ModelBuilder.joints",
+    "Sequence[str | int]": "Model.joints",
+    "Inertia": "inertia",
+    "Sequence[Inertia]": "inertias",
+    "tuple[float, float]": "position",
+    "_Integrator": "Simulation.integrator",
+    "Callable[[Control], None]": "control",
+    "_Number": "value HyperDual.other HyperDual.x",
+    "None": "mod",
+    "FrictionCone": "friction Residual.friction_cone.cone",
+    "WrenchCone": "Residual.wrench_cone.cone",
+    "_Size": "WrenchCone.size Residual.center_of_pressure.size",
+    "Activation": "activation",
+    "Residual": "residual",
+    "Sequence[Cost]": "costs",
+    "Sequence[Limit]": "limits",
+    "dict[int, Sequence[Cost]]": "costs_at",
+    "dict[int, Sequence[Limit]]": "limits_at",
+    "dict[str, Constraint]": "contacts",
+    "_Scheme": "integrator",
+    "_Action": "action terminal",
+    "Sequence[_Action]": "models",
+    "Sequence[int]": "stages",
+    "_Controls": "us",
+    "Problem": "problem",
+    "Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]]": "Action.calc",
+    "Callable[[int, _Array, _Array], dict[str, ArrayLike]]": "Action.calc_diff",
+    "Callable[[int, _Array, _Array], ArrayLike]": "ConstrainedAction.calc",
+    "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": "ConstrainedAction.calc_diff",
+    "dict[str, Any]": "AugmentedLagrangian.inner",
+    "float | str | None": "Fddp.settings",
+}
+
+# The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
+# returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
+RESULTS = {
+    "_Array": """
+        ContactDynamics.quasi_static FreeDynamics.quasi_static FrictionCone.rows WrenchCone.rows
+        Problem.rollout Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
+        Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
+        from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration""",
+    "_Array | None": "Joint.axis",
+    "tuple[_Array, _Array]": """
+        FrictionCone.bounds WrenchCone.bounds body_acceleration_derivatives frame_acceleration_derivatives
+        frame_classical_acceleration_derivatives""",
+    "float": """
+        HyperDual.eps1 HyperDual.eps1eps2 HyperDual.eps2 HyperDual.re Model.total_mass Simulation.time
+        distance kinetic_energy mechanical_energy potential_energy""",
+    "int": """
+        ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame Model.joint
+        Model.nbodies Model.nq Model.nv Problem.horizon""",
+    "bool": """
+        HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
+        HyperDual.__lt__ HyperDual.__ne__""",
+    "str": "Model.name Problem.to_json",
+    "None": """
+        AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
+        ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
+        Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state check""",
+    "slice": "ConstraintSet.range",
+    "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
+    "list[str]": "Model.body_names Model.joint_types Model.names Model.warnings",
+    "list[tuple[int, float]]": "Ltdl.row",
+    "tuple[Any, ...]": "Model.__reduce__",
+    "HyperDual": "HyperDual",
+    "Model": """
+        Model.__copy__ Model.__deepcopy__ Model.lock Model.with_armature Model.with_gravity
+        Model.with_inertias ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
+    "Limits": "Model.limits",
+    "list[Frame]": "Model.frames",
+    "list[Inertia]": "Model.inertias",
+    "list[Joint | None]": "Model.joints",
+    "list[Mimic | None]": "Model.mimics",
+    "BodyId": "ModelBuilder.body ModelBuilder.chain ModelBuilder.spherical_zyx",
+    "Inertia": "from_log_cholesky to_inertia",
+    "AssemblySize": "DivideConquer.size",
+    "_Status": "Simulation.run Simulation.step",
+    "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
+    "Outcome": "AugmentedLagrangian.outcome",
+    "AllTerms": "compute_all_terms",
+    "CentroidalMap": "centroidal_map",
+    "CentroidalMapRate": "centroidal_map_rate",
+    "RneaDerivatives": "rnea_derivatives",
+    "AbaDerivatives": "aba_derivatives",
+    "RneaHessian": "rnea_hessian",
+    "AbaHessian": "aba_hessian",
+    "RneaSecondDerivatives": "rnea_second_derivatives",
+    "CentroidalDerivatives": "centroidal_derivatives",
+    "EnergyDerivatives": "energy_derivatives",
+    "CoriolisDerivatives": "coriolis_derivatives",
+    "Constrained": "constrained_dynamics",
+    "ConstrainedDerivatives": "constrained_dynamics_derivatives",
+    "ConstrainedEquations": "constrained_dynamics_equations",
+    "Impulse": "impulse_dynamics",
+    "ImpulseDerivatives": "impulse_dynamics_derivatives",
+}
+
+
+class Table:
+    """A table from names to types, which keeps the names that it lacks, and those that nobody has asked for."""
+
+    def __init__(self, names_by_type: dict[str, str]) -> None:
+        self.types = {name: kind for kind, names in names_by_type.items() for name in names.split()}
+        self.unused = set(self.types)
+        self.missing: list[str] = []
+
+    def find(self, *names: str, otherwise: str | None = None) -> str:
+        """The type of the first of the names that has one."""
+        for name in names:
+            if name in self.types:
+                self.unused.discard(name)
+                return self.types[name]
+        if otherwise is None:
+            self.missing.append(names[0])
+        return otherwise or "object"
+
+
+def wrapped(head: str, parts: list[str], tail: str, indent: str = "") -> str:
+    """A definition or a list as Ruff formats it: in one line, else its parts in one line, else each in its own."""
+    inside = ", ".join(parts)
+    if len(indent + head + inside + tail) <= WIDTH:
+        return indent + head + inside + tail
+    if len(indent + "    " + inside) > WIDTH:
+        inside = f",\n{indent}    ".join(parts) + ","
+    return f"{indent}{head}\n{indent}    {inside}\n{indent}{tail}"
+
+
+def docstring(item: Any, indent: str) -> str:
+    """The docstring of an item as a statement."""
+    text = (inspect.getdoc(item) or "").replace("\\", "\\\\")
+    lines = [f"{indent}{line}".rstrip() for line in text.splitlines()]
+    return f'{indent}"""' + "\n".join(lines).lstrip() + ('"""' if len(lines) == 1 else f'\n{indent}"""')
+
+
+class Writer:
+    """Writes the items of a module, whose named tuples stand in another one."""
+
+    def __init__(self, module: ModuleType, types: ModuleType) -> None:
+        self.module, self.types = module, types
+        self.arguments, self.results = Table(ARGUMENTS), Table(RESULTS)
+
+    def out(self, result: str) -> str:
+        """The type of `out`, for a function that returns this: what it fills, such as an earlier result."""
+        if result == "_Array":
+            return result
+        members = re.findall("_Array", result)
+        if hasattr(self.types, result):
+            members = [str(member) for member in getattr(self.types, result).__annotations__.values()]
+        if all("array" in member.lower() for member in members):
+            return f"tuple[{', '.join('_Array' for _ in members)}] | list[_Array]"
+        return f"{result} | Sequence[_Array]"
+
+    def function(self, item: Any, name: str, owner: str = "", indent: str = "") -> str:
+        """A function, or a method of the class `owner`, or what makes one of this class."""
+        constructor = name == "__new__"
+        full = owner if constructor else f"{owner}.{name}".lstrip(".")
+        arguments = ast.parse(f"def f{item.__text_signature__.replace('$self', 'self')}: ...").body[0].args
+        positional = arguments.posonlyargs + arguments.args
+        names = [argument.arg for argument in positional]
+        static = owner != "" and not constructor and names[:1] != ["self"]
+        if constructor:
+            result = owner
+        elif static:
+            result = self.results.find(full, otherwise=owner)
+        else:
+            result = self.results.find(full, owner, otherwise="_Array" if "out" in names else None)
+
+        def parameter(argument: ast.arg, default: ast.expr | None = None) -> str:
+            name = argument.arg
+            if name == "self":
+                return name
+            usual = self.out(result) if name == "out" else None
+            kind = self.arguments.find(f"{full}.{name}", f"{owner}.{name}", name, otherwise=usual)
+            if default is None:
+                return f"{name}: {kind}"
+            value = ast.unparse(default)
+            if isinstance(default, ast.Constant) and isinstance(default.value, str):
+                value = json.dumps(default.value)
+            return f"{name}: {kind}{' | None' if value == 'None' != kind else ''} = {value}"
+
+        defaults = [None] * (len(positional) - len(arguments.defaults)) + arguments.defaults
+        parts = ["cls"] * constructor + [parameter(*pair) for pair in zip(positional, defaults, strict=True)]
+        if arguments.posonlyargs:
+            parts.insert(len(arguments.posonlyargs), "/")
+        if arguments.kwonlyargs:
+            parts.append("*")
+        parts += [parameter(*pair) for pair in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)]
+        if arguments.kwarg:
+            parts.append(f"**{parameter(arguments.kwarg)}")
+
+        decorator = f"{indent}@staticmethod\n" if static else ""
+        if constructor or not item.__doc__ or isinstance(item, WrapperDescriptorType):
+            return decorator + wrapped(f"def {name}(", parts, f") -> {result}: ...", indent)
+        head = wrapped(f"def {name}(", parts, f") -> {result}:", indent)
+        return f"{decorator}{head}\n{docstring(item, indent + '    ')}"
+
+    def klass(self, item: type, name: str) -> str:
+        """A class with its members: what makes one, properties, methods."""
+        members, known = vars(item), self.results.types
+        text = f"@final\nclass {name}:\n{docstring(item, '    ')}\n\n"
+        if item.__text_signature__ is not None:
+            text += self.function(item, "__new__", name, "    ") + "\n"
+        for member in sorted(k for k, v in members.items() if inspect.isgetsetdescriptor(v)):
+            head = f"    @property\n    def {member}(self) -> {self.results.find(f'{name}.{member}')}:\n"
+            text += head + docstring(members[member], "        ") + "\n\n"
+        for member, value in members.items():
+            special = member.startswith("__") and name not in known and f"{name}.{member}" not in known
+            if callable(value) and not special and member not in ("__new__", "__repr__"):
+                method = self.function(getattr(item, member), member, name, "    ")
+                text += method + ("\n" if method.endswith(" ...") else "\n\n")
+        return text.rstrip()
+
+    def items(self) -> Iterator[str]:
+        """Constants, exceptions, and then classes and functions in the order in which the module has them."""
+        items = {name: getattr(self.module, name) for name in self.module.__all__}
+        yield "\n".join(f"{name}: {type(item).__name__}" for name, item in items.items() if not callable(item))
+        for name, item in items.items():
+            if inspect.isclass(item) and issubclass(item, Exception):
+                yield f"class {name}({item.__base__.__name__}):\n{docstring(item, '    ')}"
+        for name, item in items.items():
+            if inspect.isclass(item) and not issubclass(item, Exception):
+                yield self.klass(item, name)
+            elif inspect.isbuiltin(item):
+                yield self.function(item, name)
+
+
+def alias(name: str, value: str) -> str:
+    """The definition of a type's short name."""
+    line = f"{name}: TypeAlias = {value}"
+    if len(line) > WIDTH:
+        inside = value if len(value) + 4 <= WIDTH else re.sub(r" \| (?![^\[]*\])", "\n    | ", value)
+        line = f"{name}: TypeAlias = (\n    {inside}\n)"
+    return line
+
+
+def stub(module: ModuleType, types: ModuleType) -> str:
+    """The text of the file."""
+    writer = Writer(module, types)
+    body = "\n\n".join(writer.items())
+    aliases = "\n".join(alias(name, value) for name, value in ALIASES.items())
+    for table, name in (writer.arguments, "ARGUMENTS"), (writer.results, "RESULTS"):
+        if table.missing or table.unused:
+            raise SystemExit(f"{name}: missing are {table.missing}, and nothing needs {sorted(table.unused)}")
+    words = set(re.findall(r"\w+", re.sub(r'"""(.|\n)*?"""', "", body + aliases)))
+    imported = [name for name, item in sorted(vars(types).items()) if type(item) is type and name in words]
+    names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
+    return f'''\
+"""{inspect.getdoc(module)}"""
+
+# Written by python/stubs.py from the extension module. Do not edit.
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, TypeAlias, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+{wrapped("from ._types import (", imported, ")")}
+
+{wrapped("__all__ = [", [f'"{name}"' for name in names], "]")}
+
+{aliases}
+
+{body}
+'''
+
+
+def main() -> None:
+    """Writes the file, or compares it."""
+    sys.path.pop(0)  # the folder of the sources, where the module is not built
+    from condyle import _condyle, _types
+
+    text = stub(_condyle, _types)
+    if sys.argv[1:] != ["--check"]:
+        FILE.write_text(text, encoding="utf-8")
+    elif FILE.read_text(encoding="utf-8") != text:
+        raise SystemExit(f"{FILE} is out of date: run `python {__file__}`")
+
+
+if __name__ == "__main__":
+    main()

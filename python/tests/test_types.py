@@ -1,0 +1,129 @@
+"""The types in the stubs: what functions and properties return is what the stubs say."""
+
+import ast
+import pkgutil
+import types
+import typing
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle import _condyle, _types
+from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, FrictionCone, Outcome, Problem, Residual, Solution
+from condyle.simulation import Simulation
+
+STUB = ast.parse(pkgutil.get_data("condyle", "_condyle.pyi") or b"")
+ARM = condyle.robots.arm7()
+Q, V = np.full(7, 0.3), np.full(7, 0.1)
+INERTIA = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
+
+# An argument of each name that functions have, unless it has a default.
+ARGUMENTS = {
+    "model": ARM,
+    "data": condyle.Data(ARM),
+    "constraints": condyle.ConstraintSet(ARM, [condyle.Constraint("tool", "point")]),
+    **dict.fromkeys(["q", "q0", "q1"], Q),
+    **dict.fromkeys(["v", "a", "tau", "lambda_", "d"], V),
+    "X": np.eye(7),
+    "t": 0.5,
+    "frame": "tool",
+    "body": "joint3",
+    "wrt": "gravity",
+    "smoothing": 1e-3,
+    "inertia": INERTIA,
+    "pi": condyle.inertial_parameters.from_inertia(INERTIA),
+    "theta": np.zeros(10),
+}
+WORDS = {"integrate_jacobian": "position", "difference_jacobian": "from"}
+
+
+def factor() -> condyle.Ltdl:
+    made = condyle.Ltdl(ARM)
+    made.factorize(np.eye(7))
+    return made
+
+
+# An object of each class that has properties.
+PROBLEM = Problem(np.r_[Q, V], [FreeDynamics(ARM, 0.1, [])], [0], FreeDynamics(ARM, None, []))
+OBJECTS = {
+    "Model": ARM,
+    "ConstraintSet": ARGUMENTS["constraints"],
+    "Ltdl": factor(),
+    "DivideConquer": condyle.DivideConquer(ARM, 1),
+    "Joint": condyle.Joint.prismatic([0.0, 0.0, 1.0]),
+    "HyperDual": condyle.HyperDual(1.0),
+    "Simulation": Simulation(ARM),
+    "Problem": PROBLEM,
+}
+
+
+def namespace() -> dict[str, Any]:
+    """The names that the types in the stubs are made of."""
+    names: dict[str, Any] = {"np": np, "typing": typing} | vars(_types) | vars(_condyle)
+    for node in STUB.body:
+        if isinstance(node, ast.ImportFrom) and node.module in ("typing", "collections.abc", "numpy.typing"):
+            exec(ast.unparse(node), names)
+        if isinstance(node, ast.Import):
+            exec(ast.unparse(node), names)
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value:
+            names[node.target.id] = eval(ast.unparse(node.value), names)
+    return names
+
+
+NAMES = namespace()
+
+
+def conforms(value: Any, kind: Any) -> bool:
+    """Whether a value is of a type."""
+    origin, parts = typing.get_origin(kind), typing.get_args(kind)
+    if kind is Any or kind is None:
+        return kind is Any or value is None
+    if origin in (typing.Union, types.UnionType):
+        return any(conforms(value, part) for part in parts)
+    if origin is typing.Literal:
+        return value in parts
+    if origin is np.ndarray:
+        return isinstance(value, np.ndarray) and value.dtype == np.float64
+    if origin is list:
+        return isinstance(value, list) and all(conforms(item, parts[0]) for item in value)
+    if origin is tuple:
+        return len(value) == len(parts) and all(conforms(*pair) for pair in zip(value, parts, strict=True))
+    if hasattr(kind, "_fields"):
+        members = typing.get_type_hints(kind, NAMES).values()
+        return type(value) is kind and all(conforms(*pair) for pair in zip(value, members, strict=True))
+    return isinstance(value, kind)
+
+
+def results() -> Iterator[Any]:
+    """Each function of a model, and each property, with its result and the type that it should have."""
+    for node in STUB.body:
+        if isinstance(node, ast.FunctionDef) and node.returns and not node.name.startswith("_"):
+            wanted = node.args.args[: len(node.args.args) - len(node.args.defaults)]
+            given = [WORDS[node.name] if a.arg == "argument" else ARGUMENTS[a.arg] for a in wanted]
+            yield pytest.param(getattr(_condyle, node.name)(*given), node.returns, id=node.name)
+        if not isinstance(node, ast.ClassDef) or node.name not in OBJECTS:
+            continue
+        for item in node.body:
+            if isinstance(item, ast.FunctionDef) and "property" in map(ast.unparse, item.decorator_list):
+                value = getattr(OBJECTS[node.name], item.name)
+                yield pytest.param(value, item.returns, id=f"{node.name}.{item.name}")
+
+
+@pytest.mark.parametrize(("value", "kind"), list(results()))
+def test_a_result_is_what_the_stubs_say(value: Any, kind: ast.expr) -> None:
+    assert conforms(value, eval(ast.unparse(kind), NAMES))
+
+
+def test_what_is_made_is_what_the_stubs_say() -> None:
+    assert conforms(FrictionCone(0.5).bounds(), eval("tuple[_Array, _Array]", NAMES))
+    warm_start = np.tile(np.r_[Q, V], (2, 1)), np.zeros((1, 7))
+    solution = Fddp(PROBLEM).solve(*warm_start)
+    assert conforms(solution, Solution)
+    solver = AugmentedLagrangian(PROBLEM)
+    solver.solve(*warm_start)
+    assert conforms(solver.outcome, Outcome)
+    assert not conforms(solution, Outcome) and not conforms([1], eval("list[str]", NAMES))
+    assert not conforms(Residual.control_gravity(), eval("_Array | None", NAMES))
