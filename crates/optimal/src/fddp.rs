@@ -2,15 +2,14 @@
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
 use crate::clock::{Clock, Phase};
-use crate::dense::max_abs;
 use crate::error::Error;
-use crate::lq::LqNode;
+use crate::lq::{LqNode, Sweep, SweepError};
 use crate::problem::{Problem, Shape};
 use crate::rollout::{Sum, Trials};
 use crate::search::Search;
 use crate::settings::{Method, Settings};
 use crate::solution::{Iteration, Solution, Status, Timings};
-use crate::sweep::{Sweep, SweepError};
+use condyle_linalg::max_abs;
 use std::time::Instant;
 
 /// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`Method`](crate::Method)), with the rules and constants of Crocoddyl

@@ -1,9 +1,8 @@
 //! Rollouts of several step lengths side by side.
 
-use crate::dense::add_scaled_product;
 use crate::lq::{DIVERGED, LqKnot};
 use crate::problem::{Problem, Shape};
-use crate::vector::{Dense, Vector, at_level};
+use condyle_linalg::{View, add_scaled_product};
 
 /// A sum that is rounded once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
 #[derive(Debug, Clone, Copy, Default)]
@@ -56,23 +55,6 @@ pub(crate) struct Nominal<'a> {
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` when there are none.
     pub(crate) gaps: Option<&'a [f64]>,
     pub(crate) knots: &'a [LqKnot],
-}
-
-/// u += α k + K δx.
-struct Feedback<'a> {
-    u: &'a mut [f64],
-    gains: &'a LqKnot,
-    step: f64,
-    dx: &'a [f64],
-}
-
-impl Dense for Feedback<'_> {
-    #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
-        let Self { u, gains, step, dx } = self;
-        add_scaled_product(u, step, gains.k.as_slice(), &[1.0]);
-        add_scaled_product(u, 1.0, gains.K.as_slice(), dx);
-    }
 }
 
 impl Trials {
@@ -144,7 +126,8 @@ impl Trials {
                 }
                 action.difference(x_nominal, x, dx);
                 let gains = &nominal.knots[t];
-                at_level(Feedback { u, gains, step, dx });
+                add_scaled_product(u, step, View::new(gains.k.as_slice(), nu), &[1.0]); // u += α k + K δx
+                add_scaled_product(u, 1.0, View::new(gains.K.as_slice(), nu), dx);
                 if let Some((lower, upper)) = action.bounds(t) {
                     for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
                         *u = if *u < *lower { *lower } else { *u }; // a NaN stays one

@@ -1,12 +1,12 @@
 //! The line search of differential dynamic programming: what a step should gain, and whether it does.
 
 use crate::clock::Phase;
-use crate::dense::{add_scaled_product, dot};
 use crate::fddp::Fddp;
 use crate::problem::Problem;
 use crate::rollout::Nominal;
 use crate::settings::Method;
 use crate::solution::Solution;
+use condyle_linalg::{View, add_scaled_product, dot};
 use std::time::Instant;
 
 /// How many step lengths are tried side by side when the first one fails: beside dynamics in lanes each costs something of
@@ -43,7 +43,7 @@ impl Fddp {
                 let place = self.solution.shape().dx(t);
                 let (f, curved) = (&self.gaps[place.clone()], &mut self.curved_gaps[place]);
                 curved.fill(0.0);
-                add_scaled_product(curved, 1.0, knot.Vxx.as_slice(), f); // Vxx f
+                add_scaled_product(curved, 1.0, View::new(knot.Vxx.as_slice(), f.len()), f); // Vxx f
                 let curvature = dot(f, curved);
                 dg -= dot(knot.Vx.as_slice(), f) + curvature;
                 dq += curvature;

@@ -2,9 +2,8 @@
 
 use crate::error::Error;
 use crate::fddp::Fddp;
-use crate::lq::LqNode;
+use crate::lq::{LqNode, Sweep};
 use crate::problem::Problem;
-use crate::sweep::Sweep;
 
 impl Fddp {
     /// Makes the solution a warm start for a problem that was [shifted](Problem::shift) by a knot since: states, controls

@@ -12,7 +12,7 @@
 
 use super::integrated::{ContinuousModel, Derivatives};
 use crate::lq::Hessian;
-use crate::structure::LARGEST_BLOCK;
+use crate::lq::LARGEST_BLOCK;
 use core::ops::Range;
 use nalgebra::DMatrix;
 

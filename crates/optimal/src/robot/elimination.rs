@@ -1,4 +1,4 @@
-//! The equations of a knot in contact, solved for what is not chosen: see [`implicit`](crate::implicit).
+//! The equations of a knot in contact, solved for what is not chosen: see [`Implicit`].
 //!
 //! Changes of accelerations a and forces f satisfy
 //!

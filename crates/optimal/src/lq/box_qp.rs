@@ -1,9 +1,7 @@
 //! Quadratic programs with bounds, by projected Newton steps.
 #![allow(non_snake_case)] // the names of the literature
 
-use crate::dense::{SLACK, dot};
-use crate::factor::{eliminate, solve_right};
-use crate::vector::Vector;
+use condyle_linalg::{SLACK, dot, eliminate, solve_right};
 use nalgebra::DMatrix;
 
 /// Newton steps by Crocoddyl's rule, and as many by the careful one.
@@ -62,8 +60,7 @@ impl BoxQp {
     ///
     /// # Errors
     /// The variable and the pivot, if H is not positive definite on the free variables.
-    #[inline(always)]
-    pub(crate) fn solve<V: Vector, const NR: usize>(
+    pub(crate) fn solve(
         &mut self,
         H: &DMatrix<f64>,
         q: &[f64],
@@ -89,7 +86,7 @@ impl BoxQp {
                     self.free.push(i);
                 }
             }
-            self.newton_step::<V, NR>(H)?;
+            self.newton_step(H)?;
             let slope = self.free.iter().fold(0.0, |largest: f64, &i| largest.max(self.gradient[i].abs()));
             self.line_search(H, q, lower, upper, n >= STEPS);
             if slope <= GRADIENT {
@@ -100,8 +97,7 @@ impl BoxQp {
     }
 
     /// Δx_f = −H_ff⁻¹ g_f,   Δx = 0 for the clamped.
-    #[inline(always)]
-    fn newton_step<V: Vector, const NR: usize>(&mut self, H: &DMatrix<f64>) -> Result<(), (usize, f64)> {
+    fn newton_step(&mut self, H: &DMatrix<f64>) -> Result<(), (usize, f64)> {
         let Self { free, gradient, step, H: work, upper, .. } = self;
         let (count, stride) = (free.len(), free.len() + 1 + SLACK);
         for (column, &j) in free.iter().enumerate() {
@@ -112,8 +108,8 @@ impl BoxQp {
             column[count] = gradient[j];
             column[count + 1..].fill(0.0);
         }
-        eliminate::<V, NR>(work, stride, count + 1, count, count).map_err(|(row, pivot)| (free[row], pivot))?;
-        solve_right::<V, NR>(work, stride, count, count + 1, count, upper);
+        eliminate(work, stride, [count + 1, count, count]).map_err(|(row, pivot)| (free[row], pivot))?;
+        solve_right(work, stride, [count, count + 1, count], upper);
         step.fill(0.0);
         for (column, &j) in free.iter().enumerate() {
             step[j] = -work[column * stride + count];
@@ -154,14 +150,13 @@ fn objective(H: &DMatrix<f64>, q: &[f64], x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::Pair;
 
     /// The problems have entries of size one; the last Newton step is exact on the set it finds.
     const KKT: f64 = 1e-10;
 
     fn solve(H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64]) -> Result<BoxQp, (usize, f64)> {
         let mut qp = BoxQp::new(q.len());
-        qp.solve::<Pair, 4>(H, q, lower, upper, std::iter::repeat_n(0.0, q.len()))?;
+        qp.solve(H, q, lower, upper, std::iter::repeat_n(0.0, q.len()))?;
         Ok(qp)
     }
 

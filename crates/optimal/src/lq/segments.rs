@@ -1,7 +1,7 @@
 //! The backward sweep in several segments of the horizon at the same time.
 //!
 //! For S at a time, the horizon of N knots is cut into S + 1 segments. A step that finds what a segment costs whatever
-//! comes after it ([`conditional`](crate::conditional)) takes 1 to 1½ times as long as one of a sweep, so the last segment
+//! comes after it ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as one of a sweep, so the last segment
 //! is by half longer than the others, and of a sweep's steps it takes the time of
 //!
 //! ```text
@@ -19,13 +19,11 @@
 //! that knot. If they differ by more than rounding, or anything failed before, all is swept again as one.
 #![allow(non_snake_case)] // the names of the literature
 
-use crate::conditional::{Link, Linking, Transfer, Value};
-use crate::dense::{SLACK, max_abs};
-use crate::lq::{LqKnot, LqNode};
-use crate::riccati::Work;
-use crate::sweep::SweepError;
-use crate::vector::{Dense, Vector, at_level};
-use std::ops::Range;
+use super::conditional_value::{Link, Transfer, Value};
+use super::node::{Hessian, LqKnot, LqNode};
+use super::step::{Sizes, Step, SweepError};
+use condyle_linalg::{SLACK, max_abs};
+use core::ops::Range;
 
 /// How far, relative to the largest entry, the value function with which a segment was swept may be from the one that is
 /// found in the next: what the sweep is good to anyway, and a thousand times what is met on robots.
@@ -42,7 +40,7 @@ pub(crate) struct Segments {
 #[derive(Debug, Clone)]
 struct Segment {
     knots: Range<usize>,
-    work: Work,
+    step: Step,
     transfer: Transfer,
     /// The value function at the knot behind it.
     end: Value,
@@ -52,9 +50,9 @@ struct Segment {
 }
 
 impl Segments {
-    /// `at_once` segments at a time for a horizon of `horizon` knots with n states and at most m controls; `None` if that
-    /// is one, or the horizon too short for two.
-    pub(crate) fn new(at_once: usize, horizon: usize, n: usize, m: usize, room: [usize; 3]) -> Option<Self> {
+    /// `at_once` segments at a time for a horizon of `horizon` knots of such sizes; `None` if that is one, or the horizon too
+    /// short for two.
+    pub(super) fn new(at_once: usize, horizon: usize, sizes: Sizes) -> Option<Self> {
         let at_once = at_once.min(horizon.saturating_sub(2));
         if at_once < 2 {
             return None;
@@ -62,13 +60,13 @@ impl Segments {
         let cut = |k: usize| if k > at_once { horizon } else { 2 * horizon * k / (2 * at_once + 3) };
         let segment = |k: usize| Segment {
             knots: cut(k)..cut(k + 1),
-            work: Work::new(&[], n, m, n, room),
-            transfer: Transfer::zeros(n),
-            end: Value::zeros(n),
+            step: Step::new(sizes, sizes.n, vec![]),
+            transfer: Transfer::zeros(sizes.n),
+            end: Value::zeros(sizes.n),
             result: Ok(()),
             good: false,
         };
-        Some(Self { all: (0..=at_once).map(segment).collect(), link: Link::new(n) })
+        Some(Self { all: (0..=at_once).map(segment).collect(), link: Link::new(sizes.n) })
     }
 
     /// Whether the step at a node is one that segments have too: not where controls are bounded, since then the value
@@ -117,16 +115,13 @@ impl Segments {
     fn link(&mut self) -> bool {
         let Self { all, link } = self;
         let last = all.len() - 1;
-        if let [.., segment, Segment { work, .. }] = &mut all[..] {
-            segment.end.copy_from(&work.P, &work.p);
+        if let [.., segment, Segment { step, .. }] = &mut all[..] {
+            segment.end.copy_from(&step.work.P, &step.work.p);
         }
         for j in (1..last).rev() {
             let (before, here) = all.split_at_mut(j);
-            let (Segment { work, transfer, end, good, .. }, start) = (&mut here[0], &mut before[j - 1].end);
-            if *good {
-                at_level(Linking { link, work, transfer, end, start, good });
-            }
-            if !*good {
+            let (Segment { step, transfer, end, good, .. }, start) = (&here[0], &mut before[j - 1].end);
+            if !(*good && link.run(step, transfer, end, start)) {
                 return false;
             }
         }
@@ -170,7 +165,7 @@ impl Running<'_> {
     /// Over consecutive segments; `knots` begin with the first one's.
     fn run(self, segments: &mut [Segment], knots: &mut [LqKnot]) {
         if let [segment] = segments {
-            return at_level(Of { running: self, segment, knots });
+            return self.over_one(segment, knots);
         }
         let (some, others) = segments.split_at_mut(segments.len() / 2);
         let (first, second) = knots.split_at_mut(others[0].knots.start - some[0].knots.start);
@@ -181,30 +176,22 @@ impl Running<'_> {
             self.run(others, second);
         }
     }
-}
 
-/// A pass over a segment, to be compiled for the processor.
-struct Of<'a> {
-    running: Running<'a>,
-    segment: &'a mut Segment,
-    knots: &'a mut [LqKnot],
-}
-
-impl Dense for Of<'_> {
-    #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
-        let Self { running: Running { pass, nodes, regularisation, .. }, segment, knots } = self;
-        let Segment { knots: range, work, transfer, end, result, good } = segment;
+    /// Over one segment.
+    fn over_one(self, segment: &mut Segment, knots: &mut [LqKnot]) {
+        let Self { pass, nodes, regularisation, .. } = self;
+        let Segment { knots: range, step, transfer, end, result, good } = segment;
         let (first, own) = (range.start, &nodes[range.clone()]);
+        let no_curvature = &mut |_: usize, _: &[f64], _: &mut Hessian| false;
         match pass {
             Pass::Begin if range.end + 1 == nodes.len() => {
-                *result = work.run::<V, NR>(first, &nodes[first..], knots, regularisation, &mut |_, _, _| false);
+                *result = step.run(first, &nodes[first..], knots, regularisation, no_curvature);
             }
-            Pass::Begin => *good = transfer.run::<V, NR>(work, own, regularisation),
+            Pass::Begin => *good = transfer.run(step, own, regularisation),
             Pass::Finish => {
-                work.P.copy_from_slice(&end.P);
-                work.p.copy_from_slice(&end.p);
-                *result = work.back::<V, NR>(first, own, knots, regularisation, &mut |_, _, _| false);
+                step.work.P.copy_from_slice(&end.P);
+                step.work.p.copy_from_slice(&end.p);
+                *result = step.back(first, own, knots, regularisation, no_curvature);
             }
         }
     }

@@ -1,33 +1,10 @@
 //! The backward sweep that solves a linear-quadratic problem.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
+use super::node::{Hessian, LqKnot, LqNode};
+use super::segments::Segments;
+use super::step::{Sizes, Step, SweepError};
 use crate::error::assert_length;
-use crate::implicit::Form;
-use crate::lq::{Hessian, LqKnot, LqNode};
-use crate::parallel::Segments;
-use crate::riccati::Work;
-use crate::vector::{Dense, Vector, at_level};
-
-/// Why a sweep stopped before the first knot.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum SweepError {
-    /// Quu has a pivot that is not positive: the problem is not convex in the control there. More regularisation helps.
-    #[error("knot {knot}: Quu is not positive definite (pivot {row} is {pivot:e})")]
-    NotPositive {
-        /// The knot.
-        knot: usize,
-        /// The row of the pivot.
-        row: usize,
-        /// Its value.
-        pivot: f64,
-    },
-    /// The value function is infinite, NaN, or beyond 1e30.
-    #[error("knot {knot}: the value function is not finite")]
-    NotFinite {
-        /// The knot.
-        knot: usize,
-    },
-}
 
 /// The backward Riccati sweep, with its workspace.
 ///
@@ -82,13 +59,11 @@ pub enum SweepError {
 #[derive(Debug, Clone)]
 pub struct Sweep {
     knots: Vec<LqKnot>,
-    /// What one step reads and writes beside its knot.
-    work: Work,
-    /// As many at the same time as asked for; with their own workspaces, unless it is one.
+    step: Step,
+    /// The number of segments that were asked for; with their workspaces, unless it is one.
     at_once: usize,
     segments: Option<Segments>,
-    /// Of the nodes' implicit form.
-    room: [usize; 3],
+    sizes: Sizes,
 }
 
 impl Sweep {
@@ -101,13 +76,13 @@ impl Sweep {
         let terminal = nodes.last().expect("`nodes` is empty");
         let n = terminal.ndx();
         assert_length("r of the terminal node", terminal.nu(), 0);
-        let m = nodes.iter().map(LqNode::nu).max().unwrap_or(0);
         let knots = nodes.iter().map(|node| {
             node.assert_shapes(n, node.nu());
             LqKnot::zeros(n, node.nu())
         });
-        let room = Form::room(nodes);
-        Self { work: Work::new(nodes, n, m, 0, room), knots: knots.collect(), at_once: 1, room, segments: None }
+        let (knots, sizes) = (knots.collect(), Sizes::of(nodes));
+        let step = Step::new(sizes, 0, nodes.iter().map(LqNode::nu).collect());
+        Self { knots, step, at_once: 1, segments: None, sizes }
     }
 
     /// Lets [`run`](Self::run) work on so many segments of the horizon at the same time, in the threads of rayon's pool in
@@ -133,8 +108,7 @@ impl Sweep {
     pub fn set_segments(&mut self, segments: usize) {
         assert!(segments > 0, "`segments` is 0, expected at least 1");
         if segments != self.at_once {
-            let m = self.knots.iter().map(|knot| knot.k.len()).max().unwrap_or(0);
-            self.segments = Segments::new(segments, self.knots.len() - 1, self.work.p.len(), m, self.room);
+            self.segments = Segments::new(segments, self.knots.len() - 1, self.sizes);
             self.at_once = segments;
         }
     }
@@ -148,7 +122,7 @@ impl Sweep {
 
     /// Whether the next runs shall write Vxx to the knots, for those that look at it.
     pub(crate) fn keep_values(&mut self, keep: bool) {
-        self.work.keep = keep;
+        self.step.keep = keep;
     }
 
     /// The feedback and value function of each knot, as the last [`run`](Self::run) left them; the terminal one has no
@@ -187,36 +161,17 @@ impl Sweep {
         &mut self,
         nodes: &[LqNode],
         regularisation: f64,
-        curvature: impl FnMut(usize, &[f64], &mut Hessian) -> bool,
+        mut curvature: impl FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
         self.check(nodes);
-        let mut result = Ok(());
-        at_level(Run { sweep: self, nodes, regularisation, curvature, result: &mut result });
-        result
+        self.step.run(0, nodes, &mut self.knots, regularisation, &mut curvature)
     }
 
     #[track_caller]
     fn check(&self, nodes: &[LqNode]) {
         assert_length("nodes", nodes.len(), self.knots.len());
         for (node, knot) in nodes.iter().zip(&self.knots) {
-            node.assert_shapes(self.work.p.len(), knot.k.len());
+            node.assert_shapes(self.sizes.n, knot.k.len());
         }
-    }
-}
-
-/// A run, to be compiled for the processor.
-struct Run<'a, F> {
-    sweep: &'a mut Sweep,
-    nodes: &'a [LqNode],
-    regularisation: f64,
-    curvature: F,
-    result: &'a mut Result<(), SweepError>,
-}
-
-impl<F: FnMut(usize, &[f64], &mut Hessian) -> bool> Dense for Run<'_, F> {
-    #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
-        let Self { sweep: Sweep { knots, work, .. }, nodes, regularisation, mut curvature, result } = self;
-        *result = work.run::<V, NR>(0, nodes, knots, regularisation, &mut curvature);
     }
 }

@@ -28,14 +28,12 @@
 //! "Parallel and proximal constrained linear-quadratic methods for real-time nonlinear MPC" (RSS 2024), of x and λ.
 #![allow(non_snake_case)] // the names of the literature
 
-use crate::dense::{
-    SLACK, Store, View, add_product_lower, add_scaled_product, column_block, copy, copy_symmetric, dot, product,
-    transpose,
+use super::node::LqNode;
+use super::step::Step;
+use condyle_linalg::{
+    SLACK, View, add_product_lower, add_scaled_product, copy_lower, copy_matrix, copy_symmetric, dot, eliminate,
+    product_of_upper_lower, product_with_upper, transpose,
 };
-use crate::factor::eliminate;
-use crate::lq::LqNode;
-use crate::riccati::Work;
-use crate::vector::{Dense, Vector};
 
 /// A value function; P is symmetric and full, with slack rows.
 #[derive(Debug, Clone)]
@@ -55,7 +53,7 @@ impl Value {
     }
 }
 
-/// How the end of a segment depends on its start and on the multiplier; beside P and p, which are in its [`Work`].
+/// How the end of a segment depends on its start and on the multiplier; beside P and p, which are in its [`Step`].
 /// Matrices have slack rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Transfer {
@@ -72,65 +70,47 @@ impl Transfer {
     }
 
     /// P, p, Θ, θ and C of a segment from its nodes. Whether all Quu were positive definite.
-    #[inline(always)]
-    pub(crate) fn run<V: Vector, const NR: usize>(
-        &mut self,
-        work: &mut Work,
-        nodes: &[LqNode],
-        regularisation: f64,
-    ) -> bool {
+    pub(crate) fn run(&mut self, step: &mut Step, nodes: &[LqNode], regularisation: f64) -> bool {
         let (n, ld) = (self.theta.len(), self.theta.len() + SLACK);
+        let work = &mut step.work;
         for zero in [&mut work.P, &mut work.p, &mut self.Theta, &mut self.theta, &mut self.C] {
             zero.fill(0.0);
         }
         for j in 0..n {
             self.Theta[j * ld + j] = 1.0;
         }
-        for i in (0..nodes.len()).rev() {
-            if !self.step::<V, NR>(work, &nodes[i], regularisation) {
-                return false;
-            }
-        }
-        true
+        nodes.iter().rev().all(|node| self.step(step, node, regularisation))
     }
 
     /// One knot.
-    #[inline(always)]
-    fn step<V: Vector, const NR: usize>(&mut self, work: &mut Work, node: &LqNode, regularisation: f64) -> bool {
+    fn step(&mut self, step: &mut Step, node: &LqNode, regularisation: f64) -> bool {
         let (n, m) = (node.ndx(), node.nu());
-        let (ld, ldt, last) = (work.stride(m), n + SLACK, m + n);
+        let (ldt, last) = (n + SLACK, m + n);
         let Self { Theta, theta, C } = self;
-        for k in 0..n {
-            if node.f[k] != 0.0 {
-                add_scaled_product(theta, node.f[k], &Theta[k * ldt..][..n], &[1.0]); // θ + Θ f
-            }
+        if node.f.iter().any(|f| *f != 0.0) {
+            add_scaled_product(theta, 1.0, View::new(Theta, ldt), node.f.as_slice()); // θ + Θ f
         }
-        let shift = work.form::<V, NR>(0, node, regularisation, &mut |_, _, _| false);
-        match node.euler() {
-            Some((dt, blocks)) if node.implicit.active => {
-                work.add_implicit_below::<V, NR>(Theta, node, dt, blocks);
-            }
-            Some((dt, blocks)) => work.add_euler_below::<V, NR>(Theta, m, dt, blocks),
-            None => {
-                let (Theta, F) = (View { data: Theta, stride: ldt }, View { data: &work.F, stride: ld });
-                product::<V, NR>(&mut work.H[last + 1..], ld, [n, last, n], Theta, F);
-            }
-        }
-        if eliminate::<V, NR>(&mut work.H, ld, last + 1 + n, last, m).is_err() {
+        let (work, turn) = step.write_with_rows_below(node, regularisation, Theta);
+        let ld = work.stride(m);
+        if eliminate(&mut work.H, ld, [last + 1 + n, last, m]).is_err() {
             return false;
         }
-        work.take_value::<V>(ld, m, shift);
+        work.take_value(ld, m, turn);
         for j in 0..n {
             work.P[j * ldt + j] += regularisation;
-            let state = if j < n - shift { j + shift } else { j + shift - n };
-            copy::<V>(&mut Theta[state * ldt..], &work.H[(m + j) * ld + last + 1..][..n]);
+        }
+        // Θ, with its columns turned back, and Y
+        let (below, split) = (&work.H[last + 1..], n - turn);
+        copy_matrix(&mut Theta[turn * ldt..], ldt, View::new(&below[m * ld..], ld), [n, split]);
+        if turn > 0 {
+            copy_matrix(Theta, ldt, View::new(&below[(m + split) * ld..], ld), [n, turn]);
         }
         for j in 0..m {
             let (y, Y) = work.H[j * ld + last..][..n + 1].split_at(1);
-            add_scaled_product(theta, -y[0], Y, &[1.0]);
+            add_scaled_product(theta, -y[0], View::new(Y, n), &[1.0]);
         }
-        let Y = View { data: &work.H[last + 1..], stride: ld };
-        add_product_lower::<V, NR>(C, ldt, [n, n, m], Y, Y);
+        let Y = View::new(below, ld);
+        add_product_lower(C, ldt, [n, n, m], Y, Y);
         true
     }
 }
@@ -161,20 +141,19 @@ impl Link {
 
     /// L of P₁ = L Lᵀ, and its transpose. Where states cost nothing P₁ may be singular, and then rounding decides whether
     /// a pivot is positive: a second try has a little more on the diagonal.
-    #[inline(always)]
-    fn factorise<V: Vector, const NR: usize>(&mut self, P: &[f64], n: usize) -> bool {
+    fn factorise(&mut self, P: &[f64], n: usize) -> bool {
         let (ld, ldp) = (n + 1 + SLACK, n + SLACK);
         let mut largest = 0.0_f64;
         for j in 0..n {
             largest = largest.max(P[j * ldp + j]);
         }
         for more in [0.0, n as f64 * f64::EPSILON * largest] {
+            copy_lower(&mut self.L, ld, View::new(P, ldp), n);
             for j in 0..n {
-                copy::<V>(&mut self.L[j * ld + j..], &P[j * ldp + j..][..n - j]);
                 self.L[j * ld + j] += more;
             }
-            if eliminate::<V, NR>(&mut self.L, ld, n, n, n).is_ok() {
-                transpose::<V>(&mut self.upper, ld, 0, &self.L, ld, 0..n, 0..n);
+            if eliminate(&mut self.L, ld, [n, n, n]).is_ok() {
+                transpose(&mut self.upper, ld, View::new(&self.L, ld), [n, n]);
                 for k in 0..n {
                     self.upper[k * ld + k + 1..(k + 1) * ld].fill(0.0);
                 }
@@ -184,38 +163,32 @@ impl Link {
         false
     }
 
-    /// The value function `start` at the start of a segment with P, p in `work`, from the one at its `end`. Whether
+    /// The value function `start` at the start of a segment with P, p in `step`, from the one at its `end`. Whether
     /// that one is convex.
-    #[inline(always)]
-    pub(crate) fn run<V: Vector, const NR: usize>(
-        &mut self,
-        work: &Work,
-        transfer: &Transfer,
-        end: &Value,
-        start: &mut Value,
-    ) -> bool {
-        let n = end.p.len();
+    pub(crate) fn run(&mut self, step: &Step, transfer: &Transfer, end: &Value, start: &mut Value) -> bool {
+        let (n, work) = (end.p.len(), &step.work);
         let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);
-        if !self.factorise::<V, NR>(&end.P, n) {
+        if !self.factorise(&end.P, n) {
             return false;
         }
         let Self { C, upper, CL, rows, H, .. } = self;
+        let upper = View::new(upper, ld);
 
         // M = 1 + Lᵀ(C L)
-        copy_symmetric::<V>(C, ld, &transfer.C, ldp, n);
-        times_lower::<V, NR>(CL, ld, n, n, View { data: C, stride: ld }, upper, ld, false);
-        transpose::<V>(rows, ld, 0, CL, ld, 0..n, 0..n);
-        times_lower::<V, NR>(H, ldh, n, n, View { data: upper, stride: ld }, rows, ld, true);
+        copy_symmetric(C, ld, View::new(&transfer.C, ldp), n);
+        product_with_upper(CL, ld, [n, n], View::new(C, ld), upper);
+        transpose(rows, ld, View::new(CL, ld), [n, n]);
+        product_of_upper_lower(H, ldh, n, upper, View::new(rows, ld));
         for j in 0..n {
             H[j * ldh + j] += 1.0;
         }
 
         // [Θ, θ − C p₁]ᵀL
-        transpose::<V>(rows, ld, 0, &transfer.Theta, ldp, 0..n, 0..n);
+        transpose(rows, ld, View::new(&transfer.Theta, ldp), [n, n]);
         for k in 0..n {
             rows[k * ld + n] = transfer.theta[k] - dot(&C[k * ld..][..n], &end.p);
         }
-        times_lower::<V, NR>(&mut H[n..], ldh, n + 1, n, View { data: rows, stride: ld }, upper, ld, false);
+        product_with_upper(&mut H[n..], ldh, [n + 1, n], View::new(rows, ld), upper);
 
         // −P and −(p + Θᵀp₁), from which the elimination subtracts what is to be added to P and p
         for j in 0..n {
@@ -225,10 +198,10 @@ impl Link {
             }
             H[n] = -work.p[j] - dot(&transfer.Theta[j * ldp..][..n], &end.p);
         }
-        if eliminate::<V, NR>(H, ldh, 2 * n + 1, 2 * n, n).is_err() {
+        if eliminate(H, ldh, [2 * n + 1, 2 * n, n]).is_err() {
             return false;
         }
-        copy_symmetric::<V>(&mut start.P, ldp, &H[n * ldh + n..], ldh, n);
+        copy_symmetric(&mut start.P, ldp, View::new(&H[n * ldh + n..], ldh), n);
         for j in 0..n {
             for i in 0..n {
                 start.P[j * ldp + i] = -start.P[j * ldp + i];
@@ -236,44 +209,5 @@ impl Link {
             start.p[j] = -H[(n + j) * ldh + 2 * n];
         }
         true
-    }
-}
-
-/// C ← A B for n rows k of B, of which the j-th entry is zero for j > k, given as columns of Bᵀ (`b`, stride `ldb`); all
-/// `rows` rows, or the lower triangle for a lower A.
-#[inline(always)]
-fn times_lower<V: Vector, const NR: usize>(
-    c: &mut [f64],
-    ldc: usize,
-    rows: usize,
-    n: usize,
-    a: View<'_>,
-    b: &[f64],
-    ldb: usize,
-    lower: bool,
-) {
-    let mut j = 0;
-    while j < n {
-        let first = if lower { j } else { 0 };
-        let (a, b) = (View { data: &a.data[j * a.stride..], ..a }, View { data: &b[j * ldb..], stride: ldb });
-        column_block::<V, NR>(c, ldc, first..rows, j, NR.min(n - j), a, b, n - j, Store::Set);
-        j += NR;
-    }
-}
-
-/// A link, to be compiled for the processor.
-pub(crate) struct Linking<'a> {
-    pub(crate) link: &'a mut Link,
-    pub(crate) work: &'a Work,
-    pub(crate) transfer: &'a Transfer,
-    pub(crate) end: &'a Value,
-    pub(crate) start: &'a mut Value,
-    pub(crate) good: &'a mut bool,
-}
-
-impl Dense for Linking<'_> {
-    #[inline(always)]
-    fn run<V: Vector, const NR: usize>(self) {
-        *self.good = self.link.run::<V, NR>(self.work, self.transfer, self.end, self.start);
     }
 }

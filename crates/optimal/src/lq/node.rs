@@ -1,10 +1,9 @@
 //! The linear-quadratic problem: all that a solver sees of a horizon.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
+use super::implicit::Implicit;
+use super::structure::{EulerBlock, LARGEST_BLOCK, Structure};
 use crate::error::assert_length;
-pub(crate) use crate::implicit::Implicit;
-pub(crate) use crate::structure::LARGEST_BLOCK;
-use crate::structure::{EulerBlock, Structure};
 use nalgebra::{DMatrix, DVector};
 
 /// Beyond this a value has diverged and the sweep or the trial is given up.

@@ -1,0 +1,102 @@
+//! The elimination of controls, of which some may lie at a bound.
+#![allow(non_snake_case)] // the names of the literature: K, Quu
+
+use super::super::box_qp::BoxQp;
+use super::super::node::{LqKnot, LqNode};
+use super::super::workspace::Workspace;
+use condyle_linalg::{SLACK, View, copy_symmetric, dot, eliminate, solve_right, transpose_negated};
+
+/// The elimination of controls, with its scratch.
+#[derive(Debug, Clone)]
+pub(crate) struct Controls {
+    qp: BoxQp,
+    /// Lᵀ for the back substitution.
+    upper: Vec<f64>,
+    /// The number of controls that were eliminated last.
+    free: usize,
+}
+
+impl Controls {
+    /// Room for m controls.
+    pub(crate) fn new(m: usize) -> Self {
+        Self { qp: BoxQp::new(m), upper: vec![0.0; (m + SLACK) * m], free: 0 }
+    }
+
+    /// L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a bound; keeps Qu, Quu
+    /// and, where there are bounds, k. Returns the number of these controls.
+    ///
+    /// # Errors
+    /// The control and the pivot that is not positive.
+    pub(super) fn eliminate(
+        &mut self,
+        work: &mut Workspace,
+        node: &LqNode,
+        knot: &mut LqKnot,
+    ) -> Result<usize, (usize, f64)> {
+        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+        let H = &mut work.H;
+        for j in 0..m {
+            knot.Qu[j] = H[j * ld + m + n];
+        }
+        copy_symmetric(knot.Quu.as_mut_slice(), m, View::new(H, ld), m);
+        if !node.is_bounded() {
+            self.free = m;
+            eliminate(H, ld, [m + n + 1, m + n, m])?;
+            return Ok(m);
+        }
+        let (lower, upper) = (node.lower.as_slice(), node.upper.as_slice());
+        let start = knot.k.iter().map(|k| -k);
+        self.qp.solve(&knot.Quu, knot.Qu.as_slice(), lower, upper, start)?;
+        let free = &self.qp.free;
+        keep_free(H, ld, m, n, free);
+        self.free = free.len();
+        eliminate(H, ld, [self.free + n + 1, self.free + n, self.free]).map_err(|(row, pivot)| (free[row], pivot))?;
+        Ok(self.free)
+    }
+
+    /// [K k]ᵀ = −[X; yᵀ] L⁻¹ from what the elimination left, with the states turned by `turn`.
+    pub(super) fn recover_gains(&mut self, work: &mut Workspace, node: &LqNode, knot: &mut LqKnot, turn: usize) {
+        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+        let (Self { qp, upper, free }, H, split) = (self, &mut work.H, n - turn);
+        let free = *free;
+        solve_right(H, ld, [free, free + n + 1, free], upper);
+        let K = knot.K.as_mut_slice();
+        if node.is_bounded() {
+            K.fill(0.0);
+            for i in 0..n {
+                let state = if i < split { i + turn } else { i - split };
+                for j in 0..free {
+                    K[state * m + qp.free[j]] = -H[j * ld + free + i];
+                }
+            }
+            knot.k.copy_from_slice(&qp.x[..m]);
+            for j in 0..m {
+                if qp.free.binary_search(&j).is_err() {
+                    knot.Qu[j] = 0.0;
+                }
+            }
+        } else {
+            transpose_negated(&mut K[turn * m..], m, View::new(&H[m..], ld), [split, m]);
+            transpose_negated(K, m, View::new(&H[m + split..], ld), [turn, m]);
+            for j in 0..m {
+                knot.k[j] = -H[j * ld + m + n];
+            }
+        }
+        let k = knot.k.as_slice();
+        knot.expected = [dot(knot.Qu.as_slice(), k), 0.0];
+        for (column, k_j) in knot.Quu.column_iter().zip(k) {
+            knot.expected[1] += k_j * dot(column.as_slice(), k);
+        }
+    }
+}
+
+/// Moves the rows and columns of the `free` ones of m controls to the front of H, and what follows up behind them.
+fn keep_free(H: &mut [f64], stride: usize, m: usize, n: usize, free: &[usize]) {
+    let (kept, rows) = (free.len(), m + n + 1);
+    for (to, from) in free.iter().copied().chain(m..m + n).enumerate() {
+        for (row, &i) in free.iter().enumerate() {
+            H[to * stride + row] = H[from * stride + i];
+        }
+        H.copy_within(from * stride + m..from * stride + rows, to * stride + kept);
+    }
+}

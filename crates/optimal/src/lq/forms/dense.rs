@@ -1,0 +1,95 @@
+//! The quadratic form of a knot of whose A and B nothing is known.
+#![allow(non_snake_case)] // the names of the literature: A, B, Q, …
+
+use super::super::node::{Hessian, LqNode};
+use super::super::workspace::Workspace;
+use super::{Curvature, Form};
+use condyle_linalg::{SLACK, View, add_product_lower, copy_lower, copy_matrix, product, transpose};
+
+/// The form with full matrices, and with the states in their order.
+#[derive(Debug, Clone)]
+pub(super) struct Dense;
+
+impl Form for Dense {
+    fn turn(&self, _: usize) -> usize {
+        0
+    }
+
+    /// H = [R + ϱ 1 ·; S Q; rᵀ qᵀ] + W [B A],   W = [P B, P A, P f + p]ᵀ.
+    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, curvature: &mut Curvature<'_>) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (ld, rows) = (work.stride(m), m + n);
+        write_cost(work, node, 0, curvature);
+        let Workspace { P, p, F, W, H, .. } = work;
+        transpose(F, ld, View::new(node.B.as_slice(), n), [n, m]);
+        transpose(&mut F[m..], ld, View::new(node.A.as_slice(), n), [n, n]);
+        let F = View::new(F, ld);
+        product(W, ld, [rows, n, n], F, View::new(P, n + SLACK));
+        for k in 0..n {
+            W[k * ld + rows] = p[k];
+        }
+        add_product_lower(H, ld, [rows + 1, rows, n], View::new(W, ld), F);
+        add_to_diagonal(H, ld, m, regularisation);
+    }
+
+    /// Θ [B A].
+    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
+        let (n, m) = (node.ndx(), node.nu());
+        let ld = work.stride(m);
+        let Workspace { F, H, .. } = work;
+        product(&mut H[m + n + 1..], ld, [n, m + n, n], View::new(Theta, n + SLACK), View::new(F, ld));
+    }
+}
+
+/// H = [R ·; S Q; rᵀ qᵀ] + [ψuu ·; ψxu ψxx; 0 0], the states turned by `turn`: its lower triangle. ψ is the curvature of the
+/// dynamics.
+pub(super) fn write_cost(work: &mut Workspace, node: &LqNode, turn: usize, curvature: &mut Curvature<'_>) {
+    let (n, m) = (node.ndx(), node.nu());
+    let (ld, split) = (work.stride(m), n - turn); // states in H before and after the turn
+    let Workspace { H, p, .. } = work;
+    let (R, S, Q) = (View::new(node.R.as_slice(), m), View::new(node.S.as_slice(), n), View::new(node.Q.as_slice(), n));
+    copy_lower(H, ld, R, m);
+    copy_matrix(&mut H[m..], ld, S.at(turn, 0), [split, m]);
+    copy_lower(&mut H[m * ld + m..], ld, Q.at(turn, turn), split);
+    if turn > 0 {
+        copy_matrix(&mut H[m + split..], ld, S, [turn, m]);
+        copy_matrix(&mut H[m * ld + m + split..], ld, Q.at(0, turn), [turn, split]);
+        copy_lower(&mut H[(m + split) * (ld + 1)..], ld, Q, turn);
+    }
+    for j in 0..m {
+        H[j * ld + m + n] = node.r[j];
+    }
+    for j in 0..n {
+        let state = if j < split { j + turn } else { j - split };
+        H[(m + j) * ld + m + n] = node.q[state];
+    }
+    if let Some(hessian) = curvature.at(p, m) {
+        add_hessian(H, ld, hessian, turn);
+    }
+}
+
+/// H += [ψuu ·; ψxu ψxx], the states turned by `turn`.
+fn add_hessian(H: &mut [f64], ld: usize, Hessian { xx, xu, uu }: &Hessian, turn: usize) {
+    let (n, m) = xu.shape();
+    let state = |i: usize| (i + turn) % n;
+    for j in 0..m {
+        for i in 0..m {
+            H[j * ld + i] += uu[(i, j)];
+        }
+        for i in 0..n {
+            H[j * ld + m + i] += xu[(state(i), j)];
+        }
+    }
+    for j in 0..n {
+        for i in j..n {
+            H[(m + j) * ld + m + i] += xx[(state(i), state(j))];
+        }
+    }
+}
+
+/// Quu += ϱ 1.
+pub(super) fn add_to_diagonal(H: &mut [f64], ld: usize, m: usize, regularisation: f64) {
+    for j in 0..m {
+        H[j * ld + j] += regularisation;
+    }
+}

@@ -1,0 +1,290 @@
+//! The quadratic form of a knot of semi-implicit Euler: blocks that are the identity or Δt are never multiplied.
+#![allow(non_snake_case)] // the names of the literature, and N, Π, T, E
+
+use super::super::node::LqNode;
+use super::super::structure::{EulerBlock, LARGEST_BLOCK};
+use super::super::workspace::Workspace;
+use super::dense::{add_to_diagonal, write_cost};
+use super::{Curvature, Form};
+use condyle_linalg::{
+    SLACK, Vector, Vectorized, View, add_matrix, add_product_lower, add_transposed_product_lower, at_level, product,
+    transpose,
+};
+
+/// The form of Euler steps with the controls as unknowns, and with the states in the order (v, q).
+#[derive(Debug, Clone)]
+pub(super) struct Euler {
+    steps: Steps,
+    /// Part of NᵀF_q; its stride is that of Nᵀ and Π.
+    M: Vec<f64>,
+}
+
+impl Euler {
+    /// Room for n states.
+    pub(super) fn new(n: usize) -> Self {
+        Self { steps: Steps::new(n), M: vec![0.0; (n / 2 + SLACK) * (n / 2)] }
+    }
+}
+
+impl Form for Euler {
+    fn turn(&self, n: usize) -> usize {
+        n / 2
+    }
+
+    /// With [B A] = [G F_v F_q] on velocities:
+    ///
+    /// ```text
+    /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
+    /// H = cost + W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T,   Qx_q += Tᵀp_q
+    /// ```
+    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, curvature: &mut Curvature<'_>) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (nv, ld, rows) = (n / 2, work.stride(m), m + n);
+        let ldn = nv + SLACK;
+        let Self { steps, M } = self;
+        write_cost(work, node, nv, curvature);
+        steps.write(work, node);
+
+        let Workspace { F, W, H, .. } = work;
+        let (A, B) = (View::new(node.A.as_slice(), n), View::new(node.B.as_slice(), n));
+        transpose(F, ld, B.at(nv, 0), [nv, m]);
+        transpose(&mut F[m..], ld, A.at(nv, nv), [nv, nv]);
+        transpose(&mut F[m + nv..], ld, A.at(nv, 0), [nv, nv]);
+        let (all, F_q) = (View::new(F, ld), View::new(&F[m + nv..], ld));
+        product(W, ld, [rows, nv, nv], all, View::new(&steps.Pi, ldn));
+        add_matrix(&mut W[m + nv..], ld, View::new(&steps.N, ldn), [nv, nv]);
+        for k in 0..nv {
+            W[k * ld + rows] = steps.py[k];
+        }
+        add_product_lower(H, ld, [rows + 1, rows, nv], View::new(W, ld), all);
+        let H_qq = &mut H[(m + nv) * (ld + 1)..];
+        add_transposed_product_lower(H_qq, ld, nv, View::new(&steps.N, ldn), F_q, M, ldn);
+        steps.add_positions(work, node);
+        add_to_diagonal(&mut work.H, ld, m, regularisation);
+    }
+
+    /// Θ B = Ψ G,   Θ A = Ψ [F_q F_v] + [Θ_q T  0],   Ψ = Δt Θ_q E + Θ_v.
+    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
+        let (n, m) = (node.ndx(), node.nu());
+        let ld = work.stride(m);
+        self.steps.write_velocities_below(work, node, Theta);
+        let Workspace { F, W: Psi, H, .. } = work;
+        product(&mut H[m + n + 1..], ld, [n, m + n, n / 2], View::new(Psi, n + SLACK), View::new(F, ld));
+        self.steps.add_positions_below(work, node, Theta);
+    }
+}
+
+/// What the step from a velocity to a position makes of the value function; column-major with slack rows, stride
+/// nv + SLACK.
+#[derive(Debug, Clone)]
+pub(super) struct Steps {
+    /// Nᵀ.
+    pub(super) N: Vec<f64>,
+    /// Π.
+    pub(super) Pi: Vec<f64>,
+    /// Δt Eᵀp_q + p_v.
+    pub(super) py: Vec<f64>,
+    /// The columns of P E or P T that are not those of P; their stride is that of P.
+    PB: Vec<f64>,
+}
+
+impl Steps {
+    /// Room for n states.
+    pub(super) fn new(n: usize) -> Self {
+        let matrix = |rows: usize| vec![0.0; (rows + SLACK) * (n / 2)];
+        Self { N: matrix(n / 2), Pi: matrix(n / 2), py: vec![0.0; n / 2], PB: matrix(n) }
+    }
+
+    /// Π, N and Δt Eᵀp_q + p_v: how the value of the next state depends on its velocity.
+    pub(super) fn write(&mut self, work: &Workspace, node: &LqNode) {
+        let (dt, blocks) = steps_of(node);
+        let n = node.ndx();
+        times_blocks(&mut self.PB, &work.P, n + SLACK, n, blocks, |block| &block.E);
+        at_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
+    }
+
+    /// H_qq += TᵀP₁₁T,   Qx_q += Tᵀp_q.
+    pub(super) fn add_positions(&mut self, work: &mut Workspace, node: &LqNode) {
+        let ((_, blocks), n, m) = (steps_of(node), node.ndx(), node.nu());
+        let (nv, ld) = (n / 2, work.stride(m));
+        let Workspace { P, p, H, .. } = work;
+        times_blocks(&mut self.PB, P, n + SLACK, nv, blocks, |block| &block.T);
+        at_level(AddPositions { steps: self, P, p, H: &mut H[(m + nv) * (ld + 1)..], ld, blocks });
+    }
+
+    /// Ψ = Δt Θ_q E + Θ_v, in W with the stride of Θ.
+    pub(super) fn write_velocities_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
+        let ((dt, blocks), n) = (steps_of(node), node.ndx());
+        let (nv, ld) = (n / 2, n + SLACK);
+        let (Self { PB, .. }, Psi) = (self, &mut work.W);
+        times_blocks(PB, Theta, ld, n, blocks, |block| &block.E);
+        for k in 0..nv {
+            let (Theta_q, Theta_v) = (column(k, blocks, Theta, PB, ld), &Theta[(nv + k) * ld..][..n]);
+            let Psi = &mut Psi[k * ld..][..n];
+            for i in 0..n {
+                Psi[i] = dt * Theta_q[i] + Theta_v[i];
+            }
+        }
+    }
+
+    /// Adds Θ_q T to the columns of δq below H.
+    pub(super) fn add_positions_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
+        let ((_, blocks), n, m) = (steps_of(node), node.ndx(), node.nu());
+        let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
+        let (Self { PB, .. }, H) = (self, &mut work.H);
+        times_blocks(PB, Theta, ldt, n, blocks, |block| &block.T);
+        for j in 0..nv {
+            let (Theta_q, H) = (column(j, blocks, Theta, PB, ldt), &mut H[(m + nv + j) * ld + at..][..n]);
+            for i in 0..n {
+                H[i] += Theta_q[i];
+            }
+        }
+    }
+}
+
+/// Δt and the blocks of T and E of a node.
+fn steps_of(node: &LqNode) -> (f64, &[EulerBlock]) {
+    node.structure.euler().expect("the form is that of Euler steps")
+}
+
+/// The loops of [`Steps::write`].
+struct WriteSteps<'a> {
+    steps: &'a mut Steps,
+    P: &'a [f64],
+    p: &'a [f64],
+    dt: f64,
+    blocks: &'a [EulerBlock],
+}
+
+impl Vectorized for WriteSteps<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { steps: Steps { N, Pi, py, PB }, P, p, dt, blocks } = self;
+        let (nv, ldp, ldn) = (p.len() / 2, p.len() + SLACK, p.len() / 2 + SLACK);
+
+        // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  as if T and E were 1 from the left
+        let step = V::splat(dt);
+        for k in 0..nv {
+            let (PE, P) = (column(k, blocks, P, PB, ldp), &P[(nv + k) * ldp..]);
+            let (N, Pi) = (&mut N[k * ldn..], &mut Pi[k * ldn..]);
+            let mut i = 0;
+            while i < nv {
+                let sum = V::load(&PE[i..]).mul_add(step, V::load(&P[i..]));
+                sum.store(&mut N[i..]);
+                sum.add(V::load(&PE[nv + i..])).mul_add(step, V::load(&P[nv + i..])).store(&mut Pi[i..]);
+                i += V::N;
+            }
+            py[k] = dt * p[k] + p[nv + k];
+        }
+        // and their blocks from the left
+        for block in blocks {
+            let (T, E, size) = (rows_of(&block.T), rows_of(&block.E), block.T.nrows());
+            for k in 0..nv {
+                let at = k * ldn + block.start;
+                let (N, Pi) = (&mut N[at..][..size], &mut Pi[at..][..size]);
+                let (TN, EN) = (combine(&T, N), combine(&E, N));
+                for i in 0..size {
+                    Pi[i] += dt * (EN[i] - N[i]);
+                }
+                N.copy_from_slice(&TN[..size]);
+            }
+            let Ep = combine(&E, &p[block.range()]);
+            for (i, k) in block.range().enumerate() {
+                py[k] = dt * Ep[i] + p[nv + k];
+            }
+        }
+    }
+}
+
+/// The loops of [`Steps::add_positions`]; H from the diagonal of δq on.
+struct AddPositions<'a> {
+    steps: &'a Steps,
+    P: &'a [f64],
+    p: &'a mut [f64],
+    H: &'a mut [f64],
+    ld: usize,
+    blocks: &'a [EulerBlock],
+}
+
+impl Vectorized for AddPositions<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { steps: Steps { PB, .. }, P, p, H, ld, blocks } = self;
+        let (nv, ldp) = (p.len() / 2, p.len() + SLACK);
+        for j in 0..nv {
+            let (PT, H) = (column(j, blocks, P, PB, ldp), &mut H[j * ld..]);
+            let gradient = H[nv];
+            let mut i = 0;
+            while i < nv {
+                V::load(&H[i..]).add(V::load(&PT[i..])).store(&mut H[i..]); // what lies above the diagonal is not read
+                i += V::N;
+            }
+            H[nv] = gradient;
+        }
+        for block in blocks {
+            let (T, size) = (rows_of(&block.T), block.T.nrows());
+            for j in 0..nv {
+                let PT = &column(j, blocks, P, PB, ldp)[block.range()];
+                let (TPT, H) = (combine(&T, PT), &mut H[j * ld + block.start..][..size]);
+                for i in 0..size {
+                    H[i] += TPT[i] - PT[i];
+                }
+            }
+        }
+        for block in blocks {
+            let rows = &mut p[block.range()];
+            let product = combine(&rows_of(&block.T), rows);
+            rows.copy_from_slice(&product[..rows.len()]);
+        }
+        for j in 0..nv {
+            H[j * ld + nv] += p[j];
+        }
+    }
+}
+
+/// The columns of the blocks of P B, in `rows` rows, for a matrix B that is the identity but for blocks.
+fn times_blocks(
+    PB: &mut [f64],
+    P: &[f64],
+    ldp: usize,
+    rows: usize,
+    blocks: &[EulerBlock],
+    B: impl Fn(&EulerBlock) -> &nalgebra::DMatrix<f64>,
+) {
+    for block in blocks {
+        let (columns, at, size) = (rows_of(B(block)), block.start * ldp, block.T.nrows());
+        let (P, B) = (View::new(&P[at..], ldp), View::new(columns.as_flattened(), 8));
+        product(&mut PB[at..], ldp, [rows, size, size], P, B);
+    }
+}
+
+/// A column of P B: that of P, unless it is in a block.
+#[inline(always)]
+fn column<'a>(k: usize, blocks: &[EulerBlock], P: &'a [f64], PB: &'a [f64], ldp: usize) -> &'a [f64] {
+    let in_block = blocks.iter().any(|block| block.range().contains(&k));
+    &(if in_block { PB } else { P })[k * ldp..]
+}
+
+/// The rows of a block, with zeros up to a whole register.
+#[inline(always)]
+fn rows_of(B: &nalgebra::DMatrix<f64>) -> [[f64; 8]; LARGEST_BLOCK] {
+    let mut rows = [[0.0; 8]; LARGEST_BLOCK];
+    for i in 0..B.nrows() {
+        for j in 0..B.ncols() {
+            rows[i][j] = B[(i, j)];
+        }
+    }
+    rows
+}
+
+/// Bᵀx from the rows of B.
+#[inline(always)]
+fn combine(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [f64; 8] {
+    let mut sum = [0.0; 8];
+    for i in 0..LARGEST_BLOCK.min(x.len()) {
+        for j in 0..8 {
+            sum[j] += rows[i][j] * x[i];
+        }
+    }
+    sum
+}

@@ -1,0 +1,251 @@
+//! Knots as the equations of inverse dynamics: accelerations and forces take the place of the controls.
+//!
+//! Inverse dynamics is cheap, and sparse where forward dynamics is full. In place of δu take as many unknowns w out of
+//! the changes of accelerations and contact forces, so that all others follow from w and δx by the equations that hold
+//! no control (contacts stay, nothing drives the base). With the step of velocities ŷ = v⁺ = v + Δt a as the unknown,
+//!
+//! ```text
+//! δu = U (w, δv, δq),     y_c = δv_c + w_k  (a coordinate that is an unknown),     y_d = δv_d + D_d (w, δv, δq)  (one that is not)
+//! δq⁺ = T δq + Δt E y,    δv⁺ = y:        ½ δx⁺ᵀ P δx⁺ = ½ yᵀ Π y + yᵀ N δq + ½ δqᵀ Tᵀ P₁₁ T δq
+//! ```
+//!
+//! with the Π and N of Euler steps ([`Sweep`](crate::Sweep)), so that the quadratic form of the knot is copies of Π and N and
+//! few outer products, U's with the cost of controls, and D's with Z = (Π y + N δq)_d − ½ Π_dd D:
+//!
+//! ```text
+//! H = [Π and N on w, δv, δq] + Uᵀ (R + ϱ 1) U + DᵀZ + ZᵀD + Gᵀ a″ G
+//! ```
+//!
+//! where the rows G are those of residuals that look at more than δq. All rows have zeros where the tree of the robot
+//! has none, which are left out in blocks. What follows is the elimination of w. P, p, K = U_x + U_w K_w and k = U_w k_w are
+//! those of the explicit form, since for any δx the map from w to δu is invertible.
+#![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
+
+use super::super::implicit::Implicit;
+use super::super::node::{LqKnot, LqNode};
+use super::super::workspace::Workspace;
+use super::euler::Steps;
+use super::{Controls, Curvature, Form};
+use condyle_linalg::{
+    OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_level, copy, copy_matrix, eliminate,
+    solve_transposed, subtract_product, transpose,
+};
+
+/// The form, with its scratch.
+#[derive(Debug, Clone)]
+pub(crate) struct InverseDynamics {
+    steps: Steps,
+    /// The outer products, of rows over (w, δv, δq).
+    products: OuterProducts,
+    /// ½ Π_dd. Shape: dependent × dependent, with slack rows.
+    half: Vec<f64>,
+    /// U_w. Shape: nu × nu, with slack rows.
+    U: Vec<f64>,
+    /// [K k], the states in the order (v, q). Shape: nu × n + 1, with slack rows.
+    gains: Vec<f64>,
+    /// Columns of dependent coordinates. Shape: n × dependent, with slack rows.
+    below: Vec<f64>,
+}
+
+impl InverseDynamics {
+    /// What the rows of some nodes need at most, whichever are active: numbers in rows, products, dependent coordinates.
+    pub(crate) fn room(nodes: &[LqNode]) -> [usize; 3] {
+        let rooms = nodes.iter().map(|LqNode { implicit, .. }| {
+            let [efforts, steps, costs] =
+                [&implicit.efforts, &implicit.steps, &implicit.costs].map(|rows| rows.masks.capacity());
+            [2 * (efforts + steps + costs) * implicit.stride, efforts + 2 * steps + costs, steps]
+        });
+        rooms.fold([0; 3], |a, b| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])])
+    }
+
+    /// For n states and at most m controls, with such room.
+    pub(super) fn new([numbers, products, dependent]: [usize; 3], n: usize, m: usize) -> Self {
+        Self {
+            steps: Steps::new(n),
+            products: OuterProducts::with_capacity(numbers, products),
+            half: Vec::with_capacity((dependent + SLACK) * dependent),
+            U: vec![0.0; (m + SLACK) * m],
+            gains: vec![0.0; (m + SLACK) * (n + 1)],
+            below: Vec::with_capacity((n + SLACK) * dependent),
+        }
+    }
+}
+
+impl Form for InverseDynamics {
+    fn turn(&self, n: usize) -> usize {
+        n / 2
+    }
+
+    /// H in the order (w, δv, δq).
+    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
+        let (n, m, count) = (node.ndx(), node.nu(), node.implicit.dependent.len());
+        let (ld, all, size) = (work.stride(m), m + n, node.implicit.stride);
+        self.steps.write(work, node);
+        self.half.resize((count + SLACK) * count, 0.0);
+        let Self { steps, products, half, .. } = self;
+        at_level(WriteRows { steps, products, half, node, regularisation, H: &mut work.H, ld });
+
+        // The last rows are D and (Π y + N δq)_d, which becomes Z.
+        let Z = products.count() - count;
+        let D = Z - count;
+        if count > 0 {
+            let (D, Z) = products.rows[D * size..].split_at_mut(count * size);
+            add_product(Z, size, [all, count, count], View::new(D, size), View::new(half, count + SLACK));
+        }
+        // DᵀZ + ZᵀD
+        let masks = &node.implicit.steps.masks;
+        for (k, &mask) in masks.iter().enumerate() {
+            products.multiply([Z + k, D + k], [u64::MAX, mask]);
+        }
+        for (k, &mask) in masks.iter().enumerate() {
+            products.multiply([D + k, Z + k], [mask, u64::MAX]);
+        }
+        products.add_to(&mut work.H, ld);
+        steps.add_positions(work, node);
+    }
+
+    /// Ψ y + Θ_q T δq,   Ψ = Δt Θ_q E + Θ_v.
+    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
+        let (n, m, Implicit { own, dependent, steps: D, stride, .. }) = (node.ndx(), node.nu(), &node.implicit);
+        let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
+        self.steps.write_velocities_below(work, node, Theta);
+        let (Self { steps, below, .. }, Workspace { W: Psi, H, .. }) = (self, &mut *work);
+        for k in (0..m).chain(m + nv..m + n) {
+            H[k * ld + at..][..n].fill(0.0);
+        }
+        for &[c, k, length] in own {
+            copy_matrix(&mut H[k * ld + at..], ld, View::new(&Psi[c * ldt..], ldt), [n, length]);
+        }
+        copy_matrix(&mut H[m * ld + at..], ld, View::new(Psi, ldt), [n, nv]);
+        let count = dependent.len();
+        if count > 0 {
+            below.resize(count * ldt, 0.0);
+            for (to, &d) in below.chunks_exact_mut(ldt).zip(dependent) {
+                to[..n].copy_from_slice(&Psi[d * ldt..][..n]);
+            }
+            let (below, D) = (View::new(below, ldt), View::new(&D.numbers, *stride));
+            add_product(&mut H[at..], ld, [n, m + n, count], below, D);
+        }
+        steps.add_positions_below(work, node, Theta);
+    }
+
+    fn eliminate(
+        &self,
+        work: &mut Workspace,
+        _: &mut Controls,
+        node: &LqNode,
+        _: &mut LqKnot,
+    ) -> Result<usize, (usize, f64)> {
+        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+        eliminate(&mut work.H, ld, [m + n + 1, m + n, m])?;
+        Ok(m)
+    }
+
+    /// From H after the elimination of w, [L ·; X ·; yᵀ ·]:
+    ///
+    /// K = U_x − U_w L⁻ᵀ Xᵀ,   k = −U_w L⁻ᵀ y,   Quᵀk = −yᵀy = −kᵀQuu k
+    fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
+        let (n, m) = (node.ndx(), node.nu());
+        let (nv, ld, ldu) = (n / 2, work.stride(m), m + SLACK);
+        let (Self { U, gains, .. }, H) = (self, &work.H);
+        let (efforts, size) = (&node.implicit.efforts.numbers, node.implicit.stride);
+        transpose(U, ldu, View::new(efforts, size), [m, m]);
+        solve_transposed(U, ldu, m, View::new(H, ld), m);
+        transpose(gains, ldu, View::new(&efforts[m..], size), [n, m]);
+        gains[n * ldu..][..m].fill(0.0);
+        subtract_product(gains, ldu, [m, n + 1, m], View::new(U, ldu), View::new(&H[m..], ld));
+        let K = knot.K.as_mut_slice();
+        copy_matrix(K, m, View::new(&gains[nv * ldu..], ldu), [m, nv]);
+        copy_matrix(&mut K[nv * m..], m, View::new(gains, ldu), [m, nv]);
+        knot.k.as_mut_slice().copy_from_slice(&gains[n * ldu..][..m]);
+        let mut square = 0.0;
+        for j in 0..m {
+            square += H[j * ld + m + n] * H[j * ld + m + n];
+        }
+        knot.expected = [-square, square];
+    }
+}
+
+/// The part of H that is Π and N, and the rows of the outer products: those of Uᵀ (R + ϱ 1) U + Gᵀ a″ G, then D and
+/// (Π y + N δq)_d.
+struct WriteRows<'a> {
+    steps: &'a Steps,
+    products: &'a mut OuterProducts,
+    half: &'a mut [f64],
+    node: &'a LqNode,
+    regularisation: f64,
+    H: &'a mut [f64],
+    ld: usize,
+}
+
+impl Vectorized for WriteRows<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { steps: Steps { N, Pi, py, .. }, products, half, node, regularisation, H, ld } = self;
+        let (n, m, imp) = (node.ndx(), node.nu(), &node.implicit);
+        let (nv, all, size) = (n / 2, m + n, imp.stride);
+        let ldn = nv + SLACK;
+
+        // Π and N on the unknowns and δv; unknowns from `forces` on are forces
+        let forces = imp.own.last().map_or(0, |own| own[1] + own[2]);
+        for &[c, k, length] in &imp.own {
+            for j in 0..length {
+                let column = &mut H[(k + j) * ld..][..ld];
+                let (Pi, N) = (&Pi[(c + j) * ldn..][..nv], &N[(c + j) * ldn..][..nv]);
+                for &[cc, kk, length] in &imp.own {
+                    if kk >= k {
+                        copy::<V>(&mut column[kk..], &Pi[cc..cc + length]);
+                    }
+                }
+                for k in forces..m {
+                    column[k] = 0.0;
+                }
+                copy::<V>(&mut column[m..], Pi);
+                copy::<V>(&mut column[m + nv..], N);
+                column[all] = py[c + j];
+            }
+        }
+        for k in forces..m {
+            H[k * ld + k..][..=all - k].fill(0.0);
+        }
+        for j in 0..nv {
+            let column = &mut H[(m + j) * ld..][..ld];
+            copy::<V>(&mut column[m + j..], &Pi[j * ldn + j..][..nv - j]);
+            copy::<V>(&mut column[m + nv..], &N[j * ldn..][..nv]);
+            column[m + j] += imp.diagonal[j];
+            column[all] = py[j] + node.q[nv + j];
+            let column = &mut H[(m + nv + j) * ld..][..ld];
+            copy::<V>(&mut column[m + nv + j..], &node.Q.as_slice()[j * n + j..][..nv - j]);
+            column[all] = node.q[j];
+        }
+
+        // Uᵀ (R + ϱ 1) U and Gᵀ a″ G
+        products.clear(all, size);
+        for (k, (row, &mask)) in imp.efforts.numbers.chunks_exact(size).zip(&imp.efforts.masks).enumerate() {
+            products.square::<V>(row, mask, [node.r[k], imp.diagonal[nv + k] + regularisation]);
+        }
+        for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
+            products.square::<V>(row, mask, slopes);
+        }
+        // D and (Π y + N δq)_d
+        for row in imp.steps.numbers.chunks_exact(size) {
+            products.push::<V>(row, 1.0);
+        }
+        let count = imp.dependent.len();
+        let first = products.add_rows(count);
+        for (j, &d) in imp.dependent.iter().enumerate() {
+            let (Pi, N) = (&Pi[d * ldn..][..nv], &N[d * ldn..][..nv]);
+            let row = &mut products.rows[(first + j) * size..][..size];
+            for &[c, k, length] in &imp.own {
+                copy::<V>(&mut row[k..], &Pi[c..c + length]);
+            }
+            row[forces..m].fill(0.0);
+            copy::<V>(&mut row[m..], Pi);
+            copy::<V>(&mut row[m + nv..], N);
+            row[all] = py[d];
+            for (i, &d) in imp.dependent.iter().enumerate() {
+                half[j * (count + SLACK) + i] = 0.5 * Pi[d]; // symmetric
+            }
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! The equations of a knot in which accelerations and contact forces take the place of the controls.
+
+use condyle_linalg::{SLACK, SparseRows};
+
+/// A knot's rows over (w, δv, δq): see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the part of `Q` for
+/// δq are those of the node; of its `A`, `B`, `S` and `R` nothing is used.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Implicit {
+    /// Whether the solver can use this form.
+    pub(crate) wanted: bool,
+    /// Whether the action wrote it.
+    pub(crate) active: bool,
+    /// The distance from a row to the next, in all rows.
+    pub(crate) stride: usize,
+    /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, how many.
+    pub(crate) own: Vec<[usize; 3]>,
+    /// The other coordinates.
+    pub(crate) dependent: Vec<usize>,
+    /// U: δu = U (w, δv, δq).
+    pub(crate) efforts: SparseRows,
+    /// D, a row for each dependent coordinate.
+    pub(crate) steps: SparseRows,
+    /// G: the gradients of residuals that depend on more than δq.
+    pub(crate) costs: SparseRows,
+    /// a′ and a″, the slope and the curvature of the cost by each of these residuals.
+    pub(crate) slopes: Vec<[f64; 2]>,
+    /// The diagonals of Q for δv and of R, one after the other.
+    pub(crate) diagonal: Vec<f64>,
+}
+
+impl Implicit {
+    /// Room for a node of nv coordinates and nu controls with at most so many dependent coordinates and rows of costs.
+    pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
+        self.stride = nu + 2 * nv + SLACK;
+        self.own.reserve(nv);
+        self.dependent.reserve(dependent);
+        self.slopes.reserve(costs);
+        self.diagonal.resize(nv + nu, 0.0);
+        for (rows, most) in [(&mut self.efforts, nu), (&mut self.steps, dependent), (&mut self.costs, costs)] {
+            rows.resize(most, self.stride);
+        }
+    }
+
+    /// U and D, for as long as G is written.
+    pub(crate) fn lend(&mut self) -> Self {
+        let Self { wanted, active, stride, .. } = *self;
+        let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
+        let diagonal = core::mem::take(&mut self.diagonal);
+        core::mem::replace(self, Self { wanted, active, stride, costs, slopes, diagonal, ..Self::default() })
+    }
+
+    /// Ends what `lend` began.
+    pub(crate) fn take_back(&mut self, lent: Self) {
+        let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
+        let diagonal = core::mem::take(&mut self.diagonal);
+        *self = Self { costs, slopes, diagonal, ..lent };
+    }
+
+    /// Copies G.
+    pub(crate) fn set_costs(&mut self, rows: &[f64], slopes: &[[f64; 2]]) {
+        self.costs.resize(slopes.len(), self.stride);
+        for (to, from) in self.costs.numbers.chunks_exact_mut(self.stride).zip(rows.chunks_exact(self.stride)) {
+            to[..self.stride - SLACK].copy_from_slice(&from[..self.stride - SLACK]);
+        }
+        self.slopes.clear();
+        self.slopes.extend_from_slice(slopes);
+        self.costs.mark(self.stride);
+    }
+}

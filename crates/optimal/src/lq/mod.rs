@@ -1,0 +1,20 @@
+//! The linear-quadratic problem, which is all that a solver sees of a horizon, and the sweep that solves it.
+
+mod box_qp;
+mod conditional_value;
+mod forms;
+mod implicit;
+mod node;
+mod segments;
+mod step;
+mod structure;
+mod sweep;
+mod workspace;
+
+pub(crate) use implicit::Implicit;
+pub(crate) use node::DIVERGED;
+pub use node::{Hessian, LqKnot, LqNode};
+pub use step::SweepError;
+pub(crate) use structure::LARGEST_BLOCK;
+pub use structure::{EulerBlock, Structure};
+pub use sweep::Sweep;

@@ -1,0 +1,159 @@
+//! Steps of the Riccati recursion.
+#![allow(non_snake_case)] // the names of the literature: H, L, X, Vxx
+
+use super::forms::{Controls, Curvature, Forms, InverseDynamics};
+use super::node::{Hessian, LqKnot, LqNode};
+use super::workspace::Workspace;
+
+/// Why a sweep stopped before the first knot.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SweepError {
+    /// Quu has a pivot that is not positive: the problem is not convex in the control there. More regularisation helps.
+    #[error("knot {knot}: Quu is not positive definite (pivot {row} is {pivot:e})")]
+    NotPositive {
+        /// The knot.
+        knot: usize,
+        /// The row of the pivot.
+        row: usize,
+        /// Its value.
+        pivot: f64,
+    },
+    /// The value function is infinite, NaN, or beyond 1e30.
+    #[error("knot {knot}: the value function is not finite")]
+    NotFinite {
+        /// The knot.
+        knot: usize,
+    },
+}
+
+/// The largest numbers of states and controls of some nodes, and what they need for inverse dynamics.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sizes {
+    pub(super) n: usize,
+    pub(super) m: usize,
+    inverse_dynamics: [usize; 3],
+}
+
+impl Sizes {
+    /// Those of some nodes.
+    pub(super) fn of(nodes: &[LqNode]) -> Self {
+        Self {
+            n: nodes.last().map_or(0, LqNode::ndx),
+            m: nodes.iter().map(LqNode::nu).max().unwrap_or(0),
+            inverse_dynamics: InverseDynamics::room(nodes),
+        }
+    }
+}
+
+/// A step of the recursion, with its workspace.
+#[derive(Debug, Clone)]
+pub(super) struct Step {
+    pub(super) work: Workspace,
+    /// Whether knots shall have their Vxx.
+    pub(super) keep: bool,
+    forms: Forms,
+    controls: Controls,
+    /// The curvature of the dynamics, one for each number of controls that nodes with curvature have.
+    hessians: Vec<Hessian>,
+}
+
+impl Step {
+    /// Room for nodes of such sizes, and in H for `below` more rows. The dynamics may be curved at nodes with one of the
+    /// numbers of controls `curved`.
+    pub(super) fn new(sizes: Sizes, below: usize, mut curved: Vec<usize>) -> Self {
+        let Sizes { n, m, inverse_dynamics } = sizes;
+        curved.sort_unstable();
+        curved.dedup();
+        Self {
+            work: Workspace::new(n, m, below),
+            keep: true,
+            forms: Forms::new(n, m, inverse_dynamics),
+            controls: Controls::new(m),
+            hessians: curved.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
+        }
+    }
+
+    /// The sweep of the end of a horizon, of which the first node is knot `first` and the last the terminal one.
+    pub(super) fn run(
+        &mut self,
+        first: usize,
+        nodes: &[LqNode],
+        knots: &mut [LqKnot],
+        regularisation: f64,
+        curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+    ) -> Result<(), SweepError> {
+        let last = nodes.len() - 1;
+        self.work.start(&nodes[last]);
+        self.finish(first + last, &mut knots[last], regularisation)?;
+        self.back(first, &nodes[..last], knots, regularisation, curvature)
+    }
+
+    /// Steps at `nodes`, of which the first is knot `first`, from P, p of the knot after them.
+    pub(super) fn back(
+        &mut self,
+        first: usize,
+        nodes: &[LqNode],
+        knots: &mut [LqKnot],
+        regularisation: f64,
+        curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+    ) -> Result<(), SweepError> {
+        for i in (0..nodes.len()).rev() {
+            let (t, knot) = (first + i, &mut knots[i]);
+            self.step(t, &nodes[i], knot, regularisation, curvature)?;
+            self.finish(t, knot, regularisation)?;
+        }
+        Ok(())
+    }
+
+    /// One step: P, p of knot t + 1 become those of knot t, and the gains of knot t are written.
+    fn step(
+        &mut self,
+        t: usize,
+        node: &LqNode,
+        knot: &mut LqKnot,
+        regularisation: f64,
+        ask: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+    ) -> Result<(), SweepError> {
+        let Self { work, forms, controls, hessians, .. } = self;
+        let form = forms.of(node);
+        work.move_by(node.f.as_slice());
+        form.write(work, node, regularisation, &mut Curvature { knot: t, ask, hessians });
+        let eliminated =
+            form.eliminate(work, controls, node, knot).map_err(|(row, pivot)| match pivot.is_finite() {
+                true => SweepError::NotPositive { knot: t, row, pivot },
+                false => SweepError::NotFinite { knot: t },
+            })?;
+        work.take_value(work.stride(node.nu()), eliminated, form.turn(node.ndx()));
+        form.recover_gains(work, controls, node, knot);
+        Ok(())
+    }
+
+    /// H of a node of which no gains are wanted, with Θ times the map to δx⁺ below it; the workspace that holds it, and how
+    /// the states are turned there.
+    pub(super) fn write_with_rows_below(
+        &mut self,
+        node: &LqNode,
+        regularisation: f64,
+        Theta: &[f64],
+    ) -> (&mut Workspace, usize) {
+        let Self { work, forms, .. } = self;
+        let form = forms.of(node);
+        work.move_by(node.f.as_slice());
+        form.write(
+            work,
+            node,
+            regularisation,
+            &mut Curvature { knot: 0, ask: &mut |_, _, _| false, hessians: &mut [] },
+        );
+        form.write_below(work, node, Theta);
+        (work, form.turn(node.ndx()))
+    }
+
+    /// Vxx += ϱ 1, and out to knot t with Vx.
+    fn finish(&mut self, t: usize, knot: &mut LqKnot, regularisation: f64) -> Result<(), SweepError> {
+        match self.work.finish_value(knot, regularisation, self.keep) {
+            true => Ok(()),
+            false => Err(SweepError::NotFinite { knot: t }),
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! What a step of the sweep reads and writes beside its knot.
+#![allow(non_snake_case)] // the names of the literature: P, F, W, H
+
+use super::node::{DIVERGED, LqKnot, LqNode};
+use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetric, sum_of_squares, transpose};
+
+/// The value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step makes of it. Matrices are
+/// column-major with slack rows; P has the stride n + SLACK, the others that of [`stride`](Self::stride).
+#[derive(Debug, Clone)]
+pub(crate) struct Workspace {
+    /// Vxx⁺, symmetric and full.
+    pub(crate) P: Vec<f64>,
+    /// Vx⁺, and then Vx⁺ + Vxx⁺ f.
+    pub(crate) p: Vec<f64>,
+    /// [B A]ᵀ, or the same of their last rows, in the order of the columns of H.
+    pub(crate) F: Vec<f64>,
+    /// The product of P with [B A], transposed, and others of its kind.
+    pub(crate) W: Vec<f64>,
+    /// The quadratic form: [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ], its lower triangle, with rows below it that a segment makes use of.
+    pub(crate) H: Vec<f64>,
+    /// The number of rows below.
+    below: usize,
+}
+
+impl Workspace {
+    /// Room for knots with n states and at most m controls, and in H for `below` more rows.
+    pub(crate) fn new(n: usize, m: usize, below: usize) -> Self {
+        let stride = m + n + 1 + below + SLACK;
+        Self {
+            P: vec![0.0; (n + SLACK) * n],
+            p: vec![0.0; n],
+            F: vec![0.0; stride * n],
+            W: vec![0.0; stride * n],
+            H: vec![0.0; stride * (m + n)],
+            below,
+        }
+    }
+
+    /// The stride of F, W and H at a knot with m controls: their m + n + 1 rows, those below, and slack.
+    pub(crate) fn stride(&self, m: usize) -> usize {
+        m + self.p.len() + 1 + self.below + SLACK
+    }
+
+    /// P, p = Q, q of the terminal knot.
+    pub(crate) fn start(&mut self, node: &LqNode) {
+        let n = node.ndx();
+        self.p.copy_from_slice(node.q.as_slice());
+        copy_matrix(&mut self.P, n + SLACK, View::new(node.Q.as_slice(), n), [n, n]);
+    }
+
+    /// p += P f, the gradient at the predicted state.
+    pub(crate) fn move_by(&mut self, f: &[f64]) {
+        if f.iter().any(|f| *f != 0.0) {
+            add_scaled_product(&mut self.p, 1.0, View::new(&self.P, f.len() + SLACK), f);
+        }
+    }
+
+    /// P, p = Vxx, Vx of an H (stride `ld`) whose first `eliminated` columns are eliminated and whose states are turned by
+    /// `turn`.
+    pub(crate) fn take_value(&mut self, ld: usize, eliminated: usize, turn: usize) {
+        let Self { P, p, H, .. } = self;
+        let n = p.len();
+        let (split, stride) = (n - turn, n + SLACK); // states in H before and after the turn
+        let first = &H[eliminated * (ld + 1)..];
+        copy_symmetric(&mut P[turn * stride + turn..], stride, View::new(first, ld), split);
+        for j in 0..split {
+            p[turn + j] = first[j * ld + n];
+        }
+        if turn > 0 {
+            let (mixed, second) = (View::new(&first[split..], ld), &first[split * (ld + 1)..]);
+            copy_symmetric(P, stride, View::new(second, ld), turn);
+            transpose(&mut P[turn..], stride, mixed, [turn, split]);
+            copy_matrix(&mut P[turn * stride..], stride, mixed, [turn, split]);
+            for j in 0..turn {
+                p[j] = second[j * ld + turn];
+            }
+        }
+    }
+
+    /// P += ϱ 1, and P, p out to the knot; P only if it is to be kept. Whether they are finite and have not diverged.
+    pub(crate) fn finish_value(&mut self, knot: &mut LqKnot, regularisation: f64, keep: bool) -> bool {
+        let Self { P, p, .. } = self;
+        let (n, stride) = (p.len(), p.len() + SLACK);
+        for j in 0..n {
+            P[j * stride + j] += regularisation;
+        }
+        let matrix = View::new(P, stride);
+        knot.Vx.as_mut_slice().copy_from_slice(p);
+        if keep {
+            copy_matrix(knot.Vxx.as_mut_slice(), n, matrix, [n, n]);
+        }
+        let squares = sum_of_squares(matrix, [n, n]) + sum_of_squares(View::new(p, n), [n, 1]);
+        squares < DIVERGED * DIVERGED // false for a NaN
+    }
+}
