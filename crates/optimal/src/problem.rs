@@ -3,6 +3,7 @@
 use crate::action::ActionModel;
 use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
+pub(crate) use crate::multipliers::{Bounded, Multipliers, Visit, leave_a_value};
 use crate::threads::Copies;
 use serde::{Deserialize, Serialize};
 use std::any::Any;

@@ -4,8 +4,7 @@ use super::{
     Actuation, Contact, Contacts, ContinuousModel, Cost, Free, FreeDynamics, ImpulseDynamics, Integrated, Integrator,
     Inverse, Limit,
 };
-use crate::action::ActionModel;
-use crate::{Error, Problem};
+use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::Model;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};

@@ -8,10 +8,10 @@ use super::quadratic::Row;
 use super::sight::Known;
 use super::state::{state_difference, state_integrate};
 use super::watch::{Offer, Scene, Signal, Slopes, add_matrix_row};
+use crate::ActionModel;
 use crate::Error;
-use crate::action::ActionModel;
 use crate::lq::LqNode;
-use crate::multipliers::Visit;
+use crate::problem::Visit;
 use condyle_dynamics::{
     ConstraintSet, Data, ImpulseDerivatives, Model, impulse_dynamics, impulse_dynamics_derivatives,
 };

@@ -8,7 +8,7 @@ use super::terms::{Plan, Room, View};
 use super::watch::{Offer, Slopes};
 use crate::Error;
 use crate::lq::LqNode;
-use crate::multipliers::{Bounded, Multipliers, Visit, leave_a_value};
+use crate::problem::{Bounded, Multipliers, Visit, leave_a_value};
 use condyle_dynamics::Model;
 use serde::{Deserialize, Serialize};
 
