@@ -1,11 +1,10 @@
 //! Constrained problems by an augmented Lagrangian.
 #![allow(non_snake_case)]
 
+use super::settings::ConstraintSettings;
+use crate::ddp::{Fddp, Settings, Solution, Status};
 use crate::error::Error;
-use crate::fddp::Fddp;
 use crate::problem::Problem;
-use crate::settings::{ConstraintSettings, Settings};
-use crate::solution::{Solution, Status};
 use nalgebra::DVector;
 use std::time::{Duration, Instant};
 

@@ -1,14 +1,14 @@
 //! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use crate::clock::{Clock, Phase};
+use super::clock::{Clock, Phase};
+use super::rollout::Sum;
+use super::search::{Iterate, LineSearch, Search};
+use super::settings::{Method, Settings};
+use super::solution::{Iteration, Solution, Status, Timings};
 use crate::error::Error;
 use crate::lq::{LqNode, Sweep, SweepError};
 use crate::problem::{Problem, Shape};
-use crate::rollout::{Sum, Trials};
-use crate::search::Search;
-use crate::settings::{Method, Settings};
-use crate::solution::{Iteration, Solution, Status, Timings};
 use condyle_linalg::max_abs;
 use std::time::Instant;
 
@@ -74,24 +74,16 @@ pub struct Fddp {
     /// May be changed between solves.
     pub settings: Settings,
     pub(crate) nodes: Vec<LqNode>,
-    pub(crate) sweep: Sweep,
-    pub(crate) trials: Trials,
-    /// The step lengths, 1, ½, ¼, ….
-    pub(crate) steps: Vec<f64>,
+    pub(super) sweep: Sweep,
+    pub(super) line_search: LineSearch,
     /// The iterate is in here.
     pub(crate) solution: Solution,
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
-    pub(crate) next: Vec<f64>,
+    pub(super) next: Vec<f64>,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
-    pub(crate) gaps: Vec<f64>,
-    /// Vxx f, (N + 1)·ndx.
-    pub(crate) curved_gaps: Vec<f64>,
-    /// xₜ ⊖ a trial's xₜ.
-    pub(crate) dx: Vec<f64>,
-    /// Expected improvement without the part that depends on the trial: dg, dq.
-    pub(crate) expected: [f64; 2],
-    pub(crate) clock: Clock,
+    gaps: Vec<f64>,
+    clock: Clock,
     /// Whether knots may come in implicit form.
     implicit: bool,
 }
@@ -117,15 +109,11 @@ impl Fddp {
             settings: Settings::default(),
             sweep: Sweep::new(&nodes),
             nodes,
-            trials: Trials::new(problem, problem.lanes()),
-            steps: Vec::new(),
+            line_search: LineSearch::new(problem),
             solution: Solution::new(problem),
             next: vec![0.0; horizon * shape.nx],
             costs: vec![0.0; horizon + 1],
             gaps: vec![0.0; (horizon + 1) * shape.ndx],
-            curved_gaps: vec![0.0; (horizon + 1) * shape.ndx],
-            dx: vec![0.0; shape.ndx],
-            expected: [0.0; 2],
             clock: Clock::default(),
             implicit: false,
         }
@@ -187,8 +175,7 @@ impl Fddp {
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
         self.solution.trace.reserve(self.settings.max_iterations);
-        self.steps.clear();
-        self.steps.extend((0..self.settings.step_lengths).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
+        self.line_search.start(self.settings.step_lengths);
         let start = self.settings.regularisation_start;
         let mut progress =
             Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
@@ -227,7 +214,7 @@ impl Fddp {
             if !self.clock.allows(Phase::Sweep) {
                 return Status::TimeLimit;
             }
-            self.sweep.keep_values(self.gaps_count(now.feasible));
+            self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
             while let Err(error) = self.sweep(problem, now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
                 if now.regularisation == self.settings.regularisation_max {
@@ -241,8 +228,10 @@ impl Fddp {
                 }
             }
             now.swept = true;
-            self.expect(now.feasible);
-            search = self.line_search(problem, now.feasible, search);
+            let Self { line_search, solution, next, gaps, sweep, settings, clock, .. } = self;
+            let (knots, feasible) = (sweep.knots(), now.feasible);
+            let iterate = Iterate { solution, next, gaps, knots, feasible, settings, clock };
+            search = line_search.run(problem, iterate, search);
             if search.out_of_time {
                 return Status::TimeLimit;
             }

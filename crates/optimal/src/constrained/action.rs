@@ -1,55 +1,11 @@
-//! General constraints on states and controls, as terms of an augmented Lagrangian.
-#![allow(non_snake_case)]
+//! Actions with constraints, as terms of an augmented Lagrangian.
 
-use crate::action::ActionModel;
-use crate::error::{Error, assert_length};
+use super::constraint::{self, Constraint};
+use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
-use crate::multipliers::{Bounded, Multipliers, PENALTY, Visit};
-use crate::numdiff;
-use crate::problem::Problem;
+use crate::problem::{ActionModel, Bounded, Multipliers, Visit};
 use nalgebra::DMatrix;
 use std::any::Any;
-
-/// Functions of state and control that must stay within bounds: lower ≤ gₜ(x, u) ≤ upper; equalities where both are equal.
-///
-/// At a terminal knot u is empty. The rules for [`ActionModel`]s hold here too.
-///
-/// # Examples
-/// The second number of the state may not exceed 1:
-/// ```
-/// use condyle_optimal::Constraint;
-/// use nalgebra::DMatrix;
-///
-/// struct Slow;
-/// impl Constraint for Slow {
-///     fn size(&self) -> usize { 1 }
-///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[f64::NEG_INFINITY], &[1.0]) }
-///     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) { g[0] = x[1]; }
-///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
-///         gx.copy_from_slice(&[0.0, 1.0]);
-///         gu.fill(0.0);
-///         true
-///     }
-/// }
-/// ```
-pub trait Constraint: Any + Send {
-    /// The number of functions.
-    fn size(&self) -> usize;
-
-    /// Their least and their greatest values at knot t, infinite where there is none. They must not change during a solve.
-    fn bounds(&self, t: usize) -> (&[f64], &[f64]);
-
-    /// gₜ(x, u) into `g`.
-    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]);
-
-    /// ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu); says whether it
-    /// did. It does not by default: they are central differences of [`calc`](Self::calc) then, slow, allocating, and
-    /// right to about 1e-9.
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
-        let _ = (t, x, u, gx, gu);
-        false
-    }
-}
 
 /// An action with constraints. To its cost comes, with the multipliers y and the penalty 1/μ that
 /// [`AugmentedLagrangian`](crate::AugmentedLagrangian) chooses,
@@ -105,8 +61,8 @@ impl Constrained {
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         self.constraint.calc(t, x, u, &mut self.g);
         if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
-            let Self { action, constraint, gx, gu, .. } = self;
-            numdiff::constraint(&**action, &mut **constraint, t, x, u, [gx, gu]);
+            let Self { action, constraint: g, gx, gu, .. } = self;
+            constraint::calc_diff(&**action, &mut **g, t, x, u, [gx, gu]);
         }
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.begin(t);
@@ -210,93 +166,5 @@ impl ActionModel for Constrained {
 
     fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
         self.action.difference(x0, x1, out);
-    }
-}
-
-impl Problem {
-    /// Multipliers of zero everywhere, and the penalty 1/μ.
-    ///
-    /// # Errors
-    /// [`Error`] if bounds have a wrong length or leave no value.
-    pub(crate) fn start_constraints(&mut self, mu: f64) -> Result<(), Error> {
-        let horizon = self.horizon();
-        for t in 0..=horizon {
-            let mut result = Ok(());
-            self.action_mut(t).constraints(t, &mut |bounded| {
-                result = result.clone().and(bounded.check(t));
-                bounded.multipliers.start(t, horizon + 1, mu);
-            });
-            result?;
-        }
-        self.share_multipliers();
-        Ok(())
-    }
-
-    /// The multipliers of each knot, where it has as many constraints as are given.
-    pub(crate) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
-        for (t, y) in y.iter().enumerate().take(self.horizon() + 1) {
-            let mut all = 0;
-            self.action_mut(t).constraints(t, &mut |bounded| all += bounded.count);
-            if all != y.len() {
-                continue;
-            }
-            let mut rest = &y[..];
-            self.action_mut(t).constraints(t, &mut |bounded| {
-                let (own, others) = rest.split_at(bounded.count);
-                bounded.multipliers.set(t, own);
-                rest = others;
-            });
-        }
-        self.share_multipliers();
-    }
-
-    /// Multipliers of zero and the penalty of actions by themselves, everywhere.
-    pub(crate) fn forget_multipliers(&mut self) {
-        let knots = self.horizon() + 1;
-        for t in 0..knots {
-            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.start(t, knots, 1.0 / PENALTY));
-        }
-        self.share_multipliers();
-    }
-
-    /// The penalty 1/μ.
-    pub(crate) fn set_penalty(&mut self, mu: f64) {
-        for t in 0..=self.horizon() {
-            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.set_mu(mu));
-        }
-        self.share_multipliers();
-    }
-
-    /// y ← (z − Π z) / μ at the trajectory at which derivatives were computed last.
-    pub(crate) fn update_multipliers(&mut self) {
-        for t in 0..=self.horizon() {
-            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.update(t));
-        }
-        self.share_multipliers();
-    }
-
-    /// The largest distance of a constraint from its bounds, infinite if one is not a number, and the sum of the cost's
-    /// terms, at the trajectory at which derivatives were computed last.
-    pub(crate) fn measure_constraints(&mut self) -> (f64, f64) {
-        let (mut worst, mut sum) = (0.0_f64, 0.0);
-        for t in 0..=self.horizon() {
-            self.action_mut(t).constraints(t, &mut |bounded| {
-                let [violation, term] = bounded.multipliers.measured(t);
-                worst = worst.max(if violation.is_nan() { f64::INFINITY } else { violation });
-                sum += term;
-            });
-        }
-        (worst, sum)
-    }
-
-    /// y of each knot. Allocates at the first call.
-    pub(crate) fn multipliers(&mut self, out: &mut Vec<Vec<f64>>) {
-        out.resize(self.horizon() + 1, vec![]);
-        for (t, out) in out.iter_mut().enumerate() {
-            out.clear();
-            self.action_mut(t).constraints(t, &mut |bounded| {
-                out.extend_from_slice(bounded.multipliers.of(t, bounded.count));
-            });
-        }
     }
 }

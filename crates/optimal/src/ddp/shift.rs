@@ -1,7 +1,7 @@
 //! Receding horizons: the solution of one problem as the warm start of the next.
 
+use super::fddp::Fddp;
 use crate::error::Error;
-use crate::fddp::Fddp;
 use crate::lq::{LqNode, Sweep};
 use crate::problem::Problem;
 
@@ -35,7 +35,7 @@ impl Fddp {
             problem.reserve_implicit(&mut self.nodes);
             self.sweep = Sweep::new(&self.nodes);
         }
-        self.trials.reshape(problem);
+        self.line_search.reshape(problem);
         // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
         let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
         let next = &mut self.next[..end.len()];
