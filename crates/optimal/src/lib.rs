@@ -72,8 +72,8 @@ mod lq;
 mod problem;
 pub mod robot;
 
-pub use constrained::{AugmentedLagrangian, Constrained, Constraint, ConstraintSettings, Outcome};
-pub use ddp::{Fddp, Iteration, Method, Settings, Solution, Status, Timings};
+pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint};
+pub use ddp::{DdpMethod, Fddp, Iteration, Settings, Solution, Status, Timings};
 pub use error::Error;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
 pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem};

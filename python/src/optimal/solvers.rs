@@ -26,8 +26,8 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
                 s.second_order = value.extract()?;
                 continue;
             }
-            "implicit" => {
-                s.implicit = value.extract()?;
+            "inverse_dynamics_form" => {
+                s.inverse_dynamics_form = value.extract()?;
                 continue;
             }
             "segments" => {
@@ -44,8 +44,8 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
             }
             "method" => {
                 s.method = match value.extract::<String>()?.as_str() {
-                    "fddp" => rust::Method::Fddp,
-                    "ddp" => rust::Method::Ddp,
+                    "fddp" => rust::DdpMethod::Fddp,
+                    "ddp" => rust::DdpMethod::Ddp,
                     other => {
                         return Err(PyValueError::new_err(format!(
                             "method: expected 'fddp' or 'ddp', found '{other}'"
@@ -125,7 +125,7 @@ fn shift<S>(
 /// problem: what is solved; the solver allocates for its shape once.
 /// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
 ///     `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP);
-///     `implicit`, whether robots' knots come to the sweep as equations of inverse dynamics where that is possible
+///     `inverse_dynamics_form`, whether robots' knots come to the sweep as equations of inverse dynamics where that is possible
 ///     (default: yes; the same steps in less time); and
 ///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
 ///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,

@@ -1,6 +1,6 @@
 //! Actions with constraints, as terms of an augmented Lagrangian.
 
-use super::constraint::{self, Constraint};
+use super::path_constraint::{self, PathConstraint};
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use crate::problem::{ActionModel, Bounded, Multipliers, Visit};
@@ -18,7 +18,7 @@ use std::any::Any;
 /// bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes its dynamics once for both.
 pub struct Constrained {
     action: Box<dyn ActionModel>,
-    constraint: Box<dyn Constraint>,
+    constraint: Box<dyn PathConstraint>,
     multipliers: Multipliers,
     g: Vec<f64>,
     /// The slope and the curvature of the cost by g.
@@ -30,7 +30,7 @@ pub struct Constrained {
 
 impl Constrained {
     /// `action` under `constraint`, at all knots that it serves.
-    pub fn new(action: Box<dyn ActionModel>, constraint: Box<dyn Constraint>) -> Self {
+    pub fn new(action: Box<dyn ActionModel>, constraint: Box<dyn PathConstraint>) -> Self {
         let (size, ndx, nu) = (constraint.size(), action.ndx(), action.nu());
         let (gx, gu) = (DMatrix::zeros(size, ndx), DMatrix::zeros(size, nu));
         let [g, d, dd] = [(); 3].map(|()| vec![0.0; size]);
@@ -44,7 +44,7 @@ impl Constrained {
     }
 
     /// The constraint, if it is a `T`.
-    pub fn constraint_mut<T: Constraint>(&mut self) -> Option<&mut T> {
+    pub fn constraint_mut<T: PathConstraint>(&mut self) -> Option<&mut T> {
         let constraint: &mut dyn Any = self.constraint.as_mut();
         constraint.downcast_mut()
     }
@@ -62,7 +62,7 @@ impl Constrained {
         self.constraint.calc(t, x, u, &mut self.g);
         if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
             let Self { action, constraint: g, gx, gu, .. } = self;
-            constraint::calc_diff(&**action, &mut **g, t, x, u, [gx, gu]);
+            path_constraint::calc_diff(&**action, &mut **g, t, x, u, [gx, gu]);
         }
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.begin(t);

@@ -2,11 +2,11 @@
 
 mod action;
 mod augmented;
-mod constraint;
 mod multipliers;
+mod path_constraint;
 mod settings;
 
 pub use action::Constrained;
 pub use augmented::{AugmentedLagrangian, Outcome};
-pub use constraint::Constraint;
+pub use path_constraint::PathConstraint;
 pub use settings::ConstraintSettings;

@@ -4,7 +4,7 @@
 use super::clock::{Clock, Phase};
 use super::rollout::Sum;
 use super::search::{Iterate, LineSearch, Search};
-use super::settings::{Method, Settings};
+use super::settings::{DdpMethod, Settings};
 use super::solution::{Iteration, Solution, Status, Timings};
 use crate::error::Error;
 use crate::lq::{LqNode, Sweep, SweepError};
@@ -12,7 +12,7 @@ use crate::problem::{Problem, Shape};
 use condyle_linalg::max_abs;
 use std::time::Instant;
 
-/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`Method`](crate::Method)), with the rules and constants of Crocoddyl
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
 /// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
 /// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
@@ -84,8 +84,8 @@ pub struct Fddp {
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
     gaps: Vec<f64>,
     clock: Clock,
-    /// Whether knots may come in implicit form.
-    implicit: bool,
+    /// Whether knots may come as equations of inverse dynamics.
+    inverse_dynamics: bool,
 }
 
 /// What carries over from one iteration to the next.
@@ -103,7 +103,7 @@ impl Fddp {
     /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
     pub fn new(problem: &Problem) -> Self {
         let (mut nodes, shape) = (problem.nodes(), problem.shape());
-        problem.reserve_implicit(&mut nodes);
+        problem.reserve_inverse_dynamics(&mut nodes);
         let horizon = problem.horizon();
         Self {
             settings: Settings::default(),
@@ -115,7 +115,7 @@ impl Fddp {
             costs: vec![0.0; horizon + 1],
             gaps: vec![0.0; (horizon + 1) * shape.ndx],
             clock: Clock::default(),
-            implicit: false,
+            inverse_dynamics: false,
         }
     }
 
@@ -169,7 +169,7 @@ impl Fddp {
         self.settings.check()?;
         check_shape(self.solution.shape(), problem.shape())?;
         let bounded = problem.check_bounds()?;
-        self.implicit = self.settings.implicit && !bounded && !self.settings.second_order;
+        self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
         let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
 
         self.solution.timings = Timings::default();
@@ -237,7 +237,7 @@ impl Fddp {
             }
             if search.accepted {
                 now.was_feasible = now.feasible;
-                now.feasible |= search.step == 1.0 || self.settings.method == Method::Ddp;
+                now.feasible |= search.step == 1.0 || self.settings.method == DdpMethod::Ddp;
             }
             if search.step > self.settings.regularisation_decrease_above {
                 now.regularisation = self.decreased(now.regularisation);
@@ -301,7 +301,7 @@ impl Fddp {
     fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
         for node in &mut self.nodes {
-            node.implicit.wanted = self.implicit;
+            node.inverse_dynamics.wanted = self.inverse_dynamics;
         }
         let Solution { xs, us, .. } = &self.solution;
         problem.calc_diff_on(self.settings.threads, xs, us, &mut self.nodes);

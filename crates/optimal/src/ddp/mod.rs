@@ -9,5 +9,5 @@ mod shift;
 mod solution;
 
 pub use fddp::Fddp;
-pub use settings::{Method, Settings};
+pub use settings::{DdpMethod, Settings};
 pub use solution::{Iteration, Solution, Status, Timings};

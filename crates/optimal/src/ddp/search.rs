@@ -2,7 +2,7 @@
 
 use super::clock::{Clock, Phase};
 use super::rollout::{Nominal, Trials};
-use super::settings::{Method, Settings};
+use super::settings::{DdpMethod, Settings};
 use super::solution::Solution;
 use crate::lq::LqKnot;
 use crate::problem::Problem;
@@ -88,7 +88,7 @@ impl LineSearch {
         self.expect(&iterate);
         let mut search = Search { accepted: false, ..last };
         let gaps = iterate.settings.counts_gaps(iterate.feasible);
-        if iterate.settings.method == Method::Ddp {
+        if iterate.settings.method == DdpMethod::Ddp {
             [search.d1, search.d2] = self.expected;
         }
         let (mut tried, count) = (0, self.steps.len());
@@ -173,7 +173,7 @@ impl Search {
     /// to lower the cost of the rollout that closes them (DDP).
     fn is_good(&self, settings: &Settings, feasible: bool) -> bool {
         let Self { d1, decrease, expected_decrease, .. } = *self;
-        let closes_gaps = !feasible && settings.method == Method::Ddp;
+        let closes_gaps = !feasible && settings.method == DdpMethod::Ddp;
         if expected_decrease >= 0.0 {
             d1.abs() < settings.flat || closes_gaps || decrease > settings.accept * expected_decrease
         } else {

@@ -8,7 +8,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
-pub enum Method {
+pub enum DdpMethod {
     /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`: every trial is a plain rollout from x̂₀,
     /// so that the first step accepted closes the gaps of a warm start at once, at whatever cost.
     Ddp,
@@ -23,7 +23,7 @@ pub enum Method {
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// How gaps are closed and which steps are accepted.
-    pub method: Method,
+    pub method: DdpMethod,
     /// Whether the curvature of the dynamics counts, Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action gives it: full DDP,
     /// which converges quadratically. Quu may need more regularisation then. Of a robot's knots those by semi-implicit
     /// Euler that are without contacts give it, exactly; the others count as linear.
@@ -31,7 +31,7 @@ pub struct Settings {
     /// Whether a robot's knots come to the sweep as the equations of inverse dynamics, with accelerations and contact
     /// forces as unknowns instead of the controls, where that is possible: without bounds on controls and without
     /// `second_order`. The same steps and gains, up to rounding, in about half the time.
-    pub implicit: bool,
+    pub inverse_dynamics_form: bool,
     /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
@@ -78,9 +78,9 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            method: Method::Fddp,
+            method: DdpMethod::Fddp,
             second_order: false,
-            implicit: true,
+            inverse_dynamics_form: true,
             max_iterations: 100,
             tolerance: 1e-9,
             tolerance_bounded: 5e-5,
@@ -104,7 +104,7 @@ impl Default for Settings {
 impl Settings {
     /// Whether gaps count in what a step should gain.
     pub(super) fn counts_gaps(&self, feasible: bool) -> bool {
-        !feasible && self.method == Method::Fddp
+        !feasible && self.method == DdpMethod::Fddp
     }
 
     /// # Errors

@@ -32,7 +32,7 @@ impl Fddp {
         if (0..horizon).any(|t| self.nodes[t].nu() != new.nu(t)) {
             self.nodes[..horizon].rotate_left(1);
             self.nodes[horizon - 1] = LqNode::zeros(ndx, new.nu(horizon - 1));
-            problem.reserve_implicit(&mut self.nodes);
+            problem.reserve_inverse_dynamics(&mut self.nodes);
             self.sweep = Sweep::new(&self.nodes);
         }
         self.line_search.reshape(problem);

@@ -279,15 +279,15 @@ impl Problem {
     }
 
     /// Checks the lengths, and lets nothing be known of the forms of A and B: the action says if it is. Asks none for the
-    /// implicit form that has none.
+    /// equations of inverse dynamics that has none.
     #[track_caller]
     fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         self.assert_trajectory(xs, us);
         assert_length("nodes", nodes.len(), self.horizon() + 1);
         for (t, node) in nodes.iter_mut().enumerate() {
             node.structure.set_dense();
-            node.implicit.active = false;
-            node.implicit.wanted &= self.action(t).implicit().is_some();
+            node.inverse_dynamics.active = false;
+            node.inverse_dynamics.wanted &= self.action(t).inverse_dynamics_form().is_some();
         }
     }
 
@@ -296,14 +296,14 @@ impl Problem {
         (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
 
-    /// Makes room in nodes for the implicit form, wherever in the horizon their actions come to serve.
-    pub(crate) fn reserve_implicit(&self, nodes: &mut [LqNode]) {
-        let sizes = self.models.iter().filter_map(|model| model.implicit());
+    /// Makes room in nodes for the equations of inverse dynamics, wherever in the horizon their actions come to serve.
+    pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) {
+        let sizes = self.models.iter().filter_map(|model| model.inverse_dynamics_form());
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return };
         let (nv, horizon) = (self.ndx() / 2, self.horizon());
         for node in &mut nodes[..horizon] {
             let nu = node.nu();
-            node.implicit.reserve(nv, nu, most);
+            node.inverse_dynamics.reserve(nv, nu, most);
         }
     }
 

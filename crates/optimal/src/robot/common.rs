@@ -76,15 +76,15 @@ impl Robot {
         scale: f64,
         node: &mut LqNode,
     ) -> bool {
-        if !elimination.run(&mut outcome.equations, scale, &mut node.implicit) {
+        if !elimination.run(&mut outcome.equations, scale, &mut node.inverse_dynamics) {
             return false;
         }
         self.actuation.effort(u, &mut self.tau);
         let scene = Scene { x, u, a: &outcome.a, tau: &self.tau, lambda: &outcome.lambda };
-        node.implicit.active = true;
-        let form = node.implicit.lend();
+        node.inverse_dynamics.active = true;
+        let form = node.inverse_dynamics.lend();
         self.schedule.calc_diff(t, &scene, outcome.known(), &elimination.slopes(&form, scale), scale, node);
-        node.implicit.take_back(form);
+        node.inverse_dynamics.take_back(form);
         true
     }
 

@@ -1,4 +1,4 @@
-//! The equations of a knot in contact, solved for what is not chosen: see [`Implicit`].
+//! The equations of a knot in contact, solved for what is not chosen: see [`InverseDynamicsForm`].
 //!
 //! Changes of accelerations a and forces f satisfy
 //!
@@ -16,7 +16,7 @@
 
 use super::quadratic::Row;
 use super::watch::{Signal, Slopes};
-use crate::lq::Implicit;
+use crate::lq::InverseDynamicsForm;
 use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, block, copy_scaled, mask, max_abs};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
@@ -97,14 +97,14 @@ impl Elimination {
     }
 
     /// Writes U and D for steps of Δt; says whether there were pivots. Overwrites the tableau.
-    pub(super) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut Implicit) -> bool {
+    pub(super) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
         at_level(Run { elimination: self, T: tableau, dt, implicit, done: &mut done });
         done
     }
 
     /// How signals depend on (w, δv, δq), for a knot whose U and D are these.
-    pub(super) fn slopes<'a>(&'a self, implicit: &'a Implicit, dt: f64) -> Unknowns<'a> {
+    pub(super) fn slopes<'a>(&'a self, implicit: &'a InverseDynamicsForm, dt: f64) -> Unknowns<'a> {
         Unknowns { elimination: self, implicit, dt }
     }
 
@@ -142,7 +142,7 @@ struct Run<'a> {
     elimination: &'a mut Elimination,
     T: &'a mut [f64],
     dt: f64,
-    implicit: &'a mut Implicit,
+    implicit: &'a mut InverseDynamicsForm,
     done: &'a mut bool,
 }
 
@@ -269,7 +269,7 @@ impl Gather<'_> {
 /// The slopes of a knot over (w, δv, δq); see [`Elimination::slopes`].
 pub(super) struct Unknowns<'a> {
     elimination: &'a Elimination,
-    implicit: &'a Implicit,
+    implicit: &'a InverseDynamicsForm,
     dt: f64,
 }
 

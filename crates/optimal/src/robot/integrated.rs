@@ -341,7 +341,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.inner.shift();
     }
 
-    fn implicit(&self) -> Option<[usize; 2]> {
+    fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         match (self.dt, &self.method) {
             (Some(_), Method::Euler) => self.inner.implicit(),
             _ => None,
@@ -394,7 +394,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         assert_length("nodes", nodes.len(), knots.len());
         for from in (0..knots.len()).step_by(lanes) {
             let to = (from + lanes).min(knots.len());
-            let implicit = self.implicit().is_some() && nodes[from].implicit.wanted;
+            let implicit = self.inverse_dynamics_form().is_some() && nodes[from].inverse_dynamics.wanted;
             let side_by_side = implicit || to - from >= WORTHWHILE;
             if side_by_side {
                 let wanted = if implicit { Wanted::Equations } else { Wanted::Derivatives };

@@ -77,9 +77,9 @@ pub trait ActionModel: Any + Send {
         1
     }
 
-    /// For actions that can write their knots in implicit form: the most dependent coordinates and rows of costs.
+    /// For actions that can write their knots as equations of inverse dynamics: the most dependent coordinates and rows of costs.
     #[doc(hidden)]
-    fn implicit(&self) -> Option<[usize; 2]> {
+    fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         None
     }
 

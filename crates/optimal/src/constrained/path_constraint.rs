@@ -12,11 +12,11 @@ use std::any::Any;
 /// # Examples
 /// The second number of the state may not exceed 1:
 /// ```
-/// use condyle_optimal::Constraint;
+/// use condyle_optimal::PathConstraint;
 /// use nalgebra::DMatrix;
 ///
 /// struct Slow;
-/// impl Constraint for Slow {
+/// impl PathConstraint for Slow {
 ///     fn size(&self) -> usize { 1 }
 ///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[f64::NEG_INFINITY], &[1.0]) }
 ///     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) { g[0] = x[1]; }
@@ -27,7 +27,7 @@ use std::any::Any;
 ///     }
 /// }
 /// ```
-pub trait Constraint: Any + Send {
+pub trait PathConstraint: Any + Send {
     /// The number of functions.
     fn size(&self) -> usize;
 
@@ -49,7 +49,7 @@ pub trait Constraint: Any + Send {
 /// ∂g/∂x and ∂g/∂u of a constraint of an action by central differences.
 pub(super) fn calc_diff(
     action: &dyn ActionModel,
-    constraint: &mut dyn Constraint,
+    constraint: &mut dyn PathConstraint,
     t: usize,
     x: &[f64],
     u: &[f64],
