@@ -104,7 +104,7 @@ def test_settings_reach_both_solvers() -> None:
     problem, xs, us = reach()
     solution = AugmentedLagrangian(problem, max_solves=1, inner={"max_iterations": 2}).solve(xs, us)
     assert solution.status == "max_iterations" and len(solution.trace) == 2
-    threaded = AugmentedLagrangian(problem, inner={"threads": 2, "implicit": True}, penalty_start=100.0)
+    threaded = AugmentedLagrangian(problem, inner={"threads": 2, "inverse_dynamics_form": True}, penalty_start=100.0)
     assert threaded.solve(xs, us).status == "converged" and threaded.outcome.penalty >= 100.0
     # to FDDP alone limits are costs for leaving their bounds, whatever was solved before
     alone = Fddp(problem).solve(xs, us)

@@ -20,6 +20,12 @@ impl<'a> View<'a> {
     pub fn new(data: &'a [f64], stride: usize) -> Self {
         Self { data, stride }
     }
+
+    /// The matrix from entry (i, j) on; nothing where there is no such entry.
+    #[inline]
+    pub fn at(self, i: usize, j: usize) -> Self {
+        Self { data: self.data.get(j * self.stride + i..).unwrap_or_default(), ..self }
+    }
 }
 
 /// tile = a[i.., ..length] · b[j.., ..length]ᵀ, with S registers of rows.

@@ -65,35 +65,15 @@
 //! # Ok::<(), condyle_optimal::Error>(())
 //! ```
 
-mod action;
-mod augmented;
-mod autodiff;
-mod clock;
 mod constrained;
+mod ddp;
 mod error;
-mod fddp;
 mod lq;
-mod lqr;
-mod multipliers;
-mod numdiff;
 mod problem;
 pub mod robot;
-mod rollout;
-mod search;
-mod settings;
-mod shift;
-mod solution;
-mod threads;
 
-pub use action::ActionModel;
-pub use augmented::{AugmentedLagrangian, Outcome};
-pub use autodiff::{AutoDiff, GenericAction};
-pub use constrained::{Constrained, Constraint};
+pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint};
+pub use ddp::{DdpMethod, Fddp, Iteration, Settings, Solution, Status, Timings};
 pub use error::Error;
-pub use fddp::Fddp;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
-pub use lqr::Lqr;
-pub use numdiff::NumDiff;
-pub use problem::Problem;
-pub use settings::{ConstraintSettings, Method, Settings};
-pub use solution::{Iteration, Solution, Status, Timings};
+pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem};

@@ -9,7 +9,7 @@ use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
     Integrator, Limit, Residual,
 };
-use condyle_optimal::{AugmentedLagrangian, Fddp, Method, Problem, Status, Sweep};
+use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Problem, Status, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -93,7 +93,7 @@ fn a_solve_allocates_nothing() {
 
 #[test]
 fn a_bounded_solve_allocates_nothing() {
-    for method in [Method::Ddp, Method::Fddp] {
+    for method in [DdpMethod::Ddp, DdpMethod::Fddp] {
         let mut problem = limited_cartpole(&HANGING, 50, 4, Some([vec![-8.0], vec![6.0]]));
         let xs = straight(problem.x0(), problem.x0(), 50);
         let mut solver = Fddp::new(&problem);

@@ -6,7 +6,7 @@ mod common;
 
 use common::{Linear, Unicycle, cartpole_action, random, random_matrix, random_node};
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Constrained, Constraint, ConstraintSettings, LqNode, NumDiff, Problem, Status,
+    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, LqNode, NumDiff, PathConstraint, Problem, Status,
 };
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -34,7 +34,7 @@ impl Rows {
     }
 }
 
-impl Constraint for Rows {
+impl PathConstraint for Rows {
     fn size(&self) -> usize {
         self.lower.len()
     }
@@ -211,7 +211,7 @@ fn derivatives_are_those_of_the_terms() {
 /// NaN once the state has moved.
 struct Broken;
 
-impl Constraint for Broken {
+impl PathConstraint for Broken {
     fn size(&self) -> usize {
         1
     }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{limited_cartpole, limited_unicycle, straight};
-use condyle_optimal::{Fddp, Method, Problem, Status};
+use condyle_optimal::{DdpMethod, Fddp, Problem, Status};
 use serde_json::Value;
 
 /// Relative. Two implementations that round differently drift apart by about the condition of the problem times 1e-16;
@@ -42,7 +42,7 @@ fn compare(name: &str, build: Build, lanes: usize) {
     let us = vec![0.0; problem.control_range(horizon).end];
 
     let mut solver = Fddp::new(&problem);
-    solver.settings.method = if reference["method"] == "ddp" { Method::Ddp } else { Method::Fddp };
+    solver.settings.method = if reference["method"] == "ddp" { DdpMethod::Ddp } else { DdpMethod::Fddp };
     solver.settings.max_iterations = reference["max_iterations"].as_u64().unwrap() as usize;
     solver.settings.regularisation_start = reference["regularisation"].as_f64().unwrap();
     let solution = solver.solve(&mut problem, &xs, &us).unwrap();

@@ -10,7 +10,7 @@ use condyle_optimal::robot::{
     InverseDynamics, Limit, Residual,
 };
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Constrained, Constraint, ConstraintSettings, Fddp, LqNode, Problem, Status,
+    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, Fddp, LqNode, PathConstraint, Problem, Status,
 };
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -166,7 +166,7 @@ struct Weak {
     upper: Vec<f64>,
 }
 
-impl Constraint for Weak {
+impl PathConstraint for Weak {
     fn size(&self) -> usize {
         self.lower.len()
     }
@@ -230,7 +230,7 @@ fn limits_and_constraints_find_one_optimum() {
     let ways: [Way<'_>; 3] = [
         (written(knot(), 0..7), &|_| ()),
         (written(limited(0..2), 2..7), &|_| ()),
-        (Box::new(limited(0..7)), &|solver| solver.inner.implicit = false),
+        (Box::new(limited(0..7)), &|solver| solver.inner.inverse_dynamics_form = false),
     ];
     for (k, (knot, change)) in ways.into_iter().enumerate() {
         let (other, theirs) = run(knot, change);
@@ -365,7 +365,7 @@ struct Step {
     written: bool,
 }
 
-impl Constraint for Step {
+impl PathConstraint for Step {
     fn size(&self) -> usize {
         2
     }

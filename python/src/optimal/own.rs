@@ -274,7 +274,7 @@ pub(super) struct Written {
     pub(super) fault: Fault,
 }
 
-impl rust::Constraint for Written {
+impl rust::PathConstraint for Written {
     fn size(&self) -> usize {
         self.bounds[0].len()
     }

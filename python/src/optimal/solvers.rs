@@ -26,10 +26,10 @@ macro_rules! set {
 
 /// Sets the settings of FDDP that are given.
 fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
-    fn method(given: &Bound<'_, PyAny>) -> PyResult<rust::Method> {
+    fn method(given: &Bound<'_, PyAny>) -> PyResult<rust::DdpMethod> {
         match given.extract::<String>()?.as_str() {
-            "fddp" => Ok(rust::Method::Fddp),
-            "ddp" => Ok(rust::Method::Ddp),
+            "fddp" => Ok(rust::DdpMethod::Fddp),
+            "ddp" => Ok(rust::DdpMethod::Ddp),
             other => Err(wrong_word("method", "'fddp' or 'ddp'", other)),
         }
     }
@@ -39,7 +39,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
         seconds.map(Duration::try_from_secs_f64).transpose().map_err(wrong)
     }
     set!(s, given, {
-        method by method, second_order, implicit, max_iterations, time_budget by duration, segments, threads,
+        method by method, second_order, inverse_dynamics_form, max_iterations, time_budget by duration, segments, threads,
         tolerance, tolerance_bounded, step_lengths, accept, accept_ascent, flat,
         regularisation_start, regularisation_min, regularisation_max, regularisation_factor,
         regularisation_decrease_above, regularisation_increase_below
@@ -138,7 +138,7 @@ solver! {
 /// settings: any of these, by name.
 ///     `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose trials are plain rollouts.
 ///     `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
-///     `implicit`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
+///     `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
 ///     (default: yes): the same steps in less time.
 ///     `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
 ///     `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as

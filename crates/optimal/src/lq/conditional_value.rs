@@ -56,14 +56,14 @@ impl Value {
 /// How the end of a segment depends on its start and on the multiplier; beside P and p, which are in its [`Step`].
 /// Matrices have slack rows.
 #[derive(Debug, Clone)]
-pub(crate) struct Transfer {
+pub(crate) struct SegmentValue {
     Theta: Vec<f64>,
     theta: Vec<f64>,
     /// Its lower triangle.
     C: Vec<f64>,
 }
 
-impl Transfer {
+impl SegmentValue {
     pub(crate) fn zeros(n: usize) -> Self {
         let square = || vec![0.0; (n + SLACK) * n];
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
@@ -165,7 +165,7 @@ impl Link {
 
     /// The value function `start` at the start of a segment with P, p in `step`, from the one at its `end`. Whether
     /// that one is convex.
-    pub(crate) fn run(&mut self, step: &Step, transfer: &Transfer, end: &Value, start: &mut Value) -> bool {
+    pub(crate) fn run(&mut self, step: &Step, segment: &SegmentValue, end: &Value, start: &mut Value) -> bool {
         let (n, work) = (end.p.len(), &step.work);
         let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);
         if !self.factorise(&end.P, n) {
@@ -175,7 +175,7 @@ impl Link {
         let upper = View::new(upper, ld);
 
         // M = 1 + Lᵀ(C L)
-        copy_symmetric(C, ld, View::new(&transfer.C, ldp), n);
+        copy_symmetric(C, ld, View::new(&segment.C, ldp), n);
         product_with_upper(CL, ld, [n, n], View::new(C, ld), upper);
         transpose(rows, ld, View::new(CL, ld), [n, n]);
         product_of_upper_lower(H, ldh, n, upper, View::new(rows, ld));
@@ -184,9 +184,9 @@ impl Link {
         }
 
         // [Θ, θ − C p₁]ᵀL
-        transpose(rows, ld, View::new(&transfer.Theta, ldp), [n, n]);
+        transpose(rows, ld, View::new(&segment.Theta, ldp), [n, n]);
         for k in 0..n {
-            rows[k * ld + n] = transfer.theta[k] - dot(&C[k * ld..][..n], &end.p);
+            rows[k * ld + n] = segment.theta[k] - dot(&C[k * ld..][..n], &end.p);
         }
         product_with_upper(&mut H[n..], ldh, [n + 1, n], View::new(rows, ld), upper);
 
@@ -196,7 +196,7 @@ impl Link {
             for i in j..n {
                 H[i] = -P[i];
             }
-            H[n] = -work.p[j] - dot(&transfer.Theta[j * ldp..][..n], &end.p);
+            H[n] = -work.p[j] - dot(&segment.Theta[j * ldp..][..n], &end.p);
         }
         if eliminate(H, ldh, [2 * n + 1, 2 * n, n]).is_err() {
             return false;

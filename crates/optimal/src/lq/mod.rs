@@ -3,7 +3,7 @@
 mod box_qp;
 mod conditional_value;
 mod forms;
-mod implicit;
+mod inverse_dynamics_form;
 mod node;
 mod segments;
 mod step;
@@ -11,7 +11,7 @@ mod structure;
 mod sweep;
 mod workspace;
 
-pub(crate) use implicit::Implicit;
+pub(crate) use inverse_dynamics_form::InverseDynamicsForm;
 pub(crate) use node::DIVERGED;
 pub use node::{Hessian, LqKnot, LqNode};
 pub use step::SweepError;

@@ -1,7 +1,7 @@
 //! The linear-quadratic problem: all that a solver sees of a horizon.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
-use super::implicit::Implicit;
+use super::inverse_dynamics_form::InverseDynamicsForm;
 use super::structure::{EulerBlock, LARGEST_BLOCK, Structure};
 use crate::error::assert_length;
 use nalgebra::{DMatrix, DVector};
@@ -42,7 +42,7 @@ pub struct LqNode {
     /// What is known of the form of A and B.
     pub structure: Structure,
     /// What stands for A, B, S, R and part of Q where the solver and the action can both use it.
-    pub(crate) implicit: Implicit,
+    pub(crate) inverse_dynamics: InverseDynamicsForm,
 }
 
 impl LqNode {
@@ -60,7 +60,7 @@ impl LqNode {
             lower: DVector::from_element(nu, f64::NEG_INFINITY),
             upper: DVector::from_element(nu, f64::INFINITY),
             structure: Structure::default(),
-            implicit: Implicit::default(),
+            inverse_dynamics: InverseDynamicsForm::default(),
         }
     }
 

@@ -19,7 +19,7 @@
 //! that knot. If they differ by more than rounding, or anything failed before, all is swept again as one.
 #![allow(non_snake_case)] // the names of the literature
 
-use super::conditional_value::{Link, Transfer, Value};
+use super::conditional_value::{Link, SegmentValue, Value};
 use super::node::{Hessian, LqKnot, LqNode};
 use super::step::{Sizes, Step, SweepError};
 use condyle_linalg::{SLACK, max_abs};
@@ -41,7 +41,7 @@ pub(crate) struct Segments {
 struct Segment {
     knots: Range<usize>,
     step: Step,
-    transfer: Transfer,
+    value: SegmentValue,
     /// The value function at the knot behind it.
     end: Value,
     result: Result<(), SweepError>,
@@ -61,7 +61,7 @@ impl Segments {
         let segment = |k: usize| Segment {
             knots: cut(k)..cut(k + 1),
             step: Step::new(sizes, sizes.n, vec![]),
-            transfer: Transfer::zeros(sizes.n),
+            value: SegmentValue::zeros(sizes.n),
             end: Value::zeros(sizes.n),
             result: Ok(()),
             good: false,
@@ -86,7 +86,7 @@ impl Segments {
             return None;
         }
         let parallel = rayon::current_num_threads() > 1;
-        let begin = Running { pass: Pass::Begin, nodes, regularisation, parallel };
+        let begin = SegmentTask { pass: Pass::Begin, nodes, regularisation, parallel };
         if parallel {
             rayon::scope(|_| self.sweep(begin, knots)) // enters the pool once, not for each step of it
         } else {
@@ -94,7 +94,7 @@ impl Segments {
         }
     }
 
-    fn sweep(&mut self, begin: Running<'_>, knots: &mut [LqKnot]) -> Option<Result<(), SweepError>> {
+    fn sweep(&mut self, begin: SegmentTask<'_>, knots: &mut [LqKnot]) -> Option<Result<(), SweepError>> {
         let last = self.all.len() - 1;
         begin.over(&mut self.all[1..], knots);
         if self.all[last].result.is_err() {
@@ -103,7 +103,7 @@ impl Segments {
         if !self.link() {
             return None;
         }
-        Running { pass: Pass::Finish, ..begin }.over(&mut self.all[..last], knots);
+        SegmentTask { pass: Pass::Finish, ..begin }.over(&mut self.all[..last], knots);
         let consistent = |pair: &[Segment]| {
             let (end, found) = (&pair[0].end, &knots[pair[1].knots.start]);
             pair[0].result.is_ok() && end.is_near(found.Vxx.as_slice(), found.Vx.as_slice())
@@ -120,8 +120,8 @@ impl Segments {
         }
         for j in (1..last).rev() {
             let (before, here) = all.split_at_mut(j);
-            let (Segment { step, transfer, end, good, .. }, start) = (&here[0], &mut before[j - 1].end);
-            if !(*good && link.run(step, transfer, end, start)) {
+            let (Segment { step, value, end, good, .. }, start) = (&here[0], &mut before[j - 1].end);
+            if !(*good && link.run(step, value, end, start)) {
                 return false;
             }
         }
@@ -149,14 +149,14 @@ enum Pass {
 }
 
 #[derive(Clone, Copy)]
-struct Running<'a> {
+struct SegmentTask<'a> {
     pass: Pass,
     nodes: &'a [LqNode],
     regularisation: f64,
     parallel: bool,
 }
 
-impl Running<'_> {
+impl SegmentTask<'_> {
     /// Over some of the segments, given all knots.
     fn over(self, segments: &mut [Segment], knots: &mut [LqKnot]) {
         self.run(segments, &mut knots[segments[0].knots.start..]);
@@ -180,14 +180,14 @@ impl Running<'_> {
     /// Over one segment.
     fn over_one(self, segment: &mut Segment, knots: &mut [LqKnot]) {
         let Self { pass, nodes, regularisation, .. } = self;
-        let Segment { knots: range, step, transfer, end, result, good } = segment;
+        let Segment { knots: range, step, value, end, result, good } = segment;
         let (first, own) = (range.start, &nodes[range.clone()]);
         let no_curvature = &mut |_: usize, _: &[f64], _: &mut Hessian| false;
         match pass {
             Pass::Begin if range.end + 1 == nodes.len() => {
                 *result = step.run(first, &nodes[first..], knots, regularisation, no_curvature);
             }
-            Pass::Begin => *good = transfer.run(step, own, regularisation),
+            Pass::Begin => *good = value.run(step, own, regularisation),
             Pass::Finish => {
                 step.work.P.copy_from_slice(&end.P);
                 step.work.p.copy_from_slice(&end.p);

@@ -32,7 +32,7 @@ use crate::error::assert_length;
 /// ```
 ///
 /// The knots of robots that [`Fddp`](crate::Fddp) sweeps come without A and B, as the equations of inverse dynamics, in
-/// which accelerations and contact forces are eliminated in place of the controls ([`implicit`](crate::Settings::implicit)):
+/// which accelerations and contact forces are eliminated in place of the controls ([`inverse_dynamics_form`](crate::Settings::inverse_dynamics_form)):
 /// what comes out is the same.
 ///
 /// Where δu is bounded, k solves the quadratic program of its knot by projected Newton steps (Tassa, Mansard, Todorov,

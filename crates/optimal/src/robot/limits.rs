@@ -6,7 +6,7 @@ use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
 use crate::Error;
-use crate::multipliers::{Bounded, Multipliers, Visit, leave_a_value};
+use crate::problem::{Bounded, Multipliers, Visit, leave_a_value};
 use condyle_dynamics::Model;
 use serde::{Deserialize, Serialize};
 

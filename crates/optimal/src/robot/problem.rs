@@ -11,7 +11,7 @@ use super::dynamics::inverse::Inverse;
 use super::dynamics::knots::HasRobot;
 use super::integrators::{Integrated, Integrator};
 use super::limits::Limit;
-use crate::action::ActionModel;
+use crate::ActionModel;
 use crate::{Error, Problem};
 use condyle_dynamics::Model;
 use nalgebra::DMatrix;

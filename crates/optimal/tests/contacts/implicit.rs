@@ -33,7 +33,7 @@ pub(super) fn compare(
     let mut problem = Problem::new(xs[..model.nq() + nv].to_vec(), vec![action], vec![0; KNOTS], end).unwrap();
     let solutions = [true, false].map(|implicit| {
         let mut solver = Fddp::new(&problem);
-        solver.settings.implicit = implicit;
+        solver.settings.inverse_dynamics_form = implicit;
         solver.settings.max_iterations = 1;
         solver.settings.regularisation_start = 1e-3;
         solver.solve(&mut problem, &xs, &us).unwrap();

@@ -47,14 +47,14 @@ pub(super) fn write_cost(work: &mut Workspace, node: &LqNode, turn: usize, curva
     let (n, m) = (node.ndx(), node.nu());
     let (ld, split) = (work.stride(m), n - turn); // states in H before and after the turn
     let Workspace { H, p, .. } = work;
-    let (S, Q) = (node.S.as_slice(), node.Q.as_slice());
-    copy_lower(H, ld, View::new(node.R.as_slice(), m), m);
-    copy_matrix(&mut H[m..], ld, View::new(&S[turn..], n), [split, m]);
-    copy_lower(&mut H[m * ld + m..], ld, View::new(&Q[turn * (n + 1)..], n), split);
+    let (R, S, Q) = (View::new(node.R.as_slice(), m), View::new(node.S.as_slice(), n), View::new(node.Q.as_slice(), n));
+    copy_lower(H, ld, R, m);
+    copy_matrix(&mut H[m..], ld, S.at(turn, 0), [split, m]);
+    copy_lower(&mut H[m * ld + m..], ld, Q.at(turn, turn), split);
     if turn > 0 {
-        copy_matrix(&mut H[m + split..], ld, View::new(S, n), [turn, m]);
-        copy_matrix(&mut H[m * ld + m + split..], ld, View::new(&Q[turn * n..], n), [turn, split]);
-        copy_lower(&mut H[(m + split) * (ld + 1)..], ld, View::new(Q, n), turn);
+        copy_matrix(&mut H[m + split..], ld, S, [turn, m]);
+        copy_matrix(&mut H[m * ld + m + split..], ld, Q.at(0, turn), [turn, split]);
+        copy_lower(&mut H[(m + split) * (ld + 1)..], ld, Q, turn);
     }
     for j in 0..m {
         H[j * ld + m + n] = node.r[j];

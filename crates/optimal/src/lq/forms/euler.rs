@@ -46,10 +46,10 @@ impl Form for Euler {
         steps.write(work, node);
 
         let Workspace { F, W, H, .. } = work;
-        let (A, B) = (node.A.as_slice(), node.B.as_slice());
-        transpose(F, ld, View::new(&B[nv.min(B.len())..], n), [nv, m]);
-        transpose(&mut F[m..], ld, View::new(&A[nv * n + nv..], n), [nv, nv]);
-        transpose(&mut F[m + nv..], ld, View::new(&A[nv..], n), [nv, nv]);
+        let (A, B) = (View::new(node.A.as_slice(), n), View::new(node.B.as_slice(), n));
+        transpose(F, ld, B.at(nv, 0), [nv, m]);
+        transpose(&mut F[m..], ld, A.at(nv, nv), [nv, nv]);
+        transpose(&mut F[m + nv..], ld, A.at(nv, 0), [nv, nv]);
         let (all, F_q) = (View::new(F, ld), View::new(&F[m + nv..], ld));
         product(W, ld, [rows, nv, nv], all, View::new(&steps.Pi, ldn));
         add_matrix(&mut W[m + nv..], ld, View::new(&steps.N, ldn), [nv, nv]);

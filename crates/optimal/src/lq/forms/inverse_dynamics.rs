@@ -21,7 +21,7 @@
 //! those of the explicit form, since for any δx the map from w to δu is invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
 
-use super::super::implicit::Implicit;
+use super::super::inverse_dynamics_form::InverseDynamicsForm;
 use super::super::node::{LqKnot, LqNode};
 use super::super::workspace::Workspace;
 use super::euler::Steps;
@@ -50,10 +50,9 @@ pub(crate) struct InverseDynamics {
 impl InverseDynamics {
     /// What the rows of some nodes need at most, whichever are active: numbers in rows, products, dependent coordinates.
     pub(crate) fn room(nodes: &[LqNode]) -> [usize; 3] {
-        let rooms = nodes.iter().map(|LqNode { implicit, .. }| {
-            let [efforts, steps, costs] =
-                [&implicit.efforts, &implicit.steps, &implicit.costs].map(|rows| rows.masks.capacity());
-            [2 * (efforts + steps + costs) * implicit.stride, efforts + 2 * steps + costs, steps]
+        let rooms = nodes.iter().map(|LqNode { inverse_dynamics: form, .. }| {
+            let [efforts, steps, costs] = [&form.efforts, &form.steps, &form.costs].map(|rows| rows.masks.capacity());
+            [2 * (efforts + steps + costs) * form.stride, efforts + 2 * steps + costs, steps]
         });
         rooms.fold([0; 3], |a, b| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])])
     }
@@ -78,8 +77,8 @@ impl Form for InverseDynamics {
 
     /// H in the order (w, δv, δq).
     fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
-        let (n, m, count) = (node.ndx(), node.nu(), node.implicit.dependent.len());
-        let (ld, all, size) = (work.stride(m), m + n, node.implicit.stride);
+        let (n, m, count) = (node.ndx(), node.nu(), node.inverse_dynamics.dependent.len());
+        let (ld, all, size) = (work.stride(m), m + n, node.inverse_dynamics.stride);
         self.steps.write(work, node);
         self.half.resize((count + SLACK) * count, 0.0);
         let Self { steps, products, half, .. } = self;
@@ -93,7 +92,7 @@ impl Form for InverseDynamics {
             add_product(Z, size, [all, count, count], View::new(D, size), View::new(half, count + SLACK));
         }
         // DᵀZ + ZᵀD
-        let masks = &node.implicit.steps.masks;
+        let masks = &node.inverse_dynamics.steps.masks;
         for (k, &mask) in masks.iter().enumerate() {
             products.multiply([Z + k, D + k], [u64::MAX, mask]);
         }
@@ -106,7 +105,8 @@ impl Form for InverseDynamics {
 
     /// Ψ y + Θ_q T δq,   Ψ = Δt Θ_q E + Θ_v.
     fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
-        let (n, m, Implicit { own, dependent, steps: D, stride, .. }) = (node.ndx(), node.nu(), &node.implicit);
+        let (n, m, InverseDynamicsForm { own, dependent, steps: D, stride, .. }) =
+            (node.ndx(), node.nu(), &node.inverse_dynamics);
         let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
         self.steps.write_velocities_below(work, node, Theta);
         let (Self { steps, below, .. }, Workspace { W: Psi, H, .. }) = (self, &mut *work);
@@ -148,7 +148,7 @@ impl Form for InverseDynamics {
         let (n, m) = (node.ndx(), node.nu());
         let (nv, ld, ldu) = (n / 2, work.stride(m), m + SLACK);
         let (Self { U, gains, .. }, H) = (self, &work.H);
-        let (efforts, size) = (&node.implicit.efforts.numbers, node.implicit.stride);
+        let (efforts, size) = (&node.inverse_dynamics.efforts.numbers, node.inverse_dynamics.stride);
         transpose(U, ldu, View::new(efforts, size), [m, m]);
         solve_transposed(U, ldu, m, View::new(H, ld), m);
         transpose(gains, ldu, View::new(&efforts[m..], size), [n, m]);
@@ -182,7 +182,7 @@ impl Vectorized for WriteRows<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let Self { steps: Steps { N, Pi, py, .. }, products, half, node, regularisation, H, ld } = self;
-        let (n, m, imp) = (node.ndx(), node.nu(), &node.implicit);
+        let (n, m, imp) = (node.ndx(), node.nu(), &node.inverse_dynamics);
         let (nv, all, size) = (n / 2, m + n, imp.stride);
         let ldn = nv + SLACK;
 

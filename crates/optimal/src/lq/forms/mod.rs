@@ -69,7 +69,7 @@ impl Forms {
 
     /// The form of a node.
     pub(super) fn of(&mut self, node: &LqNode) -> &mut dyn Form {
-        if node.implicit.active {
+        if node.inverse_dynamics.active {
             &mut self.inverse_dynamics
         } else if node.structure.euler().is_some() && node.ndx() >= EULER_FROM {
             &mut self.euler

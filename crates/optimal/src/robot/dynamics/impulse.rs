@@ -2,10 +2,10 @@
 
 use super::batch::Law;
 use super::robot::{DynamicsSensitivities, RobotDynamics};
+use crate::ActionModel;
 use crate::Error;
-use crate::action::ActionModel;
 use crate::lq::LqNode;
-use crate::multipliers::Visit;
+use crate::problem::Visit;
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::{Capabilities, Output};
 use crate::robot::contact::{Contact, constraint_set, rows_of};

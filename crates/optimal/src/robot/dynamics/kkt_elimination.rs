@@ -1,4 +1,4 @@
-//! The equations of a knot in contact, solved for what is not chosen: see [`Implicit`].
+//! The equations of a knot in contact, solved for what is not chosen: see [`InverseDynamicsForm`].
 //!
 //! Changes of accelerations a and forces f satisfy
 //!
@@ -14,7 +14,7 @@
 //! no pivot, and the knot stays explicit.
 #![allow(non_snake_case)] // J, M, T, U, D
 
-use crate::lq::Implicit;
+use crate::lq::InverseDynamicsForm;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
 use crate::robot::residuals::rows::Row;
@@ -98,14 +98,14 @@ impl KktElimination {
     }
 
     /// Writes U and D for steps of Δt; says whether there were pivots. Overwrites the tableau.
-    pub(crate) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut Implicit) -> bool {
+    pub(crate) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
         at_level(Run { elimination: self, T: tableau, dt, implicit, done: &mut done });
         done
     }
 
     /// The sensitivities of outputs by (w, δv, δq), for a knot whose U and D are these.
-    pub(crate) fn sensitivities<'a>(&'a self, implicit: &'a Implicit, dt: f64) -> Unknowns<'a> {
+    pub(crate) fn sensitivities<'a>(&'a self, implicit: &'a InverseDynamicsForm, dt: f64) -> Unknowns<'a> {
         Unknowns { elimination: self, implicit, dt }
     }
 
@@ -143,7 +143,7 @@ struct Run<'a> {
     elimination: &'a mut KktElimination,
     T: &'a mut [f64],
     dt: f64,
-    implicit: &'a mut Implicit,
+    implicit: &'a mut InverseDynamicsForm,
     done: &'a mut bool,
 }
 
@@ -270,7 +270,7 @@ impl Gather<'_> {
 /// The sensitivities of a knot by (w, δv, δq); see [`KktElimination::sensitivities`].
 pub(crate) struct Unknowns<'a> {
     elimination: &'a KktElimination,
-    implicit: &'a Implicit,
+    implicit: &'a InverseDynamicsForm,
     dt: f64,
 }
 

@@ -177,7 +177,7 @@ impl RobotDynamics {
     /// Writes a knot of Δt = `scale` seconds in inverse-dynamics form; says whether there is one.
     fn write_inverse_dynamics_form(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> bool {
         let Self { terms, data, elimination: Some(elimination), .. } = self else { return false };
-        let (KnotInput { lane, t, x, u }, form) = (input, &mut node.implicit);
+        let (KnotInput { lane, t, x, u }, form) = (input, &mut node.inverse_dynamics);
         if !elimination.run(&mut data[lane].equations, scale, form) {
             return false;
         }
@@ -185,7 +185,7 @@ impl RobotDynamics {
         let lent = form.lend();
         let state = KnotState { x, u, data: &data[lane] };
         terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, node);
-        node.implicit.take_back(lent);
+        node.inverse_dynamics.take_back(lent);
         true
     }
 

@@ -40,7 +40,7 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     let (nv, v) = (model.nv(), &input.x[model.nq()..]);
     let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, dt, node);
     step.set_euler(v, a, dt);
-    let inverse = node.implicit.active;
+    let inverse = node.inverse_dynamics.active;
     if !inverse {
         let (by_q, by_v) = node.A.as_mut_slice().split_at_mut(2 * nv * nv);
         let parts = [(da_dq.as_slice(), by_q), (da_dv.as_slice(), by_v), (da_du, node.B.as_mut_slice())];

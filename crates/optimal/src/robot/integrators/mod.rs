@@ -6,11 +6,11 @@ mod retraction;
 mod runge_kutta;
 
 use super::continuous::{ContinuousModel, KnotInput, Wanted, limit_term};
+use crate::ActionModel;
 use crate::Error;
-use crate::action::ActionModel;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
-use crate::multipliers::Visit;
+use crate::problem::Visit;
 use curvature::Curvature;
 use retraction::Retraction;
 use runge_kutta::RungeKutta;
@@ -183,7 +183,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.inner.shift();
     }
 
-    fn implicit(&self) -> Option<[usize; 2]> {
+    fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         if let Method::Euler(_) = self.method { self.inner.inverse_dynamics_form() } else { None }
     }
 
@@ -205,7 +205,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
 
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         assert_length("nodes", nodes.len(), knots.len());
-        let inverse = self.implicit().is_some() && nodes.first().is_some_and(|node| node.implicit.wanted);
+        let inverse =
+            self.inverse_dynamics_form().is_some() && nodes.first().is_some_and(|node| node.inverse_dynamics.wanted);
         let wanted = if inverse { Wanted::Equations } else { Wanted::Derivatives };
         self.each(knots, xs, us, wanted, |knot, input, i| knot.differentiate(input, &mut nodes[i]));
     }

@@ -8,7 +8,7 @@ use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
 pub(crate) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[f64], dd: &[f64]) {
-    let (n, implicit) = (node.ndx(), &mut node.implicit);
+    let (n, implicit) = (node.ndx(), &mut node.inverse_dynamics);
     for i in entries.clone() {
         node.q[i] += d[i];
     }
@@ -23,7 +23,7 @@ pub(crate) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[
 
 /// r += d and R += diag(dd).
 pub(crate) fn add_control_diagonal(node: &mut LqNode, d: &[f64], dd: &[f64]) {
-    let (n, m, implicit) = (node.ndx(), node.nu(), &mut node.implicit);
+    let (n, m, implicit) = (node.ndx(), node.nu(), &mut node.inverse_dynamics);
     for i in 0..m {
         node.r[i] += d[i];
         match implicit.active {
@@ -99,8 +99,8 @@ impl Rows {
     pub(crate) fn write(&mut self, node: &mut LqNode) {
         node.q.as_mut_slice().fill(0.0);
         node.r.as_mut_slice().fill(0.0);
-        if node.implicit.active {
-            node.implicit.set_costs(&self.rows[..self.whole * self.stride], &self.slopes[..self.whole]);
+        if node.inverse_dynamics.active {
+            node.inverse_dynamics.set_costs(&self.rows[..self.whole * self.stride], &self.slopes[..self.whole]);
         }
         at_level(Write { rows: self, node });
     }
@@ -116,7 +116,7 @@ impl Vectorized for Write<'_> {
     fn run<V: Vector>(self) {
         let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, node } = self;
         let (m, nv, n, stride) = (*nu, *nv, 2 * *nv, *stride);
-        let implicit = node.implicit.active;
+        let implicit = node.inverse_dynamics.active;
         let (some, all) = if implicit { (0, *positions) } else { (*whole, *whole + *positions) };
         let first = slopes.len() - *positions;
         for k in 0..all {
@@ -139,7 +139,7 @@ impl Vectorized for Write<'_> {
         let Q = node.Q.as_mut_slice();
         let both = [left.as_slice(), right.as_slice()];
         if implicit {
-            node.implicit.diagonal.fill(0.0);
+            node.inverse_dynamics.diagonal.fill(0.0);
             for k in 0..if all == 0 { nv } else { 0 } {
                 Q[k * n..][..nv].fill(0.0);
             }

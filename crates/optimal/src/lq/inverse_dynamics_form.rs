@@ -5,7 +5,7 @@ use condyle_linalg::{SLACK, SparseRows};
 /// A knot's rows over (w, δv, δq): see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the part of `Q` for
 /// δq are those of the node; of its `A`, `B`, `S` and `R` nothing is used.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Implicit {
+pub(crate) struct InverseDynamicsForm {
     /// Whether the solver can use this form.
     pub(crate) wanted: bool,
     /// Whether the action wrote it.
@@ -28,7 +28,7 @@ pub(crate) struct Implicit {
     pub(crate) diagonal: Vec<f64>,
 }
 
-impl Implicit {
+impl InverseDynamicsForm {
     /// Room for a node of nv coordinates and nu controls with at most so many dependent coordinates and rows of costs.
     pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
         self.stride = nu + 2 * nv + SLACK;

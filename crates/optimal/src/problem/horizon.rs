@@ -1,10 +1,10 @@
 //! The optimal control problem over a horizon of knots.
 
-use crate::action::ActionModel;
+use super::action::ActionModel;
+use super::shape::Shape;
+use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
-use crate::threads::Copies;
-use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::ops::Range;
 
@@ -50,64 +50,18 @@ use std::ops::Range;
 /// ```
 pub struct Problem {
     x0: Vec<f64>,
-    pub(crate) models: Vec<Box<dyn ActionModel>>,
+    models: Vec<Box<dyn ActionModel>>,
     stages: Vec<usize>,
-    pub(crate) terminal: Box<dyn ActionModel>,
-    pub(crate) shape: Shape,
+    terminal: Box<dyn ActionModel>,
+    shape: Shape,
     /// Maximal runs of knots with one model: (model, knots).
-    pub(crate) runs: Vec<(usize, Range<usize>)>,
+    runs: Vec<(usize, Range<usize>)>,
     /// 0, 1, …, N: the knots of a group are a slice of it.
-    pub(crate) knots: Vec<usize>,
-    /// Of the models, for threads.
-    pub(crate) copies: Copies,
+    knots: Vec<usize>,
+    /// Copies of the models, for threads.
+    copies: Copies,
     /// Where the terminal action may write a next state.
     unread: Vec<f64>,
-}
-
-/// The dimensions of a horizon: what trajectories and workspaces are allocated by.
-#[derive(Debug, PartialEq, Default, Serialize, Deserialize)]
-pub(crate) struct Shape {
-    pub(crate) nx: usize,
-    pub(crate) ndx: usize,
-    /// Where uₜ starts in the flat controls; N + 1 entries, the last is their length.
-    pub(crate) offsets: Vec<usize>,
-}
-
-impl Clone for Shape {
-    fn clone(&self) -> Self {
-        Self { nx: self.nx, ndx: self.ndx, offsets: self.offsets.clone() }
-    }
-
-    /// Allocates nothing for a horizon of the same length.
-    fn clone_from(&mut self, other: &Self) {
-        (self.nx, self.ndx) = (other.nx, other.ndx);
-        self.offsets.clone_from(&other.offsets);
-    }
-}
-
-impl Shape {
-    pub(crate) fn horizon(&self) -> usize {
-        self.offsets.len() - 1
-    }
-
-    pub(crate) fn nu(&self, t: usize) -> usize {
-        self.offsets.get(t + 1).map_or(0, |end| end - self.offsets[t])
-    }
-
-    /// The place of xₜ in a flat trajectory.
-    pub(crate) fn x(&self, t: usize) -> Range<usize> {
-        t * self.nx..(t + 1) * self.nx
-    }
-
-    /// The place of δxₜ in a flat trajectory of changes.
-    pub(crate) fn dx(&self, t: usize) -> Range<usize> {
-        t * self.ndx..(t + 1) * self.ndx
-    }
-
-    /// The place of uₜ in flat controls; empty at the terminal knot.
-    pub(crate) fn u(&self, t: usize) -> Range<usize> {
-        self.offsets[t]..self.offsets[t] + self.nu(t)
-    }
 }
 
 impl Problem {
@@ -300,16 +254,40 @@ impl Problem {
         self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
     }
 
+    /// [`calc_diff`](Self::calc_diff) on `threads` threads of the rayon pool in which it is called, else of the global one;
+    /// the same to the last bit. The knots of models without a copy ([`fork`](ActionModel::fork)) come last, on one thread.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub(crate) fn calc_diff_on(&mut self, threads: usize, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        if threads == 1 {
+            return self.calc_diff(xs, us, nodes);
+        }
+        self.begin_derivatives(xs, us, nodes);
+        let Self { models, runs, copies, knots, shape, terminal, .. } = self;
+        let (nodes, end) = nodes.split_at_mut(shape.horizon());
+        let all = Knots { runs, knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
+        copies.calc_diff(threads, models, all, nodes, || {
+            let t = shape.horizon();
+            terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
+        });
+    }
+
+    /// Gives the copies of models, which threads have, the multipliers of their models.
+    pub(crate) fn share_multipliers(&mut self) {
+        self.copies.share_multipliers(&mut self.models, &self.runs);
+    }
+
     /// Checks the lengths, and lets nothing be known of the forms of A and B: the action says if it is. Asks none for the
-    /// implicit form that has none.
+    /// equations of inverse dynamics that has none.
     #[track_caller]
-    pub(crate) fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+    fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         self.assert_trajectory(xs, us);
         assert_length("nodes", nodes.len(), self.horizon() + 1);
         for (t, node) in nodes.iter_mut().enumerate() {
             node.structure.set_dense();
-            node.implicit.active = false;
-            node.implicit.wanted &= self.action(t).implicit().is_some();
+            node.inverse_dynamics.active = false;
+            node.inverse_dynamics.wanted &= self.action(t).inverse_dynamics_form().is_some();
         }
     }
 
@@ -318,14 +296,14 @@ impl Problem {
         (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
 
-    /// Makes room in nodes for the implicit form, wherever in the horizon their actions come to serve.
-    pub(crate) fn reserve_implicit(&self, nodes: &mut [LqNode]) {
-        let sizes = self.models.iter().filter_map(|model| model.implicit());
+    /// Makes room in nodes for the equations of inverse dynamics, wherever in the horizon their actions come to serve.
+    pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) {
+        let sizes = self.models.iter().filter_map(|model| model.inverse_dynamics_form());
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return };
         let (nv, horizon) = (self.ndx() / 2, self.horizon());
         for node in &mut nodes[..horizon] {
             let nu = node.nu();
-            node.implicit.reserve(nv, nu, most);
+            node.inverse_dynamics.reserve(nv, nu, most);
         }
     }
 

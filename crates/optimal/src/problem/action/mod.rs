@@ -1,9 +1,10 @@
 //! One knot's dynamics and cost, asked for many knots at a time.
 
+pub(crate) mod differences;
+
+use super::multipliers::Visit;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
-use crate::multipliers::Visit;
-use crate::numdiff;
 use std::any::Any;
 
 /// The dynamics x⁺ = φₜ(x, u) and the cost ℓₜ(x, u) of the knots t that it serves.
@@ -76,9 +77,9 @@ pub trait ActionModel: Any + Send {
         1
     }
 
-    /// For actions that can write their knots in implicit form: the most dependent coordinates and rows of costs.
+    /// For actions that can write their knots as equations of inverse dynamics: the most dependent coordinates and rows of costs.
     #[doc(hidden)]
-    fn implicit(&self) -> Option<[usize; 2]> {
+    fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         None
     }
 
@@ -104,7 +105,7 @@ pub trait ActionModel: Any + Send {
     /// By default central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff)'s: slow, allocating, and right to
     /// about 1e-9 (1e-7 the Hessian). [`AutoDiff`](crate::AutoDiff) has exact ones of what is written for any scalar.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        numdiff::calc_diff(self, t, x, u, node);
+        differences::calc_diff(self, t, x, u, node);
     }
 
     /// The second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for ndx numbers

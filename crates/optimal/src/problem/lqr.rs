@@ -1,7 +1,7 @@
 //! The linear dynamics and quadratic cost of the textbook, as an action.
 #![allow(non_snake_case)] // the names of the literature
 
-use crate::action::ActionModel;
+use super::action::ActionModel;
 use crate::lq::LqNode;
 
 /// x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper: of an [`LqNode`], which names them.

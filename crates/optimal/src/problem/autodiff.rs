@@ -1,6 +1,6 @@
 //! Derivatives of actions that are written for any scalar, by hyper-dual numbers.
 
-use crate::action::ActionModel;
+use super::action::ActionModel;
 use crate::lq::{Hessian, LqNode};
 use condyle_spatial::Scalar;
 use num_dual::HyperDual64;

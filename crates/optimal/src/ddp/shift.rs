@@ -1,7 +1,7 @@
 //! Receding horizons: the solution of one problem as the warm start of the next.
 
+use super::fddp::Fddp;
 use crate::error::Error;
-use crate::fddp::Fddp;
 use crate::lq::{LqNode, Sweep};
 use crate::problem::Problem;
 
@@ -32,10 +32,10 @@ impl Fddp {
         if (0..horizon).any(|t| self.nodes[t].nu() != new.nu(t)) {
             self.nodes[..horizon].rotate_left(1);
             self.nodes[horizon - 1] = LqNode::zeros(ndx, new.nu(horizon - 1));
-            problem.reserve_implicit(&mut self.nodes);
+            problem.reserve_inverse_dynamics(&mut self.nodes);
             self.sweep = Sweep::new(&self.nodes);
         }
-        self.trials.reshape(problem);
+        self.line_search.reshape(problem);
         // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
         let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
         let next = &mut self.next[..end.len()];

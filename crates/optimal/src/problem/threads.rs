@@ -1,9 +1,8 @@
 //! The derivatives of a horizon on several threads, each with its own copies of the actions.
 
-use crate::action::ActionModel;
+use super::action::ActionModel;
 use crate::lq::LqNode;
-use crate::problem::Problem;
-use std::ops::Range;
+use core::ops::Range;
 
 /// The copies, and who computes what.
 #[derive(Default)]
@@ -67,21 +66,77 @@ impl Copies {
         }
         cuts.push(horizon);
     }
+
+    /// Gives copies the multipliers of their models.
+    pub(super) fn share_multipliers(&mut self, models: &mut [Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
+        for copies in &mut self.of {
+            for (model, run) in runs {
+                let Some(copy) = &mut copies[*model] else { continue };
+                let mut k = 0;
+                copy.constraints(run.start, &mut |theirs| {
+                    let mut i = 0;
+                    models[*model].constraints(run.start, &mut |ours| {
+                        if i == k {
+                            theirs.multipliers.clone_from(ours.multipliers);
+                        }
+                        i += 1;
+                    });
+                    k += 1;
+                });
+            }
+        }
+    }
+
+    /// The derivatives at all knots on `threads` threads, the first of which also does `last`. The knots of models without a
+    /// copy come after the others, on one thread.
+    pub(super) fn calc_diff(
+        &mut self,
+        threads: usize,
+        models: &mut [Box<dyn ActionModel>],
+        knots: Knots<'_>,
+        nodes: &mut [LqNode],
+        last: impl FnOnce() + Send,
+    ) {
+        self.renew(threads, models);
+        self.share(threads, models, knots.runs);
+        let Self { of, copied, cuts } = self;
+        let (own, others) = nodes.split_at_mut(cuts[1]);
+        rayon::join(
+            || {
+                knots.visit(0..own.len(), own, |model, run, nodes| {
+                    if copied[model] {
+                        knots.derive(&mut *models[model], run, nodes);
+                    }
+                });
+                last();
+            },
+            || knots.spread(&cuts[1..], of, others),
+        );
+        knots.visit(0..nodes.len(), nodes, |model, run, nodes| {
+            if !copied[model] {
+                knots.derive(&mut *models[model], run, nodes);
+            }
+        });
+    }
 }
 
-/// What all threads read.
+/// What all threads read of the knots before the terminal one.
 #[derive(Clone, Copy)]
-struct Horizon<'a> {
-    runs: &'a [(usize, Range<usize>)],
-    knots: &'a [usize],
-    xs: &'a [f64],
-    us: &'a [f64],
-    nx: usize,
+pub(super) struct Knots<'a> {
+    /// Runs of knots with one model: (model, knots).
+    pub(super) runs: &'a [(usize, Range<usize>)],
+    /// Their numbers.
+    pub(super) knots: &'a [usize],
+    /// The states, and the controls.
+    pub(super) xs: &'a [f64],
+    pub(super) us: &'a [f64],
+    /// The number of entries of a state.
+    pub(super) nx: usize,
     /// Where the controls of a knot start.
-    offsets: &'a [usize],
+    pub(super) offsets: &'a [usize],
 }
 
-impl Horizon<'_> {
+impl Knots<'_> {
     /// The derivatives at consecutive knots of one model; `nodes` are theirs.
     fn derive(self, model: &mut dyn ActionModel, knots: Range<usize>, nodes: &mut [LqNode]) {
         let xs = &self.xs[knots.start * self.nx..knots.end * self.nx];
@@ -112,64 +167,5 @@ impl Horizon<'_> {
         let (some, others) = copies.split_at_mut(half);
         let (first, second) = nodes.split_at_mut(cuts[half] - cuts[0]);
         rayon::join(|| self.spread(&cuts[..=half], some, first), || self.spread(&cuts[half..], others, second));
-    }
-}
-
-impl Problem {
-    /// Gives copies the multipliers of their models.
-    pub(crate) fn share_multipliers(&mut self) {
-        let Self { models, runs, copies, .. } = self;
-        for copies in &mut copies.of {
-            for (model, run) in runs.iter() {
-                let Some(copy) = &mut copies[*model] else { continue };
-                let mut k = 0;
-                copy.constraints(run.start, &mut |theirs| {
-                    let mut i = 0;
-                    models[*model].constraints(run.start, &mut |ours| {
-                        if i == k {
-                            theirs.multipliers.clone_from(ours.multipliers);
-                        }
-                        i += 1;
-                    });
-                    k += 1;
-                });
-            }
-        }
-    }
-
-    /// [`calc_diff`](Self::calc_diff) on `threads` threads of the rayon pool in which it is called, else of the global one;
-    /// the same to the last bit. The knots of models without a copy ([`fork`](ActionModel::fork)) come last, on one thread.
-    ///
-    /// # Panics
-    /// If a length is wrong.
-    pub(crate) fn calc_diff_on(&mut self, threads: usize, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        if threads == 1 {
-            return self.calc_diff(xs, us, nodes);
-        }
-        self.begin_derivatives(xs, us, nodes);
-        let Self { models, runs, copies, knots, shape, terminal, .. } = self;
-        copies.renew(threads, models);
-        copies.share(threads, models, runs);
-        let Copies { of, copied, cuts } = copies;
-        let (nodes, end) = nodes.split_at_mut(shape.horizon());
-        let horizon = Horizon { runs, knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
-        let (own, others) = nodes.split_at_mut(cuts[1]);
-        rayon::join(
-            || {
-                horizon.visit(0..own.len(), own, |model, knots, nodes| {
-                    if copied[model] {
-                        horizon.derive(&mut *models[model], knots, nodes);
-                    }
-                });
-                let t = shape.horizon();
-                terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
-            },
-            || horizon.spread(&cuts[1..], of, others),
-        );
-        horizon.visit(0..nodes.len(), nodes, |model, knots, nodes| {
-            if !copied[model] {
-                horizon.derive(&mut *models[model], knots, nodes);
-            }
-        });
     }
 }

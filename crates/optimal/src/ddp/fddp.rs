@@ -1,18 +1,18 @@
 //! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use crate::clock::{Clock, Phase};
+use super::clock::{Clock, Phase};
+use super::rollout::Sum;
+use super::search::{Iterate, LineSearch, Search};
+use super::settings::{DdpMethod, Settings};
+use super::solution::{Iteration, Solution, Status, Timings};
 use crate::error::Error;
 use crate::lq::{LqNode, Sweep, SweepError};
 use crate::problem::{Problem, Shape};
-use crate::rollout::{Sum, Trials};
-use crate::search::Search;
-use crate::settings::{Method, Settings};
-use crate::solution::{Iteration, Solution, Status, Timings};
 use condyle_linalg::max_abs;
 use std::time::Instant;
 
-/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`Method`](crate::Method)), with the rules and constants of Crocoddyl
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
 /// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
 /// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
@@ -74,26 +74,18 @@ pub struct Fddp {
     /// May be changed between solves.
     pub settings: Settings,
     pub(crate) nodes: Vec<LqNode>,
-    pub(crate) sweep: Sweep,
-    pub(crate) trials: Trials,
-    /// The step lengths, 1, ½, ¼, ….
-    pub(crate) steps: Vec<f64>,
+    pub(super) sweep: Sweep,
+    pub(super) line_search: LineSearch,
     /// The iterate is in here.
     pub(crate) solution: Solution,
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
-    pub(crate) next: Vec<f64>,
+    pub(super) next: Vec<f64>,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
-    pub(crate) gaps: Vec<f64>,
-    /// Vxx f, (N + 1)·ndx.
-    pub(crate) curved_gaps: Vec<f64>,
-    /// xₜ ⊖ a trial's xₜ.
-    pub(crate) dx: Vec<f64>,
-    /// Expected improvement without the part that depends on the trial: dg, dq.
-    pub(crate) expected: [f64; 2],
-    pub(crate) clock: Clock,
-    /// Whether knots may come in implicit form.
-    implicit: bool,
+    gaps: Vec<f64>,
+    clock: Clock,
+    /// Whether knots may come as equations of inverse dynamics.
+    inverse_dynamics: bool,
 }
 
 /// What carries over from one iteration to the next.
@@ -111,23 +103,19 @@ impl Fddp {
     /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
     pub fn new(problem: &Problem) -> Self {
         let (mut nodes, shape) = (problem.nodes(), problem.shape());
-        problem.reserve_implicit(&mut nodes);
+        problem.reserve_inverse_dynamics(&mut nodes);
         let horizon = problem.horizon();
         Self {
             settings: Settings::default(),
             sweep: Sweep::new(&nodes),
             nodes,
-            trials: Trials::new(problem, problem.lanes()),
-            steps: Vec::new(),
+            line_search: LineSearch::new(problem),
             solution: Solution::new(problem),
             next: vec![0.0; horizon * shape.nx],
             costs: vec![0.0; horizon + 1],
             gaps: vec![0.0; (horizon + 1) * shape.ndx],
-            curved_gaps: vec![0.0; (horizon + 1) * shape.ndx],
-            dx: vec![0.0; shape.ndx],
-            expected: [0.0; 2],
             clock: Clock::default(),
-            implicit: false,
+            inverse_dynamics: false,
         }
     }
 
@@ -181,14 +169,13 @@ impl Fddp {
         self.settings.check()?;
         check_shape(self.solution.shape(), problem.shape())?;
         let bounded = problem.check_bounds()?;
-        self.implicit = self.settings.implicit && !bounded && !self.settings.second_order;
+        self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
         let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
 
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
         self.solution.trace.reserve(self.settings.max_iterations);
-        self.steps.clear();
-        self.steps.extend((0..self.settings.step_lengths).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
+        self.line_search.start(self.settings.step_lengths);
         let start = self.settings.regularisation_start;
         let mut progress =
             Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
@@ -227,7 +214,7 @@ impl Fddp {
             if !self.clock.allows(Phase::Sweep) {
                 return Status::TimeLimit;
             }
-            self.sweep.keep_values(self.gaps_count(now.feasible));
+            self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
             while let Err(error) = self.sweep(problem, now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
                 if now.regularisation == self.settings.regularisation_max {
@@ -241,14 +228,16 @@ impl Fddp {
                 }
             }
             now.swept = true;
-            self.expect(now.feasible);
-            search = self.line_search(problem, now.feasible, search);
+            let Self { line_search, solution, next, gaps, sweep, settings, clock, .. } = self;
+            let (knots, feasible) = (sweep.knots(), now.feasible);
+            let iterate = Iterate { solution, next, gaps, knots, feasible, settings, clock };
+            search = line_search.run(problem, iterate, search);
             if search.out_of_time {
                 return Status::TimeLimit;
             }
             if search.accepted {
                 now.was_feasible = now.feasible;
-                now.feasible |= search.step == 1.0 || self.settings.method == Method::Ddp;
+                now.feasible |= search.step == 1.0 || self.settings.method == DdpMethod::Ddp;
             }
             if search.step > self.settings.regularisation_decrease_above {
                 now.regularisation = self.decreased(now.regularisation);
@@ -312,7 +301,7 @@ impl Fddp {
     fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
         for node in &mut self.nodes {
-            node.implicit.wanted = self.implicit;
+            node.inverse_dynamics.wanted = self.inverse_dynamics;
         }
         let Solution { xs, us, .. } = &self.solution;
         problem.calc_diff_on(self.settings.threads, xs, us, &mut self.nodes);

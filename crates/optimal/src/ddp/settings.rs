@@ -8,7 +8,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
-pub enum Method {
+pub enum DdpMethod {
     /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`: every trial is a plain rollout from x̂₀,
     /// so that the first step accepted closes the gaps of a warm start at once, at whatever cost.
     Ddp,
@@ -23,7 +23,7 @@ pub enum Method {
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// How gaps are closed and which steps are accepted.
-    pub method: Method,
+    pub method: DdpMethod,
     /// Whether the curvature of the dynamics counts, Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action gives it: full DDP,
     /// which converges quadratically. Quu may need more regularisation then. Of a robot's knots those by semi-implicit
     /// Euler that are without contacts give it, exactly; the others count as linear.
@@ -31,7 +31,7 @@ pub struct Settings {
     /// Whether a robot's knots come to the sweep as the equations of inverse dynamics, with accelerations and contact
     /// forces as unknowns instead of the controls, where that is possible: without bounds on controls and without
     /// `second_order`. The same steps and gains, up to rounding, in about half the time.
-    pub implicit: bool,
+    pub inverse_dynamics_form: bool,
     /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
@@ -78,9 +78,9 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            method: Method::Fddp,
+            method: DdpMethod::Fddp,
             second_order: false,
-            implicit: true,
+            inverse_dynamics_form: true,
             max_iterations: 100,
             tolerance: 1e-9,
             tolerance_bounded: 5e-5,
@@ -102,6 +102,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Whether gaps count in what a step should gain.
+    pub(super) fn counts_gaps(&self, feasible: bool) -> bool {
+        !feasible && self.method == DdpMethod::Fddp
+    }
+
     /// # Errors
     /// [`Error::Setting`] for the first field that makes no sense.
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -134,72 +139,6 @@ impl Settings {
                 "regularisation_factor",
                 self.regularisation_factor,
                 self.regularisation_factor > 1.0 && self.regularisation_factor.is_finite(),
-                "above 1",
-            ),
-        ] {
-            if !good {
-                return Err(Error::Setting { name, value, allowed });
-            }
-        }
-        Ok(())
-    }
-}
-
-/// The settings of [`AugmentedLagrangian`](crate::AugmentedLagrangian).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConstraintSettings {
-    /// How far a constraint may be from its bounds, and the dynamics from holding.
-    pub tolerance: f64,
-    /// How large an entry of the gradient of the Lagrangian may be.
-    pub tolerance_dual: f64,
-    /// Inner solves after which a solve stops.
-    pub max_solves: usize,
-    /// 1/μ of the first inner solve.
-    pub penalty_start: f64,
-    /// Largest 1/μ.
-    pub penalty_max: f64,
-    /// Factor by which 1/μ rises.
-    pub penalty_factor: f64,
-}
-
-impl Default for ConstraintSettings {
-    fn default() -> Self {
-        Self {
-            tolerance: 1e-6,
-            tolerance_dual: 1e-5,
-            max_solves: 50,
-            penalty_start: 10.0,
-            penalty_max: 1e8,
-            penalty_factor: 10.0,
-        }
-    }
-}
-
-impl ConstraintSettings {
-    /// # Errors
-    /// [`Error::Setting`] for the first field that makes no sense.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        for (name, value, good, allowed) in [
-            ("tolerance", self.tolerance, positive(self.tolerance), "above 0"),
-            ("tolerance_dual", self.tolerance_dual, positive(self.tolerance_dual), "above 0"),
-            (
-                "penalty_start",
-                self.penalty_start,
-                self.penalty_start > 1.0 && self.penalty_start.is_finite(),
-                "above 1",
-            ),
-            (
-                "penalty_max",
-                self.penalty_max,
-                self.penalty_max >= self.penalty_start && self.penalty_max.is_finite(),
-                "at least penalty_start",
-            ),
-            (
-                "penalty_factor",
-                self.penalty_factor,
-                self.penalty_factor > 1.0 && self.penalty_factor.is_finite(),
                 "above 1",
             ),
         ] {

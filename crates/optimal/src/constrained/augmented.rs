@@ -1,11 +1,10 @@
 //! Constrained problems by an augmented Lagrangian.
 #![allow(non_snake_case)]
 
+use super::settings::ConstraintSettings;
+use crate::ddp::{Fddp, Settings, Solution, Status};
 use crate::error::Error;
-use crate::fddp::Fddp;
 use crate::problem::Problem;
-use crate::settings::{ConstraintSettings, Settings};
-use crate::solution::{Solution, Status};
 use nalgebra::DVector;
 use std::time::{Duration, Instant};
 
@@ -26,7 +25,7 @@ use std::time::{Duration, Instant};
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{ActionModel, AugmentedLagrangian, Constrained, Constraint, LqNode, Problem, Status};
+/// use condyle_optimal::{ActionModel, AugmentedLagrangian, Constrained, LqNode, PathConstraint, Problem, Status};
 /// use nalgebra::DMatrix;
 /// # struct Integrator { nu: usize }
 /// # impl ActionModel for Integrator {
@@ -49,7 +48,7 @@ use std::time::{Duration, Instant};
 /// # }
 /// /// x = 3.
 /// struct Arrive;
-/// impl Constraint for Arrive {
+/// impl PathConstraint for Arrive {
 ///     fn size(&self) -> usize { 1 }
 ///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[3.0], &[3.0]) }
 ///     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) { g[0] = x[0]; }
@@ -245,7 +244,7 @@ impl AugmentedLagrangian {
         let (horizon, begin) = (problem.horizon(), Instant::now());
         let Solution { xs, us, gap, cost, .. } = &solver.solution;
         for node in &mut solver.nodes {
-            node.implicit.wanted = false; // r and B are read
+            node.inverse_dynamics.wanted = false; // r and B are read
         }
         problem.calc_diff(xs, us, &mut solver.nodes);
         let (violation, terms) = problem.measure_constraints();

@@ -1,0 +1,170 @@
+//! Actions with constraints, as terms of an augmented Lagrangian.
+
+use super::path_constraint::{self, PathConstraint};
+use crate::error::assert_length;
+use crate::lq::{Hessian, LqNode};
+use crate::problem::{ActionModel, Bounded, Multipliers, Visit};
+use nalgebra::DMatrix;
+use std::any::Any;
+
+/// An action with constraints. To its cost comes, with the multipliers y and the penalty 1/μ that
+/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) chooses,
+///
+/// ```text
+/// (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,      z = g(x, u) + μ y,      Π: into the bounds
+/// ```
+///
+/// whose Hessian is that of Gauss and Newton. A solver that knows nothing of constraints sees a cost for leaving the
+/// bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes its dynamics once for both.
+pub struct Constrained {
+    action: Box<dyn ActionModel>,
+    constraint: Box<dyn PathConstraint>,
+    multipliers: Multipliers,
+    g: Vec<f64>,
+    /// The slope and the curvature of the cost by g.
+    d: Vec<f64>,
+    dd: Vec<f64>,
+    gx: DMatrix<f64>,
+    gu: DMatrix<f64>,
+}
+
+impl Constrained {
+    /// `action` under `constraint`, at all knots that it serves.
+    pub fn new(action: Box<dyn ActionModel>, constraint: Box<dyn PathConstraint>) -> Self {
+        let (size, ndx, nu) = (constraint.size(), action.ndx(), action.nu());
+        let (gx, gu) = (DMatrix::zeros(size, ndx), DMatrix::zeros(size, nu));
+        let [g, d, dd] = [(); 3].map(|()| vec![0.0; size]);
+        Self { action, constraint, multipliers: Multipliers::new(size), g, d, dd, gx, gu }
+    }
+
+    /// The action, if it is a `T`.
+    pub fn action_mut<T: ActionModel>(&mut self) -> Option<&mut T> {
+        let action: &mut dyn Any = self.action.as_mut();
+        action.downcast_mut()
+    }
+
+    /// The constraint, if it is a `T`.
+    pub fn constraint_mut<T: PathConstraint>(&mut self) -> Option<&mut T> {
+        let constraint: &mut dyn Any = self.constraint.as_mut();
+        constraint.downcast_mut()
+    }
+
+    /// The term of the cost.
+    fn term(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
+        self.constraint.calc(t, x, u, &mut self.g);
+        let (lower, upper) = self.constraint.bounds(t);
+        self.multipliers.value(t, 0, &self.g, lower, upper)
+    }
+
+    /// The gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, …, with its slope d and its
+    /// curvature D by g.
+    fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.constraint.calc(t, x, u, &mut self.g);
+        if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
+            let Self { action, constraint: g, gx, gu, .. } = self;
+            path_constraint::calc_diff(&**action, &mut **g, t, x, u, [gx, gu]);
+        }
+        let (lower, upper) = self.constraint.bounds(t);
+        self.multipliers.begin(t);
+        self.multipliers.slopes(t, 0, &self.g, [lower, upper], &mut self.d, &mut self.dd);
+        let (ndx, nu) = (self.gx.ncols(), self.gu.ncols());
+        for i in 0..self.g.len() {
+            let (w, d) = (self.d[i], self.dd[i]);
+            if d == 0.0 {
+                continue;
+            }
+            for a in 0..ndx {
+                let ga = self.gx[(i, a)];
+                if ga != 0.0 {
+                    node.q[a] += ga * w;
+                    for b in 0..ndx {
+                        node.Q[(b, a)] += d * ga * self.gx[(i, b)];
+                    }
+                    for b in 0..nu {
+                        node.S[(a, b)] += d * ga * self.gu[(i, b)];
+                    }
+                }
+            }
+            for a in 0..nu {
+                let ga = self.gu[(i, a)];
+                if ga != 0.0 {
+                    node.r[a] += ga * w;
+                    for b in 0..nu {
+                        node.R[(b, a)] += d * ga * self.gu[(i, b)];
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl ActionModel for Constrained {
+    fn nx(&self) -> usize {
+        self.action.nx()
+    }
+
+    fn ndx(&self) -> usize {
+        self.action.ndx()
+    }
+
+    fn nu(&self) -> usize {
+        self.action.nu()
+    }
+
+    fn lanes(&self) -> usize {
+        self.action.lanes()
+    }
+
+    fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
+        self.action.bounds(t)
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let cost = self.action.calc(t, x, u, next);
+        cost + self.term(t, x, u)
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.action.calc_diff(t, x, u, node);
+        self.add_derivatives(t, x, u, node);
+    }
+
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        let (nx, nu) = (self.nx(), self.nu());
+        self.action.calc_group(knots, xs, us, next, costs);
+        for (i, &t) in knots.iter().enumerate() {
+            costs[i] += self.term(t, &xs[i * nx..][..nx], &us[i * nu..][..nu]);
+        }
+    }
+
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        let (nx, nu) = (self.nx(), self.nu());
+        assert_length("nodes", nodes.len(), knots.len());
+        self.action.calc_diff_group(knots, xs, us, nodes);
+        for (i, &t) in knots.iter().enumerate() {
+            self.add_derivatives(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
+        }
+    }
+
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        self.action.constraints(t, visit);
+        let (lower, upper) = self.constraint.bounds(t);
+        visit(Bounded { count: self.g.len(), lower, upper, multipliers: &mut self.multipliers });
+    }
+
+    fn shift(&mut self) {
+        self.action.shift();
+    }
+
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        self.action.dynamics_hessian(t, x, u, lambda, hessian)
+    }
+
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        self.action.integrate(x, dx, out);
+    }
+
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        self.action.difference(x0, x1, out);
+    }
+}

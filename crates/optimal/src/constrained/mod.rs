@@ -1,0 +1,12 @@
+//! Problems with general constraints, by an augmented Lagrangian.
+
+mod action;
+mod augmented;
+mod multipliers;
+mod path_constraint;
+mod settings;
+
+pub use action::Constrained;
+pub use augmented::{AugmentedLagrangian, Outcome};
+pub use path_constraint::PathConstraint;
+pub use settings::ConstraintSettings;

@@ -1,0 +1,79 @@
+//! General constraints on states and controls.
+
+use crate::problem::ActionModel;
+use crate::problem::differences::FIRST;
+use nalgebra::DMatrix;
+use std::any::Any;
+
+/// Functions of state and control that must stay within bounds: lower ≤ gₜ(x, u) ≤ upper; equalities where both are equal.
+///
+/// At a terminal knot u is empty. The rules for [`ActionModel`]s hold here too.
+///
+/// # Examples
+/// The second number of the state may not exceed 1:
+/// ```
+/// use condyle_optimal::PathConstraint;
+/// use nalgebra::DMatrix;
+///
+/// struct Slow;
+/// impl PathConstraint for Slow {
+///     fn size(&self) -> usize { 1 }
+///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[f64::NEG_INFINITY], &[1.0]) }
+///     fn calc(&mut self, _: usize, x: &[f64], _: &[f64], g: &mut [f64]) { g[0] = x[1]; }
+///     fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
+///         gx.copy_from_slice(&[0.0, 1.0]);
+///         gu.fill(0.0);
+///         true
+///     }
+/// }
+/// ```
+pub trait PathConstraint: Any + Send {
+    /// The number of functions.
+    fn size(&self) -> usize;
+
+    /// Their least and their greatest values at knot t, infinite where there is none. They must not change during a solve.
+    fn bounds(&self, t: usize) -> (&[f64], &[f64]);
+
+    /// gₜ(x, u) into `g`.
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]);
+
+    /// ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu); says whether it
+    /// did. It does not by default: they are central differences of [`calc`](Self::calc) then, slow, allocating, and
+    /// right to about 1e-9.
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
+        let _ = (t, x, u, gx, gu);
+        false
+    }
+}
+
+/// ∂g/∂x and ∂g/∂u of a constraint of an action by central differences.
+pub(super) fn calc_diff(
+    action: &dyn ActionModel,
+    constraint: &mut dyn PathConstraint,
+    t: usize,
+    x: &[f64],
+    u: &[f64],
+    [gx, gu]: [&mut DMatrix<f64>; 2],
+) {
+    let (ndx, size) = (action.ndx(), constraint.size());
+    let (mut moved, mut dx, mut du) = (x.to_vec(), vec![0.0; ndx], u.to_vec());
+    let mut sides = [vec![0.0; size], vec![0.0; size]];
+    for j in 0..ndx + u.len() {
+        for (g, step) in sides.iter_mut().zip([FIRST, -FIRST]) {
+            if j < ndx {
+                dx[j] = step;
+                action.integrate(x, &dx, &mut moved);
+                constraint.calc(t, &moved, u, g);
+                dx[j] = 0.0;
+            } else {
+                du[j - ndx] = u[j - ndx] + step;
+                constraint.calc(t, x, &du, g);
+                du[j - ndx] = u[j - ndx];
+            }
+        }
+        for i in 0..size {
+            let slope = (sides[0][i] - sides[1][i]) / (2.0 * FIRST);
+            if j < ndx { gx[(i, j)] = slope } else { gu[(i, j - ndx)] = slope }
+        }
+    }
+}

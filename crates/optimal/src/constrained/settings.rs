@@ -1,0 +1,70 @@
+//! The settings of the method of multipliers.
+
+use crate::error::Error;
+use serde::{Deserialize, Serialize};
+
+/// The settings of [`AugmentedLagrangian`](crate::AugmentedLagrangian).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConstraintSettings {
+    /// How far a constraint may be from its bounds, and the dynamics from holding.
+    pub tolerance: f64,
+    /// How large an entry of the gradient of the Lagrangian may be.
+    pub tolerance_dual: f64,
+    /// Inner solves after which a solve stops.
+    pub max_solves: usize,
+    /// 1/μ of the first inner solve.
+    pub penalty_start: f64,
+    /// Largest 1/μ.
+    pub penalty_max: f64,
+    /// Factor by which 1/μ rises.
+    pub penalty_factor: f64,
+}
+
+impl Default for ConstraintSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-6,
+            tolerance_dual: 1e-5,
+            max_solves: 50,
+            penalty_start: 10.0,
+            penalty_max: 1e8,
+            penalty_factor: 10.0,
+        }
+    }
+}
+
+impl ConstraintSettings {
+    /// # Errors
+    /// [`Error::Setting`] for the first field that makes no sense.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        for (name, value, good, allowed) in [
+            ("tolerance", self.tolerance, positive(self.tolerance), "above 0"),
+            ("tolerance_dual", self.tolerance_dual, positive(self.tolerance_dual), "above 0"),
+            (
+                "penalty_start",
+                self.penalty_start,
+                self.penalty_start > 1.0 && self.penalty_start.is_finite(),
+                "above 1",
+            ),
+            (
+                "penalty_max",
+                self.penalty_max,
+                self.penalty_max >= self.penalty_start && self.penalty_max.is_finite(),
+                "at least penalty_start",
+            ),
+            (
+                "penalty_factor",
+                self.penalty_factor,
+                self.penalty_factor > 1.0 && self.penalty_factor.is_finite(),
+                "above 1",
+            ),
+        ] {
+            if !good {
+                return Err(Error::Setting { name, value, allowed });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,74 @@
+//! Derivatives of an action by central differences.
+
+use super::ActionModel;
+use crate::lq::LqNode;
+
+/// The step of first differences, about ε^⅓: truncation h² meets rounding ε/h.
+pub(crate) const FIRST: f64 = 6e-6;
+
+/// The step of second differences, about ε^¼: truncation h² meets rounding ε/h².
+pub(crate) const SECOND: f64 = 1.2e-4;
+
+/// x⁺ and ℓ at (x ⊕ δx, u + δu) with z = (δx, δu).
+pub(crate) fn at<A: ActionModel + ?Sized>(
+    action: &mut A,
+    t: usize,
+    x: &[f64],
+    u: &[f64],
+    z: &[f64],
+    next: &mut [f64],
+) -> f64 {
+    let (dx, du) = z.split_at(action.ndx());
+    let mut moved = vec![0.0; x.len()];
+    action.integrate(x, dx, &mut moved);
+    let u: Vec<f64> = u.iter().zip(du).map(|(u, du)| u + du).collect();
+    action.calc(t, &moved, &u, next)
+}
+
+/// [`calc_diff`](ActionModel::calc_diff) by differences of [`calc`](ActionModel::calc).
+pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
+    // A terminal action leaves `next` alone: start from x, which is a state on any manifold.
+    let (mut centre, mut plus, mut minus) = (x.to_vec(), x.to_vec(), x.to_vec());
+    let (mut up, mut down) = (vec![0.0; ndx], vec![0.0; ndx]);
+    let mut z = vec![0.0; ndx + nu];
+    debug_assert_eq!(x.len(), nx);
+    at(action, t, x, u, &z, &mut centre);
+
+    for j in 0..ndx + nu {
+        z[j] = FIRST;
+        let above = at(action, t, x, u, &z, &mut plus);
+        z[j] = -FIRST;
+        let below = at(action, t, x, u, &z, &mut minus);
+        z[j] = 0.0;
+        // ∂x⁺/∂zⱼ = ((x⁺(h) ⊖ x⁺) − (x⁺(−h) ⊖ x⁺)) / 2h,   ∂ℓ/∂zⱼ = (ℓ(h) − ℓ(−h)) / 2h
+        action.difference(&centre, &plus, &mut up);
+        action.difference(&centre, &minus, &mut down);
+        for i in 0..ndx {
+            let slope = (up[i] - down[i]) / (2.0 * FIRST);
+            if j < ndx { node.A[(i, j)] = slope } else { node.B[(i, j - ndx)] = slope }
+        }
+        let slope = (above - below) / (2.0 * FIRST);
+        if j < ndx { node.q[j] = slope } else { node.r[j - ndx] = slope }
+    }
+
+    for i in 0..ndx + nu {
+        for j in 0..=i {
+            // ∂²ℓ/∂zᵢ∂zⱼ = (ℓ(h, h) − ℓ(h, −h) − ℓ(−h, h) + ℓ(−h, −h)) / 4h²
+            let mut sum = 0.0;
+            for (si, sj) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+                z[i] += si * SECOND;
+                z[j] += sj * SECOND;
+                sum += si * sj * at(action, t, x, u, &z, &mut plus);
+                z[i] = 0.0;
+                z[j] = 0.0;
+            }
+            let curvature = sum / (4.0 * SECOND * SECOND);
+            match (i < ndx, j < ndx) {
+                (true, _) => (node.Q[(i, j)], node.Q[(j, i)]) = (curvature, curvature),
+                (false, true) => node.S[(j, i - ndx)] = curvature,
+                (false, false) => (node.R[(i - ndx, j - ndx)], node.R[(j - ndx, i - ndx)]) = (curvature, curvature),
+            }
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! The optimal control problem: actions, horizons of them, and derivatives of what has none of its own.
+
+mod action;
+mod autodiff;
+mod horizon;
+mod lqr;
+mod multipliers;
+mod numdiff;
+mod shape;
+mod threads;
+
+pub use action::ActionModel;
+pub(crate) use action::differences;
+pub use autodiff::{AutoDiff, GenericAction};
+pub use horizon::Problem;
+pub use lqr::Lqr;
+pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Visit, leave_a_value};
+pub use numdiff::NumDiff;
+pub(crate) use shape::Shape;

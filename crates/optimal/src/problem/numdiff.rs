@@ -1,0 +1,105 @@
+//! Derivatives of any action by finite differences: the oracle against which written derivatives are tested.
+
+use super::action::ActionModel;
+use super::action::differences::{SECOND, at, calc_diff};
+use crate::lq::{Hessian, LqNode};
+
+/// An action whose derivatives, whatever it has of its own, are central differences of [`calc`](ActionModel::calc), taken
+/// with ⊕ and ⊖.
+///
+/// First derivatives are right to about 1e-9, second ones to about 1e-7 (relative to the size of cost and state). The
+/// Hessian is the exact one: an action that gives a Gauss–Newton approximation differs from it where the residuals
+/// curve. Costs 2 (ndx + nu) + 2 (ndx + nu)² calls and allocates: for tests.
+///
+/// # Examples
+/// ```
+/// use condyle_optimal::{ActionModel, LqNode, NumDiff};
+///
+/// struct Pendulum;
+/// impl ActionModel for Pendulum {
+///     fn nx(&self) -> usize { 2 }
+///     fn nu(&self) -> usize { 1 }
+///     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+///         next[0] = x[0] + 0.1 * x[1];
+///         next[1] = x[1] + 0.1 * (u[0] - x[0].sin());
+///         1.0 - x[0].cos() + 0.5 * u[0] * u[0]
+///     }
+/// }
+///
+/// let mut node = LqNode::zeros(2, 1);
+/// NumDiff(Pendulum).calc_diff(0, &[0.3, 0.0], &[0.0], &mut node);
+/// assert!((node.A[(1, 0)] + 0.1 * 0.3_f64.cos()).abs() < 1e-9);
+/// assert!((node.Q[(0, 0)] - 0.3_f64.cos()).abs() < 1e-6);
+/// ```
+#[derive(Debug, Clone)]
+pub struct NumDiff<A>(
+    /// The action that is differentiated.
+    pub A,
+);
+
+impl<A: ActionModel> ActionModel for NumDiff<A> {
+    fn nx(&self) -> usize {
+        self.0.nx()
+    }
+
+    fn ndx(&self) -> usize {
+        self.0.ndx()
+    }
+
+    fn nu(&self) -> usize {
+        self.0.nu()
+    }
+
+    fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
+        self.0.bounds(t)
+    }
+
+    fn shift(&mut self) {
+        self.0.shift();
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.0.calc(t, x, u, next)
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        calc_diff(&mut self.0, t, x, u, node);
+    }
+
+    fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
+        let (ndx, nu) = (self.ndx(), self.nu());
+        let (mut centre, mut moved) = (x.to_vec(), x.to_vec());
+        let (mut z, mut change) = (vec![0.0; ndx + nu], vec![0.0; ndx]);
+        at(&mut self.0, t, x, u, &z, &mut centre);
+        for i in 0..ndx + nu {
+            for j in 0..=i {
+                let mut sum = 0.0;
+                for (si, sj) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+                    z[i] += si * SECOND;
+                    z[j] += sj * SECOND;
+                    at(&mut self.0, t, x, u, &z, &mut moved);
+                    self.0.difference(&centre, &moved, &mut change);
+                    sum += si * sj * lambda.iter().zip(&change).map(|(l, c)| l * c).sum::<f64>();
+                    (z[i], z[j]) = (0.0, 0.0);
+                }
+                let curvature = sum / (4.0 * SECOND * SECOND);
+                match (i < ndx, j < ndx) {
+                    (true, _) => (hessian.xx[(i, j)], hessian.xx[(j, i)]) = (curvature, curvature),
+                    (false, true) => hessian.xu[(j, i - ndx)] = curvature,
+                    (false, false) => {
+                        (hessian.uu[(i - ndx, j - ndx)], hessian.uu[(j - ndx, i - ndx)]) = (curvature, curvature);
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        self.0.integrate(x, dx, out)
+    }
+
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        self.0.difference(x0, x1, out)
+    }
+}

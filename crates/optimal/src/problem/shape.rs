@@ -1,0 +1,50 @@
+//! The dimensions of a horizon.
+
+use core::ops::Range;
+use serde::{Deserialize, Serialize};
+
+/// The dimensions of a horizon: what trajectories and workspaces are allocated by.
+#[derive(Debug, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Shape {
+    pub(crate) nx: usize,
+    pub(crate) ndx: usize,
+    /// Where uₜ starts in the flat controls; N + 1 entries, the last is their length.
+    pub(crate) offsets: Vec<usize>,
+}
+
+impl Clone for Shape {
+    fn clone(&self) -> Self {
+        Self { nx: self.nx, ndx: self.ndx, offsets: self.offsets.clone() }
+    }
+
+    /// Allocates nothing for a horizon of the same length.
+    fn clone_from(&mut self, other: &Self) {
+        (self.nx, self.ndx) = (other.nx, other.ndx);
+        self.offsets.clone_from(&other.offsets);
+    }
+}
+
+impl Shape {
+    pub(crate) fn horizon(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    pub(crate) fn nu(&self, t: usize) -> usize {
+        self.offsets.get(t + 1).map_or(0, |end| end - self.offsets[t])
+    }
+
+    /// The place of xₜ in a flat trajectory.
+    pub(crate) fn x(&self, t: usize) -> Range<usize> {
+        t * self.nx..(t + 1) * self.nx
+    }
+
+    /// The place of δxₜ in a flat trajectory of changes.
+    pub(crate) fn dx(&self, t: usize) -> Range<usize> {
+        t * self.ndx..(t + 1) * self.ndx
+    }
+
+    /// The place of uₜ in flat controls; empty at the terminal knot.
+    pub(crate) fn u(&self, t: usize) -> Range<usize> {
+        self.offsets[t]..self.offsets[t] + self.nu(t)
+    }
+}
