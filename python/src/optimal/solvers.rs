@@ -125,8 +125,8 @@ fn shift<S>(
 /// problem: what is solved; the solver allocates for its shape once.
 /// settings: `method`, "fddp" (default: trials keep a part of the gaps) or "ddp" (every trial is a plain rollout);
 ///     `second_order`, whether the curvature of the dynamics counts (where the models give it; full DDP);
-///     `inverse_dynamics_form`, whether robots' knots come to the sweep as equations of inverse dynamics where that is possible
-///     (default: yes; the same steps in less time); and
+///     `inverse_dynamics_form`, whether robots' knots come to the sweep as equations of inverse dynamics where
+///     that is possible (default: yes; the same steps in less time); and
 ///     any of `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`,
 ///     `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
 ///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`,
