@@ -2222,7 +2222,7 @@ class Fddp:
     settings: any of these, by name.
         `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose trials are plain rollouts.
         `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
-        `implicit`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
+        `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
         (default: yes): the same steps in less time.
         `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
         `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as

@@ -15,7 +15,7 @@ pub(crate) type Short = <f64 as Real>::Short;
 
 /// A register of N numbers.
 pub trait Vector: Copy {
-    /// How many numbers it holds.
+    /// The number of numbers in a register.
     const N: usize;
 
     /// The first N numbers of `x`.

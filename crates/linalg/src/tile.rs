@@ -55,7 +55,7 @@ pub(crate) fn tile_rows<V: Vector, const S: usize, const COLUMNS: usize>(
     tile
 }
 
-/// What becomes of an entry of C under that of a product.
+/// The new value of an entry of C.
 #[derive(Clone, Copy)]
 pub(crate) enum Store {
     /// The product.

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// What a solve spends time on again and again.
+/// A phase of an iteration.
 #[derive(Clone, Copy)]
 pub(crate) enum Phase {
     CalcDiff,

@@ -8,7 +8,7 @@ use condyle_linalg::{View, add_scaled_product};
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sum {
     sum: f64,
-    /// What rounding took.
+    /// The part that rounding took.
     lost: f64,
 }
 

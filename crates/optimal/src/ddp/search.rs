@@ -9,8 +9,8 @@ use crate::problem::Problem;
 use condyle_linalg::{View, add_scaled_product, dot};
 use std::time::Instant;
 
-/// How many step lengths are tried side by side when the first one fails: beside dynamics in lanes each costs something of
-/// its own, and the next few mostly have a good one.
+/// The number of step lengths that are tried side by side when the first one fails: one of the next few is mostly good, and
+/// each has a cost of its own beside dynamics in lanes.
 const SECOND: usize = 4;
 
 /// The outcome of a line search: of the trial it accepted or else of the last that stayed finite.
@@ -36,7 +36,7 @@ pub(super) struct Iterate<'a> {
     pub(super) gaps: &'a [f64],
     /// The feedback and value functions.
     pub(super) knots: &'a [LqKnot],
-    /// Whether it counts as feasible.
+    /// Whether the iterate counts as feasible.
     pub(super) feasible: bool,
     pub(super) settings: &'a Settings,
     pub(super) clock: &'a mut Clock,

@@ -1,4 +1,5 @@
-//! What a segment of a horizon costs, for every state at its start and whatever comes after its end.
+//! Conditional value functions: the cost of a segment of a horizon, for every state at its start and whatever comes after
+//! its end.
 //!
 //! Let x be the state at the first knot of a segment and z that after its last one. The least cost of the segment plus
 //! λᵀz, with a multiplier λ as a parameter, is quadratic in both,
@@ -43,6 +44,7 @@ pub(crate) struct Value {
 }
 
 impl Value {
+    /// Zeros for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         Self { P: vec![0.0; (n + SLACK) * n], p: vec![0.0; n] }
     }
@@ -53,23 +55,26 @@ impl Value {
     }
 }
 
-/// How the end of a segment depends on its start and on the multiplier; beside P and p, which are in its [`Step`].
+/// The part of a conditional value function that depends on the multiplier; P and p are in the [`Step`] of the segment.
 /// Matrices have slack rows.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentValue {
+    /// Θ.
     Theta: Vec<f64>,
+    /// θ.
     theta: Vec<f64>,
-    /// Its lower triangle.
+    /// The lower triangle of C.
     C: Vec<f64>,
 }
 
 impl SegmentValue {
+    /// Zeros for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         let square = || vec![0.0; (n + SLACK) * n];
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
     }
 
-    /// P, p, Θ, θ and C of a segment from its nodes. Whether all Quu were positive definite.
+    /// Finds P, p, Θ, θ and C of a segment from its nodes; says whether all Quu were positive definite.
     pub(crate) fn run(&mut self, step: &mut Step, nodes: &[LqNode], regularisation: f64) -> bool {
         let (n, ld) = (self.theta.len(), self.theta.len() + SLACK);
         let work = &mut step.work;
@@ -82,7 +87,7 @@ impl SegmentValue {
         nodes.iter().rev().all(|node| self.step(step, node, regularisation))
     }
 
-    /// One knot.
+    /// The step of one knot; says whether Quu was positive definite.
     fn step(&mut self, step: &mut Step, node: &LqNode, regularisation: f64) -> bool {
         let (n, m) = (node.ndx(), node.nu());
         let (ldt, last) = (n + SLACK, m + n);
@@ -115,8 +120,8 @@ impl SegmentValue {
     }
 }
 
-/// Scratch for the value function at the start of a segment, given that at its end. Matrices have slack rows, and the
-/// stride n + 1 + SLACK.
+/// The link from the value function at the end of a segment to that at its start, with its scratch. Matrices have slack
+/// rows, and the stride n + 1 + SLACK.
 #[derive(Debug, Clone)]
 pub(crate) struct Link {
     /// C, both triangles.
@@ -139,8 +144,8 @@ impl Link {
         Self { C: square(), L: square(), upper: square(), CL: square(), rows: square(), H }
     }
 
-    /// L of P₁ = L Lᵀ, and its transpose. Where states cost nothing P₁ may be singular, and then rounding decides whether
-    /// a pivot is positive: a second try has a little more on the diagonal.
+    /// Finds L of P₁ = L Lᵀ, and its transpose; says whether there is one. Where states cost nothing P₁ may be singular, and
+    /// then rounding decides whether a pivot is positive: a second try has a little more on the diagonal.
     fn factorise(&mut self, P: &[f64], n: usize) -> bool {
         let (ld, ldp) = (n + 1 + SLACK, n + SLACK);
         let mut largest = 0.0_f64;
@@ -163,8 +168,8 @@ impl Link {
         false
     }
 
-    /// The value function `start` at the start of a segment with P, p in `step`, from the one at its `end`. Whether
-    /// that one is convex.
+    /// Finds the value function `start` at the start of a segment with P, p in `step`, from the one at its `end`; says
+    /// whether that one is convex.
     pub(crate) fn run(&mut self, step: &Step, segment: &SegmentValue, end: &Value, start: &mut Value) -> bool {
         let (n, work) = (end.p.len(), &step.work);
         let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);

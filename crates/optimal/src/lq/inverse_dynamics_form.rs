@@ -2,13 +2,13 @@
 
 use condyle_linalg::{SLACK, SparseRows};
 
-/// A knot's rows over (w, δv, δq): see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the part of `Q` for
-/// δq are those of the node; of its `A`, `B`, `S` and `R` nothing is used.
+/// The rows over (w, δv, δq) of a knot; see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the part of
+/// `Q` for δq are those of the node; of its `A`, `B`, `S` and `R` nothing is used.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct InverseDynamicsForm {
-    /// Whether the solver can use this form.
+    /// Whether the solver can use the equations.
     pub(crate) wanted: bool,
-    /// Whether the action wrote it.
+    /// Whether the action wrote the equations, in place of A and B.
     pub(crate) active: bool,
     /// The distance from a row to the next, in all rows.
     pub(crate) stride: usize,
@@ -41,7 +41,7 @@ impl InverseDynamicsForm {
         }
     }
 
-    /// U and D, for as long as G is written.
+    /// Takes U and D out, for as long as G is written.
     pub(crate) fn lend(&mut self) -> Self {
         let Self { wanted, active, stride, .. } = *self;
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
@@ -49,7 +49,7 @@ impl InverseDynamicsForm {
         core::mem::replace(self, Self { wanted, active, stride, costs, slopes, diagonal, ..Self::default() })
     }
 
-    /// Ends what `lend` began.
+    /// Puts back what [`lend`](Self::lend) took out.
     pub(crate) fn take_back(&mut self, lent: Self) {
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
         let diagonal = core::mem::take(&mut self.diagonal);

@@ -1,4 +1,4 @@
-//! The linear-quadratic problem: all that a solver sees of a horizon.
+//! The knots of a linear-quadratic problem, and what a sweep finds at them.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use super::inverse_dynamics_form::InverseDynamicsForm;
@@ -41,7 +41,7 @@ pub struct LqNode {
     pub upper: DVector<f64>,
     /// What is known of the form of A and B.
     pub structure: Structure,
-    /// What stands for A, B, S, R and part of Q where the solver and the action can both use it.
+    /// The equations of inverse dynamics, which stand for A, B, S, R and part of Q where solver and action can use them.
     pub(crate) inverse_dynamics: InverseDynamicsForm,
 }
 
@@ -104,7 +104,7 @@ impl LqNode {
     }
 }
 
-/// What the sweep finds at one knot: the feedback δu = k + K δx, and the value function
+/// The result of a sweep at one knot: the feedback δu = k + K δx, and the value function
 /// V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx + const of the rest of the horizon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LqKnot {

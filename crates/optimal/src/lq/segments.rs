@@ -1,8 +1,8 @@
 //! The backward sweep in several segments of the horizon at the same time.
 //!
-//! For S at a time, the horizon of N knots is cut into S + 1 segments. A step that finds what a segment costs whatever
-//! comes after it ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as one of a sweep, so the last segment
-//! is by half longer than the others, and of a sweep's steps it takes the time of
+//! To work on S segments at a time, the horizon of N knots is cut into S + 1. A step of a conditional value function
+//! ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as a step of a sweep, so the last segment is
+//! longer than the others by half. The time, counted in steps of a sweep, is
 //!
 //! ```text
 //! segment            0      1 … S − 1     S
@@ -11,12 +11,12 @@
 //! at the same time   sweep  sweep                       N / (S + 1½)
 //! ```
 //!
-//! Cuts and operations depend on S and not on the threads, which share the segments among them: results are the same to
-//! the last bit for any number.
+//! The cuts and the operations depend on S and not on the number of threads, which share the segments among them: results
+//! are the same to the last bit for any number.
 //!
-//! A link loses digits where C and the value function are large: where controls cost next to nothing. So in the end the
-//! value function with which a segment was swept is held against the one that the sweep of the next segment has found at
-//! that knot. If they differ by more than rounding, or anything failed before, all is swept again as one.
+//! A link loses digits where C and the value function are large, which is where controls cost next to nothing. So at the end
+//! the value function with which a segment was swept is compared with the one that the sweep of the next segment found at
+//! the same knot. If they differ by more than rounding, or if anything failed before, the horizon is swept again as one.
 #![allow(non_snake_case)] // the names of the literature
 
 use super::conditional_value::{Link, SegmentValue, Value};
@@ -25,33 +25,37 @@ use super::step::{Sizes, Step, SweepError};
 use condyle_linalg::{SLACK, max_abs};
 use core::ops::Range;
 
-/// How far, relative to the largest entry, the value function with which a segment was swept may be from the one that is
-/// found in the next: what the sweep is good to anyway, and a thousand times what is met on robots.
+/// The largest difference, relative to the largest entry, between the value function with which a segment was swept and the
+/// one that was found in the next segment: the accuracy of a sweep, and a thousand times what robots show.
 const CONSISTENT: f64 = 1e-9;
 
 /// The segments of a horizon.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
-    /// At least three.
+    /// All segments, in the order of the horizon; at least three.
     all: Vec<Segment>,
     link: Link,
 }
 
+/// A segment, with its workspace.
 #[derive(Debug, Clone)]
 struct Segment {
+    /// The knots of the segment.
     knots: Range<usize>,
     step: Step,
+    /// The conditional value function, together with the P and p of the step.
     value: SegmentValue,
-    /// The value function at the knot behind it.
+    /// The value function at the knot after the segment.
     end: Value,
+    /// The outcome of the sweep.
     result: Result<(), SweepError>,
-    /// Whether its conditional value function was found.
+    /// Whether the conditional value function was found.
     good: bool,
 }
 
 impl Segments {
-    /// `at_once` segments at a time for a horizon of `horizon` knots of such sizes; `None` if that is one, or the horizon too
-    /// short for two.
+    /// The segments for working on `at_once` of them at a time, in a horizon of `horizon` knots of such sizes; `None` if that
+    /// is one, or the horizon too short for two.
     pub(super) fn new(at_once: usize, horizon: usize, sizes: Sizes) -> Option<Self> {
         let at_once = at_once.min(horizon.saturating_sub(2));
         if at_once < 2 {
@@ -69,8 +73,8 @@ impl Segments {
         Some(Self { all: (0..=at_once).map(segment).collect(), link: Link::new(sizes.n) })
     }
 
-    /// Whether the step at a node is one that segments have too: not where controls are bounded, since then the value
-    /// function is not quadratic in a multiplier.
+    /// Whether a segment may contain a node: not where controls are bounded, since then the value function is not quadratic
+    /// in a multiplier.
     fn serve(node: &LqNode) -> bool {
         !node.is_bounded()
     }
@@ -111,7 +115,7 @@ impl Segments {
         self.all.windows(2).all(consistent).then_some(Ok(()))
     }
 
-    /// The value function at the end of each segment but the last. Whether it was found.
+    /// Finds the value function at the end of each segment but the last; says whether it did.
     fn link(&mut self) -> bool {
         let Self { all, link } = self;
         let last = all.len() - 1;
@@ -130,7 +134,7 @@ impl Segments {
 }
 
 impl Value {
-    /// Whether it is Vxx, Vx but for rounding; false for a NaN.
+    /// Whether P, p equal Vxx, Vx but for rounding; false for a NaN.
     fn is_near(&self, Vxx: &[f64], Vx: &[f64]) -> bool {
         let n = Vx.len();
         let near = |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= CONSISTENT * scale);
@@ -140,32 +144,36 @@ impl Value {
     }
 }
 
+/// The pass that a task makes over a segment.
 #[derive(Clone, Copy)]
 enum Pass {
-    /// Of the last segment the sweep, of others what they cost whatever comes.
+    /// The sweep of the last segment, and the conditional value function of others.
     Begin,
-    /// The sweep, from the value function at the end.
+    /// The sweep, from the value function at the end of the segment.
     Finish,
 }
 
+/// A task that is done for each of some segments.
 #[derive(Clone, Copy)]
 struct SegmentTask<'a> {
     pass: Pass,
+    /// The nodes of the whole horizon.
     nodes: &'a [LqNode],
     regularisation: f64,
+    /// Whether segments are shared among threads.
     parallel: bool,
 }
 
 impl SegmentTask<'_> {
-    /// Over some of the segments, given all knots.
+    /// Does the task for some of the segments, given all knots.
     fn over(self, segments: &mut [Segment], knots: &mut [LqKnot]) {
         self.run(segments, &mut knots[segments[0].knots.start..]);
     }
 
-    /// Over consecutive segments; `knots` begin with the first one's.
+    /// Does the task for consecutive segments; `knots` begin with those of the first one.
     fn run(self, segments: &mut [Segment], knots: &mut [LqKnot]) {
         if let [segment] = segments {
-            return self.over_one(segment, knots);
+            return self.run_one(segment, knots);
         }
         let (some, others) = segments.split_at_mut(segments.len() / 2);
         let (first, second) = knots.split_at_mut(others[0].knots.start - some[0].knots.start);
@@ -177,8 +185,8 @@ impl SegmentTask<'_> {
         }
     }
 
-    /// Over one segment.
-    fn over_one(self, segment: &mut Segment, knots: &mut [LqKnot]) {
+    /// Does the task for one segment, given its knots.
+    fn run_one(self, segment: &mut Segment, knots: &mut [LqKnot]) {
         let Self { pass, nodes, regularisation, .. } = self;
         let Segment { knots: range, step, value, end, result, good } = segment;
         let (first, own) = (range.start, &nodes[range.clone()]);

@@ -29,13 +29,16 @@ pub enum SweepError {
 /// The largest numbers of states and controls of some nodes, and what they need for inverse dynamics.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
+    /// The number of states.
     pub(super) n: usize,
+    /// The largest number of controls.
     pub(super) m: usize,
+    /// See [`InverseDynamics::room`].
     inverse_dynamics: [usize; 3],
 }
 
 impl Sizes {
-    /// Those of some nodes.
+    /// The sizes of some nodes.
     pub(super) fn of(nodes: &[LqNode]) -> Self {
         Self {
             n: nodes.last().map_or(0, LqNode::ndx),
@@ -49,7 +52,7 @@ impl Sizes {
 #[derive(Debug, Clone)]
 pub(super) struct Step {
     pub(super) work: Workspace,
-    /// Whether knots shall have their Vxx.
+    /// Whether Vxx is written to the knots.
     pub(super) keep: bool,
     forms: Forms,
     controls: Controls,
@@ -73,7 +76,7 @@ impl Step {
         }
     }
 
-    /// The sweep of the end of a horizon, of which the first node is knot `first` and the last the terminal one.
+    /// Sweeps the end of a horizon, of which the first node is knot `first` and the last the terminal one.
     pub(super) fn run(
         &mut self,
         first: usize,
@@ -88,7 +91,7 @@ impl Step {
         self.back(first, &nodes[..last], knots, regularisation, curvature)
     }
 
-    /// Steps at `nodes`, of which the first is knot `first`, from P, p of the knot after them.
+    /// Makes the steps at `nodes`, of which the first is knot `first`, from P, p of the knot after them.
     pub(super) fn back(
         &mut self,
         first: usize,
@@ -105,7 +108,7 @@ impl Step {
         Ok(())
     }
 
-    /// One step: P, p of knot t + 1 become those of knot t, and the gains of knot t are written.
+    /// Makes one step: P, p of knot t + 1 become those of knot t, and the gains of knot t are written.
     fn step(
         &mut self,
         t: usize,
@@ -128,8 +131,8 @@ impl Step {
         Ok(())
     }
 
-    /// H of a node of which no gains are wanted, with Θ times the map to δx⁺ below it; the workspace that holds it, and how
-    /// the states are turned there.
+    /// Writes H of a node, and below it Θ times the map to δx⁺. Returns the workspace that holds it, and how the states are
+    /// turned there.
     pub(super) fn write_with_rows_below(
         &mut self,
         node: &LqNode,
@@ -149,7 +152,7 @@ impl Step {
         (work, form.turn(node.ndx()))
     }
 
-    /// Vxx += ϱ 1, and out to knot t with Vx.
+    /// Adds ϱ 1 to Vxx, and writes Vx and Vxx to knot t.
     fn finish(&mut self, t: usize, knot: &mut LqKnot, regularisation: f64) -> Result<(), SweepError> {
         match self.work.finish_value(knot, regularisation, self.keep) {
             true => Ok(()),

@@ -1,4 +1,4 @@
-//! What a sweep may know of a knot's dynamics beforehand.
+//! The form of a knot's A and B, which a sweep may know beforehand.
 #![allow(non_snake_case)] // A, B, T, E
 
 use nalgebra::DMatrix;
@@ -9,7 +9,7 @@ pub(crate) const LARGEST_BLOCK: usize = 6;
 
 /// The form of the A and B of an [`LqNode`](crate::LqNode).
 ///
-/// Nothing is known of them, unless the action says so each time that it differentiates. With x = (q, v), nv numbers each
+/// Nothing is known of them unless the action says what, each time that it differentiates. With x = (q, v), nv numbers each
 /// for a change of q and of v, and the next state by semi-implicit Euler from an acceleration a(x, u),
 ///
 /// ```text
@@ -43,7 +43,7 @@ pub struct Structure {
 /// The blocks of T and E of one joint; see [`Structure`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct EulerBlock {
-    /// Its first row and column.
+    /// The first row and column of the block.
     pub(crate) start: usize,
     /// ∂(q ⊕ δ)/∂q.
     pub T: DMatrix<f64>,
@@ -52,12 +52,12 @@ pub struct EulerBlock {
 }
 
 impl Structure {
-    /// Nothing is known. Keeps the memory of blocks.
+    /// Sets that nothing is known of A and B. Keeps the memory of blocks.
     pub fn set_dense(&mut self) {
         self.dt = None;
     }
 
-    /// The form of semi-implicit Euler steps of `dt` seconds, in which T and E are the identity but for a block over each
+    /// Sets the form of semi-implicit Euler steps of `dt` seconds, in which T and E are the identity but for a block over each
     /// range of at most six rows and columns. Returns the blocks, to be written. Allocates them at the first call.
     pub fn set_euler(&mut self, dt: f64, ranges: &[Range<usize>]) -> &mut [EulerBlock] {
         self.dt = Some(dt);
@@ -79,7 +79,7 @@ impl Structure {
 }
 
 impl EulerBlock {
-    /// Its rows and columns.
+    /// The rows and columns of the block.
     pub(crate) fn range(&self) -> Range<usize> {
         self.start..self.start + self.T.nrows()
     }

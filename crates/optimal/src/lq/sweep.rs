@@ -32,8 +32,8 @@ use crate::error::assert_length;
 /// ```
 ///
 /// The knots of robots that [`Fddp`](crate::Fddp) sweeps come without A and B, as the equations of inverse dynamics, in
-/// which accelerations and contact forces are eliminated in place of the controls ([`inverse_dynamics_form`](crate::Settings::inverse_dynamics_form)):
-/// what comes out is the same.
+/// which accelerations and contact forces are eliminated in place of the controls; the results are the same. See
+/// [`Settings::inverse_dynamics_form`](crate::Settings::inverse_dynamics_form).
 ///
 /// Where δu is bounded, k solves the quadratic program of its knot by projected Newton steps (Tassa, Mansard, Todorov,
 /// ICRA 2014), and the elimination is that of the controls that are not at a bound. The steps start from minus the k of
@@ -60,7 +60,7 @@ use crate::error::assert_length;
 pub struct Sweep {
     knots: Vec<LqKnot>,
     step: Step,
-    /// The number of segments that were asked for; with their workspaces, unless it is one.
+    /// The number of segments that were asked for, and their workspaces, unless it is one.
     at_once: usize,
     segments: Option<Segments>,
     sizes: Sizes,
@@ -120,7 +120,7 @@ impl Sweep {
         }
     }
 
-    /// Whether the next runs shall write Vxx to the knots, for those that look at it.
+    /// Sets whether the next runs write Vxx to the knots.
     pub(crate) fn keep_values(&mut self, keep: bool) {
         self.step.keep = keep;
     }

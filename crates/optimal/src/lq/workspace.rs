@@ -1,4 +1,4 @@
-//! What a step of the sweep reads and writes beside its knot.
+//! The workspace of a step of the sweep.
 #![allow(non_snake_case)] // the names of the literature: P, F, W, H
 
 use super::node::{DIVERGED, LqKnot, LqNode};
@@ -18,7 +18,7 @@ pub(crate) struct Workspace {
     pub(crate) W: Vec<f64>,
     /// The quadratic form: [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ], its lower triangle, with rows below it that a segment makes use of.
     pub(crate) H: Vec<f64>,
-    /// The number of rows below.
+    /// The number of rows below the quadratic form.
     below: usize,
 }
 
@@ -77,7 +77,7 @@ impl Workspace {
         }
     }
 
-    /// P += ϱ 1, and P, p out to the knot; P only if it is to be kept. Whether they are finite and have not diverged.
+    /// Adds ϱ 1 to P, and writes p, and P if it is to be kept, to the knot; says whether they are finite and have not diverged.
     pub(crate) fn finish_value(&mut self, knot: &mut LqKnot, regularisation: f64, keep: bool) -> bool {
         let Self { P, p, .. } = self;
         let (n, stride) = (p.len(), p.len() + SLACK);

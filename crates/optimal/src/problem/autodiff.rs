@@ -111,7 +111,7 @@ impl<A: GenericAction> AutoDiff<A> {
         }
     }
 
-    /// What is differentiated, to change it.
+    /// The action that is differentiated, to change it.
     pub fn action_mut(&mut self) -> &mut A {
         &mut self.action
     }

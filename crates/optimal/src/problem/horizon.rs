@@ -100,7 +100,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Where the controls lie and which knots make a run, from the stages.
+    /// Finds from the stages where the controls lie and which knots make a run.
     fn arrange(&mut self) {
         let Self { models, stages, shape: Shape { offsets, .. }, runs, .. } = self;
         runs.clear();
@@ -136,7 +136,7 @@ impl Problem {
         Ok(())
     }
 
-    /// For each knot the index of its model.
+    /// The index of the model of each knot.
     pub fn stages(&self) -> &[usize] {
         &self.stages
     }

@@ -1,4 +1,4 @@
-//! The multipliers of an action's constraints, and what its cost takes from them.
+//! The multipliers of an action's constraints, and their terms of its cost.
 
 use crate::error::Error;
 
@@ -40,14 +40,14 @@ impl Clone for Multipliers {
 
 /// The constraints of a knot, and their multipliers.
 pub struct Bounded<'a> {
-    /// How many there are.
+    /// The number of constraints.
     pub(crate) count: usize,
     pub(crate) lower: &'a [f64],
     pub(crate) upper: &'a [f64],
     pub(crate) multipliers: &'a mut Multipliers,
 }
 
-/// What is done with the constraints of a knot.
+/// A function that is called with the constraints of a knot.
 pub(crate) type Visit<'a> = dyn FnMut(Bounded<'_>) + 'a;
 
 impl Bounded<'_> {

@@ -4,10 +4,10 @@ use super::action::ActionModel;
 use crate::lq::LqNode;
 use core::ops::Range;
 
-/// The copies, and who computes what.
+/// Copies of actions for threads, and which thread computes which knots.
 #[derive(Default)]
 pub(crate) struct Copies {
-    /// For each thread beside the first one, for each model its copy.
+    /// The copy of each model, for each thread beside the first one.
     of: Vec<Vec<Option<Box<dyn ActionModel>>>>,
     /// Whether a model has copies.
     copied: Vec<bool>,
@@ -120,7 +120,7 @@ impl Copies {
     }
 }
 
-/// What all threads read of the knots before the terminal one.
+/// The knots before the terminal one, as all threads read them.
 #[derive(Clone, Copy)]
 pub(super) struct Knots<'a> {
     /// Runs of knots with one model: (model, knots).

@@ -74,8 +74,8 @@ impl Form for Euler {
     }
 }
 
-/// What the step from a velocity to a position makes of the value function; column-major with slack rows, stride
-/// nv + SLACK.
+/// The value function of the next state as a function of velocities and positions: y is the next velocity. Matrices are
+/// column-major with slack rows and the stride nv + SLACK.
 #[derive(Debug, Clone)]
 pub(super) struct Steps {
     /// Nᵀ.
@@ -95,7 +95,7 @@ impl Steps {
         Self { N: matrix(n / 2), Pi: matrix(n / 2), py: vec![0.0; n / 2], PB: matrix(n) }
     }
 
-    /// Π, N and Δt Eᵀp_q + p_v: how the value of the next state depends on its velocity.
+    /// Writes Π, N and Δt Eᵀp_q + p_v: how the value of the next state depends on its velocity.
     pub(super) fn write(&mut self, work: &Workspace, node: &LqNode) {
         let (dt, blocks) = steps_of(node);
         let n = node.ndx();

@@ -16,7 +16,7 @@
 //! H = [Π and N on w, δv, δq] + Uᵀ (R + ϱ 1) U + DᵀZ + ZᵀD + Gᵀ a″ G
 //! ```
 //!
-//! where the rows G are those of residuals that look at more than δq. All rows have zeros where the tree of the robot
+//! where the rows G are the gradients of residuals that depend on more than δq. All rows have zeros where the tree of the robot
 //! has none, which are left out in blocks. What follows is the elimination of w. P, p, K = U_x + U_w K_w and k = U_w k_w are
 //! those of the explicit form, since for any δx the map from w to δu is invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
@@ -48,7 +48,7 @@ pub(crate) struct InverseDynamics {
 }
 
 impl InverseDynamics {
-    /// What the rows of some nodes need at most, whichever are active: numbers in rows, products, dependent coordinates.
+    /// The most that the rows of some nodes need: numbers in rows, products, dependent coordinates.
     pub(crate) fn room(nodes: &[LqNode]) -> [usize; 3] {
         let rooms = nodes.iter().map(|LqNode { inverse_dynamics: form, .. }| {
             let [efforts, steps, costs] = [&form.efforts, &form.steps, &form.costs].map(|rows| rows.masks.capacity());
@@ -57,7 +57,7 @@ impl InverseDynamics {
         rooms.fold([0; 3], |a, b| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])])
     }
 
-    /// For n states and at most m controls, with such room.
+    /// Scratch for n states and at most m controls, with such room.
     pub(super) fn new([numbers, products, dependent]: [usize; 3], n: usize, m: usize) -> Self {
         Self {
             steps: Steps::new(n),

@@ -22,7 +22,7 @@ const EULER_FROM: usize = 16;
 
 /// A form of a knot. The matrices that it reads and writes are those of the [`Workspace`].
 pub(super) trait Form {
-    /// How the n states are turned in H: the i-th there is the (i + turn)-th of x, counted around.
+    /// The turn of the n states in H: state i there is state i + turn of x, counted around.
     fn turn(&self, n: usize) -> usize;
 
     /// Writes H, with ϱ in it, from the node, from P and from p at the predicted state.
@@ -31,8 +31,8 @@ pub(super) trait Form {
     /// After `write`: writes Θ times the map from the unknowns and δx to δx⁺ below H, for a Θ of n rows (stride n + SLACK).
     fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]);
 
-    /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns how many were eliminated; they are the
-    /// controls, unless a form says otherwise, of which those stay that lie at a bound.
+    /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns how many were eliminated. Unless a form has
+    /// others, they are the controls that are not at a bound.
     ///
     /// # Errors
     /// The row and the pivot that is not positive.
@@ -79,13 +79,13 @@ impl Forms {
     }
 }
 
-/// Asks for the curvature of a knot's dynamics; see [`Sweep::run_with`](crate::Sweep::run_with).
+/// The question for the curvature of a knot's dynamics; see [`Sweep::run_with`](crate::Sweep::run_with).
 pub(super) struct Curvature<'a> {
     /// The knot.
     pub(super) knot: usize,
     /// Writes the second derivatives of λᵀφ at a knot, and says whether it did.
     pub(super) ask: &'a mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
-    /// Where they are written, a place for each number of controls.
+    /// The places for these derivatives, one for each number of controls.
     pub(super) hessians: &'a mut [Hessian],
 }
 

@@ -77,7 +77,8 @@ pub trait ActionModel: Any + Send {
         1
     }
 
-    /// For actions that can write their knots as equations of inverse dynamics: the most dependent coordinates and rows of costs.
+    /// The most dependent coordinates and the most rows of costs, for actions that can write their knots as equations of
+    /// inverse dynamics.
     #[doc(hidden)]
     fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         None
