@@ -4,7 +4,7 @@
 mod common;
 
 use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
-use condyle_dynamics::{Constraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
+use condyle_dynamics::{ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
     Integrator, Limit, Residual,
@@ -170,8 +170,8 @@ fn a_gait_allocates_nothing() {
     let mut q = neutral(&model);
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
     let x0 = [q, vec![0.0; 18]].concat();
-    let foot = |name: &str| Constraint::point(model.frame(name).unwrap());
-    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, Constraint { kd: 20.0, ..foot(name) }));
+    let foot = |name: &str| ContactConstraint::point(model.frame(name).unwrap());
+    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, ContactConstraint { kd: 20.0, ..foot(name) }));
     let cone = FrictionCone::new(0.7);
     let (lower, upper) = cone.bounds();
     let contact = || "LF_foot".to_owned();
@@ -274,7 +274,7 @@ fn active_rows_allocate_nothing() {
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
     let x0 = [q, vec![0.0; 18]].concat();
     let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
-    let contacts = feet.map(|name| Contact::new(name, Constraint::point(model.frame(name).unwrap())));
+    let contacts = feet.map(|name| Contact::new(name, ContactConstraint::point(model.frame(name).unwrap())));
     let cone = FrictionCone::new(0.7);
     let (lower, upper) = cone.bounds();
     let limited = |foot: &str| {

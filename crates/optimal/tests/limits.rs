@@ -2,8 +2,8 @@
 #![allow(non_snake_case)] // G
 
 use condyle_dynamics::{
-    Constraint as Held, ConstraintSet, Data, Inertia, Joint, Model, ModelBuilder, ReferenceFrame, Se3, Sym3, Vec3,
-    WORLD, constrained_dynamics, forward_kinematics, neutral, robots,
+    ConstraintSet, ContactConstraint as Held, Data, Inertia, Joint, Model, ModelBuilder, ReferenceFrame, Se3, Sym3,
+    Vec3, WORLD, constrained_dynamics, forward_kinematics, neutral, robots,
 };
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, Integrated, Integrator,

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{random, random_matrix, random_node};
-use condyle_dynamics::{Constraint, Vec3, integrate, neutral, robots};
+use condyle_dynamics::{ContactConstraint, Vec3, integrate, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, ImpulseDynamics, Integrator, Residual,
 };
@@ -19,8 +19,8 @@ fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     let mut q = neutral(&model);
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
     let x0 = [q, vec![0.0; 18]].concat();
-    let foot = |name: &str| Constraint::point(model.frame(name).unwrap());
-    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, Constraint { kd: 20.0, ..foot(name) }));
+    let foot = |name: &str| ContactConstraint::point(model.frame(name).unwrap());
+    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, ContactConstraint { kd: 20.0, ..foot(name) }));
     let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
     let standing = || {
         let com = Residual::CenterOfMass { target: Vec3::new(0.0, 0.0, 0.4) };

@@ -29,13 +29,13 @@ pub struct Contacts(pub(super) RobotDynamics);
 /// These are Crocoddyl's rules (`DifferentialActionModelContactFwdDynamics`).
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, robots};
+/// use condyle_dynamics::{ContactConstraint, robots};
 /// use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FrictionCone, Residual};
 /// use std::sync::Arc;
 /// let quadruped = Arc::new(robots::quadruped());
 /// let contacts = ["LF_foot", "RH_foot"].map(|foot| {
 ///     let frame = quadruped.frame(foot).unwrap();
-///     Contact::new(foot, Constraint { kd: 50.0, ..Constraint::point(frame) })
+///     Contact::new(foot, ContactConstraint { kd: 50.0, ..ContactConstraint::point(frame) })
 /// });
 /// let cone = FrictionCone::new(0.7);
 /// let (lower, upper) = cone.bounds();
