@@ -6,8 +6,8 @@ mod common;
 use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
 use condyle_dynamics::{ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
-    Integrator, Limit, Residual,
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, FrictionCone,
+    ImpulseDynamics, Integrator, Limit, Residual,
 };
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Problem, Status, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -203,7 +203,7 @@ fn a_gait_allocates_nothing() {
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, pushing).unwrap();
     let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, landing).unwrap();
     let drives = Actuation::joints(&model);
-    let flight = Free::new(model.clone(), drives, driven()).unwrap();
+    let flight = FreeAcceleration::new(model.clone(), drives, driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
     let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 24]].concat();

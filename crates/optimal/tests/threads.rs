@@ -6,7 +6,8 @@ mod common;
 use common::{random, random_matrix, random_node};
 use condyle_dynamics::{ContactConstraint, Vec3, integrate, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, ImpulseDynamics, Integrator, Residual,
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, ImpulseDynamics, Integrator,
+    Residual,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, Lqr, NumDiff, Problem, Solution};
 use rand::RngExt;
@@ -33,7 +34,7 @@ fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, driven()).unwrap();
     let us = stance.quasi_static(&x0);
     let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, standing()).unwrap();
-    let flight = Free::new(model.clone(), Actuation::joints(&model), driven()).unwrap();
+    let flight = FreeAcceleration::new(model.clone(), Actuation::joints(&model), driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
     let flying = FreeDynamics::running(model.clone(), 0.01, driven()).unwrap();
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();

@@ -3,7 +3,8 @@
 use super::{DT, contact_costs, largest_difference, random, random_state};
 use condyle_dynamics::{ContactConstraint, Model, ReferenceFrame, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, Contacts, Cost, Free, FreeDynamics, Integrated, Integrator, Residual,
+    Activation, Actuation, Contact, ContactAcceleration, Cost, FreeAcceleration, FreeDynamics, Integrated, Integrator,
+    Residual,
 };
 use condyle_optimal::{ActionModel, Fddp, Problem};
 use rand::{SeedableRng, rngs::StdRng};
@@ -100,7 +101,8 @@ fn implicit_knots_have_the_gains_of_explicit_ones() {
     for (model, contacts) in stances {
         for damping in [0.0, 1e-2] {
             let costs = costs(model, &contacts, &mut rng);
-            let inner = Contacts::new(model.clone(), Actuation::joints(model), &contacts, damping, costs).unwrap();
+            let inner =
+                ContactAcceleration::new(model.clone(), Actuation::joints(model), &contacts, damping, costs).unwrap();
             let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
             let what = format!("{} on {}, damping {damping}", model.name(), contacts.len());
             compare(&what, model, Box::new(action), |rng| random_state(model, rng));
@@ -116,7 +118,7 @@ fn implicit_knots_stand_on_straight_legs() {
     let contacts = contacts(&humanoid, ContactConstraint::rigid, &["left_foot", "right_foot"]);
     let costs = costs(&humanoid, &contacts, &mut rng);
     let action = Integrated::new(
-        Contacts::new(humanoid.clone(), Actuation::joints(&humanoid), &contacts, 0.0, costs).unwrap(),
+        ContactAcceleration::new(humanoid.clone(), Actuation::joints(&humanoid), &contacts, 0.0, costs).unwrap(),
         Integrator::SemiImplicitEuler,
         DT,
     );
@@ -134,7 +136,7 @@ fn implicit_knots_that_touch_nothing_have_the_gains_of_explicit_ones() {
         let mut costs = contact_costs(&model, &[there.clone(), there], nu, &mut rng);
         costs.retain(|cost| !["force", "cone"].contains(&cost.name.as_str()));
         costs.push(Cost::new("u", 1.0, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic));
-        let inner = Free::new(model.clone(), Actuation::joints(&model), costs).unwrap();
+        let inner = FreeAcceleration::new(model.clone(), Actuation::joints(&model), costs).unwrap();
         let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
         compare(model.name(), &model, Box::new(action), |rng| random_state(&model, rng));
     }

@@ -10,8 +10,8 @@ use condyle_dynamics::{
     forward_velocities, integrate, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Contacts, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
-    Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FreeAcceleration, FreeDynamics,
+    FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;
@@ -182,7 +182,7 @@ fn derivatives_with_damping_and_other_drives_are_those_of_the_action() {
     let S = DMatrix::from_fn(18, 4, |_, _| rng.random::<f64>() - 0.5);
     let drives = Actuation::matrix(&model, S).unwrap();
     let costs = contact_costs(&model, &contacts, 4, &mut rng);
-    let inner = Contacts::new(model.clone(), drives, &contacts, 1e-3, costs).unwrap();
+    let inner = ContactAcceleration::new(model.clone(), drives, &contacts, 1e-3, costs).unwrap();
     let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
     check_derivatives("damped", action, &model, 5.0, &mut rng);
 }
@@ -279,7 +279,7 @@ fn derivatives_of_runge_kutta_are_those_of_the_action() {
                 ),
                 Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
             ];
-            let inner = Free::new(model.clone(), drives, costs).unwrap();
+            let inner = FreeAcceleration::new(model.clone(), drives, costs).unwrap();
             let action = FreeDynamics::new(inner, method, DT).unwrap();
             check_derivatives(&format!("{method:?} of {}", model.name()), action, &model, 0.3, &mut rng);
         }
@@ -293,7 +293,7 @@ fn runge_kutta_methods_have_their_order() {
     let model = Arc::new(robots::arm7());
     let (x, u) = (random_state(&model, &mut rng), random(7, 1.0, &mut rng));
     let end = |method, dt: f64, steps: usize| {
-        let inner = Free::new(model.clone(), Actuation::joints(&model), vec![]).unwrap();
+        let inner = FreeAcceleration::new(model.clone(), Actuation::joints(&model), vec![]).unwrap();
         let mut action = FreeDynamics::new(inner, method, dt).unwrap();
         let (mut x, mut next) = (x.clone(), x.clone());
         for _ in 0..steps {
@@ -448,7 +448,7 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
     let costs = || vec![Cost::new("rest", 1.0, Residual::State { reference: x0.clone() }, Activation::Quadratic)];
     let effort = Cost::new("effort", 1e-2, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
     let running = [costs(), vec![effort]].concat();
-    let inner = Contacts::new(model.clone(), Actuation::joints(&model), &contacts, 1e-6, running).unwrap();
+    let inner = ContactAcceleration::new(model.clone(), Actuation::joints(&model), &contacts, 1e-6, running).unwrap();
     let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
     let end = FreeDynamics::terminal(model.clone(), costs()).unwrap();
     let mut problem = Problem::new(x0.clone(), vec![Box::new(action)], vec![0; 10], Box::new(end)).unwrap();
