@@ -11,7 +11,7 @@ use condyle_dynamics::{
     forward_velocities,
 };
 use condyle_spatial::block::{Block, Strided};
-use condyle_spatial::simd::Kernel;
+use condyle_spatial::block_kernel;
 use condyle_spatial::{Force, Mat3, Motion, Quaternion, Se3, Vec3, lie};
 use nalgebra::DMatrix;
 
@@ -181,59 +181,49 @@ impl<'a, S: Block<Number = f64>> Question<'a, S> {
     }
 }
 
-/// Functions that are compiled for the level of their scalar.
-macro_rules! at_level {
-    ($($(#[$doc:meta])* fn $name:ident($arguments:ident: $type:ty) $body:block)*) => {$(
-        $(#[$doc])*
-        fn $name<S: Block<Number = f64>>($arguments: $type) {
-            struct Work<T>(T);
-            impl<S: Block<Number = f64>> Kernel for Work<$type> {
-                #[inline(always)]
-                fn run(self) {
-                    let Self($arguments) = self;
-                    $body
-                }
-            }
-            S::enter(Work($arguments));
-        }
-    )*};
-}
-
 /// A robot, its data, q, and where the Jacobian of the centre of mass goes.
 type CenterOfMassJacobian<'a, S> = (&'a Model, &'a mut Data<S>, &'a [S], &'a mut DMatrix<S>);
 
 /// A robot, its data, q, v and zeros, and where the derivatives of the momentum by v and q go.
 type MomentumDerivatives<'a, S> = (&'a Model, &'a mut Data<S>, [&'a [S]; 3], &'a mut [DMatrix<S>; 2]);
 
-at_level! {
+block_kernel! {
     /// ∂c/∂q.
-    fn center_of_mass_jacobian(arguments: CenterOfMassJacobian<'_, S>) {
+    fn center_of_mass_jacobian<S>(arguments: CenterOfMassJacobian<'_, S>) {
         let (model, data, q, J) = arguments;
         J.as_mut_slice().copy_from_slice(centroidal_map(model, data, q).Jcom.as_slice());
     }
+}
 
+block_kernel! {
     /// ∂h_G/∂v and ∂h_G/∂q.
-    fn centroidal_momentum_derivatives(arguments: MomentumDerivatives<'_, S>) {
+    fn centroidal_momentum_derivatives<S>(arguments: MomentumDerivatives<'_, S>) {
         let (model, data, [q, v, zero], [by_v, by_q]) = arguments;
         let d = centroidal_derivatives(model, data, q, v, zero);
         by_v.as_mut_slice().copy_from_slice(d.dh_dv.as_slice());
         by_q.as_mut_slice().copy_from_slice(d.dh_dq.as_slice());
     }
+}
 
+block_kernel! {
     /// c − c_ref.
-    fn center_of_mass(question: Question<'_, S>) {
+    fn center_of_mass<S>(question: Question<'_, S>) {
         let r = question.placements.com() - question.position();
         question.r[..3].copy_from_slice(&r.to_array());
     }
+}
 
+block_kernel! {
     /// h_G − h_ref.
-    fn centroidal_momentum(question: Question<'_, S>) {
+    fn centroidal_momentum<S>(question: Question<'_, S>) {
         let r = question.velocities().centroidal_momentum() - Force::from(question.target::<6>(0));
         question.r[..6].copy_from_slice(&r.to_array());
     }
+}
 
+block_kernel! {
     /// log(refXo oXf), with the Jacobian Jlog J.
-    fn frame_placement(question: Question<'_, S>) {
+    fn frame_placement<S>(question: Question<'_, S>) {
         let X = Se3::new(question.rotation(), question.position()).inverse() * question.placements.frame(question.frame);
         let r = lie::log6(Quaternion::from_rotation(X.rotation), X.translation);
         question.r[..6].copy_from_slice(&r.to_array());
@@ -246,18 +236,22 @@ at_level! {
             }
         }
     }
+}
 
+block_kernel! {
     /// p − p_ref.
-    fn frame_translation(question: Question<'_, S>) {
+    fn frame_translation<S>(question: Question<'_, S>) {
         let r = question.placements.frame(question.frame).translation - question.position();
         question.r[..3].copy_from_slice(&r.to_array());
         if let Some([_, J]) = question.J {
             question.placements.frame_jacobian(question.frame, ReferenceFrame::LocalWorldAligned, J);
         }
     }
+}
 
+block_kernel! {
     /// log(R_refᵀ R), with the Jacobian Jlog J.
-    fn frame_rotation(question: Question<'_, S>) {
+    fn frame_rotation<S>(question: Question<'_, S>) {
         let R = question.rotation().transpose() * question.placements.frame(question.frame).rotation;
         let r = lie::log3(Quaternion::from_rotation(R));
         question.r[..3].copy_from_slice(&r.to_array());
@@ -270,9 +264,11 @@ at_level! {
             }
         }
     }
+}
 
+block_kernel! {
     /// v − v_ref.
-    fn frame_velocity(question: Question<'_, S>) {
+    fn frame_velocity<S>(question: Question<'_, S>) {
         let (velocities, frame, reference) = (question.velocities(), question.frame, question.reference);
         let r = velocities.frame_velocity(frame, reference) - Motion::from(question.target::<6>(0));
         question.r[..6].copy_from_slice(&r.to_array());
