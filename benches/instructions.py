@@ -23,10 +23,10 @@ BASELINE = Path(__file__).with_suffix(".json")
 ROBOTS = ("arm7", "quadruped", "humanoid")
 STATES, KNOTS, ITERATIONS = 16, 32, 5
 """As in instructions.rs."""
-PHASES = {"calc_diff": "fddp_derivatives", "sweep": "fddp_sweep", "line_search": "fddp_rollout"}
+PHASES = {"Fddp::calc_diff": "fddp_derivatives", "Fddp::sweep": "fddp_sweep", "LineSearch::run": "fddp_rollout"}
 """The parts of an iteration of FDDP, by the functions of the solver."""
 GROWTH = 1.03
-LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured|Fddp)::(\w+)")
+LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured::(\w+)|((?:Fddp|LineSearch)::\w+))")
 
 
 def run(*command: str | Path, **options: object) -> str:
@@ -51,8 +51,8 @@ def counts(program: Path, robot: str) -> dict[str, int]:
         table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", profile)
     found: dict[str, int] = {}
     for match in filter(None, map(LINE.match, table.splitlines())):  # a function stands in a line for each of its files
-        name, n = match[2], int(match[1].replace(",", ""))
-        if "Fddp::" in match[0] and name not in PHASES:
+        name, n = match[2] or match[3], int(match[1].replace(",", ""))
+        if match[3] and name not in PHASES:
             continue
         n //= KNOTS * ITERATIONS if name in PHASES else STATES
         name = PHASES.get(name, name)

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Prints how the house stands: modules that use each other in a circle, and with --sizes how large and how slow to build it is.
+"""Prints the structure: modules that use each other in a circle, and with --sizes the program's size and build time.
 
     python3 tests/structure.py [--sizes]
 
-Fails if a circle has more than three modules, and with --sizes if a function of the program has more than 64 KB of text. A
-module and its children count as one where the child reaches up to its parent only. --sizes builds the program from nothing in
-a folder of its own (some minutes) and needs `nm` and `size`.
+Fails if a circle has more than three modules, and with --sizes if a function of the program has more than 64 KB of
+text. A module and its children count as one where the child reaches up to its parent only. --sizes builds the program
+from nothing in a folder of its own (some minutes) and needs `nm` and `size`.
 """
 
 import argparse

@@ -298,6 +298,7 @@ impl Fddp {
     }
 
     /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on.
+    #[inline(never)] // `benches/instructions.py` counts it by its name
     fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
         for node in &mut self.nodes {
@@ -326,6 +327,7 @@ impl Fddp {
         self.solution.timings.calc_diff += self.clock.ran(Phase::CalcDiff, clock);
     }
 
+    #[inline(never)] // `benches/instructions.py` counts it by its name
     fn sweep(&mut self, problem: &mut Problem, regularisation: f64) -> Result<(), SweepError> {
         let clock = Instant::now();
         let result = if self.settings.second_order {

@@ -84,6 +84,7 @@ impl LineSearch {
     ///
     /// A trial that leaves all bounds keeps the expectation of the trial before it; the first one has that of the line
     /// search before, `last`, or in DDP, where it does not depend on the trial, that of this one.
+    #[inline(never)] // `benches/instructions.py` counts it by its name
     pub(super) fn run(&mut self, problem: &mut Problem, mut iterate: Iterate<'_>, last: Search) -> Search {
         self.expect(&iterate);
         let mut search = Search { accepted: false, ..last };
