@@ -1,8 +1,8 @@
 //! Dynamics under contacts and its derivatives, one call on one state: `cargo bench --bench constrained`.
 
 use condyle::{
-    Constraint, ConstraintSet, Data, Model, constrained_dynamics, constrained_dynamics_derivatives, impulse_dynamics,
-    impulse_dynamics_derivatives, random_configuration, robots,
+    ConstraintSet, ContactConstraint, Data, Model, constrained_dynamics, constrained_dynamics_derivatives,
+    impulse_dynamics, impulse_dynamics_derivatives, random_configuration, robots,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;
@@ -49,8 +49,8 @@ fn algorithms(c: &mut Criterion) {
         ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|name| quadruped.frame(name).expect("it has this foot"));
     let soles = ["left_sole", "right_sole"].map(|name| humanoid.frame(name).expect("it has this sole"));
     let stances = [
-        ("quadruped on four points", &quadruped, feet.map(Constraint::point).to_vec()),
-        ("humanoid on two soles", &humanoid, soles.map(Constraint::rigid).to_vec()),
+        ("quadruped on four points", &quadruped, feet.map(ContactConstraint::point).to_vec()),
+        ("humanoid on two soles", &humanoid, soles.map(ContactConstraint::rigid).to_vec()),
     ];
     for (name, algorithm) in algorithms {
         let mut group = c.benchmark_group(name);

@@ -1,5 +1,5 @@
 //! Which way of forward dynamics and of M⁻¹ is fastest, for which size and shape of a tree:
-//! `cargo bench --bench factorisation`. The rule in `Method::fastest` rests on its figures.
+//! `cargo bench --bench factorisation`. The rule in `ForwardDynamicsMethod::fastest` rests on its figures.
 //!
 //! µs on a Xeon at 2.6 GHz (AVX-512 machine, default build), smallest of many, forward dynamics by ABA / dense / sparse
 //! and M⁻¹ by `minv`'s recursion / by the sparse factor: arm7 0.72 / 0.97 / 0.96, 0.87 / 0.62 · quadruped 1.47 / 2.42 /
@@ -10,8 +10,8 @@
 #![allow(non_snake_case)]
 
 use condyle::{
-    BodyId, Cholesky, Data, Inertia, Joint, Ltdl, Mat3, Method, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, crba,
-    forward_dynamics, minv, random_configuration, robots,
+    BodyId, Cholesky, Data, ForwardDynamicsMethod, Inertia, Joint, Ltdl, Mat3, Model, ModelBuilder, Se3, Sym3, Vec3,
+    WORLD, crba, forward_dynamics, minv, random_configuration, robots,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::DMatrix;
@@ -59,7 +59,9 @@ fn factorisation(c: &mut Criterion) {
         let mut data = Data::new(&model);
 
         let mut group = c.benchmark_group(format!("forward dynamics/{name}"));
-        for method in [Method::ArticulatedBody, Method::Dense, Method::Sparse] {
+        for method in
+            [ForwardDynamicsMethod::ArticulatedBody, ForwardDynamicsMethod::Dense, ForwardDynamicsMethod::Sparse]
+        {
             group.bench_function(BenchmarkId::from_parameter(format!("{method:?}")), |b| {
                 b.iter(|| {
                     _ = black_box(forward_dynamics(&model, &mut data, black_box(&q), &v, &tau, &[], Some(method)))

@@ -3,7 +3,7 @@
 
 use condyle::optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem};
-use condyle::{Batch, Constraint, Data, Model, neutral, random_configuration, robots};
+use condyle::{Batch, ContactConstraint, Data, Model, neutral, random_configuration, robots};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
@@ -97,8 +97,9 @@ fn motion(robot: &Arc<Model>, feet: &[&str], bent: &[(&str, f64)]) -> (Problem, 
     } else {
         let contact = |foot: &&str| {
             let frame = robot.frame(foot).expect("one of its feet");
-            let constraint = if feet.len() == 4 { Constraint::point(frame) } else { Constraint::rigid(frame) };
-            Contact::new(foot, Constraint { kd: 50.0, ..constraint })
+            let constraint =
+                if feet.len() == 4 { ContactConstraint::point(frame) } else { ContactConstraint::rigid(frame) };
+            Contact::new(foot, ContactConstraint { kd: 50.0, ..constraint })
         };
         let contacts: Vec<_> = feet.iter().map(contact).collect();
         let mut action = ContactDynamics::running(robot.clone(), &contacts, 0.02, running).expect("costs on feet");

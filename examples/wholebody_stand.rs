@@ -14,7 +14,7 @@
 //! ```
 #![allow(non_snake_case)]
 
-use condyle::wholebody::{Contact, FrameTask, Gains, Settings, Tasks, WholeBodyController};
+use condyle::wholebody::{FrameTask, FrictionContact, Gains, Settings, Tasks, WholeBodyController};
 use condyle::{
     Data, Model, ReferenceFrame, Vec3, crba, forward_kinematics, integrate, nonlinear_effects, rnea, robots,
 };
@@ -102,7 +102,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut q = vec![0.0, 0.0, 0.7 * 0.7f64.cos(), 0.0, 0.0, 0.0, 1.0]; // knees inwards, feet on the ground
     q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
 
-    let contacts = FEET.map(|foot| Contact::new(foot, FRICTION));
+    let contacts = FEET.map(|foot| FrictionContact::new(foot, FRICTION));
     let gains = Gains::critical(60.0);
     let upright =
         FrameTask { frame: "trunk".into(), linear: Vec3::zero(), angular: Vec3::new(10.0, 10.0, 10.0), gains };

@@ -38,7 +38,7 @@ run() {
 run condyle-spatial --lib --tests
 run condyle-dynamics --test vectors
 run condyle-dynamics --test suite -- limbs::
-run condyle-optimal --lib -- dense:: factor::
+run condyle-linalg --lib --tests
 run condyle-optimal --test contacts -- side_by_side implicit
 
 # a vector instruction that was not inlined shows in any program that has kernels

@@ -4,7 +4,7 @@ use condyle::optimal::robot::{
     Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Residual, WrenchCone,
 };
 use condyle::optimal::{ActionModel, Error, Fddp, Problem, Solution};
-use condyle::{Constraint, Data, Mat3, Model, ReferenceFrame, Se3, Vec3, forward_kinematics};
+use condyle::{ContactConstraint, Data, Mat3, Model, ReferenceFrame, Se3, Vec3, forward_kinematics};
 use std::sync::Arc;
 
 const FRICTION: f64 = 0.7;
@@ -54,9 +54,10 @@ impl Gait {
     }
 
     fn contacts(&self, frames: &[usize], kd: f64) -> Vec<Contact> {
-        let make = if self.foot == Foot::Point { Constraint::point } else { Constraint::rigid };
+        let make = if self.foot == Foot::Point { ContactConstraint::point } else { ContactConstraint::rigid };
         let reference = ReferenceFrame::LocalWorldAligned;
-        let contact = |&frame: &usize| Contact::new(&self.name(frame), Constraint { kd, reference, ..make(frame) });
+        let contact =
+            |&frame: &usize| Contact::new(&self.name(frame), ContactConstraint { kd, reference, ..make(frame) });
         frames.iter().map(contact).collect()
     }
 

@@ -6,7 +6,7 @@ use crate::exceptions::{exception, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
 use crate::hyper_dual::Hyper;
 use crate::model::{MadeFor, Model, frame_index};
-use condyle::{Constraint, Motion, Proximal, Scalar, Target};
+use condyle::{ContactConstraint, Motion, Proximal, Scalar, Target};
 use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
@@ -26,13 +26,13 @@ named_tuples! {
     }
 }
 
-/// A `Constraint` of `condyle._types` as the library has it.
-pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::Constraint> {
+/// A `ContactConstraint` of `condyle._types` as the library has it.
+pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::ContactConstraint> {
     let optional = |name: &str| given.getattr(name).map(|x| (!x.is_none()).then_some(x));
     let frame = frame_index(model, &given.getattr("frame")?)?;
     let mut constraint = match given.getattr("kind")?.extract()? {
-        "point" => condyle::Constraint::point(frame),
-        "rigid" => condyle::Constraint::rigid(frame),
+        "point" => condyle::ContactConstraint::point(frame),
+        "rigid" => condyle::ContactConstraint::rigid(frame),
         other => return Err(wrong_word("kind", "'point' or 'rigid'", other)),
     };
     constraint.other = optional("other")?.map(|other| frame_index(model, &other)).transpose()?;
@@ -74,13 +74,13 @@ fn aim(
 /// is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
 /// sparse resolution of constrained dynamic equations (2021).
 ///
-/// model: the robot; constraints: a list of `Constraint`s; mu: μ (1/kg); iterations: how many there are, always.
+/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always.
 ///
 /// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
 /// 'world', a gain is negative or not finite, or two constraints are the same.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
-/// >>> trot = condyle.ConstraintSet(quadruped, [condyle.Constraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
+/// >>> trot = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
 /// >>> len(trot), trot.rows, trot.range(1)
 /// (2, 6, slice(3, 6, 1))
 #[pyclass(module = "condyle")]
@@ -89,7 +89,7 @@ pub(crate) struct ConstraintSet {
     /// The set for hyper-dual numbers, made when it is first needed after the targets changed.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
     /// The constraints with their present targets.
-    constraints: Vec<Constraint>,
+    constraints: Vec<ContactConstraint>,
     nv: usize,
     made_for: MadeFor,
 }
@@ -195,7 +195,7 @@ functions! {
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
-/// >>> feet = [condyle.Constraint(foot, "point", kd=10.0) for foot in ("LF_foot", "RH_foot")]
+/// >>> feet = [condyle.ContactConstraint(foot, "point", kd=10.0) for foot in ("LF_foot", "RH_foot")]
 /// >>> stance = condyle.ConstraintSet(quadruped, feet)
 /// >>> a, forces, residual, redundant = condyle.constrained_dynamics(quadruped, data, stance, q, zero, zero)
 /// >>> bool(residual < 1e-9), redundant, np.allclose(stance.jacobian() @ a, 0.0)
@@ -214,7 +214,7 @@ fn constrained_dynamics(model, data, constraints: ConstraintSet;
 /// result.
 ///
 /// >>> arm = condyle.robots.arm7()
-/// >>> touch = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+/// >>> touch = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
 /// >>> d = condyle.constrained_dynamics_derivatives(arm, condyle.Data(arm), touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
 /// >>> np.allclose(touch.jacobian() @ d.da_dtau, 0.0)  # no effort moves the point
 /// True
@@ -234,7 +234,7 @@ fn constrained_dynamics_derivatives(model, data, constraints: ConstraintSet;
 /// bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
-/// >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+/// >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
 /// >>> d = condyle.constrained_dynamics_equations(arm, data, touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
 /// >>> np.allclose(d.M, condyle.crba(arm, data, [0.3] * 7))
 /// True
@@ -251,7 +251,7 @@ fn constrained_dynamics_equations(model, data, constraints: ConstraintSet;
 /// restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
-/// >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.Constraint("LF_foot", "point")])
+/// >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])
 /// >>> q, falling = condyle.neutral(quadruped), np.eye(18)[2] * -1.0
 /// >>> after = condyle.impulse_dynamics(quadruped, condyle.Data(quadruped), touchdown, q, falling)
 /// >>> bool(after.lambda_[2] > 0.0)  # the ground pushes upwards
@@ -269,7 +269,7 @@ fn impulse_dynamics(model, data, constraints: ConstraintSet;
 /// as there are members, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
-/// >>> hit = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+/// >>> hit = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
 /// >>> d = condyle.impulse_dynamics_derivatives(arm, condyle.Data(arm), hit, [0.3] * 7, [0.1] * 7)
 /// >>> np.allclose(d.dv_dv @ d.dv_dv, d.dv_dv)  # an impact that sticks is a projection
 /// True

@@ -20,7 +20,7 @@ use crate::batch;
 use crate::exceptions::{ModelError, wrong_word};
 use crate::hyper_dual;
 use crate::model::{body_index, frame_index};
-use condyle::{Force, Method, Model, ReferenceFrame};
+use condyle::{Force, ForwardDynamicsMethod, Model, ReferenceFrame};
 use nalgebra::DMatrix;
 use numpy::{Ix1, Ix2};
 use pyo3::exceptions::PyValueError;
@@ -177,11 +177,11 @@ shared! {
     } }
 
     /// The method of forward dynamics: a word, or None.
-    MethodOf<S>: Option<&'a str> => Option<Method> { |name, given, _| match *given {
+    MethodOf<S>: Option<&'a str> => Option<ForwardDynamicsMethod> { |name, given, _| match *given {
         None => Ok(None),
-        Some("aba") => Ok(Some(Method::ArticulatedBody)),
-        Some("dense") => Ok(Some(Method::Dense)),
-        Some("sparse") => Ok(Some(Method::Sparse)),
+        Some("aba") => Ok(Some(ForwardDynamicsMethod::ArticulatedBody)),
+        Some("dense") => Ok(Some(ForwardDynamicsMethod::Dense)),
+        Some("sparse") => Ok(Some(ForwardDynamicsMethod::Sparse)),
         Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
     } }
 

@@ -25,6 +25,7 @@ mod differentiate;
 mod divide_conquer;
 mod lanes;
 mod passes;
+mod selection;
 pub mod simulation;
 mod workspace;
 
@@ -58,7 +59,7 @@ pub use condyle_model::{
 pub use condyle_spatial::{
     Act, Constant, Cross, Force, Inertia, Mat3, Motion, Quaternion, Scalar, Se3, Sym3, Vec3, level, lie,
 };
-pub use constraints::constraint::{Constraint, ConstraintKind, Target};
+pub use constraints::constraint::{ConstraintKind, ContactConstraint, Target};
 pub use constraints::constraint_set::ConstraintSet;
 pub use constraints::plan::Proximal;
 pub use data::Data;
@@ -69,6 +70,6 @@ pub use divide_conquer::assembly::AssemblySize;
 pub use passes::all_terms::AllTerms;
 pub use passes::centroidal::{CentroidalMap, CentroidalMapRate};
 pub use passes::energy::EnergyDerivatives;
-pub use passes::factored_dynamics::Method;
+pub use passes::factored_dynamics::ForwardDynamicsMethod;
 pub use passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities};
 pub use passes::passive::{passive_torque, passive_torque_derivative};

@@ -6,7 +6,7 @@ mod common;
 mod counting;
 
 use common::{State, Worst, all_models, lift, lift_forces, rng};
-use condyle_dynamics::{Cholesky, Data, DivideConquer, Ltdl, Method, aba, crba, forward_dynamics};
+use condyle_dynamics::{Cholesky, Data, DivideConquer, ForwardDynamicsMethod, Ltdl, aba, crba, forward_dynamics};
 use counting::allocations;
 use nalgebra::DMatrix;
 use num_dual::Dual64;
@@ -14,7 +14,8 @@ use num_dual::Dual64;
 /// Some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in these robots.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
-const METHODS: [Method; 3] = [Method::ArticulatedBody, Method::Dense, Method::Sparse];
+const METHODS: [ForwardDynamicsMethod; 3] =
+    [ForwardDynamicsMethod::ArticulatedBody, ForwardDynamicsMethod::Dense, ForwardDynamicsMethod::Sparse];
 
 #[test]
 fn methods_agree() {
@@ -30,7 +31,7 @@ fn methods_agree() {
                     worst.see(model, found, &expected);
                 }
                 let chosen = forward_dynamics(model, &mut data, &q, &v, &tau, f_ext, None).to_vec();
-                let method = Some(Method::fastest(model));
+                let method = Some(ForwardDynamicsMethod::fastest(model));
                 assert_eq!(forward_dynamics(model, &mut data, &q, &v, &tau, f_ext, method), chosen);
             }
         }
@@ -59,8 +60,8 @@ fn methods_agree_on_dual_numbers() {
 fn what_is_fastest() {
     for model in all_models(3) {
         let shared = model.bodies().iter().any(|b| b.mimic.is_some());
-        let expected = if shared { Method::Sparse } else { Method::ArticulatedBody };
-        assert_eq!(Method::fastest(&model), expected, "{model}");
+        let expected = if shared { ForwardDynamicsMethod::Sparse } else { ForwardDynamicsMethod::ArticulatedBody };
+        assert_eq!(ForwardDynamicsMethod::fastest(&model), expected, "{model}");
     }
 }
 
@@ -102,5 +103,13 @@ fn nothing_is_allocated() {
 #[should_panic(expected = "tau: expected 7 numbers, found 6")]
 fn wrong_effort() {
     let arm = condyle_dynamics::robots::arm7();
-    forward_dynamics(&arm, &mut Data::new(&arm), &[0.0; 7], &[0.0; 7], &[0.0; 6], &[], Some(Method::Sparse));
+    forward_dynamics(
+        &arm,
+        &mut Data::new(&arm),
+        &[0.0; 7],
+        &[0.0; 7],
+        &[0.0; 6],
+        &[],
+        Some(ForwardDynamicsMethod::Sparse),
+    );
 }

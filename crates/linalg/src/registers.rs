@@ -157,10 +157,6 @@ pub fn at_level(work: impl Vectorized) {
         fn run(self) {
             self.0.run::<V>();
         }
-        #[inline(always)]
-        fn run_fused(self) {
-            self.run();
-        }
     }
     match level() {
         #[cfg(target_arch = "x86_64")]

@@ -4,10 +4,10 @@
 mod common;
 
 use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
-use condyle_dynamics::{Constraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
+use condyle_dynamics::{ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
-    Integrator, Limit, Residual,
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, FrictionCone,
+    ImpulseDynamics, Integrator, Limit, Residual,
 };
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Problem, Status, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -170,8 +170,8 @@ fn a_gait_allocates_nothing() {
     let mut q = neutral(&model);
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
     let x0 = [q, vec![0.0; 18]].concat();
-    let foot = |name: &str| Constraint::point(model.frame(name).unwrap());
-    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, Constraint { kd: 20.0, ..foot(name) }));
+    let foot = |name: &str| ContactConstraint::point(model.frame(name).unwrap());
+    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, ContactConstraint { kd: 20.0, ..foot(name) }));
     let cone = FrictionCone::new(0.7);
     let (lower, upper) = cone.bounds();
     let contact = || "LF_foot".to_owned();
@@ -203,7 +203,7 @@ fn a_gait_allocates_nothing() {
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, pushing).unwrap();
     let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, landing).unwrap();
     let drives = Actuation::joints(&model);
-    let flight = Free::new(model.clone(), drives, driven()).unwrap();
+    let flight = FreeAcceleration::new(model.clone(), drives, driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
     let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 24]].concat();
@@ -274,7 +274,7 @@ fn active_rows_allocate_nothing() {
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
     let x0 = [q, vec![0.0; 18]].concat();
     let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
-    let contacts = feet.map(|name| Contact::new(name, Constraint::point(model.frame(name).unwrap())));
+    let contacts = feet.map(|name| Contact::new(name, ContactConstraint::point(model.frame(name).unwrap())));
     let cone = FrictionCone::new(0.7);
     let (lower, upper) = cone.bounds();
     let limited = |foot: &str| {

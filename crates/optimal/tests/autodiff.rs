@@ -2,7 +2,9 @@
 #![allow(non_snake_case)]
 
 use condyle_dynamics::{Data, Model, aba, difference, integrate, neutral, robots};
-use condyle_optimal::robot::{Activation, Actuation, Cost, Free, FreeDynamics, Integrated, Integrator, Residual};
+use condyle_optimal::robot::{
+    Activation, Actuation, Cost, FreeAcceleration, FreeDynamics, Integrated, Integrator, Residual,
+};
 use condyle_optimal::{ActionModel, AutoDiff, Fddp, GenericAction, Hessian, LqNode, NumDiff, Problem, Status};
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
@@ -87,7 +89,7 @@ fn first_derivatives_are_those_by_hand() {
             Cost::new("x", 1.0, Residual::State { reference: x0.clone() }, Activation::Quadratic),
             Cost::new("u", 1.0, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic),
         ];
-        let free = Free::new(model.clone(), Actuation::joints(&model), costs).unwrap();
+        let free = FreeAcceleration::new(model.clone(), Actuation::joints(&model), costs).unwrap();
         let mut by_hand = Integrated::new(free, Integrator::SemiImplicitEuler, DT).unwrap();
         let mut by_duals = AutoDiff::new(Steps { model: model.clone(), nu, x0 });
         let (x, u) = (state(&model, &mut rng), random(nu, 5.0, &mut rng));

@@ -2,12 +2,12 @@
 #![allow(non_snake_case)] // G
 
 use condyle_dynamics::{
-    Constraint as Held, ConstraintSet, Data, Inertia, Joint, Model, ModelBuilder, ReferenceFrame, Se3, Sym3, Vec3,
-    WORLD, constrained_dynamics, forward_kinematics, neutral, robots,
+    ConstraintSet, ContactConstraint as Held, Data, Inertia, Joint, Model, ModelBuilder, ReferenceFrame, Se3, Sym3,
+    Vec3, WORLD, constrained_dynamics, forward_kinematics, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, FrictionCone, Integrated, Integrator,
-    InverseDynamics, Limit, Residual,
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, FrictionCone, Integrated,
+    Integrator, InverseDynamics, Limit, Residual,
 };
 use condyle_optimal::{
     ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, Fddp, LqNode, PathConstraint, Problem, Status,
@@ -318,7 +318,7 @@ fn a_stance_does_not_slip() {
 fn limits_hold_with_runge_kutta() {
     let arm = Arc::new(robots::arm7());
     let costs = vec![quadratic("effort", 1e-3, control(7))];
-    let inner = Free::new(arm.clone(), Actuation::joints(&arm), costs).unwrap();
+    let inner = FreeAcceleration::new(arm.clone(), Actuation::joints(&arm), costs).unwrap();
     let speed = Residual::State { reference: ARM.to_vec() };
     let bounds = |b: f64| [vec![b * f64::INFINITY; 7], vec![b * 0.3; 7]].concat();
     let speed = Limit::new("speed", speed, bounds(-1.0), bounds(1.0));

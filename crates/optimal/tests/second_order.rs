@@ -8,7 +8,9 @@ use condyle_dynamics::{
     DifferenceArgument, Inertia, IntegrateArgument, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD,
     difference_jacobian, integrate_jacobian, neutral, random_configuration, robots,
 };
-use condyle_optimal::robot::{Activation, Actuation, Cost, Free, FreeDynamics, Integrator, InverseDynamics, Residual};
+use condyle_optimal::robot::{
+    Activation, Actuation, Cost, FreeAcceleration, FreeDynamics, Integrator, InverseDynamics, Residual,
+};
 use condyle_optimal::{ActionModel, Fddp, Hessian, LqNode, NumDiff, Problem, Status, Sweep};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -179,7 +181,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
 fn robots_give_theirs_exactly() {
     let arm = Arc::new(robots::arm7());
     let map = Actuation::matrix(&arm, random_matrix(&mut random(), 7, 3)).unwrap();
-    let few = Free::new(arm.clone(), map, vec![]).unwrap();
+    let few = FreeAcceleration::new(arm.clone(), map, vec![]).unwrap();
     check(&arm, FreeDynamics::new(few, Integrator::SemiImplicitEuler, 0.05).unwrap());
     for model in [arm, Arc::new(robots::quadruped()), Arc::new(groups())] {
         for dt in [0.05, 0.5] {
@@ -214,7 +216,8 @@ fn quadrotor(running: bool) -> FreeDynamics {
         Cost::new("state", 1.0, state, Activation::Quadratic),
         Cost::new("effort", 0.1, effort, Activation::Quadratic),
     ];
-    FreeDynamics::new(Free::new(robot, drives, costs).unwrap(), Integrator::SemiImplicitEuler, 0.05).unwrap()
+    FreeDynamics::new(FreeAcceleration::new(robot, drives, costs).unwrap(), Integrator::SemiImplicitEuler, 0.05)
+        .unwrap()
 }
 
 /// The costs' Hessians are exact, by differences, the dynamics' are the robot's own.

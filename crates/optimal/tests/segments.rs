@@ -4,7 +4,7 @@
 mod common;
 
 use common::{random, random_euler_node, random_matrix, random_node};
-use condyle_dynamics::{Constraint, Vec3, neutral, robots};
+use condyle_dynamics::{ContactConstraint, Vec3, neutral, robots};
 use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
 use condyle_optimal::{Error, Fddp, LqKnot, LqNode, Problem, Sweep, SweepError};
 use nalgebra::{DMatrix, DVector};
@@ -291,8 +291,9 @@ fn quadruped() -> (Problem, Vec<f64>, Vec<f64>) {
     let mut q = neutral(&model);
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
     let x0 = [q, vec![0.0; 18]].concat();
-    let foot =
-        |name: &str| Contact::new(name, Constraint { kd: 20.0, ..Constraint::point(model.frame(name).unwrap()) });
+    let foot = |name: &str| {
+        Contact::new(name, ContactConstraint { kd: 20.0, ..ContactConstraint::point(model.frame(name).unwrap()) })
+    };
     let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
     let frame = model.frame("RF_foot").unwrap();
     let costs = |target| {

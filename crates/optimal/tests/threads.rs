@@ -4,9 +4,10 @@
 mod common;
 
 use common::{random, random_matrix, random_node};
-use condyle_dynamics::{Constraint, Vec3, integrate, neutral, robots};
+use condyle_dynamics::{ContactConstraint, Vec3, integrate, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, Free, FreeDynamics, ImpulseDynamics, Integrator, Residual,
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, ImpulseDynamics, Integrator,
+    Residual,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, Lqr, NumDiff, Problem, Solution};
 use rand::RngExt;
@@ -19,8 +20,8 @@ fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     let mut q = neutral(&model);
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
     let x0 = [q, vec![0.0; 18]].concat();
-    let foot = |name: &str| Constraint::point(model.frame(name).unwrap());
-    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, Constraint { kd: 20.0, ..foot(name) }));
+    let foot = |name: &str| ContactConstraint::point(model.frame(name).unwrap());
+    let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, ContactConstraint { kd: 20.0, ..foot(name) }));
     let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
     let standing = || {
         let com = Residual::CenterOfMass { target: Vec3::new(0.0, 0.0, 0.4) };
@@ -33,7 +34,7 @@ fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, driven()).unwrap();
     let us = stance.quasi_static(&x0);
     let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, standing()).unwrap();
-    let flight = Free::new(model.clone(), Actuation::joints(&model), driven()).unwrap();
+    let flight = FreeAcceleration::new(model.clone(), Actuation::joints(&model), driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
     let flying = FreeDynamics::running(model.clone(), 0.01, driven()).unwrap();
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();

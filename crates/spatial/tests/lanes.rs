@@ -53,9 +53,6 @@ impl<S: Block<Number: Number>> Kernel for Operations<S> {
             }
         }
     }
-    fn run_fused(self) {
-        self.run();
-    }
 }
 
 impl<S: Block<Number: Number>> Operations<S> {
@@ -105,9 +102,6 @@ impl Kernel for Moves {
         }
         let x = [1e16, 3.0, -1e16, 0.1]; // of which each order has another sum
         assert_eq!(sum(Lanes::from_array(x)).to_array(), [3.1; 4]);
-    }
-    fn run_fused(self) {
-        self.run();
     }
 }
 

@@ -4,7 +4,7 @@ use crate::equations::Equations;
 use crate::error::{Error, Status, finite};
 use crate::program::ConeProgram;
 use crate::settings::Settings;
-use crate::task::{Contact, References, Tasks};
+use crate::task::{FrictionContact, References, Tasks};
 use clarabel::solver::DefaultSettings;
 use condyle_dynamics::{Model, neutral};
 use condyle_spatial::Vec3;
@@ -33,9 +33,9 @@ pub struct Command {
 ///
 /// ```
 /// use condyle_dynamics::robots;
-/// use condyle_wholebody::{Contact, Settings, Tasks, WholeBodyController};
+/// use condyle_wholebody::{FrictionContact, Settings, Tasks, WholeBodyController};
 /// let robot = robots::quadruped();
-/// let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|foot| Contact::new(foot, 0.7));
+/// let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|foot| FrictionContact::new(foot, 0.7));
 /// let mut controller = WholeBodyController::new(&robot, &feet, Tasks::default(), Settings::default())?;
 /// // Knees inwards, feet on the ground.
 /// let mut q = vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0];
@@ -58,11 +58,11 @@ impl WholeBodyController {
     /// # Errors
     /// [`Error`] for an unknown frame, an empty list of contacts or one that names a frame twice, and for any number
     /// outside of its range.
-    pub fn new(model: &Model, contacts: &[Contact], tasks: Tasks, settings: Settings) -> Result<Self, Error> {
+    pub fn new(model: &Model, contacts: &[FrictionContact], tasks: Tasks, settings: Settings) -> Result<Self, Error> {
         if contacts.is_empty() {
             return Err(Error::NoContacts);
         }
-        contacts.iter().try_for_each(Contact::check)?;
+        contacts.iter().try_for_each(FrictionContact::check)?;
         tasks.check()?;
         settings.check(model)?;
         let names = contacts.iter().map(|c| &c.frame).chain(tasks.frames.iter().map(|t| &t.frame));

@@ -5,7 +5,7 @@ use crate::kinematics::{FrameMotion, Kinematics};
 use crate::program::Numbers;
 use crate::rows::Rows;
 use crate::settings::Settings;
-use crate::task::{ComTarget, Contact, ContactTarget, FrameTarget, Gains, PostureTarget, References, Tasks};
+use crate::task::{ComTarget, ContactTarget, FrameTarget, FrictionContact, Gains, PostureTarget, References, Tasks};
 use condyle_dynamics::{Data, Model, crba, difference, lie, nonlinear_effects};
 use condyle_spatial::{Mat3, Motion, Quaternion, Vec3};
 use nalgebra::DMatrix;
@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 /// All that the numbers are computed from, and in. x = (q̈, f₁ … f_k).
 pub(crate) struct Equations {
     model: Model,
-    contacts: Vec<Contact>,
+    contacts: Vec<FrictionContact>,
     tasks: Tasks,
     settings: Settings,
     pub rows: Rows,
@@ -30,7 +30,13 @@ pub(crate) struct Equations {
 
 impl Equations {
     /// `frames`: the numbers of the contacts' frames, then of the tasks'.
-    pub(crate) fn new(model: &Model, contacts: &[Contact], tasks: Tasks, settings: Settings, frames: &[usize]) -> Self {
+    pub(crate) fn new(
+        model: &Model,
+        contacts: &[FrictionContact],
+        tasks: Tasks,
+        settings: Settings,
+        frames: &[usize],
+    ) -> Self {
         let rows = Rows::new(model, contacts, settings.effort(model));
         let (nv, n) = (model.nv(), rows.force(contacts.len()));
         let mut numbers = Numbers::zeros(rows.count(), n);
@@ -183,7 +189,7 @@ impl Equations {
 }
 
 /// The rows that are the same in every state: those of the forces.
-fn fill_constant_rows(numbers: &mut Numbers, rows: &Rows, contacts: &[Contact]) {
+fn fill_constant_rows(numbers: &mut Numbers, rows: &Rows, contacts: &[FrictionContact]) {
     let Numbers { A, b, .. } = numbers;
     let mut fill = |row: usize, k: usize, direction: Vec3<f64>| {
         for (r, x) in direction.to_array().into_iter().enumerate() {

@@ -3,9 +3,9 @@
 /// What is wrong with the description of a controller, found when it is built.
 ///
 /// ```
-/// use condyle_wholebody::{Contact, Settings, Tasks, WholeBodyController};
+/// use condyle_wholebody::{FrictionContact, Settings, Tasks, WholeBodyController};
 /// let robot = condyle_dynamics::robots::quadruped();
-/// let contacts = [Contact::new("LF_fot", 0.7)];
+/// let contacts = [FrictionContact::new("LF_fot", 0.7)];
 /// let error = WholeBodyController::new(&robot, &contacts, Tasks::default(), Settings::default()).unwrap_err();
 /// assert_eq!(error.to_string(), "unknown frame `LF_fot`; nearest is `LF_foot`");
 /// ```
@@ -29,7 +29,7 @@ pub enum Error {
     Contact {
         /// The frame.
         frame: String,
-        /// The field of [`Contact`](crate::Contact).
+        /// The field of [`FrictionContact`](crate::FrictionContact).
         name: &'static str,
         /// Its value.
         value: f64,

@@ -42,6 +42,6 @@ pub use controller::{Command, WholeBodyController};
 pub use error::{Error, Status};
 pub use settings::Settings;
 pub use task::{
-    ComTarget, ComTask, Contact, ContactTarget, FrameTarget, FrameTask, Gains, PostureTarget, PostureTask, References,
-    Tasks,
+    ComTarget, ComTask, ContactTarget, FrameTarget, FrameTask, FrictionContact, Gains, PostureTarget, PostureTask,
+    References, Tasks,
 };

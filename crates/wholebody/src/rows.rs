@@ -1,6 +1,6 @@
 //! The rows of A, in the order of their cones, and which entries may differ from zero.
 
-use crate::task::Contact;
+use crate::task::FrictionContact;
 use clarabel::solver::SupportedConeT;
 use condyle_dynamics::{Joint, Model};
 use condyle_spatial::Vec3;
@@ -29,7 +29,7 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    pub(crate) fn new(model: &Model, contacts: &[Contact], effort: &[f64]) -> Self {
+    pub(crate) fn new(model: &Model, contacts: &[FrictionContact], effort: &[f64]) -> Self {
         let free_flyers = model.bodies().iter().skip(1).filter(|b| b.joint == Joint::FreeFlyer);
         let free: Vec<usize> = free_flyers.flat_map(|b| b.idx_v..b.idx_v + 6).collect();
         let actuated: Vec<usize> = (0..model.nv()).filter(|i| !free.contains(i)).collect();
@@ -43,7 +43,7 @@ impl Rows {
                 force_bounds.push(ForceBound { contact, sign: 1.0, bound: c.max_force });
             }
         }
-        let axes = contacts.iter().map(Contact::axes).collect();
+        let axes = contacts.iter().map(FrictionContact::axes).collect();
         Self { free, actuated, limited, force_bounds, axes, nv: model.nv() }
     }
 

@@ -26,12 +26,12 @@ impl Gains {
 /// A point that touches the environment and is held there: no acceleration, and a force in the cone ‖f_t‖ ≤ μ f_n.
 ///
 /// ```
-/// use condyle_wholebody::Contact;
-/// let icy = Contact { friction: 0.05, ..Contact::new("LF_foot", 0.7) };
+/// use condyle_wholebody::FrictionContact;
+/// let icy = FrictionContact { friction: 0.05, ..FrictionContact::new("LF_foot", 0.7) };
 /// assert_eq!(icy.normal.z, 1.0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contact {
+pub struct FrictionContact {
     /// The name of a frame, whose origin is the point.
     pub frame: String,
     /// μ, Coulomb's coefficient; above 0.
@@ -44,7 +44,7 @@ pub struct Contact {
     pub max_force: f64,
 }
 
-impl Contact {
+impl FrictionContact {
     /// A contact on level ground (normal z), its normal force not bounded.
     pub fn new(frame: &str, friction: f64) -> Self {
         let normal = Vec3::new(0.0, 0.0, 1.0);
@@ -212,9 +212,9 @@ pub struct ContactTarget {
 ///
 /// ```
 /// use condyle_dynamics::{neutral, robots};
-/// use condyle_wholebody::{Contact, Settings, Tasks, WholeBodyController};
+/// use condyle_wholebody::{FrictionContact, Settings, Tasks, WholeBodyController};
 /// let robot = robots::quadruped();
-/// let contacts = [Contact::new("LF_foot", 0.7), Contact::new("RH_foot", 0.7)];
+/// let contacts = [FrictionContact::new("LF_foot", 0.7), FrictionContact::new("RH_foot", 0.7)];
 /// let mut controller = WholeBodyController::new(&robot, &contacts, Tasks::default(), Settings::default())?;
 /// let mut references = controller.hold(&neutral(&robot));
 /// references.com.acceleration.x = 0.5; // and lean forward
@@ -229,7 +229,7 @@ pub struct References {
     pub frames: Vec<FrameTarget>,
     /// The joints.
     pub posture: PostureTarget,
-    /// One for each [`Contact`], in the same order.
+    /// One for each [`FrictionContact`], in the same order.
     pub contacts: Vec<ContactTarget>,
 }
 

@@ -5,7 +5,7 @@ mod common;
 
 use common::*;
 use condyle_dynamics::{Data, ReferenceFrame, Vec3, forward_kinematics, neutral, rnea, robots};
-use condyle_wholebody::{ComTask, Contact, Gains, PostureTask, Settings, Status, Tasks, WholeBodyController};
+use condyle_wholebody::{ComTask, FrictionContact, Gains, PostureTask, Settings, Status, Tasks, WholeBodyController};
 use nalgebra::{DMatrix, DVector};
 
 #[test]
@@ -43,7 +43,7 @@ fn moving_anyhow() {
 #[test]
 fn a_humanoid_on_two_points() {
     let model = robots::humanoid();
-    let contacts = [Contact::new("left_sole", 0.7), Contact::new("right_sole", 0.7)];
+    let contacts = [FrictionContact::new("left_sole", 0.7), FrictionContact::new("right_sole", 0.7)];
     let mut controller = WholeBodyController::new(&model, &contacts, Tasks::default(), Settings::default()).unwrap();
     for seed in 0..20 {
         let (q, v) = near(&model, &neutral(&model), seed, 0.2, 0.1);
@@ -151,7 +151,7 @@ fn a_slope_is_a_tilted_world() {
     let (x, z) = (q[0], q[2]);
     turned[..7].copy_from_slice(&[x * cos - z * sin, q[1], x * sin + z * cos, 0.0, s, 0.0, c]);
     let normal = Vec3::new(-2.0 * sin, 0.0, 2.0 * cos); // of any length
-    let contacts: Vec<_> = contacts.into_iter().map(|c| Contact { normal, ..c }).collect();
+    let contacts: Vec<_> = contacts.into_iter().map(|c| FrictionContact { normal, ..c }).collect();
     let mut tilted = controller(&model, &contacts);
     let references = tilted.hold(&turned);
     let found = tilted.step(&turned, &v, &references).unwrap();
@@ -180,7 +180,7 @@ fn contacts_are_pulled_back() {
 fn a_fixed_base_arm_leans_on_its_tool() {
     let model = robots::arm7();
     let q = [0.3, 0.6, 0.0, 1.2, 0.0, 0.5, 0.0];
-    let contact = Contact { min_force: 20.0, ..Contact::new("tool", 0.5) };
+    let contact = FrictionContact { min_force: 20.0, ..FrictionContact::new("tool", 0.5) };
     let com = ComTask { weight: Vec3::zero(), gains: Gains::critical(0.0) };
     let tasks = Tasks { com, ..Tasks::default() };
     let mut controller = WholeBodyController::new(&model, &[contact], tasks, Settings::default()).unwrap();
@@ -193,7 +193,7 @@ fn a_fixed_base_arm_leans_on_its_tool() {
 #[test]
 fn what_cannot_be_is_infeasible() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
-    let contacts: Vec<_> = feet(0.7).into_iter().map(|c| Contact { min_force: 1000.0, ..c }).collect();
+    let contacts: Vec<_> = feet(0.7).into_iter().map(|c| FrictionContact { min_force: 1000.0, ..c }).collect();
     let mut controller = controller(&model, &contacts);
     let references = controller.hold(&q);
     assert_eq!(controller.step(&q, &v, &references), Err(Status::Infeasible)); // knees of 80 N m

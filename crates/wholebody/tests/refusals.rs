@@ -4,9 +4,9 @@ mod common;
 
 use common::*;
 use condyle_dynamics::{Vec3, robots};
-use condyle_wholebody::{Contact, Error, FrameTask, Gains, Settings, Status, Tasks, WholeBodyController};
+use condyle_wholebody::{Error, FrameTask, FrictionContact, Gains, Settings, Status, Tasks, WholeBodyController};
 
-fn refusal(contacts: &[Contact], tasks: Tasks, settings: Settings) -> Error {
+fn refusal(contacts: &[FrictionContact], tasks: Tasks, settings: Settings) -> Error {
     WholeBodyController::new(&robots::quadruped(), contacts, tasks, settings).unwrap_err()
 }
 
@@ -14,9 +14,13 @@ fn refusal(contacts: &[Contact], tasks: Tasks, settings: Settings) -> Error {
 fn descriptions() {
     let plain = Settings::default;
     assert_eq!(refusal(&[], tasks(), plain()), Error::NoContacts);
-    let unknown = refusal(&[Contact::new("LF_fot", 0.7)], tasks(), plain());
+    let unknown = refusal(&[FrictionContact::new("LF_fot", 0.7)], tasks(), plain());
     assert_eq!(unknown.to_string(), "unknown frame `LF_fot`; nearest is `LF_foot`");
-    let twice = [Contact::new("LF_foot", 0.7), Contact::new("RF_foot", 0.7), Contact::new("LF_foot", 0.5)];
+    let twice = [
+        FrictionContact::new("LF_foot", 0.7),
+        FrictionContact::new("RF_foot", 0.7),
+        FrictionContact::new("LF_foot", 0.5),
+    ];
     assert_eq!(refusal(&twice, tasks(), plain()), Error::DuplicateContact { frame: "LF_foot".to_owned() });
 
     let gains = Gains::critical(100.0);
@@ -25,17 +29,23 @@ fn descriptions() {
     let error = refusal(&feet(0.7), Tasks { frames: vec![missing], ..Tasks::default() }, plain());
     assert_eq!(error.to_string(), "unknown frame `trunc`; nearest is `trunk`");
 
-    let foot = || Contact::new("LF_foot", 0.7);
+    let foot = || FrictionContact::new("LF_foot", 0.7);
     for (contact, expected) in [
-        (Contact { friction: 0.0, ..foot() }, "contact `LF_foot`: friction is 0, but it must be above 0"),
-        (Contact { friction: f64::NAN, ..foot() }, "contact `LF_foot`: friction is NaN, but it must be above 0"),
+        (FrictionContact { friction: 0.0, ..foot() }, "contact `LF_foot`: friction is 0, but it must be above 0"),
         (
-            Contact { normal: Vec3::zero(), ..foot() },
+            FrictionContact { friction: f64::NAN, ..foot() },
+            "contact `LF_foot`: friction is NaN, but it must be above 0",
+        ),
+        (
+            FrictionContact { normal: Vec3::zero(), ..foot() },
             "contact `LF_foot`: normal (its length) is 0, but it must be above 0",
         ),
-        (Contact { min_force: -1.0, ..foot() }, "contact `LF_foot`: min_force is -1, but it must be at least 0"),
         (
-            Contact { min_force: 5.0, max_force: 4.0, ..foot() },
+            FrictionContact { min_force: -1.0, ..foot() },
+            "contact `LF_foot`: min_force is -1, but it must be at least 0",
+        ),
+        (
+            FrictionContact { min_force: 5.0, max_force: 4.0, ..foot() },
             "contact `LF_foot`: max_force is 4, but it must be at least min_force",
         ),
     ] {

@@ -238,7 +238,7 @@ impl FreeDynamics {
 /// A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
 ///
 /// model: the robot.
-/// contacts: a dict of `Constraint`s by name; residuals call them by these names. May be empty.
+/// contacts: a dict of `ContactConstraint`s by name; residuals call them by these names. May be empty.
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`.
 /// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
@@ -249,7 +249,7 @@ impl FreeDynamics {
 ///
 /// >>> from condyle.optimal import ContactDynamics
 /// >>> quadruped = condyle.robots.quadruped()
-/// >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
+/// >>> feet = {foot: condyle.ContactConstraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
 /// >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct ContactDynamics(pub(super) RobotAction<robot::ContactDynamics>);
@@ -294,7 +294,7 @@ impl ContactDynamics {
 /// There are no controls.
 ///
 /// model: the robot.
-/// contacts: a dict of `Constraint`s by name.
+/// contacts: a dict of `ContactConstraint`s by name.
 /// costs: a list of `Cost`; they look at the state before the impact.
 /// restitution: ε, 0 to 1.
 /// damping: μ (1/kg).

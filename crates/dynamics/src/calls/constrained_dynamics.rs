@@ -39,10 +39,10 @@ pub struct Constrained<'d, S> {
 /// algorithm for the computation of the operational-space inertia matrix* (2012).
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics, neutral, robots};
+/// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics, neutral, robots};
 /// let quadruped = robots::quadruped();
 /// let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
-/// let mut stance = ConstraintSet::new(&quadruped, &feet.map(Constraint::point))?;
+/// let mut stance = ConstraintSet::new(&quadruped, &feet.map(ContactConstraint::point))?;
 /// let (mut data, mut q) = (Data::new(&quadruped), neutral(&quadruped));
 /// (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
 /// let d = constrained_dynamics(&quadruped, &mut data, &mut stance, &q, &[0.0; 18], &[0.0; 18], &[]);
@@ -147,9 +147,9 @@ pub struct ConstrainedEquations<'d, S> {
 /// and Mansard (2018).
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics_equations, crba, robots};
+/// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_equations, crba, robots};
 /// let arm = robots::arm7();
-/// let touch = Constraint { kp: 100.0, kd: 20.0, ..Constraint::point(arm.frame("tool")?) };
+/// let touch = ContactConstraint { kp: 100.0, kd: 20.0, ..ContactConstraint::point(arm.frame("tool")?) };
 /// let (mut touch, mut data) = (ConstraintSet::new(&arm, &[touch])?, Data::new(&arm));
 /// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
 /// let M = constrained_dynamics_equations(&arm, &mut data, &mut touch, &q, &v, &tau, &[]).M.clone();
@@ -237,10 +237,10 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// force; with μ: the smallest one) of the equations differentiated. Source: Carpentier and Mansard (2018).
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};
+/// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};
 /// use nalgebra::DMatrix;
 /// let arm = robots::arm7();
-/// let touch = Constraint { kp: 100.0, kd: 20.0, ..Constraint::point(arm.frame("tool")?) };
+/// let touch = ContactConstraint { kp: 100.0, kd: 20.0, ..ContactConstraint::point(arm.frame("tool")?) };
 /// let (mut touch, mut data) = (ConstraintSet::new(&arm, &[touch])?, Data::new(&arm));
 /// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
 /// let da_dtau = constrained_dynamics_derivatives(&arm, &mut data, &mut touch, &q, &v, &tau, &[]).da_dtau.clone();

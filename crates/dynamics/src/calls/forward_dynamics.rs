@@ -5,8 +5,9 @@ use super::inverse_dynamics::rnea;
 use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
 use crate::passes::aba;
-use crate::passes::factored_dynamics::{Method, run_dense, run_sparse};
+use crate::passes::factored_dynamics::{ForwardDynamicsMethod, run_dense, run_sparse};
 use crate::passes::kinematics::positions;
+use crate::selection;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
@@ -16,7 +17,7 @@ use condyle_spatial::{Constant, Force, Scalar};
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
 /// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
 /// Source: Featherstone (2008), table 7.1. Robots whose joints share a coordinate (mimic) go over a sparse factor
-/// of M, as [`forward_dynamics`] does with [`Method::Sparse`].
+/// of M, as [`forward_dynamics`] does with [`ForwardDynamicsMethod::Sparse`].
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba, robots, rnea};
@@ -68,7 +69,7 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) {
     if model.has_mimic() {
-        by_factor(model, data, q, v, tau, f_ext, Method::Sparse);
+        by_factor(model, data, q, v, tau, f_ext, ForwardDynamicsMethod::Sparse);
         data.aba.qdd.copy_from_slice(&data.forward_dynamics.qdd);
         return;
     }
@@ -76,20 +77,33 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
     aba::run(model, &data.world, &mut data.aba, v, tau, f_ext);
 }
 
-/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, or by the [`fastest`](Method::fastest).
+impl ForwardDynamicsMethod {
+    /// The fastest method for a model: [`ArticulatedBody`](Self::ArticulatedBody), unless joints share a coordinate
+    /// (mimic), for which the recursion over bodies does not close; then [`Sparse`](Self::Sparse).
+    ///
+    /// ```
+    /// use condyle_dynamics::{ForwardDynamicsMethod, robots};
+    /// assert_eq!(ForwardDynamicsMethod::fastest(&robots::humanoid()), ForwardDynamicsMethod::ArticulatedBody);
+    /// ```
+    pub fn fastest<R>(model: &Model<R>) -> Self {
+        selection::forward_dynamics(model)
+    }
+}
+
+/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, or by the [`fastest`](ForwardDynamicsMethod::fastest).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
 /// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
 /// Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), chapters 6 and 7. If joints share a coordinate,
-/// [`Method::ArticulatedBody`] factorises M too, as [`aba`](crate::aba()) does.
+/// [`ForwardDynamicsMethod::ArticulatedBody`] factorises M too, as [`aba`](crate::aba()) does.
 ///
 /// ```
-/// use condyle_dynamics::{Data, Method, forward_dynamics, robots};
+/// use condyle_dynamics::{Data, ForwardDynamicsMethod, forward_dynamics, robots};
 /// let arm = robots::arm7();
 /// let mut data = Data::new(&arm);
 /// let (q, v, tau) = ([0.3; 7], [0.1; 7], [1.0; 7]);
 /// let a = forward_dynamics(&arm, &mut data, &q, &v, &tau, &[], None).to_vec();
-/// let same = forward_dynamics(&arm, &mut data, &q, &v, &tau, &[], Some(Method::Sparse));
+/// let same = forward_dynamics(&arm, &mut data, &q, &v, &tau, &[], Some(ForwardDynamicsMethod::Sparse));
 /// assert!(a.iter().zip(same).all(|(a, b)| f64::abs(a - b) < 1e-9));
 /// ```
 ///
@@ -103,7 +117,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
     tau: &[S],
     f_ext: &[Force<S>],
-    method: Option<Method>,
+    method: Option<ForwardDynamicsMethod>,
 ) -> &'d [S] {
     data.check(model);
     model.check_regular();
@@ -111,8 +125,8 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     check("v", v.len(), model.nv());
     check("tau", tau.len(), model.nv());
     check_forces(f_ext.len(), model.nodes().len());
-    match method.unwrap_or(Method::fastest(model)) {
-        Method::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
+    match method.unwrap_or(ForwardDynamicsMethod::fastest(model)) {
+        ForwardDynamicsMethod::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
         method => {
             by_factor(model, data, q, v, tau, f_ext, method);
             &data.forward_dynamics.qdd
@@ -128,7 +142,7 @@ pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     v: &[S],
     tau: &[S],
     f_ext: &[Force<S>],
-    method: Method,
+    method: ForwardDynamicsMethod,
 ) {
     let zero = core::mem::take(&mut data.forward_dynamics.zero);
     rnea(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
@@ -136,7 +150,7 @@ pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     crba(model, data, q);
     let (d, h, M) = (&mut data.forward_dynamics, data.rnea.tau(), data.crba.matrix());
     match method {
-        Method::Dense => run_dense(d, h, M, tau),
+        ForwardDynamicsMethod::Dense => run_dense(d, h, M, tau),
         _ => run_sparse(d, h, M, tau),
     }
 }

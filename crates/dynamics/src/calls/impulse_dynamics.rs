@@ -36,10 +36,10 @@ pub struct Impulse<'d, S> {
 /// (2008), section 11.7.
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, ConstraintSet, Data, impulse_dynamics, neutral, robots};
+/// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics, neutral, robots};
 /// let quadruped = robots::quadruped();
 /// let feet = ["LF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
-/// let mut touchdown = ConstraintSet::new(&quadruped, &feet.map(Constraint::point))?;
+/// let mut touchdown = ConstraintSet::new(&quadruped, &feet.map(ContactConstraint::point))?;
 /// let (mut data, q, mut v) = (Data::new(&quadruped), neutral(&quadruped), [0.0; 18]);
 /// v[2] = -1.0; // falling
 /// let after = impulse_dynamics(&quadruped, &mut data, &mut touchdown, &q, &v, 0.0);
@@ -131,9 +131,9 @@ pub struct ImpulseDerivatives<'d, S> {
 /// constraints. Allocates nothing.
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, ConstraintSet, Data, impulse_dynamics_derivatives, robots};
+/// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics_derivatives, robots};
 /// let arm = robots::arm7();
-/// let (mut hit, mut data) = (ConstraintSet::new(&arm, &[Constraint::point(arm.frame("tool")?)])?, Data::new(&arm));
+/// let (mut hit, mut data) = (ConstraintSet::new(&arm, &[ContactConstraint::point(arm.frame("tool")?)])?, Data::new(&arm));
 /// let d = impulse_dynamics_derivatives(&arm, &mut data, &mut hit, &[0.3; 7], &[0.1; 7], 0.0);
 /// let again = d.dv_dv * d.dv_dv; // an impact that sticks is a projection
 /// assert!((again - d.dv_dv).amax() < 1e-9);

@@ -79,16 +79,16 @@ impl<S: Scalar> Target<S> {
 /// Source: Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems* (1972).
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, robots};
+/// use condyle_dynamics::{ContactConstraint, robots};
 /// let quadruped = robots::quadruped();
 /// let foot = quadruped.frame("LF_foot")?;
-/// let contact = Constraint { kd: 50.0, ..Constraint::point(foot) };
+/// let contact = ContactConstraint { kd: 50.0, ..ContactConstraint::point(foot) };
 /// assert_eq!(contact.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Constraint {
+pub struct ContactConstraint {
     /// The number of the frame that is held.
     pub frame: usize,
     /// The number of the frame that it is held to; the world if there is none.
@@ -105,7 +105,7 @@ pub struct Constraint {
     pub target: Target<f64>,
 }
 
-impl Constraint {
+impl ContactConstraint {
     /// A point contact of a frame's origin with the world, in `Local`, without stabilisation.
     pub fn point(frame: usize) -> Self {
         let reference = ReferenceFrame::Local;

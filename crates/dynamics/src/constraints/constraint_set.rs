@@ -4,7 +4,7 @@
 //! Sorted, they are what both ways share, then the rest of one way, then the rest of the other: three runs at most. Rows
 //! of J are stored on these coordinates alone.
 
-use crate::constraints::constraint::{Constraint, Target};
+use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_lanes::ConstraintLanes;
 use crate::constraints::delassus::Delassus;
 use crate::constraints::plan::{Plan, Proximal, SupportColumn, common};
@@ -24,10 +24,10 @@ use std::collections::BTreeSet;
 /// [`target_mut`](Self::target_mut); the [`Data`](crate::Data) can be the same for all sets.
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, ConstraintSet, robots};
+/// use condyle_dynamics::{ContactConstraint, ConstraintSet, robots};
 /// let quadruped = robots::quadruped();
 /// let feet = ["LF_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
-/// let trot = ConstraintSet::<f64>::new(&quadruped, &feet.map(Constraint::point))?;
+/// let trot = ConstraintSet::<f64>::new(&quadruped, &feet.map(ContactConstraint::point))?;
 /// assert_eq!((trot.rows(), trot.range(1)), (6, 3..6));
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
@@ -76,7 +76,7 @@ impl<S: Scalar> ConstraintSet<S> {
     /// # Errors
     /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
     /// is `World`, a gain is negative or not finite, or two constraints are the same.
-    pub fn new<R>(model: &Model<R>, constraints: &[Constraint]) -> Result<Self, Error> {
+    pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let factor = Ltdl::<S>::new(model);
         let tree = factor.tree();
         let mut place = vec![0; model.nv()];

@@ -6,6 +6,7 @@
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
+use crate::selection::solve_by_tree;
 use crate::workspace::filled;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
@@ -15,10 +16,6 @@ const SIDE: usize = 16;
 
 /// The same for a scalar that has several numbers already.
 const SIDE_OF_LANES: usize = 2;
-
-/// How long a way to the root must be, in the mean, for this to be faster than the product: measured by
-/// `benches/peers/dynamics.py` on chains.
-const LONG: usize = 24;
 
 /// Columns of which each but the last has one child, the next. What a path adds up it keeps in a place, which the last path
 /// that hangs on it takes over.
@@ -49,9 +46,7 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(columns: &[Column], nv: usize) -> Self {
-        let depths: usize = columns.iter().map(|c| c.depth).sum();
-        let shared = columns.len() != nv;
-        let paths = if shared || depths < LONG * nv { Vec::new() } else { paths(columns) };
+        let paths = if solve_by_tree(columns, nv) { paths(columns) } else { Vec::new() };
         let places = paths.iter().map(|path| path.place + 1).max().unwrap_or(0);
         let zeros = |n: usize| filled(S::zero(), n * SIDE);
         let x = zeros(if paths.is_empty() { 0 } else { nv });

@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 /// A way to compute forward dynamics. All give the same numbers, up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
+pub enum ForwardDynamicsMethod {
     /// The articulated-body algorithm, O(n).
     ArticulatedBody,
     /// M q̈ = τ − h with the dense factor [`Cholesky`], O(n³).
@@ -40,24 +40,6 @@ impl<S: Scalar> Workspace<S> {
             qdd: filled(S::zero(), model.nv()),
             zero: filled(S::zero(), model.nv()),
         }
-    }
-}
-
-impl Method {
-    /// The fastest method for a model: [`ArticulatedBody`](Self::ArticulatedBody), unless joints share a coordinate
-    /// (mimic), for which the recursion over bodies does not close; then [`Sparse`](Self::Sparse).
-    ///
-    /// Measured by `benches/factorisation.rs` on chains, binary trees and stars of 6 to 200 joints and on the embedded
-    /// robots: h and M alone cost as much as the whole recursion on the smallest and 1.1 to 3 times as much on the
-    /// others, so no factor of M can win, however sparse. Of the factors, the sparse one is as fast as the dense one on
-    /// chains, and on a star of 200 it makes forward dynamics 13 times faster.
-    ///
-    /// ```
-    /// use condyle_dynamics::{Method, robots};
-    /// assert_eq!(Method::fastest(&robots::humanoid()), Method::ArticulatedBody);
-    /// ```
-    pub fn fastest<R>(model: &Model<R>) -> Self {
-        if model.has_mimic() { Self::Sparse } else { Self::ArticulatedBody }
     }
 }
 

@@ -7,6 +7,7 @@
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
+use crate::selection::inverse_by_factor;
 use crate::workspace::{Size, filled, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
@@ -15,10 +16,6 @@ use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 use condyle_spatial::kernel;
 use nalgebra::DMatrix;
-
-/// How long the factor's rows may be, in the mean, for the factor to be the faster way: measured by
-/// `benches/factorisation.rs`, equal at 12.5 on a chain of 24; the humanoid has 9.7, the arm 4.
-const SHORT_ROWS: usize = 12;
 
 #[derive(Clone, Debug)]
 #[repr(C)]
@@ -40,7 +37,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let factor = Ltdl::new(model);
         Self {
-            by_factor: model.has_mimic() || factor.nonzeros() <= SHORT_ROWS * size.nv,
+            by_factor: inverse_by_factor(model, factor.nonzeros()),
             factor,
             P: filled(S::zero(), 6 * size.columns),
             A: filled(S::zero(), (1 + size.depth) * 6 * size.columns),

@@ -3,7 +3,20 @@
 //! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980); in the bodies' own
 //! frames. It is Featherstone's (*Rigid Body Dynamics Algorithms*, 2008, table 5.1) with the classical acceleration of each
 //! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
-//! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it.
+//! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it. Line by line:
+//!
+//! | the book | here |
+//! | --- | --- |
+//! | v₀ = 0, a₀ = −g | ω₀ = ω̇₀ = 0, K₀ = 0, a₀ = −g |
+//! | iXλ = X_J X_T | `Xi` = λXi, with the sines and cosines of all joints computed before |
+//! | v_i = iXλ v_λ + v_J | ω = Rᵀ ω_λ + ω_J |
+//! | a_i = iXλ a_λ + S q̈ + v_i × v_J | a = Rᵀ (a_λ + K_λ p), ω̇ = Rᵀ ω̇_λ, and what the joint adds (`added_to`) |
+//! | f_i = I a_i + v_i ×* I v_i − f_x | f = m a + K h, n = I ω̇ + ω × I ω + h × a, minus f_x |
+//! | τ_i = S_iᵀ f_i | `project`, when the pass has left the subtree of body i |
+//! | f_λ += λX*_i f_i | `add_to_parent_on_stack` |
+//!
+//! The two loops of the book are one here: a body's subtree is finished when the pass has gone down to its last body, and its
+//! force then goes to the parent. The test `the_book_gives_the_same` runs the book's form beside it.
 
 use crate::passes::kinematics::{PlacementCache, World};
 use crate::workspace::{Size, filled};

@@ -2,7 +2,7 @@
 
 use super::{State, all_models, normal3, random_pose, rng};
 use condyle_dynamics::{
-    Constraint, ConstraintKind, ConstraintSet, Data, Model, Motion, ReferenceFrame, Target,
+    ConstraintKind, ConstraintSet, ContactConstraint, Data, Model, Motion, ReferenceFrame, Target,
     constrained_dynamics_derivatives,
 };
 use rand::RngExt;
@@ -12,11 +12,11 @@ use rand::rngs::StdRng;
 const WORST_CONDITION: f64 = 1e4;
 
 /// A contact or loop, a point or a frame, in either reference, with any gains and targets.
-pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> Constraint {
+pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConstraint {
     let frames = model.frames().len();
     let motion = |rng: &mut StdRng| Motion::new(normal3(rng), normal3(rng));
     let gain = |rng: &mut StdRng| if rng.random::<bool>() { 5.0 * rng.random::<f64>() } else { 0.0 };
-    Constraint {
+    ContactConstraint {
         frame: rng.random_range(0..frames),
         other: rng.random::<bool>().then(|| rng.random_range(0..frames)),
         kind: if rng.random::<bool>() { ConstraintKind::Point } else { ConstraintKind::Rigid },
@@ -28,7 +28,7 @@ pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> Constraint {
 }
 
 /// Some constraints that the robot can satisfy at a state, in one way.
-pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng) -> Vec<Constraint> {
+pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng) -> Vec<ContactConstraint> {
     let mut chosen = Vec::new();
     let mut data = Data::new(model);
     for _ in 0..12 {
@@ -46,7 +46,7 @@ pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng)
 }
 
 /// Models, each with a state and constraints that it can satisfy in one way.
-pub(crate) fn cases(trees: u64) -> Vec<(Model, State, Vec<Constraint>)> {
+pub(crate) fn cases(trees: u64) -> Vec<(Model, State, Vec<ContactConstraint>)> {
     let with_constraints = |(seed, model): (usize, Model)| {
         let mut rng = rng(seed as u64);
         let state = State::random(&model, &mut rng);

@@ -6,9 +6,9 @@ use super::{State, lift, lift_forces};
 use condyle_dynamics::inertial_parameters::{self, from_log_cholesky, log_cholesky_jacobian};
 use condyle_dynamics::simulation::{Integrator, Settings, Simulation};
 use condyle_dynamics::{
-    Cholesky, Constraint, ConstraintSet, Data, DifferenceArgument, Force, IntegrateArgument, Ltdl, Method, Model,
-    Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, aba, aba_derivatives, aba_hessian,
-    centroidal_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, constrained_dynamics,
+    Cholesky, ConstraintSet, ContactConstraint, Data, DifferenceArgument, Force, ForwardDynamicsMethod,
+    IntegrateArgument, Ltdl, Model, Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, aba, aba_derivatives,
+    aba_hessian, centroidal_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, constrained_dynamics,
     constrained_dynamics_derivatives, coriolis_derivatives, coriolis_matrix, crba, difference, difference_jacobian,
     distance, energy_derivatives, forward_accelerations, forward_dynamics, forward_kinematics, forward_velocities,
     gravity, impulse_dynamics, impulse_dynamics_derivatives, integrate, integrate_jacobian, interpolate,
@@ -110,8 +110,8 @@ fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     let bodies = model.bodies().len();
     let frame = |body: usize| model.frames().iter().position(|f| f.body == body).expect("each body has a frame");
     let (reference, other) = (ReferenceFrame::LocalWorldAligned, Some(frame(bodies / 2)));
-    let contact = Constraint { reference, kp: 2.0, kd: 3.0, ..Constraint::point(frame(bodies - 1)) };
-    let closure = Constraint { other, kp: 2.0, kd: 3.0, ..Constraint::rigid(frame(bodies - 1)) };
+    let contact = ContactConstraint { reference, kp: 2.0, kd: 3.0, ..ContactConstraint::point(frame(bodies - 1)) };
+    let closure = ContactConstraint { other, kp: 2.0, kd: 3.0, ..ContactConstraint::rigid(frame(bodies - 1)) };
     let mut set = ConstraintSet::new(model, &[contact, closure]).expect("the frames are on different bodies");
     set.proximal = Proximal { mu: 1e-6, iterations: 2 };
     set
@@ -162,11 +162,11 @@ pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
         ("crba", |m, d, i, o| o.numbers.extend_from_slice(crba(m, d, &i.q).as_slice())),
         ("aba", |m, d, i, o| o.numbers.extend_from_slice(aba(m, d, &i.q, &i.v, &i.x, &i.f_ext))),
         ("forward_dynamics, dense", |m, d, i, o| {
-            let method = Some(Method::Dense);
+            let method = Some(ForwardDynamicsMethod::Dense);
             o.numbers.extend_from_slice(forward_dynamics(m, d, &i.q, &i.v, &i.x, &i.f_ext, method));
         }),
         ("forward_dynamics, sparse", |m, d, i, o| {
-            let method = Some(Method::Sparse);
+            let method = Some(ForwardDynamicsMethod::Sparse);
             o.numbers.extend_from_slice(forward_dynamics(m, d, &i.q, &i.v, &i.x, &i.f_ext, method));
         }),
         ("aba without forces", |m, d, i, o| o.numbers.extend_from_slice(aba(m, d, &i.q, &i.v, &i.x, &[]))),

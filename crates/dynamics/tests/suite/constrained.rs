@@ -5,7 +5,7 @@ use crate::common;
 use common::contacts::{cases, random_constraint};
 use common::{State, Worst, all_models, dual, lift, moved, normal, rng};
 use condyle_dynamics::{
-    Act, Constraint, ConstraintKind, ConstraintSet, Data, Error, Force, Model, ModelBuilder, Motion, Proximal,
+    Act, ConstraintKind, ConstraintSet, ContactConstraint, Data, Error, Force, Model, ModelBuilder, Motion, Proximal,
     ReferenceFrame, Se3, Target, aba, constrained_dynamics, constrained_dynamics_derivatives, crba,
     forward_accelerations, forward_kinematics, forward_velocities, impulse_dynamics, impulse_dynamics_derivatives, lie,
     minv, rnea, robots,
@@ -20,7 +20,7 @@ const CONDITIONED: f64 = 1e-9;
 const TREES: u64 = 15;
 
 /// What a constraint asks to vanish, from the public kinematics, the velocities' rates by dual numbers in time.
-fn wanted(model: &Model, c: &Constraint, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
+fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
     let world = ReferenceFrame::World;
     let mut data = Data::<Dual64>::new(model);
     let later = moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v));
@@ -64,7 +64,7 @@ fn wanted(model: &Model, c: &Constraint, q: &[f64], v: &[f64], a: &[f64]) -> Vec
 }
 
 /// The effort of a constraint's force, from the public Jacobians.
-fn effort(model: &Model, c: &Constraint, force: Force<f64>, q: &[f64]) -> DVector<f64> {
+fn effort(model: &Model, c: &ContactConstraint, force: Force<f64>, q: &[f64]) -> DVector<f64> {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
     let mut J = DMatrix::zeros(6, model.nv());
@@ -121,9 +121,9 @@ fn references_turn_forces_only() {
         let mut rng = rng(seed as u64);
         let (s, mut data) = (State::random(&model, &mut rng), Data::new(&model));
         let contact = |rng: &mut _| {
-            let c = Constraint { other: None, kd: 3.0, kp: 2.0, ..random_constraint(&model, rng) };
+            let c = ContactConstraint { other: None, kd: 3.0, kp: 2.0, ..random_constraint(&model, rng) };
             let target = Target { placement: c.target.placement, ..Target::identity() };
-            Constraint { target, ..c }
+            ContactConstraint { target, ..c }
         };
         let Some(c) = (0..100).map(|_| contact(&mut rng)).find(|&c| {
             ConstraintSet::<f64>::new(&model, &[c]).is_ok_and(|mut set| {
@@ -134,7 +134,7 @@ fn references_turn_forces_only() {
             panic!("no contact on\n{model}");
         };
         let mut run = |reference| {
-            let mut set = ConstraintSet::new(&model, &[Constraint { reference, ..c }]).unwrap();
+            let mut set = ConstraintSet::new(&model, &[ContactConstraint { reference, ..c }]).unwrap();
             let a = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]).a.to_vec();
             (a, set.force(0))
         };
@@ -164,13 +164,13 @@ fn redundant_constraints() {
     let (model, s, [left, right]) = standing();
     let mut data = Data::new(&model);
     let once = [
-        Constraint::rigid(left),
-        Constraint { reference: ReferenceFrame::LocalWorldAligned, ..Constraint::rigid(right) },
+        ContactConstraint::rigid(left),
+        ContactConstraint { reference: ReferenceFrame::LocalWorldAligned, ..ContactConstraint::rigid(right) },
     ];
     // the ankle's frame is on the same body as the sole
     let body = model.frames()[left].body;
     let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
-    let twice = [once[0], once[1], Constraint::rigid(again)];
+    let twice = [once[0], once[1], ContactConstraint::rigid(again)];
     let mut single = ConstraintSet::new(&model, &once).unwrap();
     let reference = constrained_dynamics_derivatives(&model, &mut data, &mut single, &s.q, &s.v, &s.tau, &[]);
     assert_eq!(reference.redundant, 0.0);
@@ -201,7 +201,7 @@ fn smallest_forces() {
         builder.frame(&format!("f{k}"), body, placement);
     }
     let model = builder.build().unwrap();
-    let points = ["f0", "f1", "f2"].map(|name| Constraint::point(model.frame(name).unwrap()));
+    let points = ["f0", "f1", "f2"].map(|name| ContactConstraint::point(model.frame(name).unwrap()));
     let (mut data, q) = (Data::new(&model), [0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0]);
     let mut set = ConstraintSet::new(&model, &points).unwrap();
     let d = constrained_dynamics(&model, &mut data, &mut set, &q, &[0.0; 6], &[0.0; 6], &[]);
@@ -226,11 +226,11 @@ fn contradictions() {
     let body = model.frames()[left].body;
     let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
     let mut data = Data::new(&model);
-    let mut first = ConstraintSet::new(&model, &[Constraint::rigid(left)]).unwrap();
+    let mut first = ConstraintSet::new(&model, &[ContactConstraint::rigid(left)]).unwrap();
     let a = constrained_dynamics(&model, &mut data, &mut first, &s.q, &s.v, &s.tau, &[]).a.to_vec();
-    let mut other = Constraint::point(again);
+    let mut other = ContactConstraint::point(again);
     other.target.acceleration.linear.z = 1.0 + 1e3;
-    let mut set = ConstraintSet::new(&model, &[Constraint::rigid(left), other]).unwrap();
+    let mut set = ConstraintSet::new(&model, &[ContactConstraint::rigid(left), other]).unwrap();
     let d = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
     assert_eq!(d.redundant, 3.0);
     assert!(d.residual > 500.0);
@@ -274,7 +274,7 @@ fn energy_of_impacts() {
     }
 }
 
-/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0; and the
+/// ContactConstraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0; and the
 /// acceleration is the allowed one nearest to the free one, so no allowed change brings it nearer (Gauss).
 #[test]
 fn gauss_principle() {
@@ -297,7 +297,8 @@ fn gauss_principle() {
 fn moving_targets() {
     let (model, s, [left, right]) = standing();
     let mut data = Data::new(&model);
-    let mut set = ConstraintSet::new(&model, &[Constraint::rigid(left), Constraint::point(right)]).unwrap();
+    let mut set =
+        ConstraintSet::new(&model, &[ContactConstraint::rigid(left), ContactConstraint::point(right)]).unwrap();
     constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
     set.target_mut(1).acceleration.linear.y = 0.7;
     let a = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]).a.to_vec();
@@ -310,38 +311,38 @@ fn moving_targets() {
 fn what_cannot_be_is_refused() {
     let model = robots::quadruped();
     let [foot, trunk] = ["LF_foot", "trunk"].map(|name| model.frame(name).unwrap());
-    let (point, none) = (Constraint::point(foot), model.frames().len());
-    let refused = |constraints: &[Constraint]| match ConstraintSet::<f64>::new(&model, constraints) {
+    let (point, none) = (ContactConstraint::point(foot), model.frames().len());
+    let refused = |constraints: &[ContactConstraint]| match ConstraintSet::<f64>::new(&model, constraints) {
         Err(error @ Error::Constraint { .. }) => error.to_string(),
         other => panic!("{other:?}"),
     };
     let cases = [
         (
-            refused(&[point, Constraint::point(none)]),
+            refused(&[point, ContactConstraint::point(none)]),
             format!("constraint 1: there is no frame {none}: the model has {none}"),
         ),
         (
-            refused(&[Constraint { other: Some(none), ..point }]),
+            refused(&[ContactConstraint { other: Some(none), ..point }]),
             format!("constraint 0: there is no frame {none}: the model has {none}"),
         ),
         (
-            refused(&[Constraint { other: Some(foot), ..point }]),
+            refused(&[ContactConstraint { other: Some(foot), ..point }]),
             "constraint 0: frames `LF_foot` and `LF_foot` do not move relative to each other".to_owned(),
         ),
         (
-            refused(&[Constraint { reference: ReferenceFrame::World, ..point }]),
+            refused(&[ContactConstraint { reference: ReferenceFrame::World, ..point }]),
             "constraint 0: its reference frame must be Local or LocalWorldAligned, found World".to_owned(),
         ),
         (
-            refused(&[Constraint { kd: -1.0, ..point }]),
+            refused(&[ContactConstraint { kd: -1.0, ..point }]),
             "constraint 0: kd must be a number of at least 0, found -1".to_owned(),
         ),
         (
-            refused(&[Constraint { kp: f64::NAN, ..point }]),
+            refused(&[ContactConstraint { kp: f64::NAN, ..point }]),
             "constraint 0: kp must be a number of at least 0, found NaN".to_owned(),
         ),
         (
-            refused(&[point, Constraint::point(trunk), point]),
+            refused(&[point, ContactConstraint::point(trunk), point]),
             "constraint 2: it holds frame `LF_foot` as constraint 0 does already".to_owned(),
         ),
     ];

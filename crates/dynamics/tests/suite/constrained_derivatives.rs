@@ -5,8 +5,9 @@ use crate::common;
 use common::contacts::cases;
 use common::{State, Worst, dual, eps, lift, lift_forces, moved, unit};
 use condyle_dynamics::{
-    Constraint, ConstraintSet, Data, Force, Model, Scalar, constrained_dynamics, constrained_dynamics_derivatives,
-    constrained_dynamics_equations, crba, impulse_dynamics, impulse_dynamics_derivatives,
+    ConstraintSet, ContactConstraint, Data, Force, Model, Scalar, constrained_dynamics,
+    constrained_dynamics_derivatives, constrained_dynamics_equations, crba, impulse_dynamics,
+    impulse_dynamics_derivatives,
 };
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
@@ -67,7 +68,7 @@ impl Algorithm for Impact {
 fn by_duals<A: Algorithm>(
     model: &Model,
     s: &State,
-    constraints: &[Constraint],
+    constraints: &[ContactConstraint],
     f_ext: &[Force<f64>],
 ) -> [DMatrix<f64>; 3] {
     let nv = model.nv();
@@ -92,7 +93,7 @@ fn by_duals<A: Algorithm>(
 fn by_differences<A: Algorithm>(
     model: &Model,
     s: &State,
-    constraints: &[Constraint],
+    constraints: &[ContactConstraint],
     f_ext: &[Force<f64>],
 ) -> [DMatrix<f64>; 3] {
     let nv = model.nv();
@@ -227,7 +228,7 @@ fn redundant_constraints() {
         let body = |frame: usize| model.frames()[frame].body;
         let twin = (0..model.frames().len()).find(|&f| f != first.frame && body(f) == body(first.frame));
         let Some(frame) = twin else { continue };
-        let twice: Vec<_> = constraints.into_iter().chain([Constraint { frame, ..first }]).collect();
+        let twice: Vec<_> = constraints.into_iter().chain([ContactConstraint { frame, ..first }]).collect();
         let mut data = Data::new(&model);
         let mut set = ConstraintSet::new(&model, &twice).unwrap();
         let d = constrained_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);

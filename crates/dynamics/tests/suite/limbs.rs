@@ -3,9 +3,9 @@
 use crate::common::contacts::random_constraints;
 use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
-    Constraint, ConstraintSet, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, ReferenceFrame, Se3, Sym3,
-    Vec3, WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, nonlinear_effects, rnea,
-    rnea_derivatives, robots,
+    ConstraintSet, ContactConstraint, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, ReferenceFrame, Se3,
+    Sym3, Vec3, WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, nonlinear_effects,
+    rnea, rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
 
@@ -147,7 +147,13 @@ fn the_numbers_of_body_after_body() {
 }
 
 /// Compares q̈, λ and J; the residuals are the same to rounding.
-fn compare_constrained(m: &Model, constraints: &[Constraint], proximal: Proximal, worst: &mut [Worst; 2], s: &State) {
+fn compare_constrained(
+    m: &Model,
+    constraints: &[ContactConstraint],
+    proximal: Proximal,
+    worst: &mut [Worst; 2],
+    s: &State,
+) {
     let in_turn = m.clone().with_limbs(false);
     let (mut data, mut one) = (Data::new(m), Data::new(&in_turn));
     let [mut set, mut other] = [m, &in_turn].map(|m| ConstraintSet::new(m, constraints).expect("they are right"));
@@ -191,7 +197,8 @@ fn redundant_constraints_of_body_after_body() {
     let [left, right] = ["left_sole", "right_sole"].map(|name| model.frame(name).unwrap());
     let body = model.frames()[left].body;
     let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
-    let constraints = [Constraint::rigid(left), Constraint::point(right), Constraint::rigid(again)];
+    let constraints =
+        [ContactConstraint::rigid(left), ContactConstraint::point(right), ContactConstraint::rigid(again)];
     let state = State::random(&model, &mut rng(0));
     compare_constrained(&model, &constraints, Proximal::default(), &mut worst, &state);
     compare_constrained(&model, &[], Proximal::default(), &mut worst, &state);

@@ -6,6 +6,7 @@
 mod common;
 
 mod accelerations;
+mod book;
 mod centroidal;
 mod closed_forms;
 mod compose;

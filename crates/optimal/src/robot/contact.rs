@@ -1,23 +1,23 @@
 //! Contacts of a knot, by name, and what makes a set of them singular.
 
 use crate::Error;
-use condyle_dynamics::{Constraint, ConstraintSet, Model, Proximal};
+use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, Proximal};
 use condyle_spatial::Scalar;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 /// A contact of a frame with the world, and the name by which residuals call it.
 ///
-/// The constraint says which frame, whether its origin ([`Constraint::point`]) or all of it ([`Constraint::rigid`]) is
+/// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it ([`ContactConstraint::rigid`]) is
 /// held, along which axes its rows and its force are, and the gains of its stabilisation. Crocoddyl's `ContactModel3D` and
 /// `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is `LocalWorldAligned` here.
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, ReferenceFrame, robots};
+/// use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};
 /// use condyle_optimal::robot::Contact;
 /// let quadruped = robots::quadruped();
-/// let foot = Constraint::point(quadruped.frame("LF_foot")?);
-/// let contact = Contact::new("left front", Constraint { kd: 50.0, reference: ReferenceFrame::LocalWorldAligned, ..foot });
+/// let foot = ContactConstraint::point(quadruped.frame("LF_foot")?);
+/// let contact = Contact::new("left front", ContactConstraint { kd: 50.0, reference: ReferenceFrame::LocalWorldAligned, ..foot });
 /// assert_eq!(contact.constraint.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
@@ -27,12 +27,12 @@ pub struct Contact {
     /// The name by which residuals call it.
     pub name: String,
     /// The constraint that it imposes.
-    pub constraint: Constraint,
+    pub constraint: ContactConstraint,
 }
 
 impl Contact {
     /// A contact called `name`.
-    pub fn new(name: &str, constraint: Constraint) -> Self {
+    pub fn new(name: &str, constraint: ContactConstraint) -> Self {
         Self { name: name.to_owned(), constraint }
     }
 }

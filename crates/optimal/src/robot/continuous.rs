@@ -7,8 +7,8 @@ use nalgebra::DMatrix;
 
 /// Dynamics in continuous time: q̈ = a(q, v, u), ℓ̇ = ℓ(x, u), with x = (q, v).
 ///
-/// [`Integrated`](super::Integrated) makes a knot of it. Those of a robot are [`Free`](super::Free),
-/// [`Contacts`](super::Contacts) and [`Inverse`](super::Inverse); write your own for anything that moves with accelerations.
+/// [`Integrated`](super::Integrated) makes a knot of it. Those of a robot are [`FreeAcceleration`](super::FreeAcceleration),
+/// [`ContactAcceleration`](super::ContactAcceleration) and [`ControlledAcceleration`](super::ControlledAcceleration); write your own for anything that moves with accelerations.
 ///
 /// ```
 /// use condyle_optimal::robot::{ContinuousModel, Derivatives, Integrated, Integrator, KnotInput};

@@ -4,10 +4,10 @@ use super::actuation::Actuation;
 use super::contact::Contact;
 use super::continuous::ContinuousModel;
 use super::costs::Cost;
-use super::dynamics::contact::Contacts;
-use super::dynamics::free::{Free, FreeDynamics};
+use super::dynamics::contact::ContactAcceleration;
+use super::dynamics::free::{FreeAcceleration, FreeDynamics};
 use super::dynamics::impulse::ImpulseDynamics;
-use super::dynamics::inverse::Inverse;
+use super::dynamics::inverse::ControlledAcceleration;
 use super::dynamics::knots::HasRobot;
 use super::integrators::{Integrated, Integrator};
 use super::limits::Limit;
@@ -172,15 +172,15 @@ impl Knot {
         };
         match &self.dynamics {
             Dynamics::Free { actuation, integrator, dt } => {
-                let inner = Free::new(model.clone(), drives(actuation)?, costs)?;
+                let inner = FreeAcceleration::new(model.clone(), drives(actuation)?, costs)?;
                 self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Contact { contacts, damping, actuation, integrator, dt } => {
-                let inner = Contacts::new(model.clone(), drives(actuation)?, contacts, *damping, costs)?;
+                let inner = ContactAcceleration::new(model.clone(), drives(actuation)?, contacts, *damping, costs)?;
                 self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Inverse { integrator, dt } => {
-                let inner = Inverse::new(model.clone(), costs)?;
+                let inner = ControlledAcceleration::new(model.clone(), costs)?;
                 self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Impulse { contacts, restitution, damping } => {

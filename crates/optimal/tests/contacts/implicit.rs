@@ -1,9 +1,10 @@
 //! Knots in implicit form give the gains and the steps of those in explicit form.
 
 use super::{DT, contact_costs, largest_difference, random, random_state};
-use condyle_dynamics::{Constraint, Model, ReferenceFrame, robots};
+use condyle_dynamics::{ContactConstraint, Model, ReferenceFrame, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, Contacts, Cost, Free, FreeDynamics, Integrated, Integrator, Residual,
+    Activation, Actuation, Contact, ContactAcceleration, Cost, FreeAcceleration, FreeDynamics, Integrated, Integrator,
+    Residual,
 };
 use condyle_optimal::{ActionModel, Fddp, Problem};
 use rand::{SeedableRng, rngs::StdRng};
@@ -74,10 +75,10 @@ fn costs(model: &Model, contacts: &[Contact], rng: &mut StdRng) -> Vec<Cost> {
     costs
 }
 
-fn contacts(model: &Model, kind: fn(usize) -> Constraint, names: &[&str]) -> Vec<Contact> {
+fn contacts(model: &Model, kind: fn(usize) -> ContactConstraint, names: &[&str]) -> Vec<Contact> {
     let contact = |name: &&str| {
         let reference = ReferenceFrame::LocalWorldAligned;
-        let constraint = Constraint { reference, kp: 20.0, kd: 30.0, ..kind(model.frame(name).unwrap()) };
+        let constraint = ContactConstraint { reference, kp: 20.0, kd: 30.0, ..kind(model.frame(name).unwrap()) };
         Contact::new(name, constraint)
     };
     names.iter().map(contact).collect()
@@ -89,18 +90,19 @@ fn implicit_knots_have_the_gains_of_explicit_ones() {
     let (quadruped, humanoid) = (Arc::new(robots::quadruped()), Arc::new(robots::humanoid()));
     let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
     let stances = [
-        (&quadruped, contacts(&quadruped, Constraint::point, &feet)),
-        (&quadruped, contacts(&quadruped, Constraint::point, &feet[..3])),
-        (&quadruped, contacts(&quadruped, Constraint::point, &[feet[0], feet[3]])), // no moment about their line
-        (&quadruped, contacts(&quadruped, Constraint::point, &feet[1..2])),
-        (&humanoid, contacts(&humanoid, Constraint::rigid, &["left_foot", "right_foot"])),
-        (&humanoid, contacts(&humanoid, Constraint::rigid, &["right_foot"])),
-        (&humanoid, contacts(&humanoid, Constraint::point, &["left_foot", "right_foot"])), // six joints for three rows
+        (&quadruped, contacts(&quadruped, ContactConstraint::point, &feet)),
+        (&quadruped, contacts(&quadruped, ContactConstraint::point, &feet[..3])),
+        (&quadruped, contacts(&quadruped, ContactConstraint::point, &[feet[0], feet[3]])), // no moment about their line
+        (&quadruped, contacts(&quadruped, ContactConstraint::point, &feet[1..2])),
+        (&humanoid, contacts(&humanoid, ContactConstraint::rigid, &["left_foot", "right_foot"])),
+        (&humanoid, contacts(&humanoid, ContactConstraint::rigid, &["right_foot"])),
+        (&humanoid, contacts(&humanoid, ContactConstraint::point, &["left_foot", "right_foot"])), // six joints for three rows
     ];
     for (model, contacts) in stances {
         for damping in [0.0, 1e-2] {
             let costs = costs(model, &contacts, &mut rng);
-            let inner = Contacts::new(model.clone(), Actuation::joints(model), &contacts, damping, costs).unwrap();
+            let inner =
+                ContactAcceleration::new(model.clone(), Actuation::joints(model), &contacts, damping, costs).unwrap();
             let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
             let what = format!("{} on {}, damping {damping}", model.name(), contacts.len());
             compare(&what, model, Box::new(action), |rng| random_state(model, rng));
@@ -113,10 +115,10 @@ fn implicit_knots_have_the_gains_of_explicit_ones() {
 fn implicit_knots_stand_on_straight_legs() {
     let mut rng = StdRng::seed_from_u64(4);
     let humanoid = Arc::new(robots::humanoid());
-    let contacts = contacts(&humanoid, Constraint::rigid, &["left_foot", "right_foot"]);
+    let contacts = contacts(&humanoid, ContactConstraint::rigid, &["left_foot", "right_foot"]);
     let costs = costs(&humanoid, &contacts, &mut rng);
     let action = Integrated::new(
-        Contacts::new(humanoid.clone(), Actuation::joints(&humanoid), &contacts, 0.0, costs).unwrap(),
+        ContactAcceleration::new(humanoid.clone(), Actuation::joints(&humanoid), &contacts, 0.0, costs).unwrap(),
         Integrator::SemiImplicitEuler,
         DT,
     );
@@ -130,11 +132,11 @@ fn implicit_knots_that_touch_nothing_have_the_gains_of_explicit_ones() {
     for model in [robots::quadruped(), robots::humanoid(), robots::arm7()].map(Arc::new) {
         let nu = Actuation::joints(&model).nu();
         let frame = model.frames().len() - 1;
-        let there = Contact::new(&model.frames()[frame].name, Constraint::point(frame));
+        let there = Contact::new(&model.frames()[frame].name, ContactConstraint::point(frame));
         let mut costs = contact_costs(&model, &[there.clone(), there], nu, &mut rng);
         costs.retain(|cost| !["force", "cone"].contains(&cost.name.as_str()));
         costs.push(Cost::new("u", 1.0, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic));
-        let inner = Free::new(model.clone(), Actuation::joints(&model), costs).unwrap();
+        let inner = FreeAcceleration::new(model.clone(), Actuation::joints(&model), costs).unwrap();
         let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
         compare(model.name(), &model, Box::new(action), |rng| random_state(&model, rng));
     }

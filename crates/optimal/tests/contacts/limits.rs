@@ -3,8 +3,8 @@
 use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, ContactDynamics, Cost, Free, FreeDynamics, ImpulseDynamics, Integrated, Integrator,
-    InverseDynamics, Limit, Residual,
+    Activation, Actuation, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, ImpulseDynamics, Integrated,
+    Integrator, InverseDynamics, Limit, Residual,
 };
 use condyle_optimal::{ActionModel, Error, LqNode};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -135,7 +135,7 @@ fn derivatives_of_limits_of_other_steps_are_those_of_the_terms() {
         let make = |l| {
             let rest = Residual::State { reference: random_state(&model, &mut StdRng::seed_from_u64(1)) };
             let rest = vec![Cost::new("rest", 0.1, rest, Activation::Quadratic)];
-            let inner = Free::new(model.clone(), Actuation::joints(&model), rest)?;
+            let inner = FreeAcceleration::new(model.clone(), Actuation::joints(&model), rest)?;
             Integrated::new(inner, method, DT)?.with_limits(l)
         };
         assert_eq!(check(&format!("{method:?}"), &model, &all, make, 0.3, &mut rng), all.len() - 3);
@@ -162,7 +162,7 @@ fn a_limit_costs_what_it_should() {
         [Integrator::SemiImplicitEuler, Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4]
     {
         let cost = vec![Cost::new("effort", 0.3, effort.clone(), Activation::Quadratic)];
-        let inner = Free::new(arm.clone(), Actuation::joints(&arm), cost).unwrap();
+        let inner = FreeAcceleration::new(arm.clone(), Actuation::joints(&arm), cost).unwrap();
         let mut free = Integrated::new(inner, method, DT).unwrap();
         let without = free.calc(0, &x, &u, &mut next);
         let mut limited = free.clone().with_limits(limit()).unwrap();

@@ -6,12 +6,12 @@ mod implicit;
 mod limits;
 
 use condyle_dynamics::{
-    Constraint, Data, Force, Mat3, Model, Motion, ReferenceFrame, Vec3, centroidal_map, forward_kinematics,
+    ContactConstraint, Data, Force, Mat3, Model, Motion, ReferenceFrame, Vec3, centroidal_map, forward_kinematics,
     forward_velocities, integrate, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Contacts, Cost, Free, FreeDynamics, FrictionCone, ImpulseDynamics,
-    Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FreeAcceleration, FreeDynamics,
+    FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;
@@ -75,16 +75,16 @@ fn check_derivatives<A: ActionModel + Clone>(what: &str, mut action: A, model: &
 
 /// Two feet of the quadruped as points, or both of the humanoid as a whole.
 fn feet(model: &Model, reference: ReferenceFrame) -> Vec<Contact> {
-    let make: fn(usize) -> Constraint = match model.name() {
-        "quadruped" => Constraint::point,
-        _ => Constraint::rigid,
+    let make: fn(usize) -> ContactConstraint = match model.name() {
+        "quadruped" => ContactConstraint::point,
+        _ => ContactConstraint::rigid,
     };
     let names = match model.name() {
         "quadruped" => ["LF_foot", "RH_foot"],
         _ => ["left_foot", "right_foot"],
     };
     let contact = |name: &str| {
-        let constraint = Constraint { reference, kp: 20.0, kd: 30.0, ..make(model.frame(name).unwrap()) };
+        let constraint = ContactConstraint { reference, kp: 20.0, kd: 30.0, ..make(model.frame(name).unwrap()) };
         Contact::new(name, constraint)
     };
     names.map(contact).into()
@@ -182,7 +182,7 @@ fn derivatives_with_damping_and_other_drives_are_those_of_the_action() {
     let S = DMatrix::from_fn(18, 4, |_, _| rng.random::<f64>() - 0.5);
     let drives = Actuation::matrix(&model, S).unwrap();
     let costs = contact_costs(&model, &contacts, 4, &mut rng);
-    let inner = Contacts::new(model.clone(), drives, &contacts, 1e-3, costs).unwrap();
+    let inner = ContactAcceleration::new(model.clone(), drives, &contacts, 1e-3, costs).unwrap();
     let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
     check_derivatives("damped", action, &model, 5.0, &mut rng);
 }
@@ -279,7 +279,7 @@ fn derivatives_of_runge_kutta_are_those_of_the_action() {
                 ),
                 Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
             ];
-            let inner = Free::new(model.clone(), drives, costs).unwrap();
+            let inner = FreeAcceleration::new(model.clone(), drives, costs).unwrap();
             let action = FreeDynamics::new(inner, method, DT).unwrap();
             check_derivatives(&format!("{method:?} of {}", model.name()), action, &model, 0.3, &mut rng);
         }
@@ -293,7 +293,7 @@ fn runge_kutta_methods_have_their_order() {
     let model = Arc::new(robots::arm7());
     let (x, u) = (random_state(&model, &mut rng), random(7, 1.0, &mut rng));
     let end = |method, dt: f64, steps: usize| {
-        let inner = Free::new(model.clone(), Actuation::joints(&model), vec![]).unwrap();
+        let inner = FreeAcceleration::new(model.clone(), Actuation::joints(&model), vec![]).unwrap();
         let mut action = FreeDynamics::new(inner, method, dt).unwrap();
         let (mut x, mut next) = (x.clone(), x.clone());
         for _ in 0..steps {
@@ -339,7 +339,7 @@ fn residuals_are_what_they_say() {
     // the efforts that hold the robot still leave nothing of `ControlGravity`, whatever touches the ground
     let still = [q, &[0.0; 18]].concat();
     let all = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
-    let contacts = all.map(|name| Contact::new(name, Constraint::point(model.frame(name).unwrap())));
+    let contacts = all.map(|name| Contact::new(name, ContactConstraint::point(model.frame(name).unwrap())));
     let costs = vec![Cost::new("gravity", 1.0, Residual::ControlGravity, Activation::Quadratic)];
     let mut stand = ContactDynamics::running(model.clone(), &contacts, DT, costs).unwrap();
     let u = stand.quasi_static(&still);
@@ -371,7 +371,7 @@ fn a_knot_can_have_costs_of_its_own() {
 #[test]
 fn what_does_not_fit_is_refused_by_name() {
     let model = Arc::new(robots::humanoid());
-    let sole = |name: &str, frame: &str| Contact::new(name, Constraint::rigid(model.frame(frame).unwrap()));
+    let sole = |name: &str, frame: &str| Contact::new(name, ContactConstraint::rigid(model.frame(frame).unwrap()));
     let refused = |contacts: &[Contact], costs| {
         ContactDynamics::running(model.clone(), contacts, DT, costs).map(|_| ()).unwrap_err().to_string()
     };
@@ -380,16 +380,17 @@ fn what_does_not_fit_is_refused_by_name() {
         refused(&[left.clone(), sole("left", "right_foot")], vec![]),
         "contact `left`: another contact has this name"
     );
-    let heel = Contact::new("heel", Constraint::point(left.constraint.frame));
+    let heel = Contact::new("heel", ContactConstraint::point(left.constraint.frame));
     assert!(
         refused(&[left.clone(), heel], vec![])
             .ends_with("as contact `left`: together they are singular without damping")
     );
     assert_eq!(
-        refused(&[Contact::new("ghost", Constraint::point(10_000))], vec![]),
+        refused(&[Contact::new("ghost", ContactConstraint::point(10_000))], vec![]),
         format!("contact `ghost`: there is no frame 10000; the robot has {}", model.frames().len())
     );
-    let loose = Contact::new("loose", Constraint { kd: f64::NAN, ..Constraint::point(left.constraint.frame) });
+    let loose =
+        Contact::new("loose", ContactConstraint { kd: f64::NAN, ..ContactConstraint::point(left.constraint.frame) });
     assert_eq!(refused(&[loose], vec![]), "contact `loose`: kd must be a number of at least 0, found NaN");
     let cone = |contact: &str, mu| Residual::FrictionCone { contact: contact.into(), cone: FrictionCone::new(mu) };
     let term = |residual| vec![Cost::new("grip", 1.0, residual, Activation::Quadratic)];
@@ -415,7 +416,7 @@ fn what_does_not_fit_is_refused_by_name() {
         "cost `grip`: its bounds of entry 0 exclude each other: 1 and 0"
     );
     let flat = WrenchCone { friction: FrictionCone::new(0.7), size: [0.1, 0.1] };
-    let point = [Contact::new("toe", Constraint::point(contacts[0].constraint.frame))];
+    let point = [Contact::new("toe", ContactConstraint::point(contacts[0].constraint.frame))];
     assert_eq!(
         refused(&point, term(Residual::WrenchCone { contact: "toe".into(), cone: flat })),
         "cost `grip`: a wrench cone needs a rigid contact, of 6 rows; this one has 3"
@@ -436,15 +437,18 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
     let model = Arc::new(arm);
     let body = model.frames()[tool].body;
     let on_body: Vec<_> = (0..model.frames().len()).filter(|&f| model.frames()[f].body == body).collect();
-    let contacts: Vec<_> =
-        on_body.iter().enumerate().map(|(k, &f)| Contact::new(&format!("point {k}"), Constraint::point(f))).collect();
+    let contacts: Vec<_> = on_body
+        .iter()
+        .enumerate()
+        .map(|(k, &f)| Contact::new(&format!("point {k}"), ContactConstraint::point(f)))
+        .collect();
     assert!(contacts.len() > 1);
     assert!(ContactDynamics::running(model.clone(), &contacts, DT, vec![]).is_err());
     let x0 = [[0.3; 7], [0.0; 7]].concat();
     let costs = || vec![Cost::new("rest", 1.0, Residual::State { reference: x0.clone() }, Activation::Quadratic)];
     let effort = Cost::new("effort", 1e-2, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
     let running = [costs(), vec![effort]].concat();
-    let inner = Contacts::new(model.clone(), Actuation::joints(&model), &contacts, 1e-6, running).unwrap();
+    let inner = ContactAcceleration::new(model.clone(), Actuation::joints(&model), &contacts, 1e-6, running).unwrap();
     let action = Integrated::new(inner, Integrator::SemiImplicitEuler, DT).unwrap();
     let end = FreeDynamics::terminal(model.clone(), costs()).unwrap();
     let mut problem = Problem::new(x0.clone(), vec![Box::new(action)], vec![0; 10], Box::new(end)).unwrap();

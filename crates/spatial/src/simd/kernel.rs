@@ -5,10 +5,6 @@
 pub trait Kernel: Sized {
     /// The work.
     fn run(self);
-    #[doc(hidden)]
-    fn run_fused(self) {
-        self.run();
-    }
 }
 
 /// Runs a kernel with the instructions of [`Real::Short`](crate::simd::pack::Real::Short): those of

@@ -2,7 +2,7 @@
 #![allow(dead_code, non_snake_case, unreachable_pub)] // each test file uses its part
 
 use condyle_dynamics::{Act, Data, Force, Model, Se3, Vec3, forward_kinematics, integrate, rnea};
-use condyle_wholebody::{Command, Contact, FrameTask, Gains, Settings, Tasks, WholeBodyController};
+use condyle_wholebody::{Command, FrameTask, FrictionContact, Gains, Settings, Tasks, WholeBodyController};
 use num_dual::Dual2_64;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
@@ -18,8 +18,8 @@ pub fn stance() -> Vec<f64> {
     q
 }
 
-pub fn feet(friction: f64) -> Vec<Contact> {
-    FEET.iter().map(|foot| Contact::new(foot, friction)).collect()
+pub fn feet(friction: f64) -> Vec<FrictionContact> {
+    FEET.iter().map(|foot| FrictionContact::new(foot, friction)).collect()
 }
 
 pub fn tasks() -> Tasks {
@@ -28,7 +28,7 @@ pub fn tasks() -> Tasks {
     Tasks { frames: vec![trunk], ..Tasks::default() }
 }
 
-pub fn controller(model: &Model, contacts: &[Contact]) -> WholeBodyController {
+pub fn controller(model: &Model, contacts: &[FrictionContact]) -> WholeBodyController {
     WholeBodyController::new(model, contacts, tasks(), Settings::default()).unwrap()
 }
 
@@ -50,7 +50,7 @@ pub fn near(model: &Model, centre: &[f64], seed: u64, distance: f64, speed: f64)
 /// Acceleration of each contact and of the centre of mass: ẍ along q(t) = q ⊕ (t v + ½ t² a).
 pub fn accelerations(
     model: &Model,
-    contacts: &[Contact],
+    contacts: &[FrictionContact],
     q: &[f64],
     v: &[f64],
     a: &[f64],
@@ -73,7 +73,13 @@ pub fn accelerations(
 }
 
 /// M q̈ + h − Jᵀ f by one pass of inverse dynamics under the contact forces.
-pub fn inverse_dynamics(model: &Model, contacts: &[Contact], q: &[f64], v: &[f64], command: &Command) -> Vec<f64> {
+pub fn inverse_dynamics(
+    model: &Model,
+    contacts: &[FrictionContact],
+    q: &[f64],
+    v: &[f64],
+    command: &Command,
+) -> Vec<f64> {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
     let mut f_ext = vec![Force::zero(); model.bodies().len()];
@@ -88,7 +94,7 @@ pub fn inverse_dynamics(model: &Model, contacts: &[Contact], q: &[f64], v: &[f64
 }
 
 /// μ f_n − ‖f_t‖ of a contact on level ground.
-pub fn margin(contact: &Contact, f: Vec3<f64>) -> f64 {
+pub fn margin(contact: &FrictionContact, f: Vec3<f64>) -> f64 {
     contact.friction * f.z - f.x.hypot(f.y)
 }
 
@@ -101,7 +107,7 @@ pub fn max_abs(x: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Dynamics, held contacts, momentum: what holds of every command, to [`EQUALITY`]; and no force outside its cone.
-pub fn check(model: &Model, contacts: &[Contact], q: &[f64], v: &[f64], command: &Command) {
+pub fn check(model: &Model, contacts: &[FrictionContact], q: &[f64], v: &[f64], command: &Command) {
     let tau = inverse_dynamics(model, contacts, q, v, command);
     let residual = max_abs(tau.iter().zip(&command.tau).map(|(a, b)| a - b));
     assert!(residual < EQUALITY, "M q̈ + h − Jᵀ f − τ = {residual:.1e}");

@@ -24,6 +24,7 @@ mod vectorized;
 
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
+use crate::selection::pairs_by_rows;
 use crate::workspace::{Size, filled, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
@@ -214,7 +215,7 @@ kernel! {
     ) {
         let l = Single::new(model);
         let minus_gravity = if world.is_empty() { l.minus_gravity() } else { world[0] };
-        let by_rows = vectorized::pays::<S, R>(model);
+        let by_rows = pairs_by_rows::<S, R>(model);
         d.qd.copy_from_slice(v);
         d.qdd.copy_from_slice(a);
         pass(&l, w, d.parts(), v, a, f_ext, minus_gravity, by_rows);

@@ -9,17 +9,13 @@ use crate::passes::kinematics::World;
 use condyle_model::Model;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::{Force, Scalar, Vec3};
-use core::any::{Any, TypeId};
+use core::any::Any;
 
 /// How many columns go together.
 const SIDE: usize = 4;
 
 /// How many numbers a column has: Iᶜ S, 2Bᵀ S, `by_q` and `by_v`.
 const NUMBERS: usize = 6 + 3 + 6 + 6;
-
-/// How long a way to the root must be, in the mean, for this to be faster than pair by pair: measured by
-/// `benches/peers/dynamics.py`.
-const LONG: usize = 4;
 
 /// What each column brings to its pairs with the columns before it. Shape: columns / `SIDE`, rounded up, each `NUMBERS` ×
 /// `SIDE`.
@@ -46,14 +42,6 @@ impl<S: Scalar> Rows<S> {
             side[6 + k][at] = BS[k];
         }
     }
-}
-
-/// Whether this is the way to take: for single numbers in vector registers, where branches are long and no joint follows
-/// another one.
-#[inline(always)]
-pub(crate) fn pays<S: Scalar, R>(model: &Model<R>) -> bool {
-    let single = TypeId::of::<S>() == TypeId::of::<Fused>();
-    single && !model.has_mimic() && model.support_len() > LONG * model.columns().len()
 }
 
 /// All pairs of columns of different joints, from what `Rows` has kept.

@@ -22,7 +22,7 @@ use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_lanes::{All, ConstraintLanes, WIDE};
 use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
-use crate::constraints::plan::Plan as Constraint;
+use crate::constraints::plan::Plan as ConstraintPlan;
 use condyle_spatial::block::Block;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::gate::renamed;
@@ -79,7 +79,7 @@ impl ConstraintLanes {
 
     /// u + Yᵀ λ in place of u.
     #[inline(always)]
-    pub(crate) fn push(&self, plan: &Plan, constraints: &[Constraint], u: &mut [f64]) {
+    pub(crate) fn push(&self, plan: &Plan, constraints: &[ConstraintPlan], u: &mut [f64]) {
         let All { root, nv, stride, Y, x: lambda, .. } = &self.all;
         for (of, constraint) in self.rows.iter().zip(constraints) {
             let lambda = &lambda[constraint.row..];

@@ -6,7 +6,7 @@ use super::{LANES, Plan};
 use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_lanes::{All, Rows, WIDE};
 use crate::constraints::constraint_motion::FramePair;
-use crate::constraints::plan::Plan as Constraint;
+use crate::constraints::plan::Plan as ConstraintPlan;
 use crate::passes::aba;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
@@ -170,7 +170,7 @@ fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 
 impl Rows {
     /// The unit forces, and γ'.
     #[inline(always)]
-    pub(crate) fn begin(&mut self, plan: &Constraint, ends: &FramePair<Fused>, gamma: [Fused; 6]) {
+    pub(crate) fn begin(&mut self, plan: &ConstraintPlan, ends: &FramePair<Fused>, gamma: [Fused; 6]) {
         let rigid = plan.kind == ConstraintKind::Rigid;
         let axes = if plan.aligned() { Mat3::identity() } else { ends.x1.rotation }.columns();
         for (end, (x, sign)) in [(ends.x1, 1.0), (ends.x2, -1.0)].into_iter().enumerate() {
@@ -197,7 +197,7 @@ impl Rows {
     #[inline(always)]
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
         &self,
-        plan: &Constraint,
+        plan: &ConstraintPlan,
         left: Left<'_>,
         [Y, YD]: [&mut [f64]; 2],
         all: &mut All,
@@ -306,7 +306,7 @@ impl All {
     #[inline(always)]
     pub(crate) fn carry_on<V: Block<Number = f64>, const N: usize>(
         &mut self,
-        plans: &[Constraint],
+        plans: &[ConstraintPlan],
         left: Left<'_>,
         J: &mut [Fused],
     ) {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Forward dynamics of a robot in contact, and costs: q̈ and λ of M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0.
 #[derive(Clone, Debug)]
-pub struct Contacts(pub(super) RobotDynamics);
+pub struct ContactAcceleration(pub(super) RobotDynamics);
 
 /// A knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
 ///
@@ -29,13 +29,13 @@ pub struct Contacts(pub(super) RobotDynamics);
 /// These are Crocoddyl's rules (`DifferentialActionModelContactFwdDynamics`).
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, robots};
+/// use condyle_dynamics::{ContactConstraint, robots};
 /// use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FrictionCone, Residual};
 /// use std::sync::Arc;
 /// let quadruped = Arc::new(robots::quadruped());
 /// let contacts = ["LF_foot", "RH_foot"].map(|foot| {
 ///     let frame = quadruped.frame(foot).unwrap();
-///     Contact::new(foot, Constraint { kd: 50.0, ..Constraint::point(frame) })
+///     Contact::new(foot, ContactConstraint { kd: 50.0, ..ContactConstraint::point(frame) })
 /// });
 /// let cone = FrictionCone::new(0.7);
 /// let (lower, upper) = cone.bounds();
@@ -44,9 +44,9 @@ pub struct Contacts(pub(super) RobotDynamics);
 /// let trot = ContactDynamics::running(quadruped, &contacts, 0.02, costs)?;
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
-pub type ContactDynamics = Integrated<Contacts>;
+pub type ContactDynamics = Integrated<ContactAcceleration>;
 
-impl Contacts {
+impl ContactAcceleration {
     /// A robot with some drives, in contact, with the damping μ.
     ///
     /// # Errors
@@ -68,13 +68,13 @@ impl Contacts {
 
 impl ContactDynamics {
     /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler, without damping.
-    /// For other drives, integrators and damping see [`Contacts::new`] and [`Integrated::new`].
+    /// For other drives, integrators and damping see [`ContactAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
-    /// As [`Contacts::new`], and [`Error::TimeStep`] if Δt is not above 0.
+    /// As [`ContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
     pub fn running(model: Arc<Model>, contacts: &[Contact], dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
         let actuation = Actuation::joints(&model);
-        let inner = Contacts::new(model, actuation, contacts, 0.0, costs)?;
+        let inner = ContactAcceleration::new(model, actuation, contacts, 0.0, costs)?;
         Self::new(inner, Integrator::SemiImplicitEuler, dt)
     }
 

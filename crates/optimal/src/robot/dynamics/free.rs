@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
 #[derive(Clone, Debug)]
-pub struct Free(pub(super) RobotDynamics);
+pub struct FreeAcceleration(pub(super) RobotDynamics);
 
 /// A knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
 ///
@@ -37,9 +37,9 @@ pub struct Free(pub(super) RobotDynamics);
 /// assert!((next[2] + 9.81 * 0.01).abs() < 1e-12); // −g Δt²
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
-pub type FreeDynamics = Integrated<Free>;
+pub type FreeDynamics = Integrated<FreeAcceleration>;
 
-impl Free {
+impl FreeAcceleration {
     /// A robot with some drives.
     ///
     /// # Errors
@@ -53,14 +53,14 @@ impl Free {
 
 impl FreeDynamics {
     /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other
-    /// drives or integrators see [`Free::new`] and [`Integrated::new`].
+    /// drives or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0, [`Error::Actuation`] for
     /// a robot with joints that move no mass.
     pub fn running(model: Arc<Model>, dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
         let actuation = Actuation::joints(&model);
-        Self::new(Free::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
+        Self::new(FreeAcceleration::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
     }
 
     /// The knot after the last one. Terms of the control must have an empty reference: there is none.
@@ -69,7 +69,7 @@ impl FreeDynamics {
     /// [`Error::Cost`] for a term that does not fit.
     pub fn terminal(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
         let none = Actuation::none(&model);
-        Ok(Self::end(Free(RobotDynamics::new(model, none, Capabilities::default(), Law::None, costs)?)))
+        Ok(Self::end(FreeAcceleration(RobotDynamics::new(model, none, Capabilities::default(), Law::None, costs)?)))
     }
 
     /// The efforts that hold the robot still at a state, u = S⁺ g(q): the smallest ones that come nearest to it. Allocates.

@@ -28,12 +28,12 @@ use std::sync::Arc;
 /// count. These are Crocoddyl's rules (`ActionModelImpulseFwdDynamics`).
 ///
 /// ```
-/// use condyle_dynamics::{Constraint, robots};
+/// use condyle_dynamics::{ContactConstraint, robots};
 /// use condyle_optimal::ActionModel;
 /// use condyle_optimal::robot::{Contact, ImpulseDynamics};
 /// use std::sync::Arc;
 /// let quadruped = Arc::new(robots::quadruped());
-/// let foot = Contact::new("foot", Constraint::point(quadruped.frame("LF_foot").unwrap()));
+/// let foot = Contact::new("foot", ContactConstraint::point(quadruped.frame("LF_foot").unwrap()));
 /// let mut touchdown = ImpulseDynamics::new(quadruped.clone(), &[foot], 0.0, 1e-12, vec![])?;
 /// let (mut x, mut next) = (condyle_dynamics::neutral(&quadruped), vec![0.0; 37]);
 /// x.extend([0.0; 18]);

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Inverse dynamics of a robot that touches nothing: q̈ = u, τ = rnea(q, v, u), and costs.
 #[derive(Clone, Debug)]
-pub struct Inverse(pub(super) RobotDynamics);
+pub struct ControlledAcceleration(pub(super) RobotDynamics);
 
 /// A knot of a robot whose nv controls are its accelerations, by semi-implicit Euler:
 ///
@@ -37,9 +37,9 @@ pub struct Inverse(pub(super) RobotDynamics);
 /// assert!((next[7] - 0.1).abs() < 1e-15 && (next[0] - 0.01).abs() < 1e-15);
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
-pub type InverseDynamics = Integrated<Inverse>;
+pub type InverseDynamics = Integrated<ControlledAcceleration>;
 
-impl Inverse {
+impl ControlledAcceleration {
     /// A robot that is driven at every coordinate.
     ///
     /// # Errors
@@ -52,11 +52,11 @@ impl Inverse {
 }
 
 impl InverseDynamics {
-    /// A knot of Δt seconds by semi-implicit Euler. For other integrators see [`Inverse::new`] and [`Integrated::new`].
+    /// A knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0.
     pub fn running(model: Arc<Model>, dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
-        Self::new(Inverse::new(model, costs)?, Integrator::SemiImplicitEuler, dt)
+        Self::new(ControlledAcceleration::new(model, costs)?, Integrator::SemiImplicitEuler, dt)
     }
 }

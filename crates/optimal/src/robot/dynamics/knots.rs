@@ -1,9 +1,9 @@
 //! Methods that the knots of a robot of all kinds share: their model, their costs and their limits.
 
-use super::contact::{ContactDynamics, Contacts};
-use super::free::{Free, FreeDynamics};
+use super::contact::{ContactAcceleration, ContactDynamics};
+use super::free::{FreeAcceleration, FreeDynamics};
 use super::impulse::ImpulseDynamics;
-use super::inverse::{Inverse, InverseDynamics};
+use super::inverse::{ControlledAcceleration, InverseDynamics};
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
@@ -181,4 +181,4 @@ macro_rules! robot_models {
         }
     )*};
 }
-robot_models!(Free, Contacts, Inverse);
+robot_models!(FreeAcceleration, ContactAcceleration, ControlledAcceleration);

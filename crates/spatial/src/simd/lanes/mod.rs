@@ -1,7 +1,7 @@
 //! Several numbers side by side in one vector register.
 //!
 //! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON, where they are two registers each;
-//! `Lanes<f64, 8>` and `Lanes<f32, 16>` AVX-512; and [`Fused`] is a single `f64` where products and sums are fused. They are
+//! `Lanes<f64, 8>` and `Lanes<f32, 16>` AVX-512; and [`Fused`](super::Fused) is a single `f64` where products and sums are fused. They are
 //! for code that has been entered through a function compiled for their [`Level`](crate::simd::level::Level), which is the
 //! business of a dispatcher: anywhere else each operation would be a function call, and on a processor without the
 //! instructions an illegal one. Every operation treats each lane alone, so what one lane holds (not-a-numbers included) never
