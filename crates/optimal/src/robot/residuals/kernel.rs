@@ -27,7 +27,7 @@ pub(crate) struct KnotGroup<'a> {
 }
 
 impl KnotGroup<'_> {
-    /// Calls a function for each residual of kinematics that has a weight at some knot: with its list and its number there.
+    /// Calls a function for each residual of kinematics that has a weight at some knot, with its list and its number there.
     fn each(&mut self, mut visit: impl FnMut(&mut Self, [usize; 2], &Residual, &Plan)) {
         let (first, terms) = (self.terms[0], self.terms);
         for list in 0..2 {
@@ -180,7 +180,8 @@ kernel! {
 kernel! {
     /// Computes log(refXo oXf), and its Jacobian Jlog J.
     fn frame_placement<S>(
-        placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool, J: &mut [DMatrix<S>; 2],
+        placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
+        J: &mut [DMatrix<S>; 2],
     ) {
         let X = Se3::new(rotation(t), vector(t, 0)).inverse() * placements.frame(frame);
         let twist = lie::log6(Quaternion::from_rotation(X.rotation), X.translation);
@@ -199,7 +200,8 @@ kernel! {
 kernel! {
     /// Computes p − p_ref, and its Jacobian.
     fn frame_translation<S>(
-        placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool, J: &mut [DMatrix<S>; 2],
+        placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
+        J: &mut [DMatrix<S>; 2],
     ) {
         r[..3].copy_from_slice(&(placements.frame(frame).translation - vector(t, 0)).to_array());
         if slopes {
@@ -211,7 +213,8 @@ kernel! {
 kernel! {
     /// Computes log(R_refᵀ R), and its Jacobian Jlog J.
     fn frame_rotation<S>(
-        placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool, J: &mut [DMatrix<S>; 2],
+        placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
+        J: &mut [DMatrix<S>; 2],
     ) {
         let R = rotation(t).transpose() * placements.frame(frame).rotation;
         let angles = lie::log3(Quaternion::from_rotation(R));
@@ -230,8 +233,8 @@ kernel! {
 kernel! {
     /// Computes v − v_ref, ∂v/∂q̇ and ∂v/∂q.
     fn frame_velocity<S>(
-        velocities: Velocities<'_, S>, frame: usize, reference: ReferenceFrame, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
-        J: &mut [DMatrix<S>; 2],
+        velocities: Velocities<'_, S>, frame: usize, reference: ReferenceFrame, t: &[S; 12], r: &mut [S; STRIDE],
+        slopes: bool, J: &mut [DMatrix<S>; 2],
     ) {
         let v = velocities.frame_velocity(frame, reference) - Motion::new(vector(t, 0), vector(t, 3));
         r[..6].copy_from_slice(&v.to_array());

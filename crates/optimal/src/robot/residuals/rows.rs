@@ -94,8 +94,8 @@ impl Rows {
         self.rows[k * self.stride + self.nu + self.nv..][..self.nv].copy_from_slice(row);
     }
 
-    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in inverse-dynamics form, it writes q and the
-    /// part of Q for q alone, and leaves the rows that depend on more to the sweep.
+    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in inverse-dynamics form, it writes q and
+    /// the part of Q for q alone, and leaves the rows that depend on more to the sweep.
     pub(crate) fn write(&mut self, node: &mut LqNode) {
         node.q.as_mut_slice().fill(0.0);
         node.r.as_mut_slice().fill(0.0);
