@@ -53,6 +53,7 @@ impl ReferenceFrame {
 
 /// The placements of a robot at one position, as [`forward_kinematics`](crate::forward_kinematics) left them.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Placements<'d, S, R = f64> {
     pub(crate) model: &'d Model<R>,
     pub(crate) world: &'d World<S>,
@@ -60,6 +61,7 @@ pub struct Placements<'d, S, R = f64> {
 
 /// The placements and velocities of a robot, as [`forward_velocities`](crate::forward_velocities) left them. It is a [`Placements`] too.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Velocities<'d, S, R = f64> {
     pub(crate) placements: Placements<'d, S, R>,
     pub(crate) moving: &'d Moving<S>,
@@ -68,6 +70,7 @@ pub struct Velocities<'d, S, R = f64> {
 /// The placements, velocities and accelerations of a robot, as [`forward_accelerations`](crate::forward_accelerations) left them. It is a
 /// [`Velocities`] and a [`Placements`] too.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Accelerations<'d, S, R = f64> {
     pub(crate) velocities: Velocities<'d, S, R>,
 }

@@ -8,16 +8,18 @@ use serde::{Deserialize, Serialize};
 
 /// A contact of a frame with the world, and the name by which residuals call it.
 ///
-/// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it ([`ContactConstraint::rigid`]) is
-/// held, along which axes its rows and its force are, and the gains of its stabilisation. Crocoddyl's `ContactModel3D` and
-/// `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is `LocalWorldAligned` here.
+/// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it
+/// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its stabilisation.
+/// Crocoddyl's `ContactModel3D` and `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is `LocalWorldAligned`
+/// here.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};
 /// use condyle_optimal::robot::Contact;
 /// let quadruped = robots::quadruped();
 /// let foot = ContactConstraint::point(quadruped.frame("LF_foot")?);
-/// let contact = Contact::new("left front", ContactConstraint { kd: 50.0, reference: ReferenceFrame::LocalWorldAligned, ..foot });
+/// let foot = ContactConstraint { kd: 50.0, reference: ReferenceFrame::LocalWorldAligned, ..foot };
+/// let contact = Contact::new("left front", foot);
 /// assert_eq!(contact.constraint.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```

@@ -7,8 +7,9 @@ use nalgebra::DMatrix;
 
 /// Dynamics in continuous time: q̈ = a(q, v, u), ℓ̇ = ℓ(x, u), with x = (q, v).
 ///
-/// [`Integrated`](super::Integrated) makes a knot of it. Those of a robot are [`FreeAcceleration`](super::FreeAcceleration),
-/// [`ContactAcceleration`](super::ContactAcceleration) and [`ControlledAcceleration`](super::ControlledAcceleration); write your own for anything that moves with accelerations.
+/// [`Integrated`](super::Integrated) makes a knot of it. A robot's are [`FreeAcceleration`](super::FreeAcceleration),
+/// [`ContactAcceleration`](super::ContactAcceleration) and [`ControlledAcceleration`](super::ControlledAcceleration);
+/// write your own for anything that moves with accelerations.
 ///
 /// ```
 /// use condyle_optimal::robot::{ContinuousModel, Derivatives, Integrated, Integrator, KnotInput};
@@ -72,15 +73,16 @@ pub trait ContinuousModel: Send + 'static {
     /// the group that was [prepared](Self::prepare).
     fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_>;
 
-    /// The second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, for nv numbers `mu`; returns the first ones
-    /// of a. None by default: a then counts as linear, whatever [`second_order`](crate::Settings::second_order) says.
+    /// The second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, for nv numbers `mu`; returns the first
+    /// ones of a. `None` by default: a then counts as linear, whatever
+    /// [`second_order`](crate::Settings::second_order) says.
     fn hessian(&mut self, input: KnotInput<'_>, mu: &[f64], hessian: &mut Hessian) -> Option<Derivatives<'_>> {
         let _ = (input, mu, hessian);
         None
     }
 
-    /// The most coordinates and the most rows of costs that the inverse-dynamics form of a knot takes, for dynamics that can
-    /// be written so.
+    /// The most coordinates and the most rows of costs that the inverse-dynamics form of a knot takes, for dynamics that
+    /// can be written so.
     #[doc(hidden)]
     fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         None
@@ -95,7 +97,8 @@ pub trait ContinuousModel: Send + 'static {
         None
     }
 
-    /// A copy that computes the same, for another thread; `None` by default: see [`ActionModel::fork`](crate::ActionModel::fork).
+    /// A copy that computes the same, for another thread: see [`ActionModel::fork`](crate::ActionModel::fork). `None` by
+    /// default.
     fn fork(&self) -> Option<Self>
     where
         Self: Sized,
@@ -134,7 +137,7 @@ pub trait ContinuousModel: Send + 'static {
     }
 }
 
-/// A knot t of the horizon with its state x = (q, v) and its controls u. Integrators make it, of a group that they prepared.
+/// A knot t of the horizon with its state x = (q, v) and its controls u, one of a group that an integrator has prepared.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct KnotInput<'a> {

@@ -1,10 +1,11 @@
 //! Robots as optimal control problems: the state x = (q, v), costs, and the actions of robots that move freely, are in
 //! contact, or hit something.
 //!
-//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name. A [`Limit`] holds a residual
-//!   within bounds, or to zero.
+//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name. A [`Limit`] holds a
+//!   residual within bounds, or to zero.
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
-//!   [`InverseDynamics`] the accelerations are the controls. What drives a robot is its [`Actuation`]; how a knot steps through its time, its [`Integrator`].
+//!   [`InverseDynamics`] the accelerations are the controls. An [`Actuation`] drives the robot, an [`Integrator`] steps
+//!   through the time of a knot.
 //! - A [`RobotProblem`] is a problem as data, in a file for example.
 //! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
 //!

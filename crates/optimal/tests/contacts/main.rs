@@ -470,6 +470,14 @@ fn knots_side_by_side_are_single_knots() {
     let flight = FreeDynamics::running(model.clone(), DT, free).unwrap();
     check_group(stance, &model, &mut rng);
     check_group(flight, &model, &mut rng);
+    let quadratic = |name: &str, residual| Cost::new(name, 0.3, residual, Activation::Quadratic);
+    let given = vec![
+        quadratic("effort", Residual::JointEffort { reference: random(18, 5.0, &mut rng) }),
+        quadratic("acceleration", Residual::JointAcceleration { reference: random(18, 5.0, &mut rng) }),
+        quadratic("gravity", Residual::ControlGravity),
+        quadratic("com", Residual::CenterOfMass { target: Vec3::new(0.1, 0.2, 0.3) }),
+    ];
+    check_group(InverseDynamics::running(model.clone(), DT, given).unwrap(), &model, &mut rng);
 }
 
 /// The same where knots of a group differ in targets, in weights, and in what they look at at all.

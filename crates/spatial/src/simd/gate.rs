@@ -123,39 +123,6 @@ macro_rules! register_kernel {
     };
 }
 
-/// A function as of [`kernel!`](crate::kernel) for scalars that are loaded from `f64`: `f64` itself, fused where the processor can,
-/// and its lanes. It is compiled where it is used.
-#[macro_export]
-#[doc(hidden)]
-macro_rules! block_kernel {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident<$S:ident>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
-        $(#[$doc])*
-        #[allow(unsafe_code, clippy::too_many_arguments)]
-        $vis fn $name<$S: $crate::simd::pack::Block<Number = f64>>($($arg: $type),*) {
-            use $crate::simd::gate::{Fused, Kernel, Level, is, level, renamed};
-
-            struct Work<T, Scalars>(T, ::core::marker::PhantomData<Scalars>);
-            impl<$S: $crate::simd::pack::Block<Number = f64>> Kernel for Work<($($type,)*), $S> {
-                #[inline(always)]
-                fn run(self) {
-                    let Work(($($arg,)*), _) = self;
-                    $body
-                }
-            }
-
-            if !is::<$S, f64>() || level() == Level::Baseline {
-                return $S::enter(Work::<_, $S>(($($arg,)*), ::core::marker::PhantomData));
-            }
-            {
-                type $S = Fused;
-                // SAFETY: the scalar is f64, in place of `Fused`.
-                let work: ($($type,)*) = unsafe { ($(renamed($arg),)*) };
-                <$S as $crate::Scalar>::enter(Work::<_, $S>(work, ::core::marker::PhantomData));
-            }
-        }
-    };
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

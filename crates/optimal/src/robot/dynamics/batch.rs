@@ -17,9 +17,8 @@ use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_dynamics_equations, rnea, rnea_derivatives,
 };
+use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Strided, gather_rows};
-use condyle_spatial::lanes::{Element, Lanes};
-use core::fmt::Debug;
 use nalgebra::DMatrix;
 
 /// Where accelerations come from.
@@ -45,82 +44,13 @@ pub(crate) enum Pass<S> {
     Inverse,
 }
 
-/// A scalar of knots: one knot alone, or a knot in each lane.
-pub(crate) trait KnotScalar: Block<Number = f64> {
-    /// Scratch of residuals of kinematics, on the scalar that rounds as the passes on this one do.
-    type Residuals: Clone + Debug + Send;
-
-    /// Scratch for a robot with nv coordinates.
-    fn residuals(nv: usize) -> Self::Residuals;
-
-    /// Computes the residuals of kinematics of some knots at (q, v).
-    fn run_residuals(
-        scratch: &mut Self::Residuals,
-        model: &Model,
-        data: &mut Data<Self>,
-        x: [&[Self]; 2],
-        group: &mut KnotGroup<'_>,
-    );
-
-    /// Calls [`KnotBatch::run_equations`] where there are lanes.
-    fn run_equations(batch: &mut KnotBatch<Self>, model: &Model, to: &mut [KnotData]);
-}
-
-impl<const N: usize> KnotScalar for Lanes<f64, N>
-where
-    f64: Element<N>,
-{
-    type Residuals = ResidualKernel<Self>;
-
-    fn residuals(nv: usize) -> ResidualKernel<Self> {
-        ResidualKernel::new(nv)
-    }
-
-    fn run_residuals(
-        scratch: &mut ResidualKernel<Self>,
-        model: &Model,
-        data: &mut Data<Self>,
-        x: [&[Self]; 2],
-        group: &mut KnotGroup<'_>,
-    ) {
-        scratch.run(model, data, x, group);
-    }
-
-    fn run_equations(batch: &mut KnotBatch<Self>, model: &Model, to: &mut [KnotData]) {
-        batch.run_equations(model, to);
-    }
-}
-
-impl KnotScalar for f64 {
-    type Residuals = ResidualKernel<Self>;
-
-    fn residuals(nv: usize) -> ResidualKernel<Self> {
-        ResidualKernel::new(nv)
-    }
-
-    fn run_residuals(
-        scratch: &mut ResidualKernel<Self>,
-        model: &Model,
-        data: &mut Data<Self>,
-        x: [&[Self]; 2],
-        group: &mut KnotGroup<'_>,
-    ) {
-        data.placements(model); // those of limbs too are then body by body
-        scratch.run(model, data, x, group);
-    }
-
-    fn run_equations(_: &mut KnotBatch<Self>, _: &Model, _: &mut [KnotData]) {
-        unreachable!("only knots in lanes are asked for equations");
-    }
-}
-
 /// The dynamics of as many knots as a scalar has lanes.
 #[derive(Debug)]
-pub(crate) struct KnotBatch<S: KnotScalar> {
+pub(crate) struct KnotBatch<S> {
     pub data: Data<S>,
     pub pass: Pass<S>,
     surplus: Surplus<S>,
-    residuals: S::Residuals,
+    residuals: ResidualKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
     /// The output that the controls drive: τ, or q̈.
@@ -130,7 +60,7 @@ pub(crate) struct KnotBatch<S: KnotScalar> {
     visited: bool,
 }
 
-impl<S: KnotScalar> Clone for KnotBatch<S> {
+impl<S: Scalar> Clone for KnotBatch<S> {
     #[inline(never)] // large
     fn clone(&self) -> Self {
         let Self { data, pass, surplus, residuals, q, v, tau, a, visited } = self;
@@ -154,7 +84,7 @@ fn clone<T: Clone>(of: &T) -> T {
     of.clone()
 }
 
-impl<S: KnotScalar> KnotBatch<S> {
+impl<S: Block<Number = f64>> KnotBatch<S> {
     /// Scratch for a robot whose accelerations obey a law.
     ///
     /// # Errors
@@ -172,7 +102,7 @@ impl<S: KnotScalar> KnotBatch<S> {
             }
             Law::Inverse => Pass::Inverse,
         };
-        let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), S::residuals(nv));
+        let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
         Ok(Self { data, pass, surplus, residuals, q, v, tau, a, visited: false })
     }
@@ -191,7 +121,7 @@ impl<S: KnotScalar> KnotBatch<S> {
         self.pack(model, xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
         match wanted {
-            Wanted::Equations => S::run_equations(self, model, to),
+            Wanted::Equations => self.run_equations(model, to),
             _ => self.run_pass(model, wanted == Wanted::Derivatives, terms.layout().forces, to),
         }
         self.run_residuals(model, knots, terms, wanted != Wanted::Motion, to);
@@ -321,19 +251,19 @@ impl<S: KnotScalar> KnotBatch<S> {
             group.visited = true;
         }
         if requirements.placements || requirements.velocities {
-            S::run_residuals(residuals, model, data, [q, v], &mut group);
+            residuals.run(model, data, [q, v], &mut group);
         }
     }
 }
 
 /// Writes numbers of some knots side by side.
-fn pack<'a, S: KnotScalar>(count: usize, of: impl Fn(usize) -> &'a [f64], to: &mut [S]) {
+fn pack<'a, S: Block<Number = f64>>(count: usize, of: impl Fn(usize) -> &'a [f64], to: &mut [S]) {
     let rows: [&[f64]; WIDEST] = core::array::from_fn(|k| of(k.min(count - 1)));
     gather_rows(&rows[..count], to);
 }
 
 /// Writes three matrices to the data of each knot.
-fn unpack_matrices<S: KnotScalar>(
+fn unpack_matrices<S: Block<Number = f64>>(
     from: [&DMatrix<S>; 3],
     to: &mut [KnotData],
     part: impl Fn(&mut KnotData) -> &mut [DMatrix<f64>; 3],
@@ -344,7 +274,7 @@ fn unpack_matrices<S: KnotScalar>(
 }
 
 /// Writes a matrix, or its transpose, or minus it, to the equations of each knot: `at` is its first row and column there.
-fn unpack_block<S: KnotScalar>(
+fn unpack_block<S: Block<Number = f64>>(
     from: &DMatrix<S>,
     transposed: bool,
     negative: bool,
@@ -362,7 +292,7 @@ fn unpack_block<S: KnotScalar>(
 }
 
 /// Writes M, ∂τ/∂v and ∂τ/∂q to the equations of each knot.
-fn unpack_dynamics<S: KnotScalar>([M, by_v, by_q]: [&DMatrix<S>; 3], to: &mut [KnotData], tableau: Tableau) {
+fn unpack_dynamics<S: Block<Number = f64>>([M, by_v, by_q]: [&DMatrix<S>; 3], to: &mut [KnotData], tableau: Tableau) {
     let Tableau { nv, rows } = tableau;
     unpack_block(M, true, false, to, [rows, 0], tableau); // M is symmetric
     unpack_block(by_v, false, false, to, [rows, nv + rows], tableau);

@@ -20,9 +20,9 @@ pub struct ControlledAcceleration(pub(super) RobotDynamics);
 /// q̈ = u,   τ = rnea(q, v, u),   v⁺ = v + u Δt,   q⁺ = q ⊕ (v Δt + u Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// No equation is solved, so that a knot costs less than one of [`FreeDynamics`](crate::robot::FreeDynamics); efforts are looked
-/// at by [`Residual::JointEffort`](crate::robot::Residual::JointEffort), which is 0 where nothing drives a joint (a heavy weight
-/// on the first six entries holds a floating base to that).
+/// No equation is solved, so that a knot costs less than one of [`FreeDynamics`](crate::robot::FreeDynamics). Efforts are
+/// looked at by [`Residual::JointEffort`](crate::robot::Residual::JointEffort), which is 0 where nothing drives a joint (a
+/// heavy weight on the first six entries holds a floating base to that).
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -52,7 +52,8 @@ impl ControlledAcceleration {
 }
 
 impl InverseDynamics {
-    /// A knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`] and [`Integrated::new`].
+    /// A knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`] and
+    /// [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0.

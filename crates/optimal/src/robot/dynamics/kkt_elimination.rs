@@ -98,15 +98,15 @@ impl KktElimination {
     }
 
     /// Writes U and D for steps of Δt; says whether there were pivots. Overwrites the tableau.
-    pub(crate) fn run(&mut self, tableau: &mut [f64], dt: f64, implicit: &mut InverseDynamicsForm) -> bool {
+    pub(crate) fn run(&mut self, tableau: &mut [f64], dt: f64, form: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
-        at_level(Run { elimination: self, T: tableau, dt, implicit, done: &mut done });
+        at_level(Run { elimination: self, T: tableau, dt, form, done: &mut done });
         done
     }
 
     /// The sensitivities of outputs by (w, δv, δq), for a knot whose U and D are these.
-    pub(crate) fn sensitivities<'a>(&'a self, implicit: &'a InverseDynamicsForm, dt: f64) -> Unknowns<'a> {
-        Unknowns { elimination: self, implicit, dt }
+    pub(crate) fn sensitivities<'a>(&'a self, form: &'a InverseDynamicsForm, dt: f64) -> Unknowns<'a> {
+        Unknowns { elimination: self, form, dt }
     }
 
     /// The column with the largest entry of a row, and the entry.
@@ -143,7 +143,7 @@ struct Run<'a> {
     elimination: &'a mut KktElimination,
     T: &'a mut [f64],
     dt: f64,
-    implicit: &'a mut InverseDynamicsForm,
+    form: &'a mut InverseDynamicsForm,
     done: &'a mut bool,
 }
 
@@ -166,7 +166,7 @@ fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
 impl Vectorized for Run<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { elimination: e, T, dt, implicit, done } = self;
+        let Self { elimination: e, T, dt, form, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
         let (solved, all) = (rows + e.passive, rows + nv);
         let mut force_scale = 0.0_f64;
@@ -201,7 +201,7 @@ impl Vectorized for Run<'_> {
         // the columns that are left are the unknowns
         let mut unknowns = 0;
         e.runs.clear();
-        implicit.own.clear();
+        form.own.clear();
         for k in 0..nv + rows {
             if matches!(e.place[k], Place::Row(_)) {
                 continue;
@@ -213,26 +213,25 @@ impl Vectorized for Run<'_> {
             }
             unknowns += 1;
         }
-        implicit.own.extend(e.runs.iter().filter(|run| run[0] < nv));
-        let size = implicit.stride;
+        form.own.extend(e.runs.iter().filter(|run| run[0] < nv));
+        let size = form.stride;
         let m = nv - e.passive;
         let gather = Gather { runs: &e.runs, nv, x: nv + rows, m };
 
         // U; the dependent steps D; the dependent forces
-        implicit.efforts.resize(m, size);
-        for (row, to) in T[solved * stride..].chunks_exact(stride).zip(implicit.efforts.numbers.chunks_exact_mut(size))
-        {
+        form.efforts.resize(m, size);
+        for (row, to) in T[solved * stride..].chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
             gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
         }
-        implicit.dependent.clear();
-        implicit.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
-        implicit.steps.resize(implicit.dependent.len(), size);
-        e.forces.resize(solved - implicit.dependent.len(), size);
+        form.dependent.clear();
+        form.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
+        form.steps.resize(form.dependent.len(), size);
+        e.forces.resize(solved - form.dependent.len(), size);
         let (mut step, mut force) = (0, 0);
         for (r, &k) in e.pivots.iter().enumerate() {
             let row = &T[r * stride..][..stride];
             if k < nv {
-                gather.row::<V>(row, [-1.0, -dt, -dt], &mut implicit.steps.numbers[step * size..][..size]);
+                gather.row::<V>(row, [-1.0, -dt, -dt], &mut form.steps.numbers[step * size..][..size]);
                 e.place[k] = Place::Row(step);
                 step += 1;
             } else {
@@ -241,8 +240,8 @@ impl Vectorized for Run<'_> {
                 force += 1;
             }
         }
-        implicit.efforts.mark(size);
-        implicit.steps.mark(size);
+        form.efforts.mark(size);
+        form.steps.mark(size);
         *done = true;
     }
 }
@@ -270,14 +269,14 @@ impl Gather<'_> {
 /// The sensitivities of a knot by (w, δv, δq); see [`KktElimination::sensitivities`].
 pub(crate) struct Unknowns<'a> {
     elimination: &'a KktElimination,
-    implicit: &'a InverseDynamicsForm,
+    form: &'a InverseDynamicsForm,
     dt: f64,
 }
 
 impl Unknowns<'_> {
     /// g += c times row k of some rows.
     fn add(&self, rows: &SparseRows, k: usize, c: f64, g: &mut Row<'_>) {
-        let row = &rows.numbers[k * self.implicit.stride..];
+        let row = &rows.numbers[k * self.form.stride..];
         let (u, x) = row.split_at(g.u.len());
         let (v, q) = x.split_at(g.v.len());
         for (g, row) in [(&mut *g.u, u), (&mut *g.v, v), (&mut *g.q, q)] {
@@ -292,10 +291,10 @@ impl Sensitivities for Unknowns<'_> {
         let per_step = c / self.dt; // δa = (y − δv) / Δt
         match (output, row) {
             (Output::Effort, row) if row < *passive => {}
-            (Output::Effort, row) => self.add(&self.implicit.efforts, row - passive, c, g),
+            (Output::Effort, row) => self.add(&self.form.efforts, row - passive, c, g),
             (Output::Acceleration, row) => match place[row] {
                 Place::Unknown(k) => g.u[k] += per_step,
-                Place::Row(k) => self.add(&self.implicit.steps, k, per_step, g),
+                Place::Row(k) => self.add(&self.form.steps, k, per_step, g),
             },
             (Output::Force, row) => match place[tableau.nv + row] {
                 Place::Unknown(k) => g.u[k] += c,

@@ -8,26 +8,26 @@ use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
 pub(crate) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[f64], dd: &[f64]) {
-    let (n, implicit) = (node.ndx(), &mut node.inverse_dynamics);
+    let (n, form) = (node.ndx(), &mut node.inverse_dynamics);
     for i in entries.clone() {
         node.q[i] += d[i];
     }
-    let explicit = if implicit.active { n / 2 } else { n };
+    let explicit = if form.active { n / 2 } else { n };
     for i in entries.start..entries.end.min(explicit) {
         node.Q.as_mut_slice()[i * (n + 1)] += dd[i];
     }
     for i in entries.start.max(explicit)..entries.end {
-        implicit.diagonal[i - n / 2] += dd[i];
+        form.diagonal[i - n / 2] += dd[i];
     }
 }
 
 /// r += d and R += diag(dd).
 pub(crate) fn add_control_diagonal(node: &mut LqNode, d: &[f64], dd: &[f64]) {
-    let (n, m, implicit) = (node.ndx(), node.nu(), &mut node.inverse_dynamics);
+    let (n, m, form) = (node.ndx(), node.nu(), &mut node.inverse_dynamics);
     for i in 0..m {
         node.r[i] += d[i];
-        match implicit.active {
-            true => implicit.diagonal[n / 2 + i] += dd[i],
+        match form.active {
+            true => form.diagonal[n / 2 + i] += dd[i],
             false => node.R.as_mut_slice()[i * (m + 1)] += dd[i],
         }
     }
@@ -41,7 +41,7 @@ pub(crate) struct Row<'a> {
 }
 
 /// The rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In
-/// a knot of implicit form u stands for the unknowns that replace the controls.
+/// a knot in inverse-dynamics form u stands for the unknowns that replace the controls.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     nu: usize,
@@ -94,8 +94,8 @@ impl Rows {
         self.rows[k * self.stride + self.nu + self.nv..][..self.nv].copy_from_slice(row);
     }
 
-    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in implicit form, it writes q and the
-    /// part of Q for q alone, and leaves the rows that depend on more to the sweep.
+    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in inverse-dynamics form, it writes q and
+    /// the part of Q for q alone, and leaves the rows that depend on more to the sweep.
     pub(crate) fn write(&mut self, node: &mut LqNode) {
         node.q.as_mut_slice().fill(0.0);
         node.r.as_mut_slice().fill(0.0);
@@ -116,8 +116,8 @@ impl Vectorized for Write<'_> {
     fn run<V: Vector>(self) {
         let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, node } = self;
         let (m, nv, n, stride) = (*nu, *nv, 2 * *nv, *stride);
-        let implicit = node.inverse_dynamics.active;
-        let (some, all) = if implicit { (0, *positions) } else { (*whole, *whole + *positions) };
+        let inverse = node.inverse_dynamics.active;
+        let (some, all) = if inverse { (0, *positions) } else { (*whole, *whole + *positions) };
         let first = slopes.len() - *positions;
         for k in 0..all {
             let from = if k < some { k } else { first + k - some };
@@ -138,7 +138,7 @@ impl Vectorized for Write<'_> {
         let (u, v, q) = (0, m, m + nv); // where they stand in a row
         let Q = node.Q.as_mut_slice();
         let both = [left.as_slice(), right.as_slice()];
-        if implicit {
+        if inverse {
             node.inverse_dynamics.diagonal.fill(0.0);
             for k in 0..if all == 0 { nv } else { 0 } {
                 Q[k * n..][..nv].fill(0.0);

@@ -4,7 +4,7 @@ use super::kernel::KnotGroup;
 use crate::robot::knot::unpack;
 use condyle_dynamics::{Data, Model, gravity, rnea, rnea_derivatives, static_torque_derivative};
 use condyle_spatial::block::Block;
-use condyle_spatial::simd::Kernel;
+use condyle_spatial::{Scalar, kernel};
 use nalgebra::DMatrix;
 
 /// M q̈ + h − g at knots with contacts, else −g.
@@ -36,7 +36,7 @@ impl<S: Block<Number = f64>> Surplus<S> {
             true => value.copy_from_slice(rnea(model, data, q, v, a, &[])),
             false => value.fill(S::zero()),
         }
-        S::enter(Subtract(value, gravity(model, data, q))); // M q̈ + h − g
+        subtract(value, gravity(model, data, q)); // M q̈ + h − g
         unpack(value, group.data, |data| &mut data.residuals.surplus);
         if !group.slopes {
             return;
@@ -49,18 +49,14 @@ impl<S: Block<Number = f64>> Surplus<S> {
             unpack(d.dtau_da.as_slice(), group.data, |data| data.residuals.dsurplus[2].as_mut_slice());
         }
         let dg = static_torque_derivative(model, data, q, &[]);
-        S::enter(Subtract(by_q.as_mut_slice(), dg.as_slice())); // ∂τ/∂q − ∂g/∂q
+        subtract(by_q.as_mut_slice(), dg.as_slice()); // ∂τ/∂q − ∂g/∂q
         unpack(by_q.as_slice(), group.data, |data| data.residuals.dsurplus[0].as_mut_slice());
     }
 }
 
-/// x −= y.
-struct Subtract<'a, S>(&'a mut [S], &'a [S]);
-
-impl<S: Block<Number = f64>> Kernel for Subtract<'_, S> {
-    #[inline(always)]
-    fn run(self) {
-        let Self(x, y) = self;
+kernel! {
+    /// x −= y.
+    fn subtract<S>(x: &mut [S], y: &[S]) {
         for i in 0..x.len().min(y.len()) {
             x[i] -= y[i];
         }
