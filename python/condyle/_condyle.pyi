@@ -20,7 +20,7 @@ from ._types import (
     Constrained,
     ConstrainedDerivatives,
     ConstrainedEquations,
-    Constraint,
+    ContactConstraint,
     Control,
     CoriolisDerivatives,
     EnergyDerivatives,
@@ -689,19 +689,19 @@ class ConstraintSet:
     is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
     sparse resolution of constrained dynamic equations (2021).
 
-    model: the robot; constraints: a list of `Constraint`s; mu: μ (1/kg); iterations: how many there are, always.
+    model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always.
 
     Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
     'world', a gain is negative or not finite, or two constraints are the same.
 
     >>> quadruped = condyle.robots.quadruped()
-    >>> trot = condyle.ConstraintSet(quadruped, [condyle.Constraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
+    >>> trot = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
     >>> len(trot), trot.rows, trot.range(1)
     (2, 6, slice(3, 6, 1))
     """
 
     def __new__(
-        cls, model: Model, constraints: Sequence[Constraint], mu: float = 0.0, iterations: int = 1
+        cls, model: Model, constraints: Sequence[ContactConstraint], mu: float = 0.0, iterations: int = 1
     ) -> ConstraintSet: ...
     @property
     def rows(self) -> int:
@@ -743,7 +743,7 @@ def constrained_dynamics(
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
-    >>> feet = [condyle.Constraint(foot, "point", kd=10.0) for foot in ("LF_foot", "RH_foot")]
+    >>> feet = [condyle.ContactConstraint(foot, "point", kd=10.0) for foot in ("LF_foot", "RH_foot")]
     >>> stance = condyle.ConstraintSet(quadruped, feet)
     >>> a, forces, residual, redundant = condyle.constrained_dynamics(quadruped, data, stance, q, zero, zero)
     >>> bool(residual < 1e-9), redundant, np.allclose(stance.jacobian() @ a, 0.0)
@@ -768,7 +768,7 @@ def constrained_dynamics_derivatives(
     result.
 
     >>> arm = condyle.robots.arm7()
-    >>> touch = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> touch = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
     >>> d = condyle.constrained_dynamics_derivatives(arm, condyle.Data(arm), touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
     >>> np.allclose(touch.jacobian() @ d.da_dtau, 0.0)  # no effort moves the point
     True
@@ -794,7 +794,7 @@ def constrained_dynamics_equations(
     bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
-    >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
     >>> d = condyle.constrained_dynamics_equations(arm, data, touch, [0.3] * 7, [0.1] * 7, [1.0] * 7)
     >>> np.allclose(d.M, condyle.crba(arm, data, [0.3] * 7))
     True
@@ -816,7 +816,7 @@ def impulse_dynamics(
     restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 
     >>> quadruped = condyle.robots.quadruped()
-    >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.Constraint("LF_foot", "point")])
+    >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])
     >>> q, falling = condyle.neutral(quadruped), np.eye(18)[2] * -1.0
     >>> after = condyle.impulse_dynamics(quadruped, condyle.Data(quadruped), touchdown, q, falling)
     >>> bool(after.lambda_[2] > 0.0)  # the ground pushes upwards
@@ -839,7 +839,7 @@ def impulse_dynamics_derivatives(
     as there are members, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
-    >>> hit = condyle.ConstraintSet(arm, [condyle.Constraint("tool", "point")])
+    >>> hit = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
     >>> d = condyle.impulse_dynamics_derivatives(arm, condyle.Data(arm), hit, [0.3] * 7, [0.1] * 7)
     >>> np.allclose(d.dv_dv @ d.dv_dv, d.dv_dv)  # an impact that sticks is a projection
     True
@@ -2162,7 +2162,7 @@ class ContactDynamics:
     """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
 
     model: the robot.
-    contacts: a dict of `Constraint`s by name; residuals call them by these names. May be empty.
+    contacts: a dict of `ContactConstraint`s by name; residuals call them by these names. May be empty.
     dt: Δt in seconds.
     costs: a list of `Cost`.
     damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
@@ -2173,14 +2173,14 @@ class ContactDynamics:
 
     >>> from condyle.optimal import ContactDynamics
     >>> quadruped = condyle.robots.quadruped()
-    >>> feet = {foot: condyle.Constraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
+    >>> feet = {foot: condyle.ContactConstraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
     >>> trot = ContactDynamics(quadruped, feet, 0.02, [])
     """
 
     def __new__(
         cls,
         model: Model,
-        contacts: dict[str, Constraint],
+        contacts: dict[str, ContactConstraint],
         dt: float,
         costs: Sequence[Cost],
         damping: float = 0.0,
@@ -2335,7 +2335,7 @@ class ImpulseDynamics:
     There are no controls.
 
     model: the robot.
-    contacts: a dict of `Constraint`s by name.
+    contacts: a dict of `ContactConstraint`s by name.
     costs: a list of `Cost`; they look at the state before the impact.
     restitution: ε, 0 to 1.
     damping: μ (1/kg).
@@ -2347,7 +2347,7 @@ class ImpulseDynamics:
     def __new__(
         cls,
         model: Model,
-        contacts: dict[str, Constraint],
+        contacts: dict[str, ContactConstraint],
         costs: Sequence[Cost],
         restitution: float = 0.0,
         damping: float = 0.0,

@@ -210,7 +210,7 @@ class ImpulseDerivatives(NamedTuple):
     """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia that the robot shows to its constraints."""
 
 
-class Constraint(NamedTuple):
+class ContactConstraint(NamedTuple):
     """A contact of a frame with the world, or a loop that two frames close.
 
     With velocity v and acceleration a of the frame relative to the other body, and its pose X in the other frame moved

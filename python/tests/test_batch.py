@@ -34,7 +34,7 @@ def argument(name: str, robot: Robot, states: int) -> Any:
         case "frame" | "body":
             return 1
         case "constraints":
-            return condyle.ConstraintSet(model, [condyle.Constraint(len(model.frames) - 1, "point")])
+            return condyle.ConstraintSet(model, [condyle.ContactConstraint(len(model.frames) - 1, "point")])
         case "by" | "argument" | "of":
             return None
     return inspect.Parameter.empty

@@ -5,7 +5,7 @@ import pytest
 from sample import Robot, make
 
 import condyle
-from condyle import Constraint, ConstraintSet
+from condyle import ConstraintSet, ContactConstraint
 
 CLOSE = {"rtol": 1e-8, "atol": 1e-8}
 """Roundings after a product with M or its inverse, whose condition is up to 1e4."""
@@ -13,7 +13,10 @@ CLOSE = {"rtol": 1e-8, "atol": 1e-8}
 
 def stance(robot: Robot) -> ConstraintSet:
     """A sole or two feet, in both references."""
-    feet = [Constraint("LF_foot", "point"), Constraint("RH_foot", "point", reference="local_world_aligned", kd=5.0)]
+    feet = [
+        ContactConstraint("LF_foot", "point"),
+        ContactConstraint("RH_foot", "point", reference="local_world_aligned", kd=5.0),
+    ]
     return ConstraintSet(robot.model, feet)
 
 
@@ -83,14 +86,14 @@ def test_impacts(quadruped: Robot) -> None:
 
 def test_targets(quadruped: Robot) -> None:
     model, data, q, v, _, tau, _ = quadruped
-    still = ConstraintSet(model, [Constraint("LF_foot", "rigid", acceleration=[0.0, 0.0, 0.7, 0.0, 0.0, 0.0])])
+    still = ConstraintSet(model, [ContactConstraint("LF_foot", "rigid", acceleration=[0.0, 0.0, 0.7, 0.0, 0.0, 0.0])])
     a = condyle.constrained_dynamics(model, data, still, q, v, tau).a
     np.testing.assert_allclose(condyle.frame_acceleration(model, data, q, v, a, "LF_foot", "local")[2], 0.7, **CLOSE)
     still.set_target(0, acceleration=np.zeros(6))
     a = condyle.constrained_dynamics(model, data, still, q, v, tau).a
     np.testing.assert_allclose(condyle.frame_acceleration(model, data, q, v, a, "LF_foot", "local"), 0.0, **CLOSE)
     here = condyle.frame_placement(model, data, q, "LF_foot")
-    held = ConstraintSet(model, [Constraint("LF_foot", "rigid", kp=100.0, placement=here)])
+    held = ConstraintSet(model, [ContactConstraint("LF_foot", "rigid", kp=100.0, placement=here)])
     same = condyle.constrained_dynamics(model, data, held, q, v, tau).a
     np.testing.assert_allclose(same, a, **CLOSE)
 
@@ -98,7 +101,7 @@ def test_targets(quadruped: Robot) -> None:
 def test_redundant_constraints(quadruped: Robot) -> None:
     model, data, q, _, _, tau, _ = quadruped
     v = np.zeros(18)  # where the point's classical acceleration is the frame's spatial one
-    twice = [Constraint("LF_foot", "point"), Constraint("LF_foot", "rigid")]
+    twice = [ContactConstraint("LF_foot", "point"), ContactConstraint("LF_foot", "rigid")]
     without, shared = ConstraintSet(model, twice), ConstraintSet(model, twice, mu=1e-8, iterations=4)
     one = condyle.constrained_dynamics(model, data, without, q, v, tau)
     other = condyle.constrained_dynamics(model, data, shared, q, v, tau)
@@ -110,9 +113,9 @@ def test_redundant_constraints(quadruped: Robot) -> None:
 
 def test_what_is_refused(quadruped: Robot) -> None:
     model, data, q, v, _, tau, _ = quadruped
-    point = Constraint("LF_foot", "point")
+    point = ContactConstraint("LF_foot", "point")
     with pytest.raises(condyle.ModelError, match="^unknown frame `LF_fot`; nearest is `LF_foot`$"):
-        ConstraintSet(model, [Constraint("LF_fot", "point")])
+        ConstraintSet(model, [ContactConstraint("LF_fot", "point")])
     with pytest.raises(
         condyle.ModelError, match="^constraint 1: it holds frame `LF_foot` as constraint 0 does already$"
     ):

@@ -107,7 +107,7 @@ NOT_OF_A_STATE = {"gradient", "hessian", "jacobian", "neutral", "random_configur
 
 def held(r: Robot) -> condyle.ConstraintSet:
     frame = len(r.model.frames) - 1
-    constraint = condyle.Constraint(frame, "point", kp=3.0, kd=2.0, placement=np.eye(4))
+    constraint = condyle.ContactConstraint(frame, "point", kp=3.0, kd=2.0, placement=np.eye(4))
     return condyle.ConstraintSet(r.model, [constraint], mu=1e-8, iterations=3)
 
 

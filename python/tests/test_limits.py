@@ -134,7 +134,7 @@ def test_feet_do_not_slip() -> None:
     q[8::3], q[9::3] = 0.7, -1.4  # knees bent
     x0 = np.r_[q, np.zeros(18)]
     feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
-    contacts = {f: condyle.Constraint(f, "point", reference="local_world_aligned", kd=20.0) for f in feet}
+    contacts = {f: condyle.ContactConstraint(f, "point", reference="local_world_aligned", kd=20.0) for f in feet}
     cone = FrictionCone(0.3, least=5.0)
     grips = [Limit(foot, Residual.friction_cone(foot, cone)) for foot in feet]
     costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(12)))]
@@ -165,7 +165,7 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
     turn = Limit("turn", Residual.frame_rotation(ARM, "tool", np.eye(3)), lower=[0, 1, 0], upper=[0, -1, 0])
     with pytest.raises(ProblemError, match="limit `turn`: entry 1 must be at least 1 and at most -1"):
         FreeDynamics(ARM, None, [], limits=[turn])
-    feet = {"foot": condyle.Constraint("LF_foot", "point")}
+    feet = {"foot": condyle.ContactConstraint("LF_foot", "point")}
     with pytest.raises(ProblemError, match="limit `push`: there is no contact `hand` at this knot; there is `foot`"):
         ImpulseDynamics(condyle.robots.quadruped(), feet, [], limits=[Limit("push", Residual.contact_force("hand"))])
     assert repr(effort) == "<condyle.optimal.Limit 'effort'>"

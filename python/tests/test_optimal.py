@@ -99,7 +99,7 @@ def test_knots_may_have_costs_of_their_own() -> None:
 
 
 def test_controls_of_unlike_knots_are_lists() -> None:
-    feet = {foot: condyle.Constraint(foot, "point") for foot in ("LF_foot", "RH_foot")}
+    feet = {foot: condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")}
     rest = Cost("rest", 1.0, Residual.state(STANDING))
     stance = ContactDynamics(QUADRUPED, feet, 0.01, [rest, Cost("effort", 1e-2, Residual.control(np.zeros(12)))])
     impact = ImpulseDynamics(QUADRUPED, feet, [rest], damping=1e-9)
@@ -132,7 +132,7 @@ def test_residuals_are_values() -> None:
 
 
 def test_cones_have_bounds_of_their_own() -> None:
-    feet = {"foot": condyle.Constraint("LF_foot", "rigid")}
+    feet = {"foot": condyle.ContactConstraint("LF_foot", "rigid")}
     cone, box = FrictionCone(0.7, greatest=200.0), [0.2, 0.1]
     for residual, (lower, upper) in (
         (Residual.friction_cone("foot", cone), cone.bounds()),
@@ -150,8 +150,8 @@ def test_cones_have_bounds_of_their_own() -> None:
 
 
 def test_what_does_not_fit_is_refused_by_name() -> None:
-    feet = {"foot": condyle.Constraint("LF_foot", "point")}
-    twice = {"one": condyle.Constraint("LF_foot", "point"), "two": condyle.Constraint("LF_foot", "rigid")}
+    feet = {"foot": condyle.ContactConstraint("LF_foot", "point")}
+    twice = {"one": condyle.ContactConstraint("LF_foot", "point"), "two": condyle.ContactConstraint("LF_foot", "rigid")}
     cone = Cost("grip", 1.0, Residual.friction_cone("hand", FrictionCone(0.7)))
     with pytest.raises(ProblemError, match="cost `grip`: there is no contact `hand` at this knot; there is `foot`"):
         ContactDynamics(QUADRUPED, feet, 0.01, [cone])
@@ -174,7 +174,7 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
 
 
 def every_kind_of_knot(landing: bool = False) -> Problem:
-    feet = {foot: condyle.Constraint(foot, "point", kd=20.0) for foot in ("LF_foot", "RH_foot")}
+    feet = {foot: condyle.ContactConstraint(foot, "point", kd=20.0) for foot in ("LF_foot", "RH_foot")}
     cone = Cost("cone", 1e-2, Residual.friction_cone("LF_foot", FrictionCone(0.7, greatest=200.0)))
     rest, still = Cost("rest", 1.0, Residual.state(STANDING)), Cost("still", 1e-2, Residual.control(np.zeros(12)))
     lower = np.full(12, -30.0)

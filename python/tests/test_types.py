@@ -24,7 +24,7 @@ INERTIA = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
 ARGUMENTS = {
     "model": ARM,
     "data": condyle.Data(ARM),
-    "constraints": condyle.ConstraintSet(ARM, [condyle.Constraint("tool", "point")]),
+    "constraints": condyle.ConstraintSet(ARM, [condyle.ContactConstraint("tool", "point")]),
     **dict.fromkeys(["q", "q0", "q1"], Q),
     **dict.fromkeys(["v", "a", "tau", "lambda_", "d"], V),
     "X": np.eye(7),

@@ -60,7 +60,7 @@ class Robot:
                 made = crocoddyl.ContactModel6D(self.state, self.frame(foot), pin.SE3.Identity(), axes, self.nu, gains)
             contacts.addContact(foot, made)
             kind = {3: "point", 6: "rigid"}[self.rows]
-            ours[foot] = condyle.Constraint(foot, kind, reference=word, kp=5.0, kd=10.0)
+            ours[foot] = condyle.ContactConstraint(foot, kind, reference=word, kp=5.0, kd=10.0)
         return ours, contacts
 
     def impulses(self):
@@ -68,7 +68,7 @@ class Robot:
         for foot in self.feet:
             made = {3: crocoddyl.ImpulseModel3D, 6: crocoddyl.ImpulseModel6D}[self.rows]
             impulses.addImpulse(foot, made(self.state, self.frame(foot), pin.LOCAL_WORLD_ALIGNED))
-        return {f: condyle.Constraint(f, kind, reference="local_world_aligned") for f in self.feet}, impulses
+        return {f: condyle.ContactConstraint(f, kind, reference="local_world_aligned") for f in self.feet}, impulses
 
 
 ROBOTS = {name: Robot(name) for name in ("quadruped", "humanoid")}

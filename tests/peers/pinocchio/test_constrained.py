@@ -32,7 +32,7 @@ class Case:
     """Constraints of a robot at a state, in both libraries."""
 
     state: State
-    constraints: list[condyle.Constraint]
+    constraints: list[condyle.ContactConstraint]
     models: "pin.StdVec_RigidConstraintModel"
     datas: "pin.StdVec_RigidConstraintData"
 
@@ -46,7 +46,7 @@ class Case:
         return float(np.inf if d.redundant else np.linalg.cond(d.inertia))
 
 
-def case(state: State, constraints: list[condyle.Constraint]) -> Case:
+def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
     """Constraints as Pinocchio has them: the target is part of the second placement."""
     pair = state.pair
     theirs = dict(common_frames(pair))
@@ -74,7 +74,7 @@ def random_case(state: State, seed: int, loops: bool) -> Case:
     """As many constraints as the robot can satisfy in one way, of a dozen random ones."""
     rng, pair = np.random.default_rng(seed), state.pair
     frames = [i for i, _ in common_frames(pair)]
-    chosen: list[condyle.Constraint] = []
+    chosen: list[condyle.ContactConstraint] = []
     for _ in range(12):
         frame, other = (int(f) for f in rng.choice(frames, 2))
         gains = rng.random(2) * 5.0 * rng.integers(2)
@@ -82,7 +82,7 @@ def random_case(state: State, seed: int, loops: bool) -> Case:
         acceleration = rng.standard_normal(6)
         if kind == "point":
             acceleration[3:] = 0.0
-        constraint = condyle.Constraint(
+        constraint = condyle.ContactConstraint(
             frame,
             kind,
             other if loops and rng.integers(2) else None,
@@ -100,7 +100,7 @@ def random_case(state: State, seed: int, loops: bool) -> Case:
     return case(state, chosen)
 
 
-def whole(c: condyle.Constraint) -> bool:
+def whole(c: condyle.ContactConstraint) -> bool:
     """Whether Pinocchio's ∂/∂q is the derivative of its own q̈ and λ, as differences show: it is not for all loops of
     points, nor for all rigid constraints along the world's axes.
     """
