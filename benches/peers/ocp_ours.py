@@ -53,13 +53,15 @@ def our_residual(residual, model, contacts):
 
 
 def our_contact(contact, gains):
-    """A `Constraint` of a contact's or an impulse's JSON."""
+    """A `ContactConstraint` of a contact's or an impulse's JSON."""
     placement = np.eye(4)
     if "ref" in contact:
         placement[:3, 3] = contact["ref"]["p"]
         placement[:3, :3] = contact["ref"].get("R", np.eye(3))
     kind, axes = {3: "point", 6: "rigid"}[contact["dim"]], FRAMES[contact["frame_type"]][1]
-    return condyle.Constraint(contact["frame"], kind, reference=axes, kp=gains[0], kd=gains[1], placement=placement)
+    return condyle.ContactConstraint(
+        contact["frame"], kind, reference=axes, kp=gains[0], kd=gains[1], placement=placement
+    )
 
 
 def our_action(stage, model, spec, bounded, terminal=False, others=()):
