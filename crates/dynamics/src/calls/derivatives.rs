@@ -2,14 +2,15 @@
 
 use super::differentiated::State;
 use super::forward_dynamics::{check_arguments as check_forward, one_by_one as accelerate};
-use super::kinematics::forward_velocities;
+use super::inverse_dynamics::check_arguments;
+use super::kinematics::{forward_accelerations, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
 use crate::derivatives::centroidal_derivatives::{self as centroidal, CentroidalDerivatives, shift};
 use crate::derivatives::{aba_derivatives as aba, rnea_derivatives as rnea};
 use crate::lanes::limbs::LaneView;
 use crate::passes::energy::{self, EnergyDerivatives};
-use crate::passes::kinematics::{PlacementCache, accelerations, positions, velocities};
+use crate::passes::kinematics::{PlacementCache, positions};
 use crate::passes::{minv, statics};
 use condyle_linalg::check;
 use condyle_linalg::tree_product::minus_products;
@@ -20,7 +21,8 @@ use nalgebra::DMatrix;
 /// ∂τ/∂q of [`static_torque`](crate::static_torque()), and without forces of [`gravity`](crate::gravity): exact, in O(n · depth).
 ///
 /// q: nq numbers; f_ext: a force on each body in its frame (it moves with the body), or empty for none. Returns the full
-/// nv × nv matrix (N m/rad, N/m), entry (i, j) being ∂τᵢ/∂q_j. Allocates nothing. Source: see the head of the file.
+/// nv × nv matrix (N m/rad, N/m), entry (i, j) being ∂τᵢ/∂q_j. Allocates nothing. Source: as of
+/// [`rnea_derivatives`], at rest.
 ///
 /// ```
 /// use condyle_dynamics::{Data, robots, static_torque_derivative};
@@ -90,7 +92,7 @@ pub struct RneaDerivatives<'d, S, R = f64> {
 ///
 /// q: nq numbers; v, a: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
 /// Returns three nv × nv matrices, row by row ∂τᵢ/∂·. Allocates nothing. Source: Singh, Russell, Wensing (2022),
-/// algorithm 1; see the head of the file.
+/// algorithm 1.
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, rnea_derivatives, robots};
@@ -116,24 +118,12 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
         data.rnea_derivatives.qd.copy_from_slice(v);
         data.rnea_derivatives.qdd.copy_from_slice(a);
     } else {
-        positions(model, &mut data.world, q);
-        rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
+        one_by_one(model, data, q, v, a, f_ext);
     }
     view(model, data)
 }
 
-/// Panics unless the arguments fit.
-#[inline]
-#[track_caller]
-fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
-    data.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    check("a", a.len(), model.nv());
-    check_forces(f_ext.len(), model.nodes().len());
-}
-
-/// Body by body, so that what second derivatives are made of is left behind.
+/// Body by body, for arguments that fit; leaves what second derivatives are made of.
 pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -142,7 +132,6 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
     a: &[S],
     f_ext: &[Force<S>],
 ) {
-    check_arguments(model, data, q, v, a, f_ext);
     positions(model, &mut data.world, q);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
@@ -292,8 +281,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
 /// respect to q, v and a, exact, in O(n).
 ///
 /// q: nq numbers; v, a: nv. Gravity is not among the accelerations. What is fixed to the world does not count; not a
-/// number if nothing that moves has a mass. Allocates nothing. Source: Carpentier and Mansard (2018); see the head of the
-/// file.
+/// number if nothing that moves has a mass. Allocates nothing. Source: Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{Data, centroidal_derivatives, centroidal_map, neutral, robots};
@@ -305,7 +293,6 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another size.
-#[inline(always)]
 pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -313,13 +300,7 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
     a: &[S],
 ) -> CentroidalDerivatives<'d, S> {
-    data.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    check("a", a.len(), model.nv());
-    positions(model, &mut data.world, q);
-    velocities(model, &data.world, &mut data.moving, v);
-    accelerations(model, &data.world, &mut data.moving, a);
+    forward_accelerations(model, data, q, v, a);
     centroidal::run(model, &data.world, &data.moving, &mut data.centroidal_derivatives);
     shift(model, &mut data.centroidal_derivatives)
 }

@@ -119,12 +119,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     method: Option<ForwardDynamicsMethod>,
 ) -> &'d [S] {
-    data.check(model);
-    model.check_regular();
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    check("tau", tau.len(), model.nv());
-    check_forces(f_ext.len(), model.nodes().len());
+    check_arguments(model, data, q, v, tau, f_ext);
     match method.unwrap_or(ForwardDynamicsMethod::fastest(model)) {
         ForwardDynamicsMethod::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
         method => {

@@ -40,13 +40,20 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
+    check_arguments(model, data, q, v, a, f_ext);
+    run(model, data, q, v, a, f_ext);
+    &data.rnea.tau
+}
+
+/// Panics unless the arguments fit.
+#[inline]
+#[track_caller]
+pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
     data.check(model);
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
     check("a", a.len(), model.nv());
     check_forces(f_ext.len(), model.nodes().len());
-    run(model, data, q, v, a, f_ext);
-    &data.rnea.tau
 }
 
 /// h(q, v) = C(q, v) v + g(q): the efforts that keep the velocity as it is, in O(n). It is [`rnea`] with a = 0.
@@ -132,7 +139,7 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
 /// O(n · depth).
 ///
 /// q: nq numbers; v: nv. Returns the full nv × nv matrix (N m s/rad, N s/m). Allocates nothing.
-/// Source: Echeandia and Wensing (2021), algorithm 1; see the head of the file.
+/// Source: Echeandia and Wensing (2021), algorithm 1.
 ///
 /// ```
 /// use condyle_dynamics::{Data, coriolis_matrix, gravity, nonlinear_effects, robots};

@@ -1,7 +1,8 @@
 //! Second derivatives of inverse and forward dynamics, contracted with a vector or as tensors.
 
 use super::derivatives::{AbaDerivatives, RneaDerivatives, in_turn, one_by_one, view, view_of_aba};
-use super::forward_dynamics::check_arguments;
+use super::forward_dynamics::check_arguments as check_forward;
+use super::inverse_dynamics::check_arguments;
 use crate::data::Data;
 use crate::derivatives::{aba_hessian as aba, rnea_hessian as rnea};
 use crate::workspace::{filled, zero_matrix};
@@ -32,7 +33,7 @@ pub struct RneaHessian<'d, S, R = f64> {
 ///
 /// q: nq numbers; v, a, lambda: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
 /// Returns four nv × nv matrices (in units of λᵀ τ by those of q, v and a), and the first derivatives of τ. Allocates
-/// nothing. Source: see the head of the file.
+/// nothing. Source: as of [`rnea_derivatives`](crate::rnea_derivatives()), differentiated once more.
 ///
 /// ```
 /// use condyle_dynamics::{Data, rnea_hessian, robots};
@@ -59,6 +60,7 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     lambda: &[S],
 ) -> RneaHessian<'d, S, R> {
     check("lambda", lambda.len(), model.nv());
+    check_arguments(model, data, q, v, a, f_ext);
     one_by_one(model, data, q, v, a, f_ext);
     rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
     let first = view(model, data);
@@ -117,6 +119,7 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     out: &mut RneaSecondDerivatives<S>,
 ) {
     check("out", out.lambda.len(), model.nv());
+    check_arguments(model, data, q, v, a, f_ext);
     one_by_one(model, data, q, v, a, f_ext);
     for i in 0..model.nv() {
         out.lambda[i] = S::one();
@@ -152,7 +155,7 @@ pub struct AbaHessian<'d, S, R = f64> {
 /// q: nq numbers; v, tau, lambda: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for
 /// none. Returns four nv × nv matrices (in units of λᵀ q̈ by those of q, v and τ), q̈ and its first derivatives: O(n · depth)
 /// for what goes into them, and three sparse products of O(n²) columns. Allocates nothing. Source: Nganga and Wensing
-/// (2021); see the head of the file.
+/// (2021).
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba_hessian, robots};
@@ -176,7 +179,7 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     lambda: &[S],
 ) -> AbaHessian<'d, S, R> {
     check("lambda", lambda.len(), model.nv());
-    check_arguments(model, data, q, v, tau, f_ext);
+    check_forward(model, data, q, v, tau, f_ext);
     in_turn(model, data, q, v, tau, f_ext);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);
     for (i, mu) in mu.iter_mut().enumerate() {

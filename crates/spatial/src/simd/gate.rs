@@ -93,6 +93,7 @@ macro_rules! kernel {
         }
     };
 }
+
 /// A function on `f64` whose body is generic over the vector registers `V` that it may use: the widest of the level, compiled
 /// for them in the crate that owns it. It is for levels that have registers, above the baseline, and returns nothing.
 #[macro_export]
