@@ -158,10 +158,7 @@ fn joints_that_cannot_follow() {
         Model::from_mjcf_str(&text, &options).map(|m| m.warnings().iter().map(ToString::to_string).collect::<Vec<_>>())
     };
     let left_out = [
-        (
-            "<joint joint1='a' joint2='b' polycoef='0 1 2'/>",
-            "<joint>: polycoef [0.0, 1.0, 2.0, 0.0, 0.0] is not linear",
-        ),
+        ("<joint joint1='a' joint2='b' polycoef='0 1 2'/>", "<joint>: polycoef 0 1 2 0 0 is not linear"),
         ("<joint joint1='a'/>", "<joint>: holds `a` where it is: <equality> has no part in a tree of bodies"),
         (
             "<joint joint1='a' joint2='b'/><joint joint1='a' joint2='b' polycoef='1 2'/>",
@@ -200,7 +197,7 @@ const BALL: &str = "<geom size='0.1'/>";
 #[test]
 fn errors_name_file_line_and_element() {
     let cases = [
-        ("<joint name='j' axis='0 0 0'/><geom size='1'/>", "<string>:4: joint `j`: axis"),
+        ("<joint name='j' axis='0 0 0'/><geom size='1'/>", "<string>:4: joint `j`: axis 0 0 0 is no direction"),
         ("<joint axis='0 0'/>", "<string>:4: <joint>: axis: expected 3 numbers, found 2"),
         ("<joint type='hing'/>", "<string>:4: <joint>: type: `hing` is none of hinge, slide, ball and free"),
         ("<joint range='2 1'/>", "<string>:4: <joint>: range: lower limit"),
@@ -209,7 +206,10 @@ fn errors_name_file_line_and_element() {
         ("<joint/><freejoint/>", "<string>:4: <freejoint>: a free joint is the only joint"),
         ("<joint/><geom type='mesh' mesh='m'/>", "<string>:4: <geom>: has mass, and meshes are not read"),
         ("<joint/><geom type='plane' size='1 1 1'/>", "<string>:4: <geom>: a moving body has no geom of type `plane`"),
-        ("<joint/><geom type='box' size='1 1'/>", "<string>:4: <geom>: size: a box needs 3 positive numbers"),
+        (
+            "<joint/><geom type='box' size='1 1'/>",
+            "<string>:4: <geom>: size: a box needs 3 positive numbers, found 1 1",
+        ),
         ("<joint/><inertial pos='0 0 0'/>", "<string>:4: <inertial>: has no mass"),
         ("<joint/><inertial pos='0 0 0' mass='-1'/>", "<string>:4: <inertial>: mass is -1 kg"),
         ("<replicate count='3'/>", "<string>:4: <replicate>: is not supported"),
@@ -225,7 +225,7 @@ fn errors_name_file_line_and_element() {
     assert!(said("<mujoco>").starts_with("<string>:1: not well-formed XML"));
     assert!(said(&"<body>".repeat(300)).starts_with("<string>:"));
     let deep = format!("<mujoco>{}{}</mujoco>", "<worldbody>".repeat(300), "</worldbody>".repeat(300));
-    assert!(said(&deep).contains("is nested more than 256 levels deep"));
+    assert!(said(&deep).contains("elements are nested 301 levels deep, at most 256 are allowed"));
     let missing = Model::from_mjcf(data("nowhere.xml"), &MjcfOptions::default()).unwrap_err();
     assert!(matches!(missing, Error::File { .. }));
 }
