@@ -225,6 +225,7 @@ impl ModelBuilder {
             warnings,
             singular: Vec::new(),
         };
+        model.check_magnitudes()?;
         model.find_singular();
         Ok(model)
     }

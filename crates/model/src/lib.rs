@@ -47,6 +47,7 @@ pub mod joint;
 pub mod layout;
 #[doc(hidden)]
 pub mod limbs;
+mod magnitude;
 mod model;
 pub mod robots;
 #[doc(hidden)]

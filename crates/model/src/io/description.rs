@@ -72,6 +72,7 @@ impl Description {
         let Self { limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
         model.warnings = warnings;
+        model.check_magnitudes()?;
         model.find_singular();
         Ok(model)
     }
