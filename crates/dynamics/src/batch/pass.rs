@@ -7,6 +7,7 @@ use crate::calls::inertia::{crba, minv};
 use crate::calls::inverse_dynamics::{gravity, nonlinear_effects, rnea};
 use crate::data::Data;
 use crate::workspace::{filled, zero_matrix};
+use condyle_linalg::threads;
 use condyle_model::Model;
 use condyle_spatial::Force;
 use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter};
@@ -132,7 +133,7 @@ fn spread<T: Real, S: Block<Number = T>>(
     let (some, others) = workers.split_at_mut(workers.len() / 2);
     let n = (groups * some.len() / (some.len() + others.len())).max(1) * S::LANES;
     let (first, second) = (from.split(n, states), to.split(n, states));
-    rayon::join(
+    threads::join(
         || spread(pass, model, some, n, first.0, second.0),
         || spread(pass, model, others, states - n, first.1, second.1),
     );
