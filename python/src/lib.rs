@@ -34,6 +34,7 @@ mod regressors;
 mod robots;
 mod simulation;
 
+use pyo3::exceptions::PyImportError;
 use pyo3::prelude::*;
 
 /// Rigid-body dynamics with exact derivatives: the compiled part of `condyle`.
@@ -109,6 +110,7 @@ mod _condyle {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        condyle::level::requested().map_err(|refused| PyImportError::new_err(refused.to_string()))?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("WORLD", builder::world(module.py())?)?;
         module.add("ARM7", condyle::robots::ARM7)?;
