@@ -265,6 +265,7 @@ fn give<'py>(py: Python<'py>, problem: &rust::Problem, s: &rust::Solution) -> Py
         rust::Status::MaxIterations => "max_iterations",
         rust::Status::TimeLimit => "time_limit",
         rust::Status::RegularisationLimit => "regularisation_limit",
+        rust::Status::Interrupted => "interrupted",
         rust::Status::Infeasible => "infeasible",
         _ => "not_finite",
     };
