@@ -1,9 +1,11 @@
 """What a thread, a fork, a signal and the environment may do. Each test runs a program of its own, with a time-out."""
 
 import os
+import signal
 import subprocess
 import sys
 import textwrap
+import time
 
 import pytest
 
@@ -27,7 +29,7 @@ def reach(knots=20, threads=1, limits=None):
 """
 
 
-def run(source, **environment):
+def run(source: str, **environment: str) -> tuple[int, str, str]:
     """Runs a program, and returns its exit code, its output and its errors."""
     program = PRELUDE + textwrap.dedent(source)
     command = [sys.executable, "-W", "ignore::DeprecationWarning", "-c", program]
@@ -36,7 +38,7 @@ def run(source, **environment):
     return done.returncode, done.stdout, done.stderr
 
 
-def check(source, **environment):
+def check(source: str, **environment: str) -> str:
     """Runs a program that ends well, and returns its output."""
     code, output, errors = run(source, **environment)
     assert code == 0, errors
@@ -83,7 +85,7 @@ CALLS = {
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("calls", CALLS.values(), ids=CALLS)
-def test_fork_after_threads(calls):
+def test_fork_after_threads(calls: str) -> None:
     """The child of a process that has computed on threads computes the same, and so does its own child."""
     check(
         calls
@@ -116,7 +118,7 @@ def test_fork_after_threads(calls):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("name", ["batch", "fddp"])
-def test_multiprocessing_by_fork(name):
+def test_multiprocessing_by_fork(name: str) -> None:
     """A pool of forked processes computes what their parent has computed, and ends as it should."""
     check(
         CALLS[name]
@@ -135,8 +137,152 @@ def test_multiprocessing_by_fork(name):
     )
 
 
+LONG = {
+    "solve": """
+        problem, xs, us = reach(100)
+        solver = Fddp(problem, max_iterations=10**9, tolerance=0.0)
+        def call():
+            solver.solve(xs, us)
+        def check():
+            kept = solver.solution
+            assert kept.status == "interrupted", kept.status
+            assert np.isfinite(kept.cost) and kept.cost == kept.trace[-1].cost
+    """,
+    "resume": """
+        problem, xs, us = reach(100)
+        solver = Fddp(problem, max_iterations=1)
+        assert solver.solution is None
+        first = solver.solve(xs, us)
+        np.testing.assert_array_equal(solver.solution.xs, first.xs)
+        solver = Fddp(problem, max_iterations=10**9, tolerance=0.0, threads=2)
+        def call():
+            solver.resume()
+        def check():
+            assert solver.solution.status == "interrupted"
+    """,
+    "augmented lagrangian": """
+        weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+        problem, xs, us = reach(100, limits=[weak])
+        inner = {"max_iterations": 10**9}
+        solver = AugmentedLagrangian(problem, inner, tolerance=1e-300, tolerance_dual=1e-300, max_solves=10**9,
+                                     penalty_max=1e300, penalty_factor=1.0001)
+        def call():
+            solver.solve(xs, us)
+        def check():
+            assert solver.solution.status == "interrupted", solver.solution.status
+            assert np.isfinite(solver.outcome.cost)
+    """,
+    "an action": """
+        def calc(t, x, u):
+            time.sleep(1e-3)
+            return x + 0.1 * u, 0.5 * (x @ x + u @ u)
+        knot, end = Action(1, 1, calc), Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+        solver = Fddp(Problem([1.0], [knot], [0] * 1000, end), max_iterations=10**9, tolerance=0.0)
+        def call():
+            solver.solve(np.ones((1001, 1)), np.zeros((1000, 1)))
+        def check():
+            assert solver.solution is not None
+    """,
+    "simulation": """
+        simulation = condyle.simulation.Simulation(condyle.robots.arm7(), integrator="runge_kutta_4", dt=1e-6)
+        def call():
+            simulation.run(2**63)
+        def check():
+            assert simulation.time > 0.0
+            assert simulation.run(3) == "done"
+    """,
+    "batch": """
+        humanoid = condyle.robots.humanoid()
+        data, states = condyle.Data(humanoid), 300_000
+        q, v = np.tile(condyle.neutral(humanoid), (states, 1)), np.zeros((states, humanoid.nv))
+        out = np.full((states, humanoid.nv), np.nan)
+        def call():
+            condyle.aba(humanoid, data, q, v, v, out=out)
+        def check():
+            assert np.isfinite(out[0]).all() and np.isnan(out[-1]).all()  # written as far as it came
+    """,
+    "states one by one": """
+        humanoid = condyle.robots.humanoid()
+        data, states = condyle.Data(humanoid), 10**7
+        q = np.broadcast_to(condyle.neutral(humanoid), (states, humanoid.nq))
+        def call():
+            condyle.potential_energy(humanoid, data, q)
+        def check():
+            pass
+    """,
+}
+
+INTERRUPTED = """
+        def interrupted(error):
+            begin = time.monotonic()
+            try:
+                call()
+            except error:
+                took = time.monotonic() - begin
+                assert took < 20.0, took
+                check()
+                return
+            raise AssertionError("the call has ended by itself")
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
+@pytest.mark.parametrize("call", LONG.values(), ids=LONG)
+def test_signals(call: str) -> None:
+    """A handler runs while a call lasts, and what it raises ends the call; what was computed until then is kept."""
+    check(
+        call
+        + INTERRUPTED
+        + """
+        class Enough(Exception):
+            pass
+
+        def handler(number, frame):
+            raise Enough
+        signal.signal(signal.SIGALRM, handler)
+        signal.setitimer(signal.ITIMER_REAL, 0.1)
+        interrupted(Enough)
+        """
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs signals")
+@pytest.mark.parametrize("name", ["solve", "augmented lagrangian", "simulation"])
+def test_control_c(name: str) -> None:
+    """Ctrl-C raises KeyboardInterrupt within the call, and that ends the program."""
+    program = PRELUDE + textwrap.dedent(LONG[name] + INTERRUPTED) + "print('begin', flush=True)\n"
+    program += "interrupted(KeyboardInterrupt)\nprint('again', flush=True)\ncall()\n"
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in ("begin\n", "again\n"):
+            assert process.stdout.readline() == line
+            time.sleep(0.2)
+            process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == -signal.SIGINT
+    assert errors.rstrip().endswith("KeyboardInterrupt")
+
+
+def test_signals_on_another_thread() -> None:
+    """Only the main thread gets signals: a solve on another one goes on, and leaves the interpreter to others."""
+    check(
+        LONG["simulation"].replace("2**63", "200_000")
+        + """
+        signal.signal(signal.SIGALRM, lambda *_: seen.append(time.monotonic()))
+        seen = []
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+        worker = threading.Thread(target=call)
+        worker.start()
+        worker.join()
+        assert seen
+        assert simulation.time > 0.19
+        """
+    )
+
+
 @pytest.mark.parametrize("value", ["", "avx3", "AVX2", "neon" if os.uname().machine == "x86_64" else "avx2"])
-def test_refused_level(value):
+def test_refused_level(value: str) -> None:
     """A level that cannot be used is an error of the import, which names those that can."""
     code, _, errors = run("", CONDYLE_LEVEL=value)
     assert code == 1
@@ -145,5 +291,8 @@ def test_refused_level(value):
     assert "baseline" in last
 
 
-def test_chosen_level():
-    check("condyle.rnea(condyle.robots.arm7(), condyle.Data(condyle.robots.arm7()), *np.zeros((3, 7)))", CONDYLE_LEVEL="baseline")
+def test_chosen_level() -> None:
+    """A level that every processor has."""
+    check(
+        "arm = condyle.robots.arm7()\ncondyle.rnea(arm, condyle.Data(arm), *np.zeros((3, 7)))", CONDYLE_LEVEL="baseline"
+    )

@@ -34,6 +34,30 @@ pub enum Error {
         found: usize,
     },
 
+    /// A knot has too many states or controls.
+    #[error("node {node}: expected at most {most} {name}, found {found}")]
+    Size {
+        /// The knot.
+        node: usize,
+        /// `states` or `controls`.
+        name: &'static str,
+        /// The most that there may be.
+        most: usize,
+        /// What the action model says.
+        found: usize,
+    },
+
+    /// A horizon is too long for the sizes of its knots.
+    #[error("the horizon: expected matrices of at most {most:.1e} numbers, found {numbers:.1e} in {knots} knots")]
+    Horizon {
+        /// The number of knots.
+        knots: usize,
+        /// Σ (ndx + nu)².
+        numbers: f64,
+        /// The most that there may be.
+        most: f64,
+    },
+
     /// A vector or a horizon has another length than the problem needs.
     #[error("`{name}`: expected length {expected}, found {found}")]
     Length {

@@ -58,12 +58,22 @@ enum InLanes<T: Real> {
 }
 
 impl<T: Real> Batch<T> {
+    /// The most threads: each has scratch of its own.
+    pub const MOST_THREADS: usize = 1024;
+
+    /// The most states, of which there may be less memory for.
+    pub const MOST_STATES: usize = 1 << 32;
+
     /// Room for up to `states` states at once, on `threads` threads.
     ///
     /// # Panics
-    /// If `threads` is 0.
+    /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
+    /// [`MOST_STATES`](Self::MOST_STATES).
     pub fn new(model: &Model, states: usize, threads: usize) -> Self {
+        let (most_threads, most_states) = (Self::MOST_THREADS, Self::MOST_STATES);
         assert!(threads > 0, "threads: expected at least 1, found 0");
+        assert!(threads <= most_threads, "threads: expected at most {most_threads}, found {threads}");
+        assert!(states <= most_states, "states: expected at most {most_states}, found {states}");
         Self {
             states,
             lanes: match level() {

@@ -22,7 +22,7 @@ pub(crate) struct Clock {
 impl Clock {
     /// A solve begins that may take `budget`.
     pub(crate) fn start(&mut self, begin: Instant, budget: Option<Duration>) {
-        self.end = budget.map(|budget| begin + budget);
+        self.end = budget.and_then(|budget| begin.checked_add(budget));
     }
 
     /// `Ok` if there is time for a phase and the observer wants to go on, else why not. A refusal halves what is expected of

@@ -89,6 +89,9 @@ pub struct Fddp {
     inverse_dynamics: bool,
 }
 
+/// The iterations for which there is room in the trace when a solve begins; with more it grows.
+const FORESEEN: usize = 10_000;
+
 /// The state that goes from one iteration to the next.
 struct Progress {
     regularisation: f64,
@@ -183,7 +186,7 @@ impl Fddp {
 
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
-        self.solution.trace.reserve(self.settings.max_iterations);
+        self.solution.trace.reserve(self.settings.max_iterations.min(FORESEEN));
         self.line_search.start(self.settings.step_lengths);
         let start = self.settings.regularisation_start;
         let mut progress =
