@@ -118,7 +118,7 @@ fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> P
     let array = array.cast_into::<PyUntypedArray>()?;
     let dtype = array.dtype();
     let kind: char = dtype.getattr("kind")?.extract()?;
-    if !"biuf".contains(kind) {
+    if !"biuf".contains(kind) && array.len() > 0 {
         return Err(PyTypeError::new_err(format!("{argument}: expected real numbers, found dtype {dtype}")));
     }
     check_shape(argument, array.shape(), shape)?;

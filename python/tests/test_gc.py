@@ -57,11 +57,11 @@ def test_cycles_are_collected(name: str) -> None:
         held: list[Any] = []
 
         def calc(t: int, x: Any, u: Any) -> tuple[Any, float]:
-            assert marker and held
+            assert marker is not None and held is not None
             return step(t, x, u)
 
         def constraint(_t: int, x: Any, _u: Any) -> Any:
-            assert marker and held
+            assert marker is not None and held is not None
             return x - 1e3 if x[0] > 1e3 else 0.0 * x
 
         held.append(MAKERS[name](calc, constraint))

@@ -11,8 +11,11 @@ from condyle.optimal import (
     Action,
     AugmentedLagrangian,
     ConstrainedAction,
+    ContactDynamics,
     Fddp,
+    FreeDynamics,
     FrictionCone,
+    InverseDynamics,
     Lqr,
     Problem,
     ProblemError,
@@ -79,3 +82,50 @@ def test_more_states_than_memory() -> None:
     q = np.broadcast_to(np.zeros(7), (10**13, 7))
     with pytest.raises(MemoryError):
         condyle.gravity(ARM, condyle.Data(ARM), q)
+
+
+FIXED = """<robot name="fixed">
+  <link name="base"/>
+  <link name="arm"><inertial>
+    <mass value="2"/><origin xyz="0 0 1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+  </inertial></link>
+  <joint name="bolt" type="fixed"><origin xyz="1 0 0"/><parent link="base"/><child link="arm"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "runge_kutta_4", "variational"])
+def test_nothing_to_simulate(integrator: Any) -> None:
+    simulation = condyle.simulation.Simulation(condyle.Model.from_urdf_str(FIXED), integrator)
+    assert simulation.run(10) == simulation.step([]) == simulation.run(3, lambda now: None) == "done"
+    assert simulation.time == pytest.approx(14e-3)
+    assert simulation.q.shape == simulation.v.shape == (0,)
+
+
+def test_nothing_to_control() -> None:
+    """A problem of a robot without coordinates is refused; what makes its knots is not."""
+    robot = condyle.Model.from_urdf_str(FIXED)
+    knot = FreeDynamics(robot, 0.1, [])
+    assert knot.quasi_static([]).shape == (0,)
+    for other in (knot, InverseDynamics(robot, 0.1, []), ContactDynamics(robot, {}, 0.1, [])):
+        with pytest.raises(ProblemError, match="the states have no numbers: a problem needs at least one"):
+            Problem([], [other], [0] * 3, FreeDynamics(robot, None, []))
+    with pytest.raises(ProblemError, match="the states have no numbers"):
+        Problem([], [Lqr(np.zeros((0, 0)))], [0], Lqr(np.zeros((0, 0))))
+
+
+def test_nothing_to_factor() -> None:
+    robot, nothing = condyle.Model.from_urdf_str(FIXED), np.zeros((0, 0))
+    for factor in (condyle.Cholesky(0), condyle.Ltdl(robot)):
+        factor.factorize(nothing)
+        assert factor.solve([]).shape == (0,)
+        assert factor.inverse().shape == factor.solve_matrix(nothing).shape == (0, 0)
+    assert condyle.DivideConquer(robot, 1).aba(robot, [], [], []).shape == (0,)
+
+
+def test_nothing_to_differentiate() -> None:
+    robot = condyle.Model.from_urdf_str(FIXED)
+    value, slope = condyle.gradient(robot, np.zeros(0), lambda x: 2.0)
+    assert value == 2.0
+    assert slope.shape == (0,)
+    assert condyle.jacobian(robot, np.zeros(0), lambda x: np.ones(3))[1].shape == (3, 0)
+    assert condyle.hessian(robot, np.zeros(0), lambda x: 2.0)[2].shape == (0, 0)

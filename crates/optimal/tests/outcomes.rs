@@ -459,3 +459,51 @@ fn observers_end_solves() {
     let solution = solver.resume_with(&mut problem, |_: &Iteration| ControlFlow::Break(())).unwrap();
     assert_eq!(solution.status, Status::Interrupted);
 }
+
+/// Sizes are refused before memory is asked for; a state without numbers too.
+#[test]
+fn sizes_are_limited() {
+    /// An action of so many states and controls, which is never computed.
+    struct Sized([usize; 2]);
+    impl ActionModel for Sized {
+        fn nx(&self) -> usize {
+            self.0[0]
+        }
+        fn nu(&self) -> usize {
+            self.0[1]
+        }
+        fn calc(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut [f64]) -> f64 {
+            unreachable!()
+        }
+        fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut LqNode) {
+            unreachable!()
+        }
+    }
+    let make = |nx: usize, nu: usize, knots: usize| {
+        let x0 = vec![0.0; nx.min(5000)];
+        Problem::new(x0, vec![Box::new(Sized([nx, nu]))], vec![0; knots], Box::new(Sized([nx, 0])))
+    };
+    let message = |nx, nu, knots| make(nx, nu, knots).unwrap_err().to_string();
+    assert_eq!(message(usize::MAX, 1, 3), format!("node 0: expected at most 4096 states, found {}", usize::MAX));
+    assert_eq!(message(1, 1 << 40, 3), "node 0: expected at most 4096 controls, found 1099511627776");
+    assert_eq!(
+        message(1000, 24, 1025),
+        "the horizon: expected matrices of at most 1.1e9 numbers, found 1.1e9 in 1025 knots"
+    );
+    assert_eq!(message(0, 1, 3), "the states have no numbers: a problem needs at least one");
+    assert!(make(1000, 24, 1024).is_ok());
+
+    let mut problem = cartpole(&HANGING, 5, 1);
+    let mut solver = Fddp::new(&problem);
+    for settings in [
+        Settings { threads: 10_000_000, ..Settings::default() },
+        Settings { segments: 10_000_000, ..Settings::default() },
+    ] {
+        solver.settings = settings;
+        let error = solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap_err().to_string();
+        assert!(error.ends_with("is 10000000, but it must be at least 1 and at most 1024"), "{error}");
+    }
+    // where a number only says when to stop, any is good
+    solver.settings = Settings { max_iterations: usize::MAX, time_budget: Some(Duration::MAX), ..Settings::default() };
+    assert_eq!(solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap().status, Status::Converged);
+}

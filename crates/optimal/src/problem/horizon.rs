@@ -71,7 +71,7 @@ impl Problem {
     /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has
+    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has
     /// a wrong length or an entry that is not finite, a knot has more than [`LqNode::MOST_SIZE`] states or controls, or the
     /// matrices (ndx + nu)² of all knots have more than 2³⁰ numbers (8 GiB).
     pub fn new(
@@ -91,6 +91,9 @@ impl Problem {
                     return Err(Error::Dimension { node: knot, name, expected, found });
                 }
             }
+        }
+        if ndx == 0 {
+            return Err(Error::EmptyState);
         }
         if terminal.nu() != 0 {
             return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
