@@ -8,6 +8,7 @@
 //! however many threads.
 
 mod pass;
+use crate::workspace::Gate;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::Force;
@@ -53,8 +54,8 @@ pub struct Batch<T: Real = f64> {
 #[derive(Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
-    Short(Group<T::Short>),
-    Long(Group<T::Long>),
+    Short(Group<T::Short<Gate>>),
+    Long(Group<T::Long<Gate>>),
 }
 
 impl<T: Real> Batch<T> {

@@ -170,6 +170,22 @@ pub fn requested() -> Result<Option<Level>, Refused> {
     if level.is_supported() { Ok(Some(level)) } else { Err(Refused::Unsupported(level)) }
 }
 
+/// Asserts that this processor has a level: at each door to code that is compiled for it.
+#[inline(always)]
+pub(crate) fn assert_supported(level: Level) {
+    /// The best level of this processor; 0 until it is first asked for. (Each has all below, Arm's only one too.)
+    static BEST: AtomicU8 = AtomicU8::new(0);
+    #[cold]
+    fn find(level: Level) {
+        let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap_or(Level::Baseline);
+        BEST.store(best as u8, Ordering::Relaxed);
+        assert!(level <= best, "{}", Unsupported(level));
+    }
+    if BEST.load(Ordering::Relaxed) < level as u8 {
+        find(level);
+    }
+}
+
 #[cold]
 fn choose() -> Level {
     let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap_or(Level::Baseline);
