@@ -34,3 +34,4 @@ mod second_order;
 mod urdf;
 mod urdf_errors;
 mod urdf_fuzz;
+mod validity;
