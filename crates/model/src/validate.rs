@@ -18,9 +18,6 @@ const PIVOT_ROUNDING: f64 = 1e-13;
 /// Positions at which M is looked at. A joint is called singular if it is so at all of them.
 const SAMPLES: usize = 3;
 
-/// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
-#[doc(hidden)]
-pub const ROTATION_ROUNDING: f64 = 1e-6;
 /// How far from 1 the length of a quaternion or of (cos, sin) in a position may be: 0.707 in place of √½ is off by 1.5e-4, an
 /// estimate that was integrated in single precision by less.
 const UNIT_ROUNDING: f64 = 1e-3;
@@ -48,7 +45,7 @@ fn check_placement(X: &Se3<f64>) -> Result<(), String> {
     if numbers.into_iter().any(|x| !x.is_finite()) {
         return Err("placement is not finite".to_owned());
     }
-    if !X.rotation.is_rotation(ROTATION_ROUNDING) {
+    if !X.rotation.is_rotation() {
         return Err("placement is no rotation and translation".to_owned());
     }
     Ok(())

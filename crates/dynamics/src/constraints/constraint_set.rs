@@ -21,7 +21,7 @@ use std::collections::BTreeSet;
 /// Constraints of one model: contacts and loops, and the scratch and results of [`constrained_dynamics`] and its like.
 ///
 /// All memory is allocated here. Make one set for each combination of contacts, and change where they shall be through
-/// [`target_mut`](Self::target_mut); the [`Data`](crate::Data) can be the same for all sets.
+/// [`set_target`](Self::set_target); the [`Data`](crate::Data) can be the same for all sets.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, robots};
@@ -75,7 +75,7 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Errors
     /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
-    /// is `World`, a gain is negative or not finite, or two constraints are the same.
+    /// is `World`, a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let factor = Ltdl::<S>::new(model);
         let tree = factor.tree();
@@ -199,12 +199,29 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
-    /// Where constraint k wants its frame to be: to be changed between calls, in each lane by itself.
+    /// Where constraint k wants its frame to be, in each lane by itself.
     ///
     /// # Panics
     /// If there is no such constraint.
-    pub fn target_mut(&mut self, k: usize) -> &mut Target<S> {
-        &mut self.targets[k]
+    pub fn target(&self, k: usize) -> Target<S> {
+        self.targets[k]
+    }
+
+    /// Changes where constraint k wants its frame to be, between calls. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Constraint`] for a target of plain numbers that is not finite or whose rotation is none; that of before then
+    /// stays.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    pub fn set_target(&mut self, k: usize, target: Target<S>) -> Result<(), Error> {
+        let to = &mut self.targets[k];
+        if let Some(what) = target.wrong() {
+            return Err(Error::Constraint { constraint: k, what: what.to_owned() });
+        }
+        *to = target;
+        Ok(())
     }
 
     /// J, rows × nv, as the last call left it: J is overwritten.

@@ -129,7 +129,7 @@ impl Fddp {
     ///
     /// # Errors
     /// [`Error`] if the dimensions of `problem` are not those given to [`new`](Self::new), the warm start has a wrong
-    /// length or is not finite, or a setting makes no sense. How the solve went is no error: see [`Solution::status`].
+    /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.solve_with(problem, xs, us, |_| ())
     }
@@ -148,6 +148,9 @@ impl Fddp {
         check_shape(self.solution.shape(), problem.shape())?;
         Error::check("xs", xs, self.solution.xs.len())?;
         Error::check("us", us, self.solution.us.len())?;
+        for (knot, x) in xs.chunks_exact(problem.nx().max(1)).enumerate() {
+            problem.action(knot).check_state(x).map_err(|what| Error::State { name: "xs", knot, what })?;
+        }
         self.solution.xs.copy_from_slice(xs);
         self.solution.us.copy_from_slice(us);
         self.resume_with(problem, observer)

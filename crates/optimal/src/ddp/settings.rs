@@ -32,7 +32,7 @@ pub struct Settings {
     /// forces as unknowns instead of the controls, where that is possible: without bounds on controls and without
     /// `second_order`. The same steps and gains, up to rounding, in about half the time.
     pub inverse_dynamics_form: bool,
-    /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
+    /// Iterations after which a solve stops, at most 1 000 000. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
     pub tolerance: f64,
@@ -101,6 +101,9 @@ impl Default for Settings {
     }
 }
 
+/// The most iterations of a solve: a trace of as many takes 100 MB.
+const MOST_ITERATIONS: usize = 1_000_000;
+
 impl Settings {
     /// Whether gaps count in what a step should gain.
     pub(super) fn counts_gaps(&self, feasible: bool) -> bool {
@@ -113,7 +116,18 @@ impl Settings {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();
         let [steps, segments, threads] = [self.step_lengths, self.segments, self.threads].map(|count| count as f64);
+        let number = |x: f64| x.is_finite();
+        let (above, below) = (self.regularisation_decrease_above, self.regularisation_increase_below);
+        let most = MOST_ITERATIONS as f64;
         for (name, value, good, allowed) in [
+            (
+                "max_iterations",
+                self.max_iterations as f64,
+                self.max_iterations as f64 <= most,
+                "at most 1000000, for which the trace has room",
+            ),
+            ("regularisation_decrease_above", above, number(above), "a finite number"),
+            ("regularisation_increase_below", below, number(below), "a finite number"),
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
             ("segments", segments, self.segments > 0, "at least 1"),
