@@ -94,6 +94,9 @@ pub(crate) fn body_index(
 /// An index from `least` to below `count`.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
     let index: isize = given.extract()?;
+    if count <= least {
+        return Err(PyIndexError::new_err(format!("{expected}, found {index}: the model has none")));
+    }
     usize::try_from(index)
         .ok()
         .filter(|i| (least..count).contains(i))

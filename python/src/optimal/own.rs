@@ -41,12 +41,13 @@ impl Lqr {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let nx = A.len()?;
+        let nx = limited("A", A.len()?)?;
         let nu = match (R, B) {
             (Some(R), _) => R.len()?,
-            (None, Some(B)) => B.get_item(0)?.len()?,
-            (None, None) => 0,
+            (None, Some(B)) if nx > 0 => B.get_item(0)?.len()?,
+            _ => 0,
         };
+        let nu = limited(if R.is_some() { "R" } else { "B" }, nu)?;
         let mut node = LqNode::zeros(nx, nu);
         let parts = [("B", B), ("f", f), ("Q", Q), ("S", S), ("R", R), ("q", q), ("r", r)];
         for (name, given) in [("A", Some(A)), ("lower", lower), ("upper", upper)].into_iter().chain(parts) {
@@ -54,6 +55,15 @@ impl Lqr {
         }
         Ok(Self(rust::Lqr::new(node)))
     }
+}
+
+/// A number of entries or rows for which there is memory; an error if there are more.
+fn limited(argument: &str, count: usize) -> PyResult<usize> {
+    const MOST: usize = 4096; // as of a state in a problem
+    if count <= MOST {
+        return Ok(count);
+    }
+    Err(PyValueError::new_err(format!("{argument}: {count} is more than the limit of {MOST}")))
 }
 
 /// Writes the part of a node that has this name.
@@ -73,7 +83,8 @@ fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()
 /// An action written in Python.
 ///
 /// nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
-/// calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+/// calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
+///     state may be None.
 /// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
 ///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
 /// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
@@ -105,13 +116,16 @@ impl Action {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let (nx, nu) = (limited("nx", nx)?, limited("nu", nu)?);
         Ok(Self { nx, nu, calc, calc_diff, bounds: bounds(nu, lower, upper)? })
     }
 }
 
 impl Action {
-    pub(super) fn copy(&self, py: Python<'_>) -> Own {
+    /// The action as the solver calls it, at the end of the horizon or before it.
+    pub(super) fn copy(&self, py: Python<'_>, terminal: bool) -> Own {
         Own {
+            terminal,
             nx: self.nx,
             nu: self.nu,
             calc: self.calc.clone_ref(py),
@@ -124,6 +138,8 @@ impl Action {
 
 /// An `Action` as the solver calls it. An error becomes a cost that is not a number, and is raised after the solve.
 pub(super) struct Own {
+    /// Whether it serves the end, after which there is no state.
+    terminal: bool,
     nx: usize,
     nu: usize,
     calc: Py<PyAny>,
@@ -152,8 +168,13 @@ impl Own {
     fn try_calc(&self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> PyResult<f64> {
         Python::attach(|py| {
             let (state, cost): (Bound<'_, PyAny>, f64) = call(py, &self.calc, t, x, u)?.extract()?;
-            if !state.is_none() {
-                next.copy_from_slice(&vector("the next state", &state, self.nx)?);
+            match state.is_none() {
+                false => next.copy_from_slice(&vector("the next state", &state, self.nx)?),
+                true if self.terminal => {}
+                true => {
+                    let what = format!("the next state of knot {t}: expected {} numbers, found None", self.nx);
+                    return Err(PyValueError::new_err(what));
+                }
             }
             Ok(cost)
         })
@@ -245,6 +266,7 @@ impl ConstrainedAction {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let size = limited("size", size)?;
         let bounds = bounds(size, lower, upper)?.unwrap_or_else(|| [vec![0.0; size], vec![0.0; size]]);
         Ok(Self { action, calc, calc_diff, bounds })
     }
