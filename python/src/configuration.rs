@@ -114,7 +114,7 @@ fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
         "velocity" => IntegrateArgument::Velocity,
         other => return Err(wrong_word("argument", "'position' or 'velocity'", other)),
     };
-    let mut J = DMatrix::zeros(model.nv(), model.nv());
+    let mut J = DMatrix::from_element(model.nv(), model.nv(), condyle::Scalar::zero());
     condyle::integrate_jacobian(model, &v, argument, &mut J);
     J
 }
@@ -129,7 +129,7 @@ fn difference_jacobian(model; d: Tangent, argument: Word; out) {
         "to" => DifferenceArgument::To,
         other => return Err(wrong_word("argument", "'from' or 'to'", other)),
     };
-    let mut J = DMatrix::zeros(model.nv(), model.nv());
+    let mut J = DMatrix::from_element(model.nv(), model.nv(), condyle::Scalar::zero());
     condyle::difference_jacobian(model, &d, argument, &mut J);
     J
 }

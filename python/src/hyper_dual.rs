@@ -2,6 +2,7 @@
 
 use crate::arrays::{Give, Number, check_shape};
 use condyle::Scalar;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use num_dual::{DualNum, HyperDual64};
 use numpy::ndarray::Dimension;
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
@@ -9,8 +10,78 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// The type of hyper-dual number that the library computes with.
-pub(crate) type Hyper = HyperDual64;
+/// The hyper-dual number that the library computes with. Its operations are called, not inlined: a model's functions have
+/// thousands of them, and what takes time is Python's making and reading of each number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hyper(HyperDual64);
+
+macro_rules! operators {
+    ($($trait:ident $name:ident),*; $($assign:ident $assign_name:ident $operator:tt),*) => {
+        $(impl $trait for Hyper {
+            type Output = Self;
+            #[inline(never)]
+            fn $name(self, other: Self) -> Self {
+                Self(self.0.$name(other.0))
+            }
+        })*
+        $(impl $assign for Hyper {
+            #[inline]
+            fn $assign_name(&mut self, other: Self) {
+                *self = *self $operator other;
+            }
+        })*
+    };
+}
+operators!(Add add, Sub sub, Mul mul, Div div; AddAssign add_assign +, SubAssign sub_assign -);
+
+impl Neg for Hyper {
+    type Output = Self;
+    #[inline(never)]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl Scalar for Hyper {
+    type Mask = bool;
+    const LANES: usize = 1;
+
+    fn splat(x: f64) -> Self {
+        Self(x.into())
+    }
+    #[inline(never)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(self.0 * b.0 + c.0)
+    }
+    fn recip(self) -> Self {
+        Self(Scalar::recip(self.0))
+    }
+    fn sqrt(self) -> Self {
+        Self(Scalar::sqrt(self.0))
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = Scalar::sin_cos(self.0);
+        (Self(sin), Self(cos))
+    }
+    fn atan2(self, x: Self) -> Self {
+        Self(Scalar::atan2(self.0, x.0))
+    }
+    fn abs(self) -> Self {
+        Self(Scalar::abs(self.0))
+    }
+    fn lt(self, other: Self) -> bool {
+        Scalar::lt(self.0, other.0)
+    }
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+    fn and(a: bool, b: bool) -> bool {
+        a && b
+    }
+    fn or(a: bool, b: bool) -> bool {
+        a || b
+    }
+}
 
 /// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0: it knows its derivatives in two
 /// directions, and the second derivative by both.
@@ -26,10 +97,10 @@ pub(crate) type Hyper = HyperDual64;
 /// >>> bool(abs(y.eps1eps2 - 2.0 * np.cos(0.5) * 2.0) < 1e-15)  # ∂²y/∂x₀∂x₁
 /// True
 #[pyclass(frozen, module = "condyle")]
-pub(crate) struct HyperDual(Hyper);
+pub(crate) struct HyperDual(HyperDual64);
 
 /// The other number of an operation: hyper-dual or real. It is no array: an array has operations of its own.
-pub(crate) struct Operand(Hyper);
+pub(crate) struct Operand(HyperDual64);
 
 impl<'py> FromPyObject<'_, 'py> for Operand {
     type Error = PyErr;
@@ -49,7 +120,7 @@ impl HyperDual {
     #[new]
     #[pyo3(signature = (re, eps1=0.0, eps2=0.0, eps1eps2=0.0))]
     fn new(re: f64, eps1: f64, eps2: f64, eps1eps2: f64) -> Self {
-        Self(Hyper::new(re, eps1, eps2, eps1eps2))
+        Self(HyperDual64::new(re, eps1, eps2, eps1eps2))
     }
 
     /// The value.
@@ -74,7 +145,7 @@ impl HyperDual {
     }
 
     fn __repr__(&self) -> String {
-        let Hyper { re, eps1, eps2, eps1eps2, .. } = self.0;
+        let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = self.0;
         format!("HyperDual({re}, eps1={eps1}, eps2={eps2}, eps1eps2={eps1eps2})")
     }
     fn __add__(&self, other: Operand) -> Self {
@@ -252,7 +323,7 @@ impl Number for Hyper {
         array.getattr("flat")?.try_iter()?.map(|x| Self::read_one(argument, &x?)).collect()
     }
     fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        value.extract::<Operand>().map(|x| x.0).map_err(|_| {
+        value.extract::<Operand>().map(|x| Self(x.0)).map_err(|_| {
             let found = value.get_type();
             PyTypeError::new_err(format!("{argument}: expected real or hyper-dual numbers, found {found}"))
         })
@@ -271,7 +342,7 @@ impl Number for Hyper {
         let array = py.import("numpy")?.call_method1("empty", (shape.to_vec(), "O"))?;
         let flat = array.getattr("flat")?;
         for (k, x) in numbers.into_iter().enumerate() {
-            flat.set_item(k, HyperDual(x))?;
+            flat.set_item(k, HyperDual(x.0))?;
         }
         Ok(array)
     }
@@ -279,6 +350,6 @@ impl Number for Hyper {
 
 impl Give for Hyper {
     fn give<'py>(&self, py: Python<'py>, _: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(Bound::new(py, HyperDual(*self))?.into_any())
+        Ok(Bound::new(py, HyperDual(self.0))?.into_any())
     }
 }

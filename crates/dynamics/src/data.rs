@@ -138,33 +138,39 @@ fn clone_long(data: &Data<Long>) -> Data<Long> {
     data.copy()
 }
 
+/// A copy, made in a function of its own for each kind of workspace: in one for all it would be the library's largest.
+#[inline(never)]
+fn copied<W: Clone>(workspace: &W) -> W {
+    workspace.clone()
+}
+
 impl<S: Scalar> Data<S> {
     fn copy(&self) -> Self {
         Self {
             size: self.size,
             tree: self.tree,
-            world: self.world.clone(),
-            moving: self.moving.clone(),
-            rnea: self.rnea.clone(),
-            crba: self.crba.clone(),
-            aba: self.aba.clone(),
-            minv: self.minv.clone(),
-            rnea_derivatives: self.rnea_derivatives.clone(),
-            aba_derivatives: self.aba_derivatives.clone(),
-            rnea_hessian: self.rnea_hessian.clone(),
-            aba_hessian: self.aba_hessian.clone(),
-            constrained_dynamics: self.constrained_dynamics.clone(),
-            constrained_derivatives: self.constrained_derivatives.clone(),
-            impulse_dynamics: self.impulse_dynamics.clone(),
-            statics: self.statics.clone(),
-            coriolis: self.coriolis.clone(),
-            centroidal: self.centroidal.clone(),
-            centroidal_derivatives: self.centroidal_derivatives.clone(),
-            energy: self.energy.clone(),
-            all_terms: self.all_terms.clone(),
-            forward_dynamics: self.forward_dynamics.clone(),
-            regressor: self.regressor.clone(),
-            limbs: self.limbs.clone(),
+            world: copied(&self.world),
+            moving: copied(&self.moving),
+            rnea: copied(&self.rnea),
+            crba: copied(&self.crba),
+            aba: copied(&self.aba),
+            minv: copied(&self.minv),
+            rnea_derivatives: copied(&self.rnea_derivatives),
+            aba_derivatives: copied(&self.aba_derivatives),
+            rnea_hessian: copied(&self.rnea_hessian),
+            aba_hessian: copied(&self.aba_hessian),
+            constrained_dynamics: copied(&self.constrained_dynamics),
+            constrained_derivatives: copied(&self.constrained_derivatives),
+            impulse_dynamics: copied(&self.impulse_dynamics),
+            statics: copied(&self.statics),
+            coriolis: copied(&self.coriolis),
+            centroidal: copied(&self.centroidal),
+            centroidal_derivatives: copied(&self.centroidal_derivatives),
+            energy: copied(&self.energy),
+            all_terms: copied(&self.all_terms),
+            forward_dynamics: copied(&self.forward_dynamics),
+            regressor: copied(&self.regressor),
+            limbs: copied(&self.limbs),
         }
     }
 }

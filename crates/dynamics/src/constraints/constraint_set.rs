@@ -1,22 +1,15 @@
-//! Constraints of one model, planned: which coordinates each of them touches, and memory for all that they need.
-//!
-//! The coordinates that move a constraint's frames lie on the ways from the frames to the root of the tree of M's factor.
-//! Sorted, they are what both ways share, then the rest of one way, then the rest of the other: three runs at most. Rows
-//! of J are stored on these coordinates alone.
+//! Constraints of one model: their plans, and memory for all that they need.
 
 use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_lanes::ConstraintLanes;
 use crate::constraints::delassus::Delassus;
-use crate::constraints::plan::{Plan, Proximal, SupportColumn, common};
-use condyle_linalg::Ltdl;
-use condyle_linalg::elimination_tree::NONE;
+use crate::constraints::plan::{Plan, Proximal, nonzero_rows, touching};
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Error;
 use condyle_model::Model;
-use condyle_spatial::{Scalar, Se3, Vec3};
+use condyle_spatial::Scalar;
 use core::ops::Range;
 use nalgebra::DMatrix;
-use std::collections::BTreeSet;
 
 /// Constraints of one model: contacts and loops, and the scratch and results of [`constrained_dynamics`] and its like.
 ///
@@ -77,88 +70,17 @@ impl<S: Scalar> ConstraintSet<S> {
     /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
     /// is `World`, a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
-        let factor = Ltdl::<S>::new(model);
-        let tree = factor.tree();
-        let mut place = vec![0; model.nv()];
-        for (k, &coordinate) in tree.order.iter().enumerate() {
-            place[coordinate] = k;
-        }
-        let support = |body: usize| model.support(&model.nodes()[body]);
-        let mut plans: Vec<Plan> = Vec::new();
-        let (mut row, mut start) = (0, 0);
-        for (i, constraint) in constraints.iter().enumerate() {
-            let bodies = constraint.bodies(model, &constraints[..i])?;
-            let ways = bodies.map(|body| {
-                let mut way = BTreeSet::new(); // with all places before, to the root
-                for &c in support(body) {
-                    let mut k = place[model.columns()[c].coordinate];
-                    while k != NONE && way.insert(k) {
-                        k = tree.parent[k];
-                    }
-                }
-                way
-            });
-            let places: Vec<usize> = ways[0].union(&ways[1]).copied().collect();
-            let shared = ways[0].intersection(&ways[1]).count();
-            let branch = |k: &usize| ways[0].contains(k) && !ways[1].contains(k);
-            let second = (shared + 1..places.len()).find(|&j| branch(&places[j]) != branch(&places[j - 1]));
-            let columns: BTreeSet<usize> = bodies.iter().flat_map(|&body| support(body)).copied().collect();
-            let touch = |column: usize| {
-                let c = &model.columns()[column];
-                SupportColumn {
-                    column,
-                    at: places.binary_search(&place[c.coordinate]).expect("its place is on the way"),
-                    coordinate: c.coordinate,
-                    ratio: c.ratio,
-                    first: support(bodies[0]).contains(&column),
-                    second: support(bodies[1]).contains(&column),
-                }
-            };
-            let placement = |frame: usize| model.frames()[frame].placement;
-            let placements = [placement(constraint.frame), constraint.other.map_or(Se3::identity(), placement)];
-            let turn =
-                |k: usize| Se3::new(model.nodes()[bodies[k]].axis_rotation.transpose(), Vec3::zero()) * placements[k];
-            let mut plan = Plan {
-                kind: constraint.kind,
-                reference: constraint.reference,
-                kp: constraint.kp,
-                kd: constraint.kd,
-                bodies,
-                placements,
-                turned: [turn(0), turn(1)],
-                row,
-                coordinates: places.iter().map(|&k| tree.order[k]).collect(),
-                shared,
-                second: second.unwrap_or(places.len()),
-                touches: columns.into_iter().map(touch).collect(),
-                places,
-                start,
-                common: Vec::new(),
-            };
-            plan.common = plans.iter().chain([&plan]).map(|other| common(&plan.places, &other.places)).collect();
-            row += plan.rows();
-            start += plan.rows() * plan.places.len();
-            plans.push(plan);
-        }
-        let (rows, entries, nv) = (row, start, model.nv());
-        let touching = |k: usize| {
-            let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
-            touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
-        };
-        let nonzero_rows = |k: usize| {
-            // what carries a frame moves the force on the other one
-            let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
-            let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
-            model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
-        };
+        let plans = Plan::of_constraints(model, constraints)?;
+        let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));
+        let nv = model.nv();
         let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
         Ok(Self {
             proximal: Proximal::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
             nv,
             geometry: model.geometry_hash(),
-            nonzero_rows: NonzeroRows::of_columns((0..nv).map(nonzero_rows).collect()),
-            touching: (0..nv).map(touching).collect(),
+            nonzero_rows: nonzero_rows(model, &plans),
+            touching: (0..nv).map(|k| touching(&plans, k)).collect(),
             J: vec![o; entries],
             gamma: vec![o; rows],
             delassus: Delassus::new(rows, entries),

@@ -4,10 +4,14 @@
 //! Sorted, they are what both ways share, then the rest of one way, then the rest of the other: three runs at most. Rows
 //! of J are stored on these coordinates alone.
 
-use crate::constraints::constraint::ConstraintKind;
+use crate::constraints::constraint::{ConstraintKind, ContactConstraint};
 use crate::passes::frames::ReferenceFrame;
-use condyle_spatial::Se3;
+use condyle_linalg::elimination_tree::{EliminationTree, NONE};
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_model::{Error, Model};
+use condyle_spatial::{Se3, Vec3};
 use core::ops::Range;
+use std::collections::BTreeSet;
 
 /// How J M⁻¹ Jᵀ is regularised, so that redundant constraints share their forces.
 ///
@@ -73,6 +77,75 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
+    /// The plans of some constraints, one after the other.
+    ///
+    /// # Errors
+    /// [`Error::Constraint`] for the first that the model does not allow.
+    pub(crate) fn of_constraints<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Vec<Self>, Error> {
+        let tree = EliminationTree::new(model, 1);
+        let mut place = vec![0; model.nv()];
+        for (k, &coordinate) in tree.order.iter().enumerate() {
+            place[coordinate] = k;
+        }
+        let support = |body: usize| model.support(&model.nodes()[body]);
+        let mut plans: Vec<Plan> = Vec::new();
+        let (mut row, mut start) = (0, 0);
+        for (i, constraint) in constraints.iter().enumerate() {
+            let bodies = constraint.bodies(model, &constraints[..i])?;
+            let ways = bodies.map(|body| {
+                let mut way = BTreeSet::new(); // with all places before, to the root
+                for &c in support(body) {
+                    let mut k = place[model.columns()[c].coordinate];
+                    while k != NONE && way.insert(k) {
+                        k = tree.parent[k];
+                    }
+                }
+                way
+            });
+            let places: Vec<usize> = ways[0].union(&ways[1]).copied().collect();
+            let shared = ways[0].intersection(&ways[1]).count();
+            let branch = |k: &usize| ways[0].contains(k) && !ways[1].contains(k);
+            let second = (shared + 1..places.len()).find(|&j| branch(&places[j]) != branch(&places[j - 1]));
+            let columns: BTreeSet<usize> = bodies.iter().flat_map(|&body| support(body)).copied().collect();
+            let touch = |column: usize| {
+                let c = &model.columns()[column];
+                SupportColumn {
+                    column,
+                    at: places.binary_search(&place[c.coordinate]).expect("its place is on the way"),
+                    coordinate: c.coordinate,
+                    ratio: c.ratio,
+                    first: support(bodies[0]).contains(&column),
+                    second: support(bodies[1]).contains(&column),
+                }
+            };
+            let placement = |frame: usize| model.frames()[frame].placement;
+            let placements = [placement(constraint.frame), constraint.other.map_or(Se3::identity(), placement)];
+            let turn =
+                |k: usize| Se3::new(model.nodes()[bodies[k]].axis_rotation.transpose(), Vec3::zero()) * placements[k];
+            let mut plan = Plan {
+                kind: constraint.kind,
+                reference: constraint.reference,
+                kp: constraint.kp,
+                kd: constraint.kd,
+                bodies,
+                placements,
+                turned: [turn(0), turn(1)],
+                row,
+                coordinates: places.iter().map(|&k| tree.order[k]).collect(),
+                shared,
+                second: second.unwrap_or(places.len()),
+                touches: columns.into_iter().map(touch).collect(),
+                places,
+                start,
+                common: Vec::new(),
+            };
+            plan.common = plans.iter().chain([&plan]).map(|other| common(&plan.places, &other.places)).collect();
+            (row, start) = (row + plan.rows(), plan.end());
+            plans.push(plan);
+        }
+        Ok(plans)
+    }
+
     pub(crate) fn rows(&self) -> usize {
         self.kind.rows()
     }
@@ -84,11 +157,33 @@ impl Plan {
         self.start + r * n..self.start + (r + 1) * n
     }
 
+    /// Where the array of all rows goes on behind it.
+    pub(crate) fn end(&self) -> usize {
+        self.start + self.rows() * self.places.len()
+    }
+
     /// Whether the rows turn with the world's axes, not the frame's.
     #[inline(always)]
     pub(crate) fn aligned(&self) -> bool {
         self.reference == ReferenceFrame::LocalWorldAligned
     }
+}
+
+/// The rows of J in which coordinate k may differ from zero.
+pub(crate) fn touching(plans: &[Plan], k: usize) -> Vec<usize> {
+    let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
+    touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
+}
+
+/// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
+pub(crate) fn nonzero_rows<R>(model: &Model<R>, plans: &[Plan]) -> Vec<NonzeroRows> {
+    let rows = |k: usize| {
+        // what carries a frame moves the force on the other one
+        let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
+        let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
+        model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
+    };
+    NonzeroRows::of_columns((0..model.nv()).map(rows).collect())
 }
 
 /// Places common to two sorted lists, as runs.
