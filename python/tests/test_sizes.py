@@ -1,6 +1,5 @@
 """Sizes that an argument gives: an error with the number and the limit, before memory is asked for."""
 
-import re
 from typing import Any
 
 import numpy as np
@@ -62,7 +61,7 @@ def test_sizes_are_limited(name: str) -> None:
 
 def test_a_horizon_is_limited() -> None:
     """By the size of its knots, as a solver has matrices of them."""
-    with pytest.raises(ProblemError, match=re.escape("the horizon: expected matrices of at most 1.1e9 numbers")):
+    with pytest.raises(ProblemError, match="^numbers in the matrices of all knots: .* is more than the limit of 268435456$"):
         problem(nx=2000, knots=1000)
     problem(nx=20, knots=1000)
 

@@ -38,30 +38,6 @@ pub enum Error {
         found: usize,
     },
 
-    /// A knot has too many states or controls.
-    #[error("node {node}: expected at most {most} {name}, found {found}")]
-    Size {
-        /// The knot.
-        node: usize,
-        /// `states` or `controls`.
-        name: &'static str,
-        /// The most that there may be.
-        most: usize,
-        /// What the action model says.
-        found: usize,
-    },
-
-    /// A horizon is too long for the sizes of its knots.
-    #[error("the horizon: expected matrices of at most {most:.1e} numbers, found {numbers:.1e} in {knots} knots")]
-    Horizon {
-        /// The number of knots.
-        knots: usize,
-        /// Σ (ndx + nu)².
-        numbers: f64,
-        /// The most that there may be.
-        most: f64,
-    },
-
     /// A vector or a horizon has another length than the problem needs.
     #[error("`{name}`: expected length {expected}, found {found}")]
     Length {
@@ -82,6 +58,28 @@ pub enum Error {
         index: usize,
         /// The entry.
         value: f64,
+    },
+
+    /// A state is none of the robot's.
+    #[error("`{name}`, knot {knot}: {what}")]
+    State {
+        /// The argument.
+        name: &'static str,
+        /// The knot.
+        knot: usize,
+        /// The fault, with the numbers.
+        what: String,
+    },
+
+    /// A number of things is beyond what memory is asked for.
+    #[error("{name}: {found} is more than the limit of {most}")]
+    Size {
+        /// The thing that is counted.
+        name: &'static str,
+        /// The number.
+        found: usize,
+        /// The limit.
+        most: usize,
     },
 
     /// No control satisfies the bounds of a knot.
@@ -127,6 +125,13 @@ pub enum Error {
         /// The knot, if it is a limit of one.
         knot: Option<usize>,
         /// What does not fit, with the numbers.
+        what: String,
+    },
+
+    /// A friction or wrench cone makes no sense.
+    #[error("cone: {what}")]
+    Cone {
+        /// The fault, with the numbers.
         what: String,
     },
 
@@ -176,6 +181,16 @@ impl Error {
         if found.len() != expected {
             return Err(Self::Length { name, expected, found: found.len() });
         }
+        Self::check_finite(name, found)
+    }
+
+    /// `Ok` if there are at most so many.
+    pub(crate) fn check_size(name: &'static str, found: usize, most: usize) -> Result<(), Self> {
+        if found > most { Err(Self::Size { name, found, most }) } else { Ok(()) }
+    }
+
+    /// `Ok` if all entries are finite.
+    pub(crate) fn check_finite(name: &'static str, found: &[f64]) -> Result<(), Self> {
         match found.iter().position(|x| !x.is_finite()) {
             Some(index) => Err(Self::NotFinite { name, index, value: found[index] }),
             None => Ok(()),

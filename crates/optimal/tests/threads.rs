@@ -83,9 +83,9 @@ fn copies_follow_their_models() {
     let (mut problem, xs, us) = gait();
     let before = solve(&mut problem, &xs, &us, 3);
     let change = |problem: &mut Problem| {
-        assert!(problem.model_mut::<ContactDynamics>(0).unwrap().set_weight("com", 50.0));
-        assert!(problem.model_mut::<ImpulseDynamics>(1).unwrap().set_weight("state", 0.3));
-        assert!(problem.terminal_mut::<FreeDynamics>().unwrap().set_weight("com", 5.0));
+        assert!(problem.model_mut::<ContactDynamics>(0).unwrap().set_weight("com", 50.0).unwrap());
+        assert!(problem.model_mut::<ImpulseDynamics>(1).unwrap().set_weight("state", 0.3).unwrap());
+        assert!(problem.terminal_mut::<FreeDynamics>().unwrap().set_weight("com", 5.0).unwrap());
     };
     change(&mut problem);
     let after = solve(&mut problem, &xs, &us, 3);

@@ -95,8 +95,8 @@ impl Lqr {
         let nx = within("A, rows", A.len()?, 0, MOST_SIZE)?;
         let nu = match (R, B) {
             (Some(R), _) => R.len()?,
-            (None, Some(B)) => B.get_item(0)?.len()?,
-            (None, None) => 0,
+            (None, Some(B)) if nx > 0 => B.get_item(0)?.len()?,
+            _ => 0,
         };
         within("R, rows, or B, columns", nu, 0, MOST_SIZE)?;
         let mut node = LqNode::zeros(nx, nu);
@@ -125,7 +125,8 @@ fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()
 /// An action written in Python.
 ///
 /// nx, nu: the numbers of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-/// calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+/// calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
+///     state may be None.
 /// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
 ///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
 /// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
@@ -170,16 +171,20 @@ impl Action {
 }
 
 impl Action {
-    /// A copy for a problem, whose errors go to `fault`.
-    pub(super) fn boxed(&self, fault: &Fault) -> Box<dyn ActionModel> {
+    /// A copy for a problem, at the end of the horizon or before it, whose errors go to `fault`.
+    pub(super) fn boxed(&self, terminal: bool, fault: &Fault) -> Box<dyn ActionModel> {
         let Self { nx, nu, ref functions, ref bounds } = *self;
-        let own = Own { nx, nu, functions: functions.clone(), bounds: bounds.clone(), fault: fault.clone() };
-        if functions.has_calc_diff() { Box::new(own) } else { Box::new(rust::NumDiff(own)) }
+        let (functions, bounds, fault) = (functions.clone(), bounds.clone(), fault.clone());
+        let differentiated = functions.has_calc_diff();
+        let own = Own { terminal, nx, nu, functions, bounds, fault };
+        if differentiated { Box::new(own) } else { Box::new(rust::NumDiff(own)) }
     }
 }
 
 /// An `Action` as the solver calls it. An error becomes a cost that is not a number, and is raised after the solve.
 struct Own {
+    /// Whether it serves the end, after which there is no state.
+    terminal: bool,
     nx: usize,
     nu: usize,
     functions: Functions,
@@ -205,8 +210,13 @@ fn unless_failed<T>(fault: &Fault, call: impl FnOnce(Python<'_>) -> PyResult<T>)
 impl Own {
     fn try_calc(&self, py: Python<'_>, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> PyResult<f64> {
         let (state, cost): (Bound<'_, PyAny>, f64) = self.functions.calc(py, t, x, u)?.extract()?;
-        if !state.is_none() {
-            next.copy_from_slice(&vector("the next state", &state, self.nx)?);
+        match state.is_none() {
+            false => next.copy_from_slice(&vector("the next state", &state, self.nx)?),
+            true if self.terminal => {}
+            true => {
+                let what = format!("the next state of knot {t}: expected {} numbers, found None", self.nx);
+                return Err(PyValueError::new_err(what));
+            }
         }
         Ok(cost)
     }

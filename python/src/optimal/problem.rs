@@ -41,7 +41,7 @@ pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResu
 }
 
 /// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `fault`.
-fn boxed(model: &Bound<'_, PyAny>, fault: &Fault) -> PyResult<Boxed> {
+fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> PyResult<Boxed> {
     macro_rules! of_a_robot {
         ($($class:ident),*) => {$(
             if let Ok(action) = model.cast::<$class>() {
@@ -54,9 +54,9 @@ fn boxed(model: &Bound<'_, PyAny>, fault: &Fault) -> PyResult<Boxed> {
         Box::new(lqr.get().0.clone())
     } else if let Ok(constrained) = model.cast::<ConstrainedAction>() {
         let constrained = constrained.get();
-        constrained.boxed(boxed(constrained.action.bind(model.py()), fault)?.action, fault)
+        constrained.boxed(boxed(constrained.action.bind(model.py()), terminal, fault)?.action, fault)
     } else if let Ok(action) = model.cast::<Action>() {
-        action.get().boxed(fault)
+        action.get().boxed(terminal, fault)
     } else {
         let found = model.get_type().name()?;
         return Err(PyTypeError::new_err(format!("models: expected an action, found '{found}'")));
@@ -72,7 +72,9 @@ fn boxed(model: &Bound<'_, PyAny>, fault: &Fault) -> PyResult<Boxed> {
 /// stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
 /// terminal: the model of the end, without controls.
 ///
-/// Raises `ProblemError` if they do not fit together.
+/// Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
+/// 1e-3), and for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot, or 2²⁸ in the matrices [A B] of
+/// all knots.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
@@ -94,7 +96,8 @@ impl Problem {
         terminal: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let fault = Fault::default();
-        let all = models.iter().chain([terminal]).map(|model| boxed(model, &fault)).collect::<PyResult<Vec<_>>>()?;
+        let ends = models.iter().map(|model| (model, false)).chain([(terminal, true)]);
+        let all = ends.map(|(model, end)| boxed(model, end, &fault)).collect::<PyResult<Vec<_>>>()?;
         let is_written =
             |model: &&Bound<'_, PyAny>| model.cast::<Action>().is_ok() || model.cast::<ConstrainedAction>().is_ok();
         let written = models.iter().chain([terminal]).filter(is_written).map(|model| model.clone().unbind());
@@ -107,7 +110,8 @@ impl Problem {
 
     /// A problem of a robot from the text that `to_json` gave.
     ///
-    /// Raises `ProblemError` for a text that is none, and for what does not fit together in it.
+    /// Raises `ProblemError` for a text that is none, for what does not fit together in it, and for sizes beyond the limits
+    /// that `Problem` has.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let data: rust::robot::RobotProblem =
@@ -171,7 +175,7 @@ impl Problem {
 
     /// Sets the initial state, nx numbers, as an MPC does before each solve.
     ///
-    /// Raises `ProblemError` for a number that is not finite.
+    /// Raises `ProblemError` for a number that is not finite, and for a rotation whose length is not 1 (up to 1e-3).
     fn set_x0(&self, x0: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let x0 = vector("x0", x0, problem.nx())?;
@@ -180,13 +184,14 @@ impl Problem {
 
     /// Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
     ///
-    /// Raises `KeyError` if there is no such term.
+    /// Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
     fn set_weight(&self, name: &str, weight: f64) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let mut described = lock("problem", &self.described)?;
         let mut found = false;
         for k in (0..described.len() - 1).map(Some).chain([None]) {
-            found |= change!(&mut problem, k, |knot| knot.set_weight(name, weight)).unwrap_or(false);
+            let set = change!(&mut problem, k, |knot| knot.set_weight(name, weight)).unwrap_or(Ok(false));
+            found |= set.map_err(problem_error)?;
         }
         described.iter_mut().flatten().for_each(|described| described.set_weight(name, weight));
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
@@ -205,14 +210,18 @@ impl Problem {
             return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {horizon}")));
         }
         let k = problem.stages().get(knot).copied();
-        let costs = terms(&costs);
+        let mut described = lock("problem", &self.described)?;
+        let last = described.len() - 1;
+        let described = &mut described[k.unwrap_or(last)];
+        let Some(model) = described.as_ref().map(|described| described.robot.clone()) else {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
+        };
+        let costs = terms(&model, &costs)?;
         let Some(set) = change!(&mut problem, k, |action| action.set_costs(knot, costs.clone())) else {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
         };
         set.map_err(problem_error)?;
-        let mut described = lock("problem", &self.described)?;
-        let last = described.len() - 1;
-        if let Some(described) = &mut described[k.unwrap_or(last)] {
+        if let Some(described) = described {
             described.knot.costs_at.insert(knot, costs);
         }
         Ok(())

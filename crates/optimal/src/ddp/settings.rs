@@ -32,14 +32,14 @@ pub struct Settings {
     /// forces as unknowns instead of the controls, where that is possible: without bounds on controls and without
     /// `second_order`. The same steps and gains, up to rounding, in about half the time.
     pub inverse_dynamics_form: bool,
-    /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
+    /// Iterations after which a solve stops, at most 1 000 000. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
     pub tolerance: f64,
     /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
     pub tolerance_bounded: f64,
     /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
-    /// as the last of its kind. `None` for no limit.
+    /// as the last of its kind. `None` for no limit. A solve that goes back to a better iterate may take a sweep longer.
     pub time_budget: Option<Duration>,
     /// How many segments of the horizon a sweep works on at the same time: see [`Sweep::set_segments`]. It is not the number
     /// of threads, which are those of rayon's pool, and any number of them finds the same.
@@ -121,7 +121,11 @@ impl Settings {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();
         let [steps, segments, threads] = [self.step_lengths, self.segments, self.threads].map(|count| count as f64);
+        let number = |x: f64| x.is_finite();
+        let (above, below) = (self.regularisation_decrease_above, self.regularisation_increase_below);
         for (name, value, good, allowed) in [
+            ("regularisation_decrease_above", above, number(above), "a finite number"),
+            ("regularisation_increase_below", below, number(below), "a finite number"),
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
             ("segments", segments, (1..=MOST_AT_ONCE).contains(&self.segments), AT_ONCE),

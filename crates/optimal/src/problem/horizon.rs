@@ -8,8 +8,12 @@ use crate::lq::LqNode;
 use std::any::Any;
 use std::ops::Range;
 
-/// The most numbers of the matrices of a horizon: a solver has a few times as many.
-const MOST_NUMBERS: f64 = 1073741824.0; // 2³⁰
+/// The most knots of a horizon.
+pub(crate) const MOST_KNOTS: usize = 1 << 20;
+/// The most entries of a state, a change of state, or the controls of a knot: matrices of that size take 128 MiB each.
+pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
+/// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
+const MOST_NUMBERS: usize = 1 << 28;
 
 /// An optimal control problem in discrete time, with N knots and a terminal one:
 ///
@@ -71,9 +75,9 @@ impl Problem {
     /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has
-    /// a wrong length or an entry that is not finite, a knot has more than [`LqNode::MOST_SIZE`] states or controls, or the
-    /// matrices (ndx + nu)² of all knots have more than 2³⁰ numbers (8 GiB).
+    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has a
+    /// wrong length or an entry that is not finite or is no state, a state or the controls of a knot have more than 4096
+    /// entries, or there are more than 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
@@ -84,6 +88,11 @@ impl Problem {
             return Err(Error::EmptyHorizon);
         }
         let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
+        Error::check_size("knots", horizon, MOST_KNOTS)?;
+        for (name, found) in [("nx", nx), ("ndx", ndx)] {
+            Error::check_size(name, found, MOST_ENTRIES)?;
+        }
+        let mut numbers = 0;
         for (knot, &index) in stages.iter().enumerate() {
             let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
             for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
@@ -91,6 +100,9 @@ impl Problem {
                     return Err(Error::Dimension { node: knot, name, expected, found });
                 }
             }
+            Error::check_size("nu", model.nu(), MOST_ENTRIES)?;
+            numbers += ndx * (ndx + model.nu());
+            Error::check_size("numbers in the matrices of all knots", numbers, MOST_NUMBERS)?;
         }
         if ndx == 0 {
             return Err(Error::EmptyState);
@@ -98,8 +110,8 @@ impl Problem {
         if terminal.nu() != 0 {
             return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
         }
-        check_size(ndx.max(nx), &models, &stages)?;
         Error::check("x0", &x0, nx)?;
+        terminal.check_state(&x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
         let (copies, unread) = (Copies::default(), vec![0.0; nx]);
@@ -190,9 +202,10 @@ impl Problem {
     /// Sets the initial state, as an MPC does before each solve.
     ///
     /// # Errors
-    /// [`Error`] if its length is not nx or an entry is not finite; the old one then stays.
+    /// [`Error`] if its length is not nx, an entry is not finite, or it is no state; the old one then stays.
     pub fn set_x0(&mut self, x0: &[f64]) -> Result<(), Error> {
         Error::check("x0", x0, self.nx())?;
+        self.terminal.check_state(x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
         self.x0.copy_from_slice(x0);
         Ok(())
     }
@@ -372,26 +385,6 @@ impl Problem {
         assert_length("us", us.len(), self.shape.offsets[self.horizon()]);
     }
 }
-
-/// Checks that a solver has memory of a sensible size for a problem of n states: its knots are matrices.
-fn check_size(n: usize, models: &[Box<dyn ActionModel>], stages: &[usize]) -> Result<(), Error> {
-    let most = LqNode::MOST_SIZE;
-    let mut numbers = 0.0;
-    for (knot, &index) in stages.iter().enumerate() {
-        let nu = models[index].nu();
-        for (name, found) in [("states", n), ("controls", nu)] {
-            if found > most {
-                return Err(Error::Size { node: knot, name, most, found });
-            }
-        }
-        numbers += ((n + nu) as f64).powi(2);
-    }
-    if numbers > MOST_NUMBERS {
-        return Err(Error::Horizon { knots: stages.len(), numbers, most: MOST_NUMBERS });
-    }
-    Ok(())
-}
-
 impl std::fmt::Debug for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Problem")
