@@ -136,7 +136,7 @@ impl ConstraintSet {
         if !(mu.is_finite() && mu >= 0.0) {
             return Err(PyValueError::new_err(format!("mu: expected a number of at least 0, found {mu}")));
         }
-        let (made_for, model) = (MadeFor::new(model.get()), &model.get().inner);
+        let (made_for, model) = (MadeFor::with_geometry(model.get()), &model.get().inner);
         let constraints = constraints.iter().map(|c| constraint(model, c)).collect::<PyResult<Vec<_>>>()?;
         let mut inner = condyle::ConstraintSet::new(model, &constraints).map_err(exception)?;
         inner.proximal = Proximal { mu, iterations };

@@ -195,7 +195,7 @@ impl DivideConquer {
     #[new]
     fn new(model: &Bound<'_, Model>, grain: usize) -> Self {
         let model = model.get();
-        Self { inner: condyle::DivideConquer::new(&model.inner, grain), made_for: MadeFor::new(model) }
+        Self { inner: condyle::DivideConquer::new(&model.inner, grain), made_for: MadeFor::with_geometry(model) }
     }
 
     /// The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`.

@@ -80,6 +80,20 @@ pub enum Error {
         /// The fault, with the numbers.
         what: String,
     },
+    /// A gravity is infinite or not a number.
+    #[error("gravity: ({}, {}, {}) m/s² is not finite", gravity[0], gravity[1], gravity[2])]
+    Gravity {
+        /// As given (m/s²).
+        gravity: [f64; 3],
+    },
+    /// A position is none of the robot's.
+    #[error("joint `{joint}`: {what}")]
+    Position {
+        /// The joint's name.
+        joint: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
     /// A list in a model's file is too short or too long.
     #[error("{name}: expected {expected} entries, found {found}")]
     Length {

@@ -68,3 +68,5 @@ pub use io::sdf::SdfOptions;
 pub use io::urdf::UrdfOptions;
 pub use joint::{Joint, Mimic};
 pub use model::Model;
+#[doc(hidden)]
+pub use validate::ROTATION_ROUNDING;

@@ -34,8 +34,8 @@ pub struct ConstraintSet<S> {
     pub(crate) plans: Vec<Plan>,
     pub(crate) targets: Vec<Target<S>>,
     pub(crate) nv: usize,
-    /// Of the tree that it was made for.
-    tree: u64,
+    /// Of the robot that it was made for: the frames and the axes of its joints are in here.
+    geometry: u64,
     /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
     pub(crate) nonzero_rows: Vec<NonzeroRows>,
     /// For each coordinate, the rows of J in which it may differ from zero.
@@ -78,7 +78,7 @@ impl<S: Scalar> ConstraintSet<S> {
             proximal: Proximal::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
             nv,
-            tree: model.tree_hash(),
+            geometry: model.geometry_hash(),
             nonzero_rows: nonzero_rows(model, &plans),
             touching: (0..nv).map(|k| touching(&plans, k)).collect(),
             J: vec![o; entries],
@@ -147,10 +147,10 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// Panics unless this was made for a model of the same tree.
+    /// Panics unless this was made for a model with the same joints and frames in the same places.
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
-        assert!(self.tree == model.tree_hash(), "constraints: made for another model than `{}`", model.name());
+        assert!(self.geometry == model.geometry_hash(), "constraints: made for another model than `{}`", model.name());
     }
 }

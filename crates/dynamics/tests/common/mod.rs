@@ -55,7 +55,7 @@ pub(crate) fn embedded() -> [Model; 3] {
         let first = if model.bodies()[1].joint == Joint::FreeFlyer { 6 } else { 0 };
         let armature: Vec<f64> =
             (0..model.nv()).map(|k| if k < first { 0.0 } else { 0.01 + 1e-3 * k as f64 }).collect();
-        model.with_armature(&armature)
+        model.with_armature(&armature).unwrap()
     })
 }
 

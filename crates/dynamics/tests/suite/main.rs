@@ -33,3 +33,4 @@ mod sdf;
 mod second_order;
 mod urdf;
 mod urdf_errors;
+mod validity;

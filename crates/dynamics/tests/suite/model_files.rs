@@ -46,6 +46,15 @@ fn mistakes_have_names() {
     expect("/limits/lower/2", json!(9.0), "joint `joint3`: lower limit 9 is above upper limit");
     expect("/damping", json!([0.0]), "damping: expected 7 entries, found 1");
     expect("/armature", json!([]), "armature: expected 7 entries, found 0");
+    expect("/damping/2", json!(-1.0), "joint `joint3`: damping is -1, expected a finite number of at least 0");
+    expect("/friction/2", json!(-1.0), "joint `joint3`: friction is -1");
+    expect("/armature/0", json!(-1e-3), "joint `joint1`: armature is -0.001");
+    expect(
+        "/limits/velocity/0",
+        json!(-1.0),
+        "joint `joint1`: limit of velocity is -1, expected a number of at least 0",
+    );
+    expect("/limits/effort/6", json!(-1.0), "joint `joint7`: limit of effort is -1");
     expect("/gravity/z", json!(null), "invalid type: null, expected f64");
     let mut file = arm();
     file["nodes"] = json!([]);

@@ -44,7 +44,7 @@ fn equals_the_same_robot_as_urdf() {
     let root_joint = Some(Joint::FreeFlyer);
     let sdf = load(LINKAGE, root_joint).unwrap();
     let urdf = Model::from_urdf_str(URDF, &UrdfOptions { root_joint, ..UrdfOptions::default() }).unwrap();
-    let urdf = urdf.with_gravity(Vec3::new(0.0, 0.0, -1.62));
+    let urdf = urdf.with_gravity(Vec3::new(0.0, 0.0, -1.62)).unwrap();
     let mut rng = <rand::rngs::StdRng as rand::SeedableRng>::seed_from_u64(1);
     let (mut left, mut right) = (Data::new(&sdf), Data::new(&urdf));
     for _ in 0..5 {

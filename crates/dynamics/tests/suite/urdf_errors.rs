@@ -101,7 +101,7 @@ fn trees() {
 #[test]
 fn joints() {
     let axis = r#"<axis xyz="0 0 1"/>"#;
-    expect(&with(axis, r#"<axis xyz="0 0 0"/>"#), "<string>:6: joint `j`: axis 0 0 0 is no direction");
+    expect(&with(axis, r#"<axis xyz="0 0 0"/>"#), "<string>:6: joint `j`: axis (0, 0, 0) is no direction");
     expect(&with(axis, r#"<axis xyz="0 nan 1"/>"#), "<string>:9: joint `j`: axis xyz: `nan` is no finite number");
     expect(&with(axis, r#"<axis xyz="0 1"/>"#), "<string>:9: joint `j`: axis xyz: expected 3 numbers, found 2");
     expect(&with(axis, r#"<axis xyz="0 x 0 1"/>"#), "<string>:9: joint `j`: axis xyz: `x` is no finite number");
@@ -152,7 +152,9 @@ fn inertias() {
     let origin = r#"<mass value="1"/><origin xyz="0 nan 0"/>"#;
     expect(&with(mass, origin), &said("origin xyz: `nan` is no finite number"));
     let far = r#"<mass value="1"/><origin xyz="0 1e200 0"/>"#;
-    expect(&with(mass, far), "<string>:3: link `arm`: inertia or placement is not finite");
+    expect(&with(mass, far), "<string>:3: link `arm`: inertia is not finite");
+    let large = "has a mass, inertia, length, ratio or acceleration of 2e40, at most 1e30 is allowed";
+    expect(&with(mass, r#"<mass value="2e40"/>"#), &format!("<string>:3: link `arm`: {large}"));
 }
 
 /// XML's rules of values, once: a line break or tab in a name is a space, a reference is the character that it stands for.
@@ -237,26 +239,53 @@ fn builders() {
     let heavy = |mass: f64| Inertia { mass, ..ball };
     let options = |options: JointOptions| (hinge, Se3::identity(), ball, options);
     let plain = JointOptions::default;
+    let (nan, infinite) = (f64::NAN, f64::INFINITY);
+    let negative = |what: &str, x: &str| format!("joint `j`: {what} is {x}, expected a finite number of at least 0");
+    let limit = |what: &str, x: &str| format!("joint `j`: limit of {what} is {x}, expected a number of at least 0");
     for ((joint, placement, inertia, options), message) in [
-        ((Joint::Prismatic { axis: Vec3::zero() }, Se3::identity(), ball, plain()), "axis 0 0 0 is no direction"),
-        ((hinge, shifted(f64::NAN), ball, plain()), "inertia or placement is not finite"),
-        ((hinge, shifted(0.0), Inertia::zero().scale(f64::NAN), plain()), "inertia or placement is not finite"),
-        ((hinge, shifted(0.0), heavy(-0.5), plain()), "mass is -0.5"),
-        ((hinge, shifted(0.0), heavy(f64::INFINITY), plain()), "mass is inf"),
-        (options(JointOptions { position: Some((1.0, -1.0)), ..plain() }), "lower limit 1 is above upper limit -1"),
         (
-            options(JointOptions { armature: f64::NAN, ..plain() }),
-            "a limit, damping, friction or armature is not a number",
+            (Joint::Prismatic { axis: Vec3::zero() }, Se3::identity(), ball, plain()),
+            "body `arm`: axis (0, 0, 0) is no direction".to_owned(),
+        ),
+        ((hinge, shifted(nan), ball, plain()), "body `arm`: placement is not finite".to_owned()),
+        (
+            (hinge, shifted(0.0), Inertia { rotational: Sym3::diagonal(nan), ..ball }, plain()),
+            "body `arm`: inertia is not finite".to_owned(),
         ),
         (
-            options(JointOptions { effort: Some(f64::NAN), ..plain() }),
-            "a limit, damping, friction or armature is not a number",
+            (hinge, shifted(0.0), heavy(-0.5), plain()),
+            "body `arm`: mass is -0.5 kg, expected a finite number of at least 0".to_owned(),
         ),
+        (
+            (hinge, shifted(0.0), heavy(infinite), plain()),
+            "body `arm`: mass is inf kg, expected a finite number of at least 0".to_owned(),
+        ),
+        (
+            options(JointOptions { position: Some((1.0, -1.0)), ..plain() }),
+            "joint `j`: lower limit 1 is above upper limit -1".to_owned(),
+        ),
+        (
+            options(JointOptions { position: Some((infinite, infinite)), ..plain() }),
+            "joint `j`: lower limit inf is above upper limit inf".to_owned(),
+        ),
+        (
+            options(JointOptions { position: Some((nan, 1.0)), ..plain() }),
+            "joint `j`: limits of position NaN and 1: expected numbers".to_owned(),
+        ),
+        (options(JointOptions { armature: nan, ..plain() }), negative("armature", "NaN")),
+        (options(JointOptions { armature: -0.1, ..plain() }), negative("armature", "-0.1")),
+        (options(JointOptions { damping: -1.0, ..plain() }), negative("damping", "-1")),
+        (options(JointOptions { friction: infinite, ..plain() }), negative("friction", "inf")),
+        (options(JointOptions { effort: Some(nan), ..plain() }), limit("effort", "NaN")),
+        (options(JointOptions { velocity: Some(-2.0), ..plain() }), limit("velocity", "-2")),
     ] {
         let mut builder = ModelBuilder::new("r");
         builder.body_with(("arm", "j"), WORLD, joint, placement, inertia, options);
-        assert_eq!(builder.build().unwrap_err().to_string(), format!("body `arm`: {message}"));
+        assert_eq!(builder.build().unwrap_err().to_string(), message);
     }
+    let mut heavy = ModelBuilder::new("r");
+    heavy.gravity(Vec3::new(0.0, nan, 0.0));
+    assert_eq!(heavy.build().unwrap_err().to_string(), "gravity: (0, NaN, 0) m/s² is not finite");
 
     let build = |change: fn(&mut ModelBuilder, condyle_dynamics::BodyId, condyle_dynamics::BodyId)| {
         let mut builder = ModelBuilder::new("r");
@@ -283,7 +312,7 @@ fn builders() {
     let lost = |m: &mut ModelBuilder, a, _| {
         m.frame("f", a, Se3 { translation: Vec3::new(f64::NAN, 0.0, 0.0), ..Se3::identity() })
     };
-    assert_eq!(find(build(lost)), "frame `f`: is not finite");
+    assert_eq!(find(build(lost)), "frame `f`: placement is not finite");
     let follow = |m: &mut ModelBuilder, a, b| m.mimic(b, a, Mimic { ratio: 1.0, offset: 0.0 });
     assert_eq!(find(build(follow)), "joint `b`: mimic works between joints of one degree of freedom only");
     let world = |m: &mut ModelBuilder, a, _| m.mimic(a, WORLD, Mimic { ratio: 1.0, offset: 0.0 });

@@ -5,8 +5,9 @@ use crate::body::{Body, Frame, Limits};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::{Error, Warning};
 use crate::model::Model;
-use condyle_spatial::{Se3, Vec3};
+use condyle_spatial::{Inertia, Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::HashSet;
 
 /// The fields of a model that stand in a file, each as in [`Model`].
 #[derive(Serialize, Deserialize)]
@@ -69,11 +70,17 @@ impl Description {
             }
         }
         self.check_coordinates(model.tree.nq, model.tree.nv)?;
-        let Self { limits, damping, friction, armature, warnings, .. } = self;
+        let Self { bodies, limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
+        // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
+        let warned: HashSet<&str> = warnings
+            .iter()
+            .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })
+            .collect();
+        let massless = |b: &Body| b.inertia == Inertia::zero() && !warned.contains(&*b.name);
+        model.between = bodies.iter().map(|b| b.name.contains('#') && massless(b)).collect();
         model.warnings = warnings;
-        model.check_magnitudes()?;
-        model.find_singular();
+        model.validate()?;
         Ok(model)
     }
 
@@ -110,7 +117,7 @@ impl Description {
         Ok(ids)
     }
 
-    /// Checks what has a number for each coordinate.
+    /// Checks how many numbers there are for each coordinate.
     fn check_coordinates(&self, nq: usize, nv: usize) -> Result<(), Error> {
         let Limits { lower, upper, velocity, effort } = &self.limits;
         for (name, numbers, expected) in [
@@ -124,14 +131,6 @@ impl Description {
         ] {
             if numbers.len() != expected {
                 return Err(Error::Length { name, expected, found: numbers.len() });
-            }
-        }
-        for body in self.bodies.iter().skip(1).filter(|b| b.mimic.is_none()) {
-            for k in body.idx_q..body.idx_q + body.joint.nq() {
-                if lower[k].is_nan() || upper[k].is_nan() || lower[k] > upper[k] {
-                    let what = format!("lower limit {} is above upper limit {}", lower[k], upper[k]);
-                    return Err(Error::Joint { joint: body.joint_name.clone(), what });
-                }
             }
         }
         Ok(())

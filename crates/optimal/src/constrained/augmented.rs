@@ -196,13 +196,9 @@ impl AugmentedLagrangian {
             self.outcome.solves += 1;
             self.outcome.iterations += result.trace.len();
             let stopped = result.status;
-            if stopped == Status::NotFinite {
-                (self.outcome.primal, self.outcome.dual) = (f64::NAN, f64::NAN);
-                return Ok(stopped);
-            }
             // z − Π z at the iterate, and how far it is from a solution
             self.measure(problem);
-            if stopped == Status::TimeLimit {
+            if matches!(stopped, Status::TimeLimit | Status::NotFinite) {
                 return Ok(stopped);
             }
             if self.outcome.primal <= eta.max(tolerance) {
@@ -248,7 +244,7 @@ impl AugmentedLagrangian {
         }
         problem.calc_diff(xs, us, &mut solver.nodes);
         let (violation, terms) = problem.measure_constraints();
-        (outcome.primal, outcome.cost, outcome.dual) = (gap.max(violation), cost - terms, 0.0);
+        (outcome.primal, outcome.cost, outcome.dual) = (larger(*gap, violation), cost - terms, 0.0);
         lambda.copy_from(&solver.nodes[horizon].q);
         for t in (0..horizon).rev() {
             let node = &solver.nodes[t];
@@ -260,12 +256,21 @@ impl AugmentedLagrangian {
                     None => (f64::NEG_INFINITY, f64::INFINITY),
                 };
                 // u = the projection of u − ∂L/∂u into its bounds
-                outcome.dual = outcome.dual.max((u - (u - slope).min(upper).max(lower)).abs());
+                let projected = if slope.is_nan() { slope } else { (u - slope).min(upper).max(lower) };
+                outcome.dual = larger(outcome.dual, (u - projected).abs());
             }
             before.copy_from(&node.q);
             before.gemv_tr(1.0, &node.A, lambda, 1.0);
             std::mem::swap(lambda, before);
         }
+        for number in [&mut outcome.cost, &mut outcome.primal, &mut outcome.dual] {
+            *number = if number.is_nan() { f64::INFINITY } else { *number };
+        }
         self.measuring = begin.elapsed();
     }
+}
+
+/// The larger of two numbers, or NaN if one is.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
 }

@@ -1,6 +1,7 @@
 //! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
+use super::best::{Best, Value};
 use super::clock::{Clock, Phase};
 use super::rollout::Sum;
 use super::search::{Iterate, LineSearch, Search};
@@ -83,6 +84,8 @@ pub struct Fddp {
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
     gaps: Vec<f64>,
+    /// What the solution becomes if the last iterate is worse.
+    pub(super) best: Best,
     clock: Clock,
     /// Whether knots may come as equations of inverse dynamics.
     inverse_dynamics: bool,
@@ -97,6 +100,8 @@ struct Progress {
     tolerance: f64,
     /// Whether there are gains of this solve.
     swept: bool,
+    /// Whether they are those of the best iterate, which the last step left.
+    swept_best: bool,
 }
 
 impl Fddp {
@@ -114,6 +119,7 @@ impl Fddp {
             next: vec![0.0; horizon * shape.nx],
             costs: vec![0.0; horizon + 1],
             gaps: vec![0.0; (horizon + 1) * shape.ndx],
+            best: Best::new(problem),
             clock: Clock::default(),
             inverse_dynamics: false,
         }
@@ -177,13 +183,20 @@ impl Fddp {
         self.solution.trace.reserve(self.settings.max_iterations);
         self.line_search.start(self.settings.step_lengths);
         let start = self.settings.regularisation_start;
-        let mut progress =
-            Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
+        let mut progress = Progress {
+            regularisation: start,
+            feasible: false,
+            was_feasible: false,
+            tolerance,
+            swept: false,
+            swept_best: false,
+        };
         self.sweep.set_segments(self.settings.segments);
         self.sweep.forget();
+        self.best.start();
         self.clock.start(begin, self.settings.time_budget);
         let status = self.iterate(problem, &mut progress, &mut observer);
-        self.finish(problem, &progress, status);
+        self.finish(problem, &mut progress, status);
         self.solution.timings.total = begin.elapsed();
         Ok(&self.solution)
     }
@@ -214,6 +227,7 @@ impl Fddp {
             if !self.clock.allows(Phase::Sweep) {
                 return Status::TimeLimit;
             }
+            now.swept_best = false;
             self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
             while let Err(error) = self.sweep(problem, now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
@@ -228,14 +242,16 @@ impl Fddp {
                 }
             }
             now.swept = true;
-            let Self { line_search, solution, next, gaps, sweep, settings, clock, .. } = self;
+            let Self { line_search, solution, next, gaps, best, sweep, settings, clock, .. } = self;
             let (knots, feasible) = (sweep.knots(), now.feasible);
-            let iterate = Iterate { solution, next, gaps, knots, feasible, settings, clock };
+            let value = Value { gap, cost: solution.cost, feasible, regularisation: now.regularisation };
+            let iterate = Iterate { solution, next, value, best, gaps, knots, feasible, settings, clock };
             search = line_search.run(problem, iterate, search);
             if search.out_of_time {
                 return Status::TimeLimit;
             }
             if search.accepted {
+                now.swept_best = search.left_best;
                 now.was_feasible = now.feasible;
                 now.feasible |= search.step == 1.0 || self.settings.method == DdpMethod::Ddp;
             }
@@ -352,14 +368,31 @@ impl Fddp {
         (regularisation / self.settings.regularisation_factor).max(self.settings.regularisation_min)
     }
 
-    /// Fills what the iterations leave open in the solution.
-    fn finish(&mut self, problem: &Problem, now: &Progress, status: Status) {
+    /// Fills what the iterations leave open in the solution, of the last iterate or of a better one.
+    fn finish(&mut self, problem: &mut Problem, now: &mut Progress, status: Status) {
         let infinite_if_nan = |x: f64| if x.is_nan() { f64::INFINITY } else { x };
         self.solution.gap = infinite_if_nan(self.update_gaps(problem));
+        self.solution.cost = infinite_if_nan(self.solution.cost);
+        let Solution { gap, cost, .. } = self.solution;
+        let last = Value { gap, cost, feasible: now.feasible, regularisation: now.regularisation };
+        let regularisation = now.regularisation;
+        let goes_back = match status {
+            Status::Converged => false,
+            Status::NotFinite => true, // there is no direction at the last one
+            _ => self.best.is_better_than(&last),
+        };
+        if goes_back && let Some(best) = self.best.restore(&mut self.solution, &mut self.next) {
+            (self.solution.gap, self.solution.cost, now.feasible) = (best.gap, best.cost, best.feasible);
+            self.update_gaps(problem);
+            if !now.swept_best {
+                self.calc_diff(problem, best.feasible);
+                self.sweep.keep_values(false);
+                now.swept = self.sweep(problem, best.regularisation).is_ok();
+            }
+        }
         let solution = &mut self.solution;
-        solution.cost = infinite_if_nan(solution.cost);
         solution.feasible = now.feasible;
-        solution.regularisation = now.regularisation;
+        solution.regularisation = regularisation;
         solution.status = status;
         if !now.swept {
             return; // the gains of the solve before, shifted or not

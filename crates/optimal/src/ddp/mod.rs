@@ -1,5 +1,6 @@
 //! Differential dynamic programming, feasibility-driven or not.
 
+mod best;
 mod clock;
 mod fddp;
 mod rollout;

@@ -1,5 +1,6 @@
 //! The line search of differential dynamic programming: what a step should gain, and whether it does.
 
+use super::best::{Best, Value};
 use super::clock::{Clock, Phase};
 use super::rollout::{Nominal, Trials};
 use super::settings::{DdpMethod, Settings};
@@ -24,6 +25,8 @@ pub(super) struct Search {
     pub(super) accepted: bool,
     /// There was no time for another trial.
     pub(super) out_of_time: bool,
+    /// The iterate before the accepted step is the best one now.
+    pub(super) left_best: bool,
 }
 
 /// An iterate, its feedback, and how to search around it.
@@ -31,7 +34,10 @@ pub(super) struct Iterate<'a> {
     /// The iterate is in here; it becomes the accepted trial.
     pub(super) solution: &'a mut Solution,
     /// φₜ(xₜ, uₜ), N·nx.
-    pub(super) next: &'a mut [f64],
+    pub(super) next: &'a mut Vec<f64>,
+    /// What it is worth, and the best one before it.
+    pub(super) value: Value,
+    pub(super) best: &'a mut Best,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
     pub(super) gaps: &'a [f64],
     /// The feedback and value functions.
@@ -87,7 +93,7 @@ impl LineSearch {
     #[inline(never)] // `benches/instructions.py` counts it by its name
     pub(super) fn run(&mut self, problem: &mut Problem, mut iterate: Iterate<'_>, last: Search) -> Search {
         self.expect(&iterate);
-        let mut search = Search { accepted: false, ..last };
+        let mut search = Search { accepted: false, left_best: false, ..last };
         let gaps = iterate.settings.counts_gaps(iterate.feasible);
         if iterate.settings.method == DdpMethod::Ddp {
             [search.d1, search.d2] = self.expected;
@@ -115,6 +121,7 @@ impl LineSearch {
                 search.expected_decrease = search.step * (search.d1 + 0.5 * search.step * search.d2);
                 search.decrease = iterate.solution.cost - cost;
                 if search.is_good(iterate.settings, iterate.feasible) {
+                    search.left_best = iterate.best.leave(iterate.solution, iterate.next, iterate.value);
                     let Solution { xs, us, .. } = iterate.solution;
                     self.trials.copy_to(i, xs, us, iterate.next);
                     iterate.solution.cost = cost;

@@ -247,6 +247,22 @@ impl<S: Scalar> Mat3<S> {
     }
 }
 
+impl Mat3<f64> {
+    /// Whether the columns are unit vectors at right angles, right-handed, up to `rounding` (in length, in cosines of right
+    /// angles). Not if a number is not finite.
+    ///
+    /// ```
+    /// use condyle_spatial::Mat3;
+    /// let turn = Mat3::identity();
+    /// assert!(turn.is_rotation(1e-12) && !(turn - turn).is_rotation(0.5));
+    /// ```
+    pub fn is_rotation(self, rounding: f64) -> bool {
+        let Self { x, y, z } = self;
+        let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
+        off.iter().all(|e| e.abs() < rounding)
+    }
+}
+
 impl<S: Scalar> Mul<Vec3<S>> for Mat3<S> {
     type Output = Vec3<S>;
     #[inline(always)]
