@@ -27,7 +27,6 @@ pub(crate) fn exception(error: Cause) -> PyErr {
         Cause::File { .. }
         | Cause::Package { .. }
         | Cause::Xml { .. }
-        | Cause::Urdf { .. }
         | Cause::Element { .. }
         | Cause::Strict { .. } => ParseError::new_err(error.to_string()),
         _ => ModelError::new_err(error.to_string()),

@@ -214,7 +214,7 @@ impl Problem {
     /// The states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates them.
     ///
     /// # Errors
-    /// [`Error`] if `us` has a wrong length or an entry that is not finite.
+    /// [`Error`] if `us` has a wrong length or an entry that is not finite, or a state `xs` becomes infinite.
     pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
         let mut xs = vec![0.0; (self.horizon() + 1) * self.nx()];
@@ -224,6 +224,7 @@ impl Problem {
             let u = &us[self.shape.u(t)];
             self.models[self.stages[t]].calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
         }
+        Error::check("xs", &xs, xs.len())?;
         Ok(xs)
     }
 

@@ -86,7 +86,9 @@ impl RobotDynamics {
         let singular = model.singular_joints();
         if !singular.is_empty() && (capabilities.impulse || matches!(law, Law::Free | Law::Contact(..))) {
             let why = "nothing with a mass moves with the joints";
-            return Err(Error::Actuation { what: format!("{why} {singular:?}: their accelerations are undefined") });
+            let names: Vec<_> = singular.iter().map(|&i| format!("`{}`", model.bodies()[i].joint_name)).collect();
+            let what = format!("{why} {}: their accelerations are undefined", names.join(", "));
+            return Err(Error::Actuation { what });
         }
         let (lanes, vectors) = match (law, level()) {
             (Law::None, _) | (_, Level::Baseline) => (1, None),
