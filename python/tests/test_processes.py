@@ -117,6 +117,24 @@ def test_fork_after_threads(calls: str) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
+def test_random_after_a_fork() -> None:
+    """Forked processes draw positions of their own."""
+    check(
+        """
+        arm = condyle.robots.arm7()
+        def draw(_):
+            return condyle.random_configuration(arm).tobytes()
+        draw(0)
+        draws = []
+        for _ in range(2):
+            with multiprocessing.get_context("fork").Pool(1) as pool:
+                draws.append(pool.apply(draw, (0,)))
+        assert len({draw(0), *draws}) == 3
+        """
+    )
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("name", ["batch", "fddp"])
 def test_multiprocessing_by_fork(name: str) -> None:
     """A pool of forked processes computes what their parent has computed, and ends as it should."""

@@ -42,13 +42,13 @@ pub struct Settings {
     /// as the last of its kind. `None` for no limit. A solve that goes back to a better iterate may take a sweep longer.
     pub time_budget: Option<Duration>,
     /// How many segments of the horizon a sweep works on at the same time: see [`Sweep::set_segments`]. It is not the number
-    /// of threads, which are those of rayon's pool, and any number of them finds the same.
+    /// of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.
     ///
     /// [`Sweep::set_segments`]: crate::Sweep::set_segments
     pub segments: usize,
     /// Threads on which derivatives are computed, of rayon's pool in which a solve is called, else of the global one. Any
     /// number finds the same to the last bit. More than 1 need copies of the actions ([`fork`]), which are made when
-    /// there are none yet, or not of a model as it is now.
+    /// there are none yet, or not of a model as it is now. At most 1024.
     ///
     /// [`fork`]: crate::ActionModel::fork
     pub threads: usize,
