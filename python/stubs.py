@@ -151,6 +151,7 @@ RESULTS = {
     "AssemblySize": "DivideConquer.size",
     "_Status": "Simulation.run Simulation.step",
     "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
+    "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
     "Outcome": "AugmentedLagrangian.outcome",
     "AllTerms": "compute_all_terms",
     "CentroidalMap": "centroidal_map",

@@ -83,10 +83,12 @@ pub(crate) fn body_index(
 /// An index from `least` to below `count`.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
     let index: isize = given.extract()?;
-    usize::try_from(index)
-        .ok()
-        .filter(|i| (least..count).contains(i))
-        .ok_or_else(|| PyIndexError::new_err(format!("{expected} or {least} to {}, found {index}", count - 1)))
+    let wrong = || match count {
+        _ if least < count => format!("{expected} or {least} to {}, found {index}", count - 1),
+        _ => format!("{expected}, found {index}: the model has none"),
+    };
+    let inside = usize::try_from(index).ok().filter(|i| (least..count).contains(i));
+    inside.ok_or_else(|| PyIndexError::new_err(wrong()))
 }
 
 impl Model {

@@ -34,6 +34,11 @@ pub struct JointOptions {
     pub armature: f64,
 }
 
+/// How many degrees of freedom the joints of a model may have: algorithms have matrices of their number by their number.
+const MAX_DEGREES: usize = 4096;
+/// How many coordinates a model may have whose joints follow others: its inertia matrix is factored as a dense one.
+const MAX_SHARED: usize = 1024;
+
 struct Draft {
     body: Body,
     options: JointOptions,
@@ -166,8 +171,10 @@ impl ModelBuilder {
     ///
     /// # Errors
     /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`] and [`Error::Frame`]: names, axes, masses, limits,
-    /// placements, numbers that are not finite, what a mimic joint follows.
+    /// placements, numbers that are not finite, what a mimic joint follows. [`Error::Size`]: more than 4096 degrees of
+    /// freedom, or 1024 coordinates where joints follow others.
     pub fn build(mut self) -> Result<Model, Error> {
+        self.check_size()?;
         self.check()?;
         let order = self.depth_first();
         let mut number = vec![0; order.len()];
@@ -218,6 +225,7 @@ impl ModelBuilder {
             warnings,
             singular: Vec::new(),
         };
+        model.check_magnitudes()?;
         model.find_singular();
         Ok(model)
     }
@@ -234,6 +242,22 @@ impl ModelBuilder {
             stack.extend(children[i].iter().rev());
         }
         order
+    }
+
+    /// Checks the number of degrees of freedom.
+    pub(crate) fn check_size(&self) -> Result<(), Error> {
+        let degrees = |draft: &Draft| draft.body.joint.nv();
+        let joints = || self.drafts.iter().skip(1);
+        let found = joints().map(degrees).sum();
+        if found > MAX_DEGREES {
+            return Err(Error::Size { what: "degrees of freedom", found, limit: MAX_DEGREES });
+        }
+        let own = joints().filter(|draft| draft.mimic.is_none()).map(degrees).sum();
+        if own < found && own > MAX_SHARED {
+            let what = "coordinates, with joints that follow others";
+            return Err(Error::Size { what, found: own, limit: MAX_SHARED });
+        }
+        Ok(())
     }
 
     /// Checks names, bodies, joints and frames, and makes axes unit vectors.

@@ -14,6 +14,8 @@ use rand::{SeedableRng, rngs::StdRng};
 const MOMENT_ROUNDING: f64 = 1e-6;
 /// A pivot that is smaller than this share of the products it is a sum of is rounding, and none.
 const PIVOT_ROUNDING: f64 = 1e-13;
+/// A pivot that is smaller than this is none (kg m², kg): its reciprocal may be no number.
+const LEAST_PIVOT: f64 = 1e-200;
 /// Positions at which M is looked at. A joint is called singular if it is so at all of them.
 const SAMPLES: usize = 3;
 
@@ -75,7 +77,7 @@ impl Model {
                 let U = Ia * S;
                 let D = S.dot(U) + l.armature(i, k);
                 let products = S.to_array().iter().zip(U.to_array()).map(|(s, u)| (s * u).abs()).sum::<f64>();
-                if D <= PIVOT_ROUNDING * products {
+                if D <= (PIVOT_ROUNDING * products).max(LEAST_PIVOT) {
                     singular[i] = true;
                 } else {
                     Ia = Ia.minus_outer(U, 1.0 / D);
@@ -93,7 +95,7 @@ impl Model {
         let mut singular = vec![false; self.tree.nv];
         for k in (0..self.tree.nv).rev() {
             let D = M[(k, k)];
-            if D <= PIVOT_ROUNDING * diagonal[k] {
+            if D <= (PIVOT_ROUNDING * diagonal[k]).max(LEAST_PIVOT) {
                 singular[k] = true;
                 continue;
             }

@@ -10,6 +10,10 @@ pub enum Error {
     #[error("the horizon is empty: a problem needs at least one knot before the terminal one")]
     EmptyHorizon,
 
+    /// The actions have states without a number, as robots of fixed joints only have: there is nothing to control.
+    #[error("the states have no numbers: a problem needs at least one")]
+    EmptyState,
+
     /// A knot names an action model that the problem does not hold.
     #[error("knot {knot}: there is no action model {index}, the problem holds {models}")]
     UnknownModel {
@@ -32,6 +36,30 @@ pub enum Error {
         expected: usize,
         /// What the action model says.
         found: usize,
+    },
+
+    /// A knot has too many states or controls.
+    #[error("node {node}: expected at most {most} {name}, found {found}")]
+    Size {
+        /// The knot.
+        node: usize,
+        /// `states` or `controls`.
+        name: &'static str,
+        /// The most that there may be.
+        most: usize,
+        /// What the action model says.
+        found: usize,
+    },
+
+    /// A horizon is too long for the sizes of its knots.
+    #[error("the horizon: expected matrices of at most {most:.1e} numbers, found {numbers:.1e} in {knots} knots")]
+    Horizon {
+        /// The number of knots.
+        knots: usize,
+        /// Σ (ndx + nu)².
+        numbers: f64,
+        /// The most that there may be.
+        most: f64,
     },
 
     /// A vector or a horizon has another length than the problem needs.

@@ -33,4 +33,3 @@ mod sdf;
 mod second_order;
 mod urdf;
 mod urdf_errors;
-mod urdf_fuzz;

@@ -31,10 +31,10 @@ fn mistakes_have_names() {
     expect("/bodies/3/parent", json!(5), "body `link3`: number 3 on body 5: bodies stand parents first, depth first");
     expect("/bodies/3/parent", json!(3), "body `link3`: number 3 on body 3");
     expect("/bodies/3/name", json!("link2"), "two bodys are named `link2`");
-    expect("/bodies/3/idx_v", json!(3), "body `link3`: its coordinates in q and v begin at (2, 3), expected (2, 2)");
+    expect("/bodies/3/idx_v", json!(3), "body `link3`: begins at 2 in q and 3 in v, expected 2 and 2");
     expect("/bodies/3/inertia/mass", json!(-1.0), "body `link3`: mass is -1");
     expect("/bodies/3/placement/rotation/x/x", json!(0.5), "body `link3`: placement is no rotation");
-    expect("/bodies/3/joint", json!("Planar"), "body `link4`: its coordinates in q and v begin at (3, 3)");
+    expect("/bodies/3/joint", json!("Planar"), "body `link4`: begins at 3 in q and 3 in v");
     let none = json!({"Revolute": {"axis": {"x": 0.0, "y": 0.0, "z": 0.0}}});
     expect("/bodies/3/joint", none, "body `link3`: axis");
     let mimic = json!({"ratio": 2.0, "offset": 0.0});

@@ -63,7 +63,8 @@ impl Description {
         for (built, body) in model.bodies.iter().zip(&self.bodies).skip(1) {
             let (expected, found) = ((built.idx_q, built.idx_v), (body.idx_q, body.idx_v));
             if expected != found {
-                let what = format!("its coordinates in q and v begin at {found:?}, expected {expected:?}");
+                let ((q, v), (expected_q, expected_v)) = (found, expected);
+                let what = format!("begins at {q} in q and {v} in v, expected {expected_q} and {expected_v}");
                 return Err(Error::Body { body: body.name.clone(), what });
             }
         }
@@ -71,6 +72,7 @@ impl Description {
         let Self { limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
         model.warnings = warnings;
+        model.check_magnitudes()?;
         model.find_singular();
         Ok(model)
     }
@@ -95,6 +97,7 @@ impl Description {
             let options = Default::default();
             ids.push(builder.body_with(names, parent, body.joint, body.placement, body.inertia, options));
         }
+        builder.check_size()?; // before leaders are looked for among all bodies
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             let Some(mimic) = body.mimic else { continue };
             let leads = |b: &Body| b.mimic.is_none() && b.idx_v == body.idx_v;

@@ -75,6 +75,12 @@ pub struct Settings {
     pub regularisation_increase_below: f64,
 }
 
+/// The most segments, and the most threads: each has memory of its own.
+const MOST_AT_ONCE: usize = 1024;
+
+/// `MOST_AT_ONCE` in words.
+const AT_ONCE: &str = "at least 1 and at most 1024";
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -107,17 +113,19 @@ impl Settings {
         !feasible && self.method == DdpMethod::Fddp
     }
 
+    /// Checks the settings, as each solve does.
+    ///
     /// # Errors
     /// [`Error::Setting`] for the first field that makes no sense.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<(), Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();
         let [steps, segments, threads] = [self.step_lengths, self.segments, self.threads].map(|count| count as f64);
         for (name, value, good, allowed) in [
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
-            ("segments", segments, self.segments > 0, "at least 1"),
-            ("threads", threads, self.threads > 0, "at least 1"),
+            ("segments", segments, (1..=MOST_AT_ONCE).contains(&self.segments), AT_ONCE),
+            ("threads", threads, (1..=MOST_AT_ONCE).contains(&self.threads), AT_ONCE),
             ("step_lengths", steps, (1..=60).contains(&self.step_lengths), "from 1 to 60"),
             ("accept", self.accept, from_zero(self.accept), "at least 0"),
             ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),

@@ -8,6 +8,9 @@ use crate::lq::LqNode;
 use std::any::Any;
 use std::ops::Range;
 
+/// The most numbers of the matrices of a horizon: a solver has a few times as many.
+const MOST_NUMBERS: f64 = 1073741824.0; // 2³⁰
+
 /// An optimal control problem in discrete time, with N knots and a terminal one:
 ///
 /// ```text
@@ -68,8 +71,9 @@ impl Problem {
     /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon is empty, an index has no model, nx or ndx differ, the terminal model has controls, or
-    /// x̂₀ has a wrong length or an entry that is not finite.
+    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has
+    /// a wrong length or an entry that is not finite, a knot has more than [`LqNode::MOST_SIZE`] states or controls, or the
+    /// matrices (ndx + nu)² of all knots have more than 2³⁰ numbers (8 GiB).
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
@@ -88,9 +92,13 @@ impl Problem {
                 }
             }
         }
+        if ndx == 0 {
+            return Err(Error::EmptyState);
+        }
         if terminal.nu() != 0 {
             return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
         }
+        check_size(ndx.max(nx), &models, &stages)?;
         Error::check("x0", &x0, nx)?;
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
@@ -206,7 +214,7 @@ impl Problem {
     /// The states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates them.
     ///
     /// # Errors
-    /// [`Error`] if `us` has a wrong length or an entry that is not finite.
+    /// [`Error`] if `us` has a wrong length or an entry that is not finite, or a state `xs` becomes infinite.
     pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
         let mut xs = vec![0.0; (self.horizon() + 1) * self.nx()];
@@ -216,6 +224,7 @@ impl Problem {
             let u = &us[self.shape.u(t)];
             self.models[self.stages[t]].calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
         }
+        Error::check("xs", &xs, xs.len())?;
         Ok(xs)
     }
 
@@ -362,6 +371,25 @@ impl Problem {
         assert_length("xs", xs.len(), (self.horizon() + 1) * self.nx());
         assert_length("us", us.len(), self.shape.offsets[self.horizon()]);
     }
+}
+
+/// Checks that a solver has memory of a sensible size for a problem of n states: its knots are matrices.
+fn check_size(n: usize, models: &[Box<dyn ActionModel>], stages: &[usize]) -> Result<(), Error> {
+    let most = LqNode::MOST_SIZE;
+    let mut numbers = 0.0;
+    for (knot, &index) in stages.iter().enumerate() {
+        let nu = models[index].nu();
+        for (name, found) in [("states", n), ("controls", nu)] {
+            if found > most {
+                return Err(Error::Size { node: knot, name, most, found });
+            }
+        }
+        numbers += ((n + nu) as f64).powi(2);
+    }
+    if numbers > MOST_NUMBERS {
+        return Err(Error::Horizon { knots: stages.len(), numbers, most: MOST_NUMBERS });
+    }
+    Ok(())
 }
 
 impl std::fmt::Debug for Problem {

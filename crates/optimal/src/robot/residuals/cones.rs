@@ -22,7 +22,7 @@ pub struct FrictionCone {
     pub rotation: Mat3<f64>,
     /// μ.
     pub mu: f64,
-    /// The number of sides of the pyramid; even.
+    /// The number of sides of the pyramid; even, 4 to [`MOST_FACETS`](Self::MOST_FACETS).
     pub facets: usize,
     /// Whether the pyramid lies inside of the cone, or around it.
     pub inner: bool,
@@ -54,6 +54,9 @@ pub struct WrenchCone {
 }
 
 impl FrictionCone {
+    /// The most sides of a pyramid.
+    pub const MOST_FACETS: usize = 1000;
+
     /// A pyramid of four sides around the cone on a surface whose normal is z, for any normal force that pushes.
     pub fn new(mu: f64) -> Self {
         Self { rotation: Mat3::identity(), mu, facets: 4, inner: false, least: 0.0, greatest: f64::INFINITY }
@@ -93,8 +96,12 @@ impl FrictionCone {
         if !(self.mu >= 0.0 && self.mu.is_finite()) {
             return Some(format!("its friction is {}, but it must be at least 0", self.mu));
         }
-        if self.facets < 4 || self.facets % 2 == 1 {
-            return Some(format!("its cone has {} sides, but they must be even and at least 4", self.facets));
+        if !(4..=Self::MOST_FACETS).contains(&self.facets) || self.facets % 2 == 1 {
+            let most = Self::MOST_FACETS;
+            return Some(format!(
+                "its cone has {} sides, but they must be even, at least 4 and at most {most}",
+                self.facets
+            ));
         }
         rotation.iter().any(|x| !x.is_finite()).then(|| "its cone's rotation is not finite".to_owned())
     }
