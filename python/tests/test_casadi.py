@@ -245,7 +245,9 @@ def test_what_cannot_be() -> None:
 def test_swing_up_by_ipopt() -> None:
     """A pendulum on a cart swings up: direct transcription with exact Hessians; the motion obeys the dynamics."""
     builder = ModelBuilder("cart")
-    cart = builder.body("cart", WORLD, Joint.prismatic([1.0, 0.0, 0.0]), None, Inertia.from_com(1.0, np.zeros(3), np.eye(3)))
+    cart = builder.body(
+        "cart", WORLD, Joint.prismatic([1.0, 0.0, 0.0]), None, Inertia.from_com(1.0, np.zeros(3), np.eye(3))
+    )
     rod = Inertia.from_com(0.3, [0.0, 0.0, -0.5], 0.01 * np.eye(3))
     builder.body("rod", cart, Joint.revolute([0.0, 1.0, 0.0]), None, rod)
     model = builder.build()
