@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Times functions of a robot in CasADi: ours, and the same recursions written as CasADi expressions.
 
-    .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--json]
+    .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--free-flyer] [--json]
 
 Without robots: the embedded arm and humanoid. Prints, for RNEA and ABA, the time of the function, of its Jacobian by all
-arguments and of the Hessian of λᵀf, in microseconds, medians of alternating rounds on one core, and how many times faster
-ours are. The expressions run in CasADi's own virtual machine, as those of pinocchio.casadi do.
+arguments and of the Hessian of λᵀf, in microseconds, medians of alternating rounds on one core, and how many times
+faster ours are. The expressions run in CasADi's own virtual machine, as those of pinocchio.casadi do.
 """
 
 import argparse
@@ -25,7 +25,7 @@ SECONDS = 0.02  # of each round
 
 
 class Expressions:
-    """RNEA and ABA of a robot whose joints are revolute, prismatic or a free-flyer, in body frames (Featherstone 2008)."""
+    """RNEA and ABA in body frames (Featherstone 2008) for revolute, prismatic and free-flyer joints."""
 
     def __init__(self, model: condyle.Model) -> None:
         self.model = model
