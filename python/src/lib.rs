@@ -17,6 +17,7 @@ mod algorithms;
 mod arrays;
 mod batch;
 mod builder;
+mod casadi;
 mod centroidal;
 mod configuration;
 mod constrained;
@@ -51,6 +52,8 @@ mod _condyle {
     };
     #[pymodule_export]
     use builder::{BodyId, ModelBuilder};
+    #[pymodule_export]
+    use casadi::{casadi_hold, casadi_release};
     #[pymodule_export]
     use centroidal::{
         centroidal_map, centroidal_map_rate, centroidal_momentum, centroidal_momentum_rate, com, com_acceleration,
