@@ -152,7 +152,7 @@ fn inertias() {
     let origin = r#"<mass value="1"/><origin xyz="0 nan 0"/>"#;
     expect(&with(mass, origin), &said("origin xyz: `nan` is no finite number"));
     let far = r#"<mass value="1"/><origin xyz="0 1e200 0"/>"#;
-    expect(&with(mass, far), "<string>:3: link `arm`: inertia or placement is not finite");
+    expect(&with(mass, far), "<string>:3: link `arm`: inertia is not finite");
 }
 
 /// XML's rules of values, once: a line break or tab in a name is a space, a reference is the character that it stands for.
