@@ -1,4 +1,4 @@
-"""What makes no sense is refused by name, with its numbers, where it is given: never a NaN, a wrong result or an abort."""
+"""What makes no sense is refused by name, with its numbers, where it is given: never a NaN, a wrong result, an abort."""
 
 import json
 import pickle
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import condyle
+import condyle.simulation
 from condyle import ModelError
 from condyle.optimal import (
     Action,
@@ -212,6 +213,14 @@ def test_weights_cones_and_settings_are_checked() -> None:
     for dt in (0.0, -0.1, np.nan, np.inf):
         with pytest.raises(ProblemError, match="its duration must be above 0"):
             FreeDynamics(ARM, dt, [])
+
+
+def test_steps_of_a_simulation_are_numbers() -> None:
+    for dt in (0.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="^dt: expected a finite number other than 0, found"):
+            condyle.simulation.Simulation(ARM, dt=dt)
+    with pytest.raises(ValueError, match="^tolerance: expected a finite number of at least 0, found NaN$"):
+        condyle.simulation.Simulation(ARM, tolerance=np.nan)
 
 
 def test_states_are_states() -> None:
