@@ -2,7 +2,7 @@
 
 use crate::arrays::{Give, array, named_tuples, pose};
 use crate::data::{Holds, Scratch};
-use crate::exceptions::{exception, wrong_word};
+use crate::exceptions::{exception, within, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
 use crate::hyper_dual::Hyper;
 use crate::model::{MadeFor, Model, frame_index};
@@ -74,7 +74,8 @@ fn aim(
 /// is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
 /// sparse resolution of constrained dynamic equations (2021).
 ///
-/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always.
+/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always, 1 to
+/// 10000.
 ///
 /// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
 /// 'world', a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
@@ -93,9 +94,6 @@ pub(crate) struct ConstraintSet {
     nv: usize,
     made_for: MadeFor,
 }
-
-/// The most iterations of the proximal method: each is a solve, and few are useful.
-const MOST_ITERATIONS: usize = 1000;
 
 impl ConstraintSet {
     fn checked(&self, k: usize) -> PyResult<usize> {
@@ -139,10 +137,7 @@ impl ConstraintSet {
         if !(mu.is_finite() && mu >= 0.0) {
             return Err(PyValueError::new_err(format!("mu: expected a number of at least 0, found {mu}")));
         }
-        if !(1..=MOST_ITERATIONS).contains(&iterations) {
-            let what = format!("iterations: expected 1 to {MOST_ITERATIONS}, found {iterations}");
-            return Err(PyValueError::new_err(what));
-        }
+        within("iterations", iterations, 1, 10_000)?;
         let (made_for, model) = (MadeFor::with_geometry(model.get()), &model.get().inner);
         let constraints = constraints.iter().map(|c| constraint(model, c)).collect::<PyResult<Vec<_>>>()?;
         let mut inner = condyle::ConstraintSet::new(model, &constraints).map_err(exception)?;

@@ -42,3 +42,14 @@ pub(crate) fn problem_error(error: condyle::optimal::Error) -> PyErr {
 pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
 }
+
+/// A number that an argument gives, if it is within its limits.
+pub(crate) fn within(name: &str, found: usize, least: usize, most: usize) -> PyResult<usize> {
+    if found < least {
+        return Err(PyValueError::new_err(format!("{name}: expected at least {least}, found {found}")));
+    }
+    if found > most {
+        return Err(PyValueError::new_err(format!("{name}: expected at most {most}, found {found}")));
+    }
+    Ok(found)
+}

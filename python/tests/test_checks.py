@@ -159,7 +159,7 @@ def test_targets_that_are_none_are_refused() -> None:
     solved = condyle.constrained_dynamics(quadruped, condyle.Data(quadruped), stance, q, zero, zero)
     assert np.isfinite(solved.lambda_).all()
     for iterations in (0, 10**9):
-        with pytest.raises(ValueError, match=f"^iterations: expected 1 to 1000, found {iterations}$"):
+        with pytest.raises(ValueError, match=f"^iterations: expected at (least 1|most 10000), found {iterations}$"):
             condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")], iterations=iterations)
     none = "is no rotation: expected three unit vectors at right angles$"
     pose = Cost("pose", 1.0, Residual.frame_placement(ARM, "tool", np.diag([2.0, 1.0, 1.0, 1.0])))
@@ -193,19 +193,14 @@ def test_weights_cones_and_settings_are_checked() -> None:
     for mu in (-0.1, np.nan):
         with pytest.raises(ProblemError, match="^cone: its friction is .*, but it must be at least 0$"):
             FrictionCone(mu)
-    for facets in (0, 3, 10**9):
+    for facets in (0, 3):
         with pytest.raises(ProblemError, match=f"^cone: its cone has {facets} sides, but they must be even"):
             FrictionCone(0.5, facets=facets)
     with pytest.raises(ProblemError, match="rotation is none"):
         FrictionCone(0.5, rotation=np.zeros((3, 3)))
     with pytest.raises(ProblemError, match="^cone: its sides are 0.1 and NaN m"):
         WrenchCone(FrictionCone(0.5), [0.1, np.nan])
-    for name, bad in [
-        ("tolerance", -1.0),
-        ("tolerance", np.nan),
-        ("max_iterations", 10**12),
-        ("regularisation_max", 0.0),
-    ]:
+    for name, bad in [("tolerance", -1.0), ("tolerance", np.nan), ("regularisation_max", 0.0)]:
         with pytest.raises(ProblemError, match=f"^setting `{name}` is "):
             Fddp(problem, **{name: bad}).solve(xs, us)
     with pytest.raises(ProblemError, match="^setting `max_solves` is 0, but it must be at least 1$"):
@@ -251,15 +246,15 @@ def test_only_the_end_has_no_next_state() -> None:
 
 
 def test_sizes_beyond_memory_are_refused() -> None:
-    with pytest.raises(ValueError, match="^nx: 1000000000 is more than the limit of 4096$"):
+    with pytest.raises(ValueError, match="^nx: expected at most 4096, found 1000000000$"):
         Action(10**9, 1, lambda t, x, u: (x, 0.0))
-    with pytest.raises(ValueError, match="^nu: 1000000000 is more than the limit of 4096$"):
+    with pytest.raises(ValueError, match="^nu: expected at most 4096, found 1000000000$"):
         Action(1, 10**9, lambda t, x, u: (x, 0.0))
-    with pytest.raises(ValueError, match="^size: 1000000000 is more than the limit of 4096$"):
+    with pytest.raises(ValueError, match="^size: expected at most 4096, found 1000000000$"):
         ConstrainedAction(Action(1, 1, lambda t, x, u: (x, 0.0)), 10**9, lambda t, x, u: x)
-    with pytest.raises(ValueError, match="^A: 1000000 is more than the limit of 4096$"):
+    with pytest.raises(ValueError, match="^A, rows: expected at most 4096, found 1000000$"):
         Lqr(np.empty((10**6, 0)))
-    with pytest.raises(ValueError, match="^R: 100000 is more than the limit of 4096$"):
+    with pytest.raises(ValueError, match="^R, rows, or B, columns: expected at most 4096, found 100000$"):
         Lqr([[1.0]], R=np.empty((10**5, 0)))
     with pytest.raises(ProblemError, match="^knot: 1000000000 is more than the limit of 1048576$"):
         FreeDynamics(ARM, 0.1, [], costs_at={10**9: []})

@@ -190,8 +190,9 @@ impl ModelBuilder {
     /// # Errors
     /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`], [`Error::Frame`] and [`Error::Gravity`]: names, axes;
     /// masses, damping, friction, armature, speeds and efforts below zero; limits that exclude each other; placements that
-    /// are none; numbers that are not finite; what a mimic joint follows. Every other way to make a model is checked alike.
-    /// [`Error::Size`]: more than 4096 degrees of freedom, or 1024 coordinates where joints follow others.
+    /// are none; numbers that are not finite, or so large that their products are not (above 1e30); what a mimic joint
+    /// follows. Every other way to make a model is checked alike. [`Error::Size`]: more than 4096 degrees of freedom, or
+    /// 1024 coordinates where joints follow others.
     pub fn build(mut self) -> Result<Model, Error> {
         self.check_size()?;
         self.check()?;

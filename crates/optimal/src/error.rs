@@ -10,6 +10,10 @@ pub enum Error {
     #[error("the horizon is empty: a problem needs at least one knot before the terminal one")]
     EmptyHorizon,
 
+    /// The actions have states without a number, as robots of fixed joints only have: there is nothing to control.
+    #[error("the states have no numbers: a problem needs at least one")]
+    EmptyState,
+
     /// A knot names an action model that the problem does not hold.
     #[error("knot {knot}: there is no action model {index}, the problem holds {models}")]
     UnknownModel {

@@ -165,7 +165,6 @@ fn settings_that_make_no_sense_are_refused() {
     for (settings, name) in [
         (Settings { tolerance: -1.0, ..plain() }, "tolerance"),
         (Settings { tolerance_bounded: NAN, ..plain() }, "tolerance_bounded"),
-        (Settings { max_iterations: usize::MAX, ..plain() }, "max_iterations"),
         (Settings { regularisation_min: 1.0, regularisation_max: 0.1, ..plain() }, "regularisation_max"),
         (Settings { regularisation_start: NAN, ..plain() }, "regularisation_start"),
         (Settings { regularisation_decrease_above: NAN, ..plain() }, "regularisation_decrease_above"),
@@ -217,6 +216,7 @@ fn sizes_beyond_memory_are_refused_before_it_is_asked_for() {
         "numbers in the matrices of all knots: 301989888 is more than the limit of 268435456"
     );
     assert_eq!(problem(4, 1, 100_000), Ok(()));
+    assert_eq!(problem(0, 1, 3), Err(Error::EmptyState));
     let arm = Arc::new(robots::arm7());
     let mut knot = FreeDynamics::running(arm, 0.01, vec![]).unwrap();
     let far = Error::Size { name: "knot", found: 1_000_000_000, most: 1 << 20 };

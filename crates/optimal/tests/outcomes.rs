@@ -11,9 +11,12 @@ use common::{
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Error, Fddp, LqNode, NumDiff, Problem, Settings, Status, Sweep,
+    ActionModel, AugmentedLagrangian, Error, Fddp, Iteration, LqNode, NumDiff, Observer, Problem, Settings, Status,
+    Sweep,
 };
+use core::ops::ControlFlow;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// The accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
 const FIRST: f64 = 1e-6;
@@ -69,7 +72,7 @@ fn the_pendulum_on_a_cart_stands_up() {
     let xs = problem.rollout(&us).unwrap();
     let mut solver = Fddp::new(&problem);
     let mut seen = 0;
-    let solution = solver.solve_with(&mut problem, &xs, &us, |_| seen += 1).unwrap();
+    let solution = solver.solve_with(&mut problem, &xs, &us, |_: &Iteration| seen += 1).unwrap();
     assert_eq!(solution.status, Status::Converged);
     assert_eq!(seen, solution.trace.len());
     assert!(solution.x(50).iter().all(|x| x.abs() < 0.1), "{:?}", solution.x(50));
@@ -380,6 +383,104 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
         assert!(expected.len() > solution.trace.len());
         assert_eq!(problem.model_mut::<Noting>(0).unwrap().groups, expected, "{lanes} lanes");
     }
+}
+
+/// x⁺ = x + u, ℓ = ½ (x² + u²) + x⁴, with so many controls, at its leisure.
+struct Slow(usize);
+
+impl ActionModel for Slow {
+    fn nx(&self) -> usize {
+        1
+    }
+
+    fn nu(&self) -> usize {
+        self.0
+    }
+
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        std::thread::sleep(Duration::from_millis(3));
+        let u: f64 = u.iter().sum();
+        next[0] = x[0] + u;
+        0.5 * (x[0] * x[0] + u * u) + x[0].powi(4)
+    }
+
+    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut LqNode) {
+        unreachable!("is differentiated by differences")
+    }
+}
+
+/// Ends a solve when it has been asked so often whether to go on, or has seen so many iterations.
+struct Impatient {
+    questions: usize,
+    iterations: usize,
+}
+
+impl Observer for Impatient {
+    fn iteration(&mut self, _: &Iteration) -> ControlFlow<()> {
+        self.iterations -= 1;
+        if self.iterations == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn go_on(&mut self) -> ControlFlow<()> {
+        self.questions -= 1;
+        if self.questions == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// An observer ends a solve after an iteration, or within one that lasts; `resume` goes on from there, to the same end.
+#[test]
+fn observers_end_solves() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let us = [0.0; 50];
+    let xs = problem.rollout(&us).unwrap();
+    let mut solver = Fddp::new(&problem);
+    let end = solver.solve(&mut problem, &xs, &us).unwrap().clone();
+
+    let solution = solver.solve_with(&mut problem, &xs, &us, |now: &Iteration| match now.iteration {
+        3 => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    });
+    let solution = solution.unwrap();
+    assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 4));
+    assert_eq!(solution.cost, end.trace[3].cost);
+    let resumed = solver.resume(&mut problem).unwrap();
+    assert!(resumed.status == Status::Converged && (resumed.cost - end.cost).abs() < 1e-6 * end.cost);
+
+    // a model that takes its time: the iteration is not waited for
+    let mut problem =
+        Problem::new(vec![1.0], vec![Box::new(NumDiff(Slow(1)))], vec![0; 5], Box::new(NumDiff(Slow(0)))).unwrap();
+    let mut solver = Fddp::new(&problem);
+    for questions in [1, 2] {
+        let observer = Impatient { questions, iterations: 9 };
+        let solution = solver.solve_with(&mut problem, &[1.0; 6], &[0.0; 5], observer).unwrap();
+        assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 0));
+    }
+
+    // around them, the augmented Lagrangian
+    let mut solver = AugmentedLagrangian::new(&problem);
+    let observer = Impatient { questions: 9, iterations: 1 };
+    let solution = solver.solve_with(&mut problem, &[1.0; 6], &[0.0; 5], observer).unwrap();
+    assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 1));
+    assert_eq!(solver.outcome().solves, 1);
+    let solution = solver.resume_with(&mut problem, |_: &Iteration| ControlFlow::Break(())).unwrap();
+    assert_eq!(solution.status, Status::Interrupted);
+}
+
+/// Counts that memory depends on are limited; where a number only says when to stop, any is good.
+#[test]
+fn settings_that_count_are_limited() {
+    let mut problem = cartpole(&HANGING, 5, 1);
+    let mut solver = Fddp::new(&problem);
+    for settings in [
+        Settings { threads: 10_000_000, ..Settings::default() },
+        Settings { segments: 10_000_000, ..Settings::default() },
+    ] {
+        solver.settings = settings;
+        let error = solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap_err().to_string();
+        assert!(error.ends_with("is 10000000, but it must be at least 1 and at most 1024"), "{error}");
+    }
+    solver.settings = Settings { max_iterations: usize::MAX, time_budget: Some(Duration::MAX), ..Settings::default() };
+    assert_eq!(solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap().status, Status::Converged);
 }
 
 /// An arm reaches for a point in 50 knots, and nothing but a tiny weight keeps its efforts small.

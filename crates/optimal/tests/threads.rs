@@ -121,6 +121,6 @@ fn no_thread_at_all_is_refused() {
     let (mut problem, xs, us) = gait();
     let mut solver = Fddp::new(&problem);
     solver.settings.threads = 0;
-    let expected = Error::Setting { name: "threads", value: 0.0, allowed: "at least 1" };
+    let expected = Error::Setting { name: "threads", value: 0.0, allowed: "at least 1 and at most 1024" };
     assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap_err(), expected);
 }

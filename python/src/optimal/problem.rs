@@ -9,8 +9,9 @@ use crate::arrays::{matrix, numbers, output, vector};
 use crate::exceptions::{ProblemError, problem_error};
 use condyle::optimal as rust;
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The value behind a lock; an error if another call holds it.
 pub(super) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
@@ -39,8 +40,8 @@ pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResu
     Ok(flat)
 }
 
-/// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `faults`.
-fn boxed(model: &Bound<'_, PyAny>, terminal: bool, faults: &mut Vec<Fault>) -> PyResult<Boxed> {
+/// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `fault`.
+fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> PyResult<Boxed> {
     macro_rules! of_a_robot {
         ($($class:ident),*) => {$(
             if let Ok(action) = model.cast::<$class>() {
@@ -49,18 +50,13 @@ fn boxed(model: &Bound<'_, PyAny>, terminal: bool, faults: &mut Vec<Fault>) -> P
         )*};
     }
     of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics);
-    let py = model.py();
     let action: Box<dyn rust::ActionModel> = if let Ok(lqr) = model.cast::<Lqr>() {
         Box::new(lqr.get().0.clone())
     } else if let Ok(constrained) = model.cast::<ConstrainedAction>() {
-        let inside = boxed(constrained.get().action.bind(py), terminal, faults)?.action;
-        let constraint = constrained.get().constraint(py, &*inside);
-        faults.push(constraint.fault.clone());
-        Box::new(rust::Constrained::new(inside, Box::new(constraint)))
+        let constrained = constrained.get();
+        constrained.boxed(boxed(constrained.action.bind(model.py()), terminal, fault)?.action, fault)
     } else if let Ok(action) = model.cast::<Action>() {
-        let written = action.get().copy(py, terminal);
-        faults.push(written.fault.clone());
-        if written.calc_diff.is_some() { Box::new(written) } else { Box::new(rust::NumDiff(written)) }
+        action.get().boxed(terminal, fault)
     } else {
         let found = model.get_type().name()?;
         return Err(PyTypeError::new_err(format!("models: expected an action, found '{found}'")));
@@ -84,8 +80,10 @@ pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
     /// The models, the terminal one last, as data where they are a robot's.
     described: Mutex<Vec<Option<Described>>>,
-    /// The errors of the actions that are written in Python.
-    faults: Vec<Fault>,
+    /// The actions that are written in Python: the problem's copies of them compute with their functions.
+    written: Vec<Py<PyAny>>,
+    /// Their first error.
+    fault: Fault,
 }
 
 #[pymethods]
@@ -97,10 +95,17 @@ impl Problem {
         stages: Vec<usize>,
         terminal: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let mut faults = Vec::new();
-        let all = models.iter().map(|model| (model, false)).chain([(terminal, true)]);
-        let all = all.map(|(model, end)| boxed(model, end, &mut faults)).collect::<PyResult<Vec<_>>>()?;
-        Self::make(numbers("x0", x0)?, all, stages, faults)
+        let fault = Fault::default();
+        let ends = models.iter().map(|model| (model, false)).chain([(terminal, true)]);
+        let all = ends.map(|(model, end)| boxed(model, end, &fault)).collect::<PyResult<Vec<_>>>()?;
+        let is_written =
+            |model: &&Bound<'_, PyAny>| model.cast::<Action>().is_ok() || model.cast::<ConstrainedAction>().is_ok();
+        let written = models.iter().chain([terminal]).filter(is_written).map(|model| model.clone().unbind());
+        Self::make(numbers("x0", x0)?, all, stages, written.collect(), fault)
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.written.iter().try_for_each(|action| visit.call(action))
     }
 
     /// A problem of a robot from the text that `to_json` gave.
@@ -117,7 +122,7 @@ impl Problem {
         }
         let knots = data.knots.into_iter().chain([data.terminal]);
         let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
-        Self::make(data.x0, all, data.stages, Vec::new())
+        Self::make(data.x0, all, data.stages, Vec::new(), Fault::default())
     }
 
     /// The problem and its robot as JSON, with the present initial state, weights and stages. An infinite bound is
@@ -236,11 +241,17 @@ impl Problem {
 
 impl Problem {
     /// A problem of models, the terminal one last.
-    fn make(x0: Vec<f64>, all: Vec<Boxed>, stages: Vec<usize>, faults: Vec<Fault>) -> PyResult<Self> {
+    fn make(
+        x0: Vec<f64>,
+        all: Vec<Boxed>,
+        stages: Vec<usize>,
+        written: Vec<Py<PyAny>>,
+        fault: Fault,
+    ) -> PyResult<Self> {
         let (mut actions, described): (Vec<_>, _) = all.into_iter().map(|b| (b.action, b.described)).unzip();
         let end = actions.pop().expect("the terminal one is there");
         let problem = rust::Problem::new(x0, actions, stages, end).map_err(problem_error)?;
-        Ok(Self { inner: Mutex::new(problem), described: Mutex::new(described), faults })
+        Ok(Self { inner: Mutex::new(problem), described: Mutex::new(described), written, fault })
     }
 
     /// Moves the data of the models on by a knot.
@@ -253,6 +264,11 @@ impl Problem {
 
     /// Raises the error of an action that is written in Python, if there is one.
     pub(super) fn raise(&self) -> PyResult<()> {
-        self.faults.iter().find_map(|fault| fault.lock().ok()?.take()).map_or(Ok(()), Err)
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+
+    /// Whether there is such an error.
+    pub(super) fn has_failed(&self) -> bool {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 }

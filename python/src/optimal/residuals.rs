@@ -1,7 +1,7 @@
 //! Residuals, and the cones that some of them look at.
 
 use crate::arrays::{Give, array, numbers, pose, rotation, three};
-use crate::exceptions::{ProblemError, problem_error};
+use crate::exceptions::{ProblemError, problem_error, within};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
@@ -220,7 +220,7 @@ fn frame_mut(residual: &mut robot::Residual) -> Option<&mut usize> {
 
 /// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 ///
-/// mu: μ; facets: the number of the pyramid's sides; inner: whether the pyramid lies inside of the cone; rotation: the
+/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
 /// surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
 /// default 0 and infinite.
 ///
@@ -243,6 +243,7 @@ impl FrictionCone {
         least: f64,
         greatest: f64,
     ) -> PyResult<Self> {
+        within("facets", facets, 0, robot::FrictionCone::MOST_FACETS)?;
         let rotation = surface(rotation)?;
         let cone = robot::FrictionCone { rotation, mu, facets, inner, least, greatest };
         cone.check().map_err(problem_error)?;

@@ -17,7 +17,7 @@ use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::divide_conquer::mimic::Ties;
 use crate::divide_conquer::scratch::{Body, Dof, Part};
-use condyle_linalg::check;
+use condyle_linalg::{check, threads};
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Single};
@@ -134,12 +134,12 @@ impl<S: Scalar> DivideConquer<S> {
         }
         self.ties.prepare(model);
         let world = Motion::new(l.minus_gravity(), Vec3::zero());
-        let parallel = self.assembly.pieces.len() > 1 && rayon::current_num_threads() > 1;
+        let parallel = self.assembly.pieces.len() > 1 && threads::threads() > 1;
         let Self { assembly, bodies, dofs, handles, ties, zero, qdd, .. } = self;
         let all = Part { pieces: &assembly.pieces, links: &assembly.links, bodies, dofs, handles };
         let job = Job { l: &l, q, qd: v, f_ext, world, parallel };
         if parallel {
-            rayon::scope(|_| job.run(all, ties, zero)); // enters the pool once, not three times
+            threads::enter(|| job.run(all, ties, zero)); // enters the pool once, not three times
         } else {
             job.run(all, ties, zero);
         }
@@ -203,7 +203,7 @@ impl<L: Layout + Sync> Job<'_, L> {
     #[inline(always)]
     fn both(&self, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
         if self.parallel {
-            rayon::join(one, other);
+            threads::join(one, other);
         } else {
             one();
             other();

@@ -184,6 +184,17 @@ impl Tree {
     }
 }
 
+/// A robot that does not move: two bodies that are fixed to the world, and a frame.
+#[allow(dead_code)] // by some of the tests
+pub(crate) fn fixed() -> Model {
+    let rng = &mut rng(0);
+    let mut builder = ModelBuilder::new("fixed");
+    builder.merge(WORLD, random_pose(rng), random_inertia(rng));
+    builder.merge(WORLD, random_pose(rng), random_inertia(rng));
+    builder.frame("tool", WORLD, random_pose(rng));
+    builder.build().expect("a robot need not move")
+}
+
 /// The embedded robots, and random trees without and with mimic joints.
 pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     let mut models = embedded().to_vec();

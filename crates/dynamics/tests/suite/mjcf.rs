@@ -195,7 +195,7 @@ const BALL: &str = "<geom size='0.1'/>";
 #[test]
 fn errors_name_file_line_and_element() {
     let cases = [
-        ("<joint name='j' axis='0 0 0'/><geom size='1'/>", "<string>:4: joint `j`: axis 0 0 0 is no direction"),
+        ("<joint name='j' axis='0 0 0'/><geom size='1'/>", "<string>:4: joint `j`: axis (0, 0, 0) is no direction"),
         ("<joint axis='0 0'/>", "<string>:4: <joint>: axis: expected 3 numbers, found 2"),
         ("<joint type='hing'/>", "<string>:4: <joint>: type: `hing` is none of hinge, slide, ball and free"),
         ("<joint range='2 1'/>", "<string>:4: <joint>: range: lower limit"),

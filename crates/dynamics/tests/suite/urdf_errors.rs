@@ -101,7 +101,7 @@ fn trees() {
 #[test]
 fn joints() {
     let axis = r#"<axis xyz="0 0 1"/>"#;
-    expect(&with(axis, r#"<axis xyz="0 0 0"/>"#), "<string>:6: joint `j`: axis 0 0 0 is no direction");
+    expect(&with(axis, r#"<axis xyz="0 0 0"/>"#), "<string>:6: joint `j`: axis (0, 0, 0) is no direction");
     expect(&with(axis, r#"<axis xyz="0 nan 1"/>"#), "<string>:9: joint `j`: axis xyz: `nan` is no finite number");
     expect(&with(axis, r#"<axis xyz="0 1"/>"#), "<string>:9: joint `j`: axis xyz: expected 3 numbers, found 2");
     expect(&with(axis, r#"<axis xyz="0 x 0 1"/>"#), "<string>:9: joint `j`: axis xyz: `x` is no finite number");
@@ -153,6 +153,8 @@ fn inertias() {
     expect(&with(mass, origin), &said("origin xyz: `nan` is no finite number"));
     let far = r#"<mass value="1"/><origin xyz="0 1e200 0"/>"#;
     expect(&with(mass, far), "<string>:3: link `arm`: inertia is not finite");
+    let large = "has a mass, inertia, length, ratio or acceleration of 2e40, at most 1e30 is allowed";
+    expect(&with(mass, r#"<mass value="2e40"/>"#), &format!("<string>:3: link `arm`: {large}"));
 }
 
 /// XML's rules of values, once: a line break or tab in a name is a space, a reference is the character that it stands for.
@@ -243,7 +245,7 @@ fn builders() {
     for ((joint, placement, inertia, options), message) in [
         (
             (Joint::Prismatic { axis: Vec3::zero() }, Se3::identity(), ball, plain()),
-            "body `arm`: axis 0 0 0 is no direction".to_owned(),
+            "body `arm`: axis (0, 0, 0) is no direction".to_owned(),
         ),
         ((hinge, shifted(nan), ball, plain()), "body `arm`: placement is not finite".to_owned()),
         (

@@ -7,6 +7,7 @@ use crate::error::{Error, Warning};
 use crate::model::Model;
 use condyle_spatial::{Inertia, Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::HashSet;
 
 /// The fields of a model that stand in a file, each as in [`Model`].
 #[derive(Serialize, Deserialize)]
@@ -72,8 +73,11 @@ impl Description {
         let Self { bodies, limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
         // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
-        let warned = |b: &Body| warnings.contains(&Warning::Massless { body: b.name.clone() });
-        let massless = |b: &Body| b.inertia == Inertia::zero() && !warned(b);
+        let warned: HashSet<&str> = warnings
+            .iter()
+            .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })
+            .collect();
+        let massless = |b: &Body| b.inertia == Inertia::zero() && !warned.contains(&*b.name);
         model.between = bodies.iter().map(|b| b.name.contains('#') && massless(b)).collect();
         model.warnings = warnings;
         model.validate()?;

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 use super::settings::ConstraintSettings;
-use crate::ddp::{Fddp, Settings, Solution, Status};
+use crate::ddp::{Fddp, Observer, Settings, Solution, Status, Unobserved};
 use crate::error::Error;
 use crate::problem::Problem;
 use nalgebra::DVector;
@@ -123,7 +123,21 @@ impl AugmentedLagrangian {
     /// # Errors
     /// [`Error`] as for [`Fddp::solve`], or if a constraint's bounds leave no value.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]))
+        self.run(problem, Some([xs, us]), &mut Unobserved)
+    }
+
+    /// As [`solve`](Self::solve), and shows each iteration of the inner solves to `observer`, who may end the solve.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_with(
+        &mut self,
+        problem: &mut Problem,
+        xs: &[f64],
+        us: &[f64],
+        mut observer: impl Observer,
+    ) -> Result<&Solution, Error> {
+        self.run(problem, Some([xs, us]), &mut observer)
     }
 
     /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new references
@@ -133,7 +147,15 @@ impl AugmentedLagrangian {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.run(problem, None)
+        self.run(problem, None, &mut Unobserved)
+    }
+
+    /// As [`resume`](Self::resume), and shows each iteration of the inner solves to `observer`, who may end the solve.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
+        self.run(problem, None, &mut observer)
     }
 
     /// Makes the solution and its multipliers a warm start for a problem that was [shifted](Problem::shift) by a knot
@@ -154,8 +176,13 @@ impl AugmentedLagrangian {
         Ok(())
     }
 
-    fn run(&mut self, problem: &mut Problem, warm_start: Option<[&[f64]; 2]>) -> Result<&Solution, Error> {
-        let result = self.iterate(problem, warm_start);
+    fn run(
+        &mut self,
+        problem: &mut Problem,
+        warm_start: Option<[&[f64]; 2]>,
+        observer: &mut dyn Observer,
+    ) -> Result<&Solution, Error> {
+        let result = self.iterate(problem, warm_start, observer);
         if result.is_ok() {
             problem.multipliers(&mut self.outcome.multipliers);
         }
@@ -165,7 +192,12 @@ impl AugmentedLagrangian {
     }
 
     /// The outer iterations.
-    fn iterate(&mut self, problem: &mut Problem, warm_start: Option<[&[f64]; 2]>) -> Result<Status, Error> {
+    fn iterate(
+        &mut self,
+        problem: &mut Problem,
+        warm_start: Option<[&[f64]; 2]>,
+        observer: &mut dyn Observer,
+    ) -> Result<Status, Error> {
         let begin = Instant::now();
         self.settings.check()?;
         self.solver.settings = self.inner.clone();
@@ -189,16 +221,13 @@ impl AugmentedLagrangian {
             (self.solver.settings.tolerance, self.solver.settings.tolerance_bounded) = (dual * dual, dual * dual);
             let over = begin.elapsed() + self.measuring;
             self.solver.settings.time_budget = self.inner.time_budget.map(|budget| budget.saturating_sub(over));
-            let result = match warm_start {
-                Some([xs, us]) if solve == 0 => self.solver.solve(problem, xs, us)?,
-                _ => self.solver.resume(problem)?,
-            };
+            let result = self.solver.run(problem, warm_start.filter(|_| solve == 0), observer)?;
             self.outcome.solves += 1;
             self.outcome.iterations += result.trace.len();
             let stopped = result.status;
             // z − Π z at the iterate, and how far it is from a solution
             self.measure(problem);
-            if matches!(stopped, Status::TimeLimit | Status::NotFinite) {
+            if matches!(stopped, Status::TimeLimit | Status::Interrupted | Status::NotFinite) {
                 return Ok(stopped);
             }
             if self.outcome.primal <= eta.max(tolerance) {

@@ -3,6 +3,7 @@
 
 use super::best::{Best, Value};
 use super::clock::{Clock, Phase};
+use super::observer::{Observer, Unobserved, Watch};
 use super::rollout::Sum;
 use super::search::{Iterate, LineSearch, Search};
 use super::settings::{DdpMethod, Settings};
@@ -91,6 +92,9 @@ pub struct Fddp {
     inverse_dynamics: bool,
 }
 
+/// The iterations for which there is room in the trace when a solve begins; with more it grows.
+const FORESEEN: usize = 10_000;
+
 /// The state that goes from one iteration to the next.
 pub(super) struct Progress {
     pub(super) regularisation: f64,
@@ -131,10 +135,10 @@ impl Fddp {
     /// [`Error`] if the dimensions of `problem` are not those given to [`new`](Self::new), the warm start has a wrong
     /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.solve_with(problem, xs, us, |_| ())
+        self.run(problem, Some([xs, us]), &mut Unobserved)
     }
 
-    /// As [`solve`](Self::solve), and shows each iteration to `observer` as it ends.
+    /// As [`solve`](Self::solve), and shows each iteration as it ends to `observer`, who may end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -143,17 +147,9 @@ impl Fddp {
         problem: &mut Problem,
         xs: &[f64],
         us: &[f64],
-        observer: impl FnMut(&Iteration),
+        mut observer: impl Observer,
     ) -> Result<&Solution, Error> {
-        self.solution.shape().check(problem.shape())?;
-        Error::check("xs", xs, self.solution.xs.len())?;
-        Error::check("us", us, self.solution.us.len())?;
-        for (knot, x) in xs.chunks_exact(problem.nx().max(1)).enumerate() {
-            problem.action(knot).check_state(x).map_err(|what| Error::State { name: "xs", knot, what })?;
-        }
-        self.solution.xs.copy_from_slice(xs);
-        self.solution.us.copy_from_slice(us);
-        self.resume_with(problem, observer)
+        self.run(problem, Some([xs, us]), &mut observer)
     }
 
     /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
@@ -162,19 +158,35 @@ impl Fddp {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.resume_with(problem, |_| ())
+        self.run(problem, None, &mut Unobserved)
     }
 
-    /// As [`resume`](Self::resume), and shows each iteration to `observer` as it ends.
+    /// As [`resume`](Self::resume), and shows each iteration as it ends to `observer`, who may end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
-    pub fn resume_with(
+    pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
+        self.run(problem, None, &mut observer)
+    }
+
+    /// A solve, from a warm start or the trajectory of the last one.
+    pub(crate) fn run(
         &mut self,
         problem: &mut Problem,
-        mut observer: impl FnMut(&Iteration),
+        warm_start: Option<[&[f64]; 2]>,
+        observer: &mut dyn Observer,
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
+        if let Some([xs, us]) = warm_start {
+            self.solution.shape().check(problem.shape())?;
+            Error::check("xs", xs, self.solution.xs.len())?;
+            Error::check("us", us, self.solution.us.len())?;
+            for (knot, x) in xs.chunks_exact(problem.nx()).enumerate() {
+                problem.action(knot).check_state(x).map_err(|what| Error::State { name: "xs", knot, what })?;
+            }
+            self.solution.xs.copy_from_slice(xs);
+            self.solution.us.copy_from_slice(us);
+        }
         self.settings.check()?;
         self.solution.shape().check(problem.shape())?;
         let bounded = problem.check_bounds()?;
@@ -183,7 +195,7 @@ impl Fddp {
 
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
-        self.solution.trace.reserve(self.settings.max_iterations);
+        self.solution.trace.reserve(self.settings.max_iterations.min(FORESEEN));
         self.line_search.start(self.settings.step_lengths);
         let start = self.settings.regularisation_start;
         let mut progress = Progress {
@@ -198,7 +210,7 @@ impl Fddp {
         self.sweep.forget();
         self.best.start();
         self.clock.start(begin, self.settings.time_budget);
-        let status = self.iterate(problem, &mut progress, &mut observer);
+        let status = self.iterate(problem, &mut progress, &mut Watch::new(observer, begin));
         self.finish(problem, &mut progress, status);
         self.solution.timings.total = begin.elapsed();
         Ok(&self.solution)
@@ -210,7 +222,7 @@ impl Fddp {
     }
 
     /// The iterations, until one of the reasons to stop.
-    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, observer: &mut dyn FnMut(&Iteration)) -> Status {
+    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, watch: &mut Watch<'_>) -> Status {
         self.calc(problem);
         let mut gap = self.update_gaps(problem);
         if !(self.solution.cost.is_finite() && gap.is_finite()) {
@@ -222,13 +234,13 @@ impl Fddp {
                 gap = self.update_gaps(problem);
             }
             if search.accepted || iteration == 0 {
-                if !self.clock.allows(Phase::CalcDiff) {
-                    return Status::TimeLimit;
+                if let Err(status) = self.clock.allows(Phase::CalcDiff, watch) {
+                    return status;
                 }
                 self.calc_diff(problem, now.feasible);
             }
-            if !self.clock.allows(Phase::Sweep) {
-                return Status::TimeLimit;
+            if let Err(status) = self.clock.allows(Phase::Sweep, watch) {
+                return status;
             }
             now.swept_best = false;
             self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
@@ -240,18 +252,18 @@ impl Fddp {
                         SweepError::NotFinite { .. } => Status::NotFinite,
                     };
                 }
-                if !self.clock.allows(Phase::Sweep) {
-                    return Status::TimeLimit;
+                if let Err(status) = self.clock.allows(Phase::Sweep, watch) {
+                    return status;
                 }
             }
             now.swept = true;
             let Self { line_search, solution, next, gaps, best, sweep, settings, clock, .. } = self;
             let (knots, feasible) = (sweep.knots(), now.feasible);
             let value = Value { gap, cost: solution.cost, feasible, regularisation: now.regularisation };
-            let iterate = Iterate { solution, next, value, best, gaps, knots, feasible, settings, clock };
+            let iterate = Iterate { solution, next, value, best, gaps, knots, feasible, settings, clock, watch };
             search = line_search.run(problem, iterate, search);
-            if search.out_of_time {
-                return Status::TimeLimit;
+            if let Some(status) = search.stopped {
+                return status;
             }
             if search.accepted {
                 now.swept_best = search.left_best;
@@ -280,12 +292,15 @@ impl Fddp {
                 accepted: search.accepted,
             };
             self.solution.trace.push(record);
-            observer(&record);
+            let verdict = watch.iteration(&record);
             if now.regularisation == self.settings.regularisation_max {
                 return Status::RegularisationLimit;
             }
             if now.was_feasible && stop < now.tolerance {
                 return Status::Converged;
+            }
+            if verdict.is_break() {
+                return Status::Interrupted;
             }
         }
         Status::MaxIterations

@@ -19,6 +19,8 @@ pub enum Status {
     MaxIterations,
     /// The time allowed is over, or what is left of it is too short to go on.
     TimeLimit,
+    /// An [`Observer`](crate::Observer) has ended the solve.
+    Interrupted,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
     /// The constraints do not hold, however much leaving them costs: there may be no solution.

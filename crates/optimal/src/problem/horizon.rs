@@ -11,7 +11,7 @@ use std::ops::Range;
 /// The most knots of a horizon.
 pub(crate) const MOST_KNOTS: usize = 1 << 20;
 /// The most entries of a state, a change of state, or the controls of a knot: matrices of that size take 128 MiB each.
-pub(crate) const MOST_ENTRIES: usize = 4096;
+pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
 /// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
 const MOST_NUMBERS: usize = 1 << 28;
 
@@ -75,7 +75,7 @@ impl Problem {
     /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has a
+    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has a
     /// wrong length or an entry that is not finite or is no state, a state or the controls of a knot have more than 4096
     /// entries, or there are more than 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
     pub fn new(
@@ -103,6 +103,9 @@ impl Problem {
             Error::check_size("nu", model.nu(), MOST_ENTRIES)?;
             numbers += ndx * (ndx + model.nu());
             Error::check_size("numbers in the matrices of all knots", numbers, MOST_NUMBERS)?;
+        }
+        if ndx == 0 {
+            return Err(Error::EmptyState);
         }
         if terminal.nu() != 0 {
             return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
@@ -382,7 +385,6 @@ impl Problem {
         assert_length("us", us.len(), self.shape.offsets[self.horizon()]);
     }
 }
-
 impl std::fmt::Debug for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Problem")

@@ -24,7 +24,7 @@ pub struct FrictionCone {
     pub rotation: Mat3<f64>,
     /// μ.
     pub mu: f64,
-    /// The number of sides of the pyramid; even.
+    /// The number of sides of the pyramid; even, 4 to [`MOST_FACETS`](Self::MOST_FACETS).
     pub facets: usize,
     /// Whether the pyramid lies inside of the cone, or around it.
     pub inner: bool,
@@ -55,10 +55,10 @@ pub struct WrenchCone {
     pub size: [f64; 2],
 }
 
-/// The most sides that a friction cone may have: 1000 of them are within 5e-6 of the round one.
-pub(crate) const MOST_FACETS: usize = 1000;
-
 impl FrictionCone {
+    /// The most sides of a pyramid: 1000 of them are within 5e-6 of the round cone.
+    pub const MOST_FACETS: usize = 1000;
+
     /// A pyramid of four sides around the cone on a surface whose normal is z, for any normal force that pushes.
     pub fn new(mu: f64) -> Self {
         Self { rotation: Mat3::identity(), mu, facets: 4, inner: false, least: 0.0, greatest: f64::INFINITY }
@@ -90,8 +90,8 @@ impl FrictionCone {
 
     #[track_caller]
     fn assert_facets(&self) {
-        let facets = self.facets;
-        assert!((1..=MOST_FACETS).contains(&facets), "`facets` is {facets}, expected from 4 to {MOST_FACETS}");
+        let (facets, most) = (self.facets, Self::MOST_FACETS);
+        assert!((1..=most).contains(&facets), "`facets` is {facets}, expected from 4 to {most}");
     }
 
     /// The least and greatest values of A f.
@@ -121,8 +121,8 @@ impl FrictionCone {
         if !(self.mu >= 0.0 && self.mu.is_finite()) {
             return Some(format!("its friction is {}, but it must be at least 0", self.mu));
         }
-        if !(4..=MOST_FACETS).contains(&self.facets) || self.facets % 2 == 1 {
-            let allowed = format!("they must be even, at least 4 and at most {MOST_FACETS}");
+        if !(4..=Self::MOST_FACETS).contains(&self.facets) || self.facets % 2 == 1 {
+            let allowed = format!("they must be even, at least 4 and at most {}", Self::MOST_FACETS);
             return Some(format!("its cone has {} sides, but {allowed}", self.facets));
         }
         if !leave_a_value(least, greatest) {
