@@ -1,4 +1,4 @@
-"""What makes no sense is refused by name, with its numbers, where it is given: never a NaN, a wrong result, an abort."""
+"""What makes no sense is refused by name, with its numbers, where it is given: never a NaN or a wrong result."""
 
 import json
 import pickle
