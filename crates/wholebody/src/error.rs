@@ -1,5 +1,7 @@
 //! What can be wrong with a controller's description, and how a step can fail.
 
+use crate::cone_program;
+
 /// What is wrong with the description of a controller, found when it is built.
 ///
 /// ```
@@ -98,6 +100,20 @@ pub enum Status {
         /// The number.
         value: f64,
     },
+}
+
+impl From<cone_program::Status> for Status {
+    fn from(status: cone_program::Status) -> Self {
+        match status {
+            cone_program::Status::Infeasible => Self::Infeasible,
+            cone_program::Status::IterationLimit => Self::IterationLimit,
+            cone_program::Status::TimeLimit => Self::TimeLimit,
+            // The objective is bounded below, and what goes into the numbers was checked: both are numerical failures.
+            cone_program::Status::Unbounded
+            | cone_program::Status::NotFinite { .. }
+            | cone_program::Status::NumericalError => Self::NumericalError,
+        }
+    }
 }
 
 /// `Ok` if every number of an argument is finite.

@@ -29,6 +29,7 @@
 //! program in (q̈, f); Lobo et al. (1998), friction as a second-order cone; Baumgarte (1972), drift.
 #![allow(non_snake_case)]
 
+mod cone_program;
 mod controller;
 mod equations;
 mod error;

@@ -1,0 +1,3 @@
+//! Both back ends on the same programs.
+
+mod closed_forms;
