@@ -58,6 +58,35 @@ compiled! {
         }
     }
 
+    /// x ← L⁻¹ x for the L of an H of which m columns were eliminated; x has m numbers and slack.
+    pub fn forward_solve<V, COLUMNS>(h: View<'_>, m: usize, x: &mut [f64]) {
+        for j in 0..m {
+            let column = &h.data[j * h.stride..];
+            x[j] /= column[j];
+            let (factor, mut i) = (V::splat(-x[j]), j + 1);
+            while i < m {
+                V::load(&column[i..]).mul_add(factor, V::load(&x[i..])).store(&mut x[i..]);
+                i += V::N;
+            }
+        }
+    }
+
+    /// x ← L⁻ᵀ x, as [`forward_solve`]; what follows the m numbers of x becomes zero.
+    pub fn backward_solve<V, COLUMNS>(h: View<'_>, m: usize, x: &mut [f64]) {
+        x[m..m + V::N].fill(0.0);
+        for j in (0..m).rev() {
+            let column = &h.data[j * h.stride..];
+            let (mut sum, mut i) = (V::splat(0.0), j + 1);
+            while i < m {
+                sum = V::load(&column[i..]).mul_add(V::load(&x[i..]), sum);
+                i += V::N;
+            }
+            let mut numbers = [0.0; SLACK];
+            sum.store(&mut numbers);
+            x[j] = (x[j] - numbers.iter().sum::<f64>()) / column[j];
+        }
+    }
+
     /// X ← X L⁻¹, for the X in the rows `first`..`rows` of H's first m columns and the L in the lower triangle above them;
     /// `shape` = [first, rows, m]. H has slack rows.
     ///
@@ -183,6 +212,15 @@ mod tests {
                     solve_transposed(&mut x, ldx, below, View::new(&h, stride), m);
                     for (x, h) in x.chunks_exact(ldx).zip(h.chunks_exact(stride)) {
                         assert!(x[..below].iter().zip(&h[m..rows]).all(|(x, h)| (x - h).abs() < TOLERANCE));
+                    }
+
+                    let (mut y, factor) = (vec![0.0; m + SLACK], View::new(&h, stride));
+                    (0..m).for_each(|i| y[i] = entry(i, 3));
+                    forward_solve(factor, m, &mut y);
+                    backward_solve(factor, m, &mut y);
+                    for i in 0..m {
+                        let b: f64 = (0..m).map(|j| full[(i, j)] * y[j]).sum();
+                        assert!((b - entry(i, 3)).abs() < TOLERANCE * size as f64);
                     }
 
                     let (mut gains, mut upper) = (h.clone(), vec![0.0; (m + SLACK) * m]);

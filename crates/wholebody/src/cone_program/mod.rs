@@ -12,12 +12,15 @@
 #![allow(dead_code)]
 
 mod clarabel;
+mod interior_point;
 mod program;
 #[cfg(test)]
 mod tests;
 
 #[allow(unused_imports)]
 pub(crate) use self::clarabel::{Clarabel, Dense, Pattern};
+#[allow(unused_imports)]
+pub(crate) use interior_point::InteriorPoint;
 pub(crate) use program::{ConeProgram, Size};
 
 /// When a solver stops.

@@ -1,0 +1,169 @@
+//! The cones of a program together: slacks, multipliers, their scalings and directions, row after row.
+
+use super::cone::{apply_inverse, divide, inverse_step, product, scaling};
+use super::scaled::Cone;
+
+/// s = h + F x in the product of cones, and z. Vectors with a tilde are scaled: d̃s = W⁻¹ ds, d̃z = W dz.
+#[derive(Debug, Default)]
+pub(super) struct Cones {
+    pub s: Vec<f64>,
+    pub z: Vec<f64>,
+    /// h + F x − s.
+    pub r: Vec<f64>,
+    pub ds: Vec<f64>,
+    pub dz: Vec<f64>,
+    /// W's w and η of each cone, and λ.
+    w: Vec<f64>,
+    eta: Vec<f64>,
+    lambda: Vec<f64>,
+    /// λ \ ξ.
+    p: Vec<f64>,
+    ds_tilde: Vec<f64>,
+    dz_tilde: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Cones {
+    pub(super) fn new(rows: usize) -> Self {
+        let vector = || vec![0.0; rows];
+        Self {
+            s: vector(),
+            z: vector(),
+            r: vector(),
+            ds: vector(),
+            dz: vector(),
+            w: vector(),
+            eta: vector(),
+            lambda: vector(),
+            p: vector(),
+            ds_tilde: vector(),
+            dz_tilde: vector(),
+            scratch: vector(),
+        }
+    }
+
+    /// r, the multipliers; adds to [‖r‖∞, sᵀ z, −hᵀ z].
+    pub(super) fn residuals(&mut self, h: &[f64], Fx: &[f64], multipliers: &mut [f64], sums: &mut [f64; 3]) {
+        for i in 0..h.len() {
+            self.r[i] = h[i] + Fx[i] - self.s[i];
+            multipliers[i] = self.z[i];
+            sums[0] = sums[0].max(self.r[i].abs());
+            sums[1] += self.s[i] * self.z[i];
+            sums[2] -= h[i] * self.z[i];
+        }
+    }
+
+    /// W and λ of each cone; false if a pair is not in the interior.
+    pub(super) fn scale(&mut self, cones: &[Cone]) -> bool {
+        for (k, cone) in cones.iter().enumerate() {
+            let at = cone.at..cone.at + cone.dim;
+            let (w, lambda) = (&mut self.w[at.clone()], &mut self.lambda[at.clone()]);
+            match scaling(&self.s[at.clone()], &self.z[at], w, lambda) {
+                Some(eta) => self.eta[k] = eta,
+                None => return false,
+            }
+        }
+        true
+    }
+
+    /// B = (W⁻¹ F)ᵀ, whose columns are as those of `F`: n numbers, `ld` apart.
+    pub(super) fn scale_rows(&self, cones: &[Cone], F: &[f64], B: &mut [f64], [n, ld]: [usize; 2]) {
+        for (k, cone) in cones.iter().enumerate() {
+            let (w, r) = (&self.w[cone.at..][..cone.dim], self.eta[k].recip());
+            let (F, B) = (&F[cone.at * ld..], &mut B[cone.at * ld..]);
+            let a = r / (1.0 + w[0]);
+            let (head, rest) = B.split_at_mut(ld);
+            let head = &mut head[..n];
+            // inner = w₁ᵀ F₁, first in the head's place
+            head.fill(0.0);
+            for i in 1..cone.dim {
+                let (wi, f) = (w[i], &F[i * ld..][..n]);
+                for j in 0..n {
+                    head[j] += wi * f[j];
+                }
+            }
+            for i in 1..cone.dim {
+                let (wi, f) = (w[i], &F[i * ld..][..n]);
+                let (to, f0) = (&mut rest[(i - 1) * ld..][..n], &F[..n]);
+                for j in 0..n {
+                    to[j] = r * f[j] + wi * (a * head[j] - r * f0[j]);
+                }
+            }
+            let f0 = &F[..n];
+            for j in 0..n {
+                head[j] = r * (w[0] * f0[j] - head[j]);
+            }
+        }
+    }
+
+    /// x ← W⁻² x.
+    pub(super) fn weigh(&mut self, cones: &[Cone], x: &mut [f64]) {
+        for (k, cone) in cones.iter().enumerate() {
+            let at = cone.at..cone.at + cone.dim;
+            let (w, y) = (&self.w[at.clone()], &mut self.scratch[at.clone()]);
+            apply_inverse(self.eta[k], w, &x[at.clone()], y);
+            apply_inverse(self.eta[k], w, y, &mut x[at]);
+        }
+    }
+
+    /// p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z, of which the last part only if `second_order`, and the target
+    /// W⁻¹ (p − W⁻¹ r).
+    pub(super) fn target(&mut self, cones: &[Cone], centre: f64, second_order: bool, target: &mut [f64]) {
+        for (k, cone) in cones.iter().enumerate() {
+            let at = cone.at..cone.at + cone.dim;
+            let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
+            let (p, y) = (&mut self.p[at.clone()], &mut self.scratch[at.clone()]);
+            if second_order {
+                product(&self.ds_tilde[at.clone()], &self.dz_tilde[at.clone()], y);
+                y[0] -= centre;
+                divide(lambda, y, p);
+            } else if centre > 0.0 {
+                y.fill(0.0);
+                y[0] = -centre;
+                divide(lambda, y, p);
+            } else {
+                p.fill(0.0);
+            }
+            for i in 0..p.len() {
+                p[i] = -lambda[i] - p[i];
+            }
+            apply_inverse(eta, w, &self.r[at.clone()], y);
+            for i in 0..p.len() {
+                y[i] = p[i] - y[i];
+            }
+            apply_inverse(eta, w, y, &mut target[at]);
+        }
+    }
+
+    /// ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds); the inverse of the greatest step, if it is greater.
+    pub(super) fn direction(&mut self, cones: &[Cone], Fdx: &[f64], inverse: &mut f64) {
+        for (k, cone) in cones.iter().enumerate() {
+            let at = cone.at..cone.at + cone.dim;
+            let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
+            let (ds, dz) = (&mut self.ds[at.clone()], &mut self.dz[at.clone()]);
+            let (ds_tilde, dz_tilde) = (&mut self.ds_tilde[at.clone()], &mut self.dz_tilde[at.clone()]);
+            for i in 0..cone.dim {
+                ds[i] = Fdx[cone.at + i] + self.r[cone.at + i];
+            }
+            apply_inverse(eta, w, ds, ds_tilde);
+            for i in 0..cone.dim {
+                dz_tilde[i] = self.p[cone.at + i] - ds_tilde[i];
+            }
+            apply_inverse(eta, w, dz_tilde, dz);
+            *inverse = inverse.max(inverse_step(lambda, ds_tilde)).max(inverse_step(lambda, dz_tilde));
+        }
+    }
+
+    /// s += α ds, z += α dz.
+    pub(super) fn advance(&mut self, rows: usize, step: f64) {
+        for i in 0..rows {
+            self.s[i] += step * self.ds[i];
+            self.z[i] += step * self.dz[i];
+        }
+    }
+
+    /// (s + α ds)ᵀ (z + α dz).
+    pub(super) fn gap_after(&self, rows: usize, step: f64) -> f64 {
+        (0..rows).map(|i| (self.s[i] + step * self.ds[i]) * (self.z[i] + step * self.dz[i])).sum()
+    }
+}

@@ -1,0 +1,162 @@
+//! Where the iteration begins: from the data, or from the last solution.
+
+use super::cone::{margin, split, split_number};
+use super::scaled::Source;
+use super::solution::Solution;
+use super::workspace::Workspace;
+use condyle_linalg::{View, add_product_vector, max_abs, transposed_product_vector};
+
+/// The weight of s² against the cost, which is also the ratio of z to s, in a cold start.
+const WEIGHT: f64 = 0.1;
+/// How far inside of its cone s is after it was moved there.
+const INSIDE: f64 = 1.0;
+/// The bounds of μ ρ in a warm start; with slacks of size one, the upper one turns s and ρ z at a tenth of that.
+const CENTRE: [f64; 2] = [1e-10, 1e-2];
+
+impl Workspace {
+    /// x from the minimum of the cost and of ω / 2 sᵀ s; s = h + F x and z = −ω s, both moved along e into the cone.
+    ///
+    /// Source: Vandenberghe (2010), section 5.3, where ω = 1.
+    pub(super) fn cold_start(&mut self) -> bool {
+        let Self { data, system, sides, cones, x, y, Kx, target, .. } = self;
+        let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());
+        for i in 0..columns {
+            let weight = if i < m { WEIGHT * (data.has_lower[i] + data.has_upper[i]) } else { WEIGHT };
+            let (at, root) = (i * data.ld, weight.sqrt());
+            for j in at..at + n {
+                system.B[j] = root * data.K[j];
+            }
+            target[i] = WEIGHT * if i < m { data.lower[i] + data.upper[i] } else { -data.h[i - m] };
+        }
+        if !system.factorize(data) {
+            return false;
+        }
+        for j in 0..n {
+            x[j] = -data.c[j];
+        }
+        add_product_vector(x, n, data.K(), &target[..columns]);
+        y[..me].copy_from_slice(&data.e);
+        system.solve(data, [x, y], &mut Kx[..columns], 0, |_| {});
+
+        let (mut low_s, mut low_z) = (f64::INFINITY, f64::INFINITY);
+        for (side, bound, has) in [(0, &data.lower, &data.has_lower), (1, &data.upper, &data.has_upper)] {
+            let side = &mut sides[side];
+            for i in 0..m {
+                let s = side.sign * (Kx[i] - bound[i]);
+                side.s[i] = s;
+                if has[i] > 0.0 {
+                    (low_s, low_z) = (low_s.min(s), low_z.min(-s));
+                }
+            }
+        }
+        for cone in &data.cones {
+            let at = cone.at..cone.at + cone.dim;
+            for i in at.clone() {
+                let s = data.h[i] + Kx[m + i];
+                (cones.s[i], cones.z[i]) = (s, -s);
+            }
+            low_s = low_s.min(margin(&cones.s[at.clone()]));
+            low_z = low_z.min(margin(&cones.z[at]));
+        }
+        let shift = |low: f64| if low > 0.0 { 0.0 } else { INSIDE - low };
+        let (shift_s, shift_z) = (shift(low_s), shift(low_z));
+        for (side, has) in sides.iter_mut().zip([&data.has_lower, &data.has_upper]) {
+            for i in 0..m {
+                let s = side.s[i];
+                (side.s[i], side.z[i]) = if has[i] > 0.0 { (s + shift_s, WEIGHT * (shift_z - s)) } else { (1.0, 1.0) };
+            }
+        }
+        for cone in &data.cones {
+            cones.s[cone.at] += shift_s;
+            cones.z[cone.at] += shift_z;
+            for z in &mut cones.z[cone.at..cone.at + cone.dim] {
+                *z *= WEIGHT;
+            }
+        }
+        true
+    }
+
+    /// x and y of the last solution, and s and z from s − ρ z = (h + F x) − ρ z* at that x with s ∘ z = μ e.
+    ///
+    /// Each pair is exactly central, and far from where both are small it is the last one but for μ / s; ρ is the ratio of
+    /// the greatest slack and the greatest multiplier. μ ρ is the square of how far the last solution is from solving this
+    /// program, within [`CENTRE`]: changes of that size turn a bound on or off.
+    ///
+    /// Source: Chen and Harker (1993), the smoothing of complementarity; here as a start, in the cones' algebra.
+    pub(super) fn warm_start(&mut self, last: &Solution) {
+        let Self { data, sides, cones, x, y, Kx, multipliers, Px, forces, rd, .. } = self;
+        let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());
+        for j in 0..n {
+            x[j] = last.x[j] / data.units[j];
+        }
+        x[n..].fill(0.0);
+        transposed_product_vector(&mut Kx[..columns], n, data.K(), x);
+        for (k, (&source, scale)) in data.equality_sources.iter().zip(&data.equality_scales).enumerate() {
+            y[k] = (last.of(source, 0) - last.of(source, 1)) * data.cost / scale;
+        }
+        let (mut most_s, mut most_z) = (0.0_f64, 0.0_f64);
+        multipliers[..m].fill(0.0);
+        for (k, (bound, has)) in
+            [(&data.lower, &data.has_lower), (&data.upper, &data.has_upper)].into_iter().enumerate()
+        {
+            let side = &mut sides[k];
+            for i in 0..m {
+                side.s[i] = has[i] * side.sign * (Kx[i] - bound[i]);
+                side.z[i] = has[i] * last.of(data.sources[i], k) * data.cost / data.scales[i];
+                multipliers[i] += side.sign * side.z[i];
+                most_s = most_s.max(side.s[i]);
+                most_z = most_z.max(side.z[i]);
+            }
+        }
+        for cone in &data.cones {
+            for i in 0..cone.dim {
+                let at = cone.at + i;
+                cones.s[at] = data.h[at] + Kx[m + at];
+                cones.z[at] = last.of(Source::Cone(cone.source + i), 0) * data.cost / cone.scale;
+                multipliers[m + at] = cones.z[at];
+            }
+            most_s = most_s.max(cones.s[cone.at]);
+            most_z = most_z.max(cones.z[cone.at]);
+        }
+        let rho = if most_s > 0.0 && most_z > 0.0 { most_s / most_z } else { 1.0 };
+
+        // How far the last solution is from solving this program: P x + c − Kᵀ z − E y and min(s, ρ z).
+        Px[..n].fill(0.0);
+        forces[..n].fill(0.0);
+        add_product_vector(Px, n, View::new(&data.P, data.ld), &x[..n]);
+        add_product_vector(forces, n, data.K(), &multipliers[..columns]);
+        add_product_vector(forces, n, View::new(&data.E, data.ld), &y[..me]);
+        for j in 0..n {
+            rd[j] = Px[j] + data.c[j] - forces[j];
+        }
+        let mut distance = 0.0_f64;
+        for side in sides.iter() {
+            for i in 0..m {
+                distance = distance.max(side.s[i].min(rho * side.z[i]).abs());
+            }
+        }
+        for cone in &data.cones {
+            distance = distance.max(-margin(&cones.s[cone.at..][..cone.dim]));
+        }
+        let distance = distance.max(rho * max_abs(&rd[..n]));
+        let mu = (distance * distance).clamp(CENTRE[0], CENTRE[1]);
+
+        for (side, has) in sides.iter_mut().zip([&data.has_lower, &data.has_upper]) {
+            for i in 0..m {
+                let [s, z] = split_number(side.s[i] - rho * side.z[i], mu);
+                (side.s[i], side.z[i]) = if has[i] > 0.0 { (s, z / rho) } else { (1.0, 1.0) };
+            }
+        }
+        for cone in &data.cones {
+            let at = cone.at..cone.at + cone.dim;
+            let v = &mut cones.ds[at.clone()];
+            for i in 0..cone.dim {
+                v[i] = cones.s[cone.at + i] - rho * cones.z[cone.at + i];
+            }
+            split(v, mu, &mut cones.s[at.clone()], &mut cones.z[at.clone()]);
+            for z in &mut cones.z[at] {
+                *z /= rho;
+            }
+        }
+    }
+}
