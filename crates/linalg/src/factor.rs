@@ -58,32 +58,68 @@ compiled! {
         }
     }
 
-    /// x ← L⁻¹ x for the L of an H of which m columns were eliminated; x has m numbers and slack.
-    pub fn forward_solve<V, COLUMNS>(h: View<'_>, m: usize, x: &mut [f64]) {
-        for j in 0..m {
-            let column = &h.data[j * h.stride..];
-            x[j] /= column[j];
-            let (factor, mut i) = (V::splat(-x[j]), j + 1);
+    /// x ← L⁻¹ x for the L of an H of which columns were eliminated, with the inverse of L's diagonal; x has slack.
+    pub fn forward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
+        let (m, mut j) = (inverse_diagonal.len(), 0);
+        while j < m {
+            let (width, block) = (V::N.min(m - j), h.at(j, j));
+            let mut y = [0.0; SLACK];
+            for k in 0..width {
+                y[k] += x[j + k];
+                y[k] *= inverse_diagonal[j + k];
+                let column = &block.data[k * h.stride..][..width];
+                for i in k + 1..width {
+                    y[i] -= column[i] * y[k];
+                }
+                x[j + k] = y[k];
+            }
+            let mut i = j + V::N;
             while i < m {
-                V::load(&column[i..]).mul_add(factor, V::load(&x[i..])).store(&mut x[i..]);
+                let mut sum = V::load(&x[i..]);
+                for k in 0..V::N {
+                    sum = V::load(&h.data[(j + k) * h.stride + i..]).mul_add(V::splat(-y[k]), sum);
+                }
+                sum.store(&mut x[i..]);
                 i += V::N;
             }
+            j += V::N;
         }
     }
 
-    /// x ← L⁻ᵀ x, as [`forward_solve`]; what follows the m numbers of x becomes zero.
-    pub fn backward_solve<V, COLUMNS>(h: View<'_>, m: usize, x: &mut [f64]) {
+    /// x ← L⁻ᵀ x, as [`forward_solve`]; the slack of x becomes zero.
+    pub fn backward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
+        let m = inverse_diagonal.len();
         x[m..m + V::N].fill(0.0);
-        for j in (0..m).rev() {
-            let column = &h.data[j * h.stride..];
-            let (mut sum, mut i) = (V::splat(0.0), j + 1);
-            while i < m {
-                sum = V::load(&column[i..]).mul_add(V::load(&x[i..]), sum);
-                i += V::N;
+        let mut block = m.div_ceil(V::N);
+        while block > 0 {
+            block -= 1;
+            let j = block * V::N;
+            let width = V::N.min(m - j);
+            // Σ over the rows below the block, for its columns together.
+            let mut products = [0.0; SLACK];
+            if j + V::N < m {
+                let (mut sums, mut i) = ([V::splat(0.0); SLACK], j + V::N);
+                while i < m {
+                    let x = V::load(&x[i..]);
+                    for k in 0..V::N {
+                        sums[k] = V::load(&h.data[(j + k) * h.stride + i..]).mul_add(x, sums[k]);
+                    }
+                    i += V::N;
+                }
+                V::transpose(&mut sums[..V::N]);
+                let mut sum = sums[0];
+                for k in 1..V::N {
+                    sum = sum.add(sums[k]);
+                }
+                sum.store(&mut products);
             }
-            let mut numbers = [0.0; SLACK];
-            sum.store(&mut numbers);
-            x[j] = (x[j] - numbers.iter().sum::<f64>()) / column[j];
+            for k in (0..width).rev() {
+                let y = (x[j + k] - products[k]) * inverse_diagonal[j + k];
+                for i in 0..k {
+                    products[i] += h.data[(j + i) * h.stride + j + k] * y;
+                }
+                x[j + k] = y;
+            }
         }
     }
 
@@ -216,8 +252,9 @@ mod tests {
 
                     let (mut y, factor) = (vec![0.0; m + SLACK], View::new(&h, stride));
                     (0..m).for_each(|i| y[i] = entry(i, 3));
-                    forward_solve(factor, m, &mut y);
-                    backward_solve(factor, m, &mut y);
+                    let inverse: Vec<f64> = (0..m).map(|i| h[i * stride + i].recip()).collect();
+                    forward_solve(factor, &inverse, &mut y);
+                    backward_solve(factor, &inverse, &mut y);
                     for i in 0..m {
                         let b: f64 = (0..m).map(|j| full[(i, j)] * y[j]).sum();
                         assert!((b - entry(i, 3)).abs() < TOLERANCE * size as f64);

@@ -1,7 +1,7 @@
 //! The cones of a program together: slacks, multipliers, their scalings and directions, row after row.
 
 use super::cone::{apply_inverse, divide, inverse_step, product, scaling};
-use super::scaled::Cone;
+use super::scaled::{Cone, Scaled};
 
 /// s = h + F x in the product of cones, and z. Vectors with a tilde are scaled: d̃s = W⁻¹ ds, d̃z = W dz.
 #[derive(Debug, Default)]
@@ -66,30 +66,31 @@ impl Cones {
         true
     }
 
-    /// B = (W⁻¹ F)ᵀ, whose columns are as those of `F`: n numbers, `ld` apart.
-    pub(super) fn scale_rows(&self, cones: &[Cone], F: &[f64], B: &mut [f64], [n, ld]: [usize; 2]) {
-        for (k, cone) in cones.iter().enumerate() {
-            let (w, r) = (&self.w[cone.at..][..cone.dim], self.eta[k].recip());
-            let (F, B) = (&F[cone.at * ld..], &mut B[cone.at * ld..]);
-            let a = r / (1.0 + w[0]);
-            let (head, rest) = B.split_at_mut(ld);
-            let head = &mut head[..n];
-            // inner = w₁ᵀ F₁, first in the head's place
+    /// B = (W⁻¹ F)ᵀ, where F is not zero.
+    #[inline(always)]
+    pub(super) fn scale_rows(&self, data: &Scaled, B: &mut [f64]) {
+        let (ld, m) = (data.ld, data.rows());
+        for (k, cone) in data.cones.iter().enumerate() {
+            let rows = data.range(m + cone.at);
+            let (w, r, n) = (&self.w[cone.at..][..cone.dim], self.eta[k].recip(), rows.len());
+            let F = &data.K[(m + cone.at) * ld + rows.start..];
+            let (head, tail) = B[cone.at * ld + rows.start..].split_at_mut(ld);
+            let (f0, head) = (&F[..n], &mut head[..n]);
+            // w₁ᵀ F₁, in the head's place for now.
             head.fill(0.0);
             for i in 1..cone.dim {
-                let (wi, f) = (w[i], &F[i * ld..][..n]);
+                let f = &F[i * ld..][..n];
                 for j in 0..n {
-                    head[j] += wi * f[j];
+                    head[j] += w[i] * f[j];
                 }
             }
+            let a = r / (1.0 + w[0]);
             for i in 1..cone.dim {
-                let (wi, f) = (w[i], &F[i * ld..][..n]);
-                let (to, f0) = (&mut rest[(i - 1) * ld..][..n], &F[..n]);
+                let (to, f) = (&mut tail[(i - 1) * ld..][..n], &F[i * ld..][..n]);
                 for j in 0..n {
-                    to[j] = r * f[j] + wi * (a * head[j] - r * f0[j]);
+                    to[j] = r * f[j] + w[i] * (a * head[j] - r * f0[j]);
                 }
             }
-            let f0 = &F[..n];
             for j in 0..n {
                 head[j] = r * (w[0] * f0[j] - head[j]);
             }

@@ -74,7 +74,7 @@ impl Solver for InteriorPoint {
             self.solution.clear();
             return Outcome { iterations: 0, warm: false, reduced: false, stopped: Some(status) };
         }
-        self.work.system.resize(self.work.data.n, self.work.data.equalities());
+        self.work.system.prepare(&self.work.data);
         let mut iterations = 0;
         let (warm, found) = self.minimise(start, &mut iterations);
         if self.work.is_finite() {

@@ -5,7 +5,8 @@
 //! Rows of Ĝ = G D, and the longest row of each cone, have length one.
 
 use crate::cone_program::{ConeProgram, Size, Status};
-use condyle_linalg::{SLACK, View, dot};
+use condyle_linalg::{SLACK, View, add_product_vector, block, dot, mask, transposed_product_vector};
+use std::ops::Range;
 
 /// A diagonal entry of P below this share of the greatest counts as zero when units are chosen.
 const NO_CURVATURE: f64 = 1e-14;
@@ -33,6 +34,20 @@ pub(super) struct Cone {
     pub scale: f64,
 }
 
+/// Columns of K that are not zero between the same rows.
+#[derive(Clone, Debug)]
+struct Run {
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+/// The rows that a mask's blocks lie between.
+fn range(mask: u64, n: usize, ld: usize) -> Range<usize> {
+    let (block, first) = (block(ld), mask.trailing_zeros() as usize);
+    let end = 64 - mask.leading_zeros() as usize;
+    if mask == 0 { 0..0 } else { block * first..n.min(block * end) }
+}
+
 /// minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q; the columns of K are rows of G and of F.
 #[derive(Debug, Default)]
 pub(super) struct Scaled {
@@ -54,6 +69,9 @@ pub(super) struct Scaled {
     pub equality_scales: Vec<f64>,
     /// [Gᵀ Fᵀ].
     pub K: Vec<f64>,
+    /// The blocks of each column that are not zero, in any of a cone's columns for those of a cone.
+    pub masks: Vec<u64>,
+    runs: Vec<Run>,
     /// l and u, 0 where there is none.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
@@ -85,6 +103,8 @@ impl Scaled {
             equality_sources: Vec::with_capacity(me),
             equality_scales: vector(me),
             K: vec![0.0; ld * (m + SLACK)],
+            masks: Vec::with_capacity(m),
+            runs: Vec::with_capacity(m),
             lower: vector(m),
             upper: vector(m),
             has_lower: vector(m),
@@ -106,8 +126,25 @@ impl Scaled {
         self.e.len()
     }
 
-    pub(super) fn K(&self) -> View<'_> {
-        View::new(&self.K, self.ld)
+    /// The rows of a column between which it is not zero, in whole blocks but for the last.
+    pub(super) fn range(&self, column: usize) -> Range<usize> {
+        range(self.masks[column], self.n, self.ld)
+    }
+
+    /// y = Kᵀ x: G x and F x. The slack of x is zero.
+    pub(super) fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        for Run { columns, rows } in &self.runs {
+            let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
+            transposed_product_vector(&mut y[columns.clone()], rows.len(), K, &x[rows.start..]);
+        }
+    }
+
+    /// y += K x.
+    pub(super) fn add_transposed(&self, x: &[f64], y: &mut [f64]) {
+        for Run { columns, rows } in &self.runs {
+            let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
+            add_product_vector(&mut y[rows.start..], rows.len(), K, &x[columns.clone()]);
+        }
     }
 
     /// The columns of K, rows of G and of F.
@@ -172,9 +209,30 @@ impl Scaled {
             }
             first += dim;
         }
+        self.note_zeros();
         let bounds: f64 = self.has_lower.iter().zip(&self.has_upper).map(|(l, u)| l + u).sum();
         self.degree = bounds + self.cones.len() as f64;
         Ok(())
+    }
+
+    /// The masks and runs of K's columns.
+    fn note_zeros(&mut self) {
+        let (m, columns, ld) = (self.rows(), self.columns(), self.ld);
+        self.masks.clear();
+        self.masks.extend(self.K.chunks_exact(ld).take(columns).map(mask));
+        for cone in &self.cones {
+            let masks = &mut self.masks[m + cone.at..][..cone.dim];
+            let all = masks.iter().fold(0, |all, mask| all | mask);
+            masks.fill(all);
+        }
+        self.runs.clear();
+        for k in 0..columns {
+            let rows = self.range(k);
+            match self.runs.last_mut() {
+                Some(run) if run.rows == rows => run.columns.end = k + 1,
+                _ => self.runs.push(Run { columns: k..k + 1, rows }),
+            }
+        }
     }
 
     /// D and the cost's factor 1 / C².

@@ -4,7 +4,7 @@ use super::cone::{margin, split, split_number};
 use super::scaled::Source;
 use super::solution::Solution;
 use super::workspace::Workspace;
-use condyle_linalg::{View, add_product_vector, max_abs, transposed_product_vector};
+use condyle_linalg::{View, add_product_vector, max_abs};
 
 /// The weight of s² against the cost, which is also the ratio of z to s, in a cold start.
 const WEIGHT: f64 = 0.1;
@@ -23,8 +23,8 @@ impl Workspace {
         for i in 0..columns {
             let weight = if i < m { WEIGHT * (data.has_lower[i] + data.has_upper[i]) } else { WEIGHT };
             let (at, root) = (i * data.ld, weight.sqrt());
-            for j in at..at + n {
-                system.B[j] = root * data.K[j];
+            for j in data.range(i) {
+                system.B.rows[at + j] = root * data.K[at + j];
             }
             target[i] = WEIGHT * if i < m { data.lower[i] + data.upper[i] } else { -data.h[i - m] };
         }
@@ -34,7 +34,7 @@ impl Workspace {
         for j in 0..n {
             x[j] = -data.c[j];
         }
-        add_product_vector(x, n, data.K(), &target[..columns]);
+        data.add_transposed(&target[..columns], x);
         y[..me].copy_from_slice(&data.e);
         system.solve(data, [x, y], &mut Kx[..columns], 0, |_| {});
 
@@ -90,7 +90,7 @@ impl Workspace {
             x[j] = last.x[j] / data.units[j];
         }
         x[n..].fill(0.0);
-        transposed_product_vector(&mut Kx[..columns], n, data.K(), x);
+        data.multiply(x, &mut Kx[..columns]);
         for (k, (&source, scale)) in data.equality_sources.iter().zip(&data.equality_scales).enumerate() {
             y[k] = (last.of(source, 0) - last.of(source, 1)) * data.cost / scale;
         }
@@ -124,7 +124,7 @@ impl Workspace {
         Px[..n].fill(0.0);
         forces[..n].fill(0.0);
         add_product_vector(Px, n, View::new(&data.P, data.ld), &x[..n]);
-        add_product_vector(forces, n, data.K(), &multipliers[..columns]);
+        data.add_transposed(&multipliers[..columns], forces);
         add_product_vector(forces, n, View::new(&data.E, data.ld), &y[..me]);
         for j in 0..n {
             rd[j] = Px[j] + data.c[j] - forces[j];

@@ -10,7 +10,7 @@
 
 use super::scaled::Scaled;
 use condyle_linalg::{
-    SLACK, View, add_product_lower, add_product_vector, add_scaled_product, backward_solve, eliminate, forward_solve,
+    OuterProducts, SLACK, View, add_product_vector, add_scaled_product, backward_solve, eliminate, forward_solve, mask,
     transposed_product_vector,
 };
 
@@ -29,11 +29,12 @@ pub(super) struct System {
     /// The lower triangle of [H; E], then of its factor.
     H: Vec<f64>,
     ldh: usize,
-    /// Columns of K, scaled: √D G and W⁻¹ F, then those of E.
-    pub B: Vec<f64>,
+    /// The inverse of the factor's diagonal.
+    inverse: Vec<f64>,
+    /// Columns of K, scaled: √D G and W⁻¹ F, then those of E; only their blocks that are not zero are written and multiplied.
+    pub B: OuterProducts,
     n: usize,
     me: usize,
-    dy: Vec<f64>,
     r: Vec<f64>,
     /// r₂ of the refinement.
     re: Vec<f64>,
@@ -45,8 +46,8 @@ impl System {
     pub(super) fn new(n: usize, me: usize, columns: usize) -> Self {
         Self {
             H: vec![0.0; (n + me + SLACK) * (n + me + SLACK)],
-            B: vec![0.0; (n + SLACK) * (columns + me + SLACK)],
-            dy: vec![0.0; me + SLACK],
+            inverse: vec![0.0; n + me],
+            B: OuterProducts::with_capacity((n + SLACK) * (columns + me + SLACK), columns + me),
             r: vec![0.0; n + 4 * SLACK],
             re: vec![0.0; me + SLACK],
             more: vec![0.0; n + 4 * SLACK],
@@ -55,21 +56,27 @@ impl System {
         }
     }
 
-    /// Takes the sizes of a program, and forgets what stood in the slack.
-    pub(super) fn resize(&mut self, n: usize, me: usize) {
-        if [n, me] != [self.n, self.me] {
-            self.B.fill(0.0);
-            (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
+    /// Takes the sizes of a program and which blocks of its columns are not zero; writes E, and zeros where K has them.
+    pub(super) fn prepare(&mut self, data: &Scaled) {
+        let (n, me, columns, ld) = (data.n, data.equalities(), data.columns(), data.ld);
+        (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
+        let B = &mut self.B;
+        B.clear(n, ld);
+        B.rows[..(columns + me) * ld].fill(0.0);
+        B.add_rows(columns + me);
+        B.rows[columns * ld..][..me * ld].copy_from_slice(&data.E[..me * ld]);
+        for k in 0..columns + me {
+            let row = &if k < columns { &data.K[k * ld..] } else { &data.E[(k - columns) * ld..] }[..ld];
+            // What W⁻¹ makes of a cone's rows has the blocks of all of them.
+            let mask = if k < columns { data.masks[k] } else { mask(row) };
+            B.multiply([k, k], [mask, mask]);
         }
     }
 
     /// Factorises P + B Bᵀ, where `B` has been written; false if even with the greatest regularisation it has no factor.
     pub(super) fn factorize(&mut self, data: &Scaled) -> bool {
-        let Self { H, ldh, B, n, me, .. } = self;
-        let (n, me, ldh, ld, columns) = (*n, *me, *ldh, data.ld, data.columns());
-        for j in 0..me {
-            B[(columns + j) * ld..][..n].copy_from_slice(&data.E[j * ld..][..n]);
-        }
+        let Self { H, ldh, B, n, me, inverse, .. } = self;
+        let (n, me, ldh, ld) = (*n, *me, *ldh, data.ld);
         let mut regularisation = 1.0;
         for _ in 0..ATTEMPTS {
             for j in 0..n {
@@ -81,8 +88,7 @@ impl System {
                 column[n + me..].fill(0.0);
             }
             H[n * ldh..][..me * ldh].fill(0.0);
-            let view = View::new(B, ld);
-            add_product_lower(H, ldh, [n, n, columns + me], view, view);
+            B.add_to(H, ldh);
             for j in 0..n {
                 let x = &mut H[j * ldh + j];
                 *x += regularisation * (REGULARISATION + RELATIVE_REGULARISATION * *x);
@@ -90,6 +96,9 @@ impl System {
             if eliminate(H, ldh, [n + me, n + me, n]).is_ok()
                 && factorize_schur(&mut H[n * ldh + n..], ldh, me, regularisation)
             {
+                for j in 0..n + me {
+                    inverse[j] = H[j * ldh + j].recip();
+                }
                 return true;
             }
             regularisation *= GROWTH;
@@ -100,22 +109,22 @@ impl System {
     /// dx in place of r₁, dy in place of r₂, by the factor.
     fn solve_once(&mut self, data: &Scaled, x: &mut [f64], y: &mut [f64]) {
         let (n, me, ldh) = (self.n, self.me, self.ldh);
-        let L = View::new(&self.H, ldh);
+        let (L, (inverse, inverse_S)) = (View::new(&self.H, ldh), self.inverse[..n + me].split_at(n));
         if me > 0 {
             add_product_vector(x, n, View::new(&data.E, data.ld), &y[..me]);
         }
-        forward_solve(L, n, x);
+        forward_solve(L, inverse, x);
         if me > 0 {
             add_scaled_product(&mut y[..me], -1.0, View::new(&self.H[n..], ldh), &x[..n]);
             let S = L.at(n, n);
-            forward_solve(S, me, y);
-            backward_solve(S, me, y);
+            forward_solve(S, inverse_S, y);
+            backward_solve(S, inverse_S, y);
             for j in 0..n {
                 let X = &self.H[j * ldh + n..][..me];
                 x[j] += X.iter().zip(&*y).map(|(a, b)| a * b).sum::<f64>();
             }
         }
-        backward_solve(L, n, x);
+        backward_solve(L, inverse, x);
     }
 
     /// dx in place of r₁ and dy in place of r₂; writes K dx. `weigh` makes [D G dx; W⁻² F dx] of it, for `refinements`.
@@ -128,7 +137,6 @@ impl System {
         mut weigh: impl FnMut(&mut [f64]),
     ) {
         let (n, me, ld) = (self.n, self.me, data.ld);
-        let K = data.K();
         let (mut r, mut re) = (std::mem::take(&mut self.r), std::mem::take(&mut self.re));
         let (mut more, mut more_y) = (std::mem::take(&mut self.more), std::mem::take(&mut self.more_y));
         r[..n].copy_from_slice(&x[..n]);
@@ -136,12 +144,12 @@ impl System {
         self.solve_once(data, x, y);
         for _ in 0..refinements {
             // r₁ − H dx + Eᵀ dy, r₂ − E dx
-            transposed_product_vector(Kdx, n, K, x);
+            data.multiply(x, Kdx);
             weigh(Kdx);
             for i in 0..n {
                 more[i] = 0.0;
             }
-            add_product_vector(&mut more, n, K, Kdx);
+            data.add_transposed(Kdx, &mut more);
             add_product_vector(&mut more, n, View::new(&data.P, ld), &x[..n]);
             for i in 0..n {
                 more[i] = r[i] - more[i];
@@ -161,7 +169,7 @@ impl System {
                 y[i] += more_y[i];
             }
         }
-        transposed_product_vector(Kdx, n, K, x);
+        data.multiply(x, Kdx);
         (self.r, self.re, self.more, self.more_y) = (r, re, more, more_y);
     }
 }

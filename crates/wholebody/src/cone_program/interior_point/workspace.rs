@@ -6,7 +6,9 @@ use super::cones::Cones;
 use super::scaled::Scaled;
 use super::system::System;
 use crate::cone_program::{Size, Status};
-use condyle_linalg::{SLACK, View, add_product_vector, at_level, dot, max_abs, transposed_product_vector};
+use condyle_linalg::{
+    SLACK, Vector, Vectorized, View, add_product_vector, at_level, copy_scaled, dot, max_abs, transposed_product_vector,
+};
 
 /// A gap is relative to the objective, or to one unit of the program's cost, but to no less than this in the units of the method.
 const SMALL_COST: f64 = 1e-6;
@@ -35,6 +37,29 @@ pub(super) struct Workspace {
     pub forces: Vec<f64>,
     pub rd: Vec<f64>,
     pub re: Vec<f64>,
+}
+
+/// D, and B: √D G and W⁻¹ F.
+struct Scale<'a> {
+    data: &'a Scaled,
+    sides: &'a [Side; 2],
+    cones: &'a Cones,
+    D: &'a mut [f64],
+    B: &'a mut [f64],
+}
+
+impl Vectorized for Scale<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { data, sides: [lower, upper], cones, D, B } = self;
+        let (m, ld) = (data.rows(), data.ld);
+        for i in 0..m {
+            D[i] = lower.d[i] + upper.d[i];
+            let (at, rows) = (i * ld, data.range(i));
+            copy_scaled::<V>(&mut B[at + rows.start..], &data.K[at + rows.start..at + rows.end], D[i].sqrt());
+        }
+        cones.scale_rows(data, &mut B[m * ld..]);
+    }
 }
 
 /// How far an iterate is from a solution.
@@ -106,7 +131,7 @@ impl Workspace {
         Px[..n].fill(0.0);
         forces[..n].fill(0.0);
         add_product_vector(Px, n, View::new(&data.P, ld), &x[..n]);
-        add_product_vector(forces, n, data.K(), &multipliers[..columns]);
+        data.add_transposed(&multipliers[..columns], forces);
         if me > 0 {
             let E = View::new(&data.E, ld);
             add_product_vector(forces, n, E, &y[..me]);
@@ -143,19 +168,10 @@ impl Workspace {
     /// D, W and B.
     pub(super) fn scale(&mut self) -> bool {
         let Self { data, sides, cones, D, system, .. } = self;
-        let (n, m, ld) = (data.n, data.rows(), data.ld);
         if !cones.scale(&data.cones) {
             return false;
         }
-        for i in 0..m {
-            D[i] = sides[0].d[i] + sides[1].d[i];
-            let root = D[i].sqrt();
-            let (from, to) = (&data.K[i * ld..][..n], &mut system.B[i * ld..][..n]);
-            for j in 0..n {
-                to[j] = root * from[j];
-            }
-        }
-        cones.scale_rows(&data.cones, &data.K[m * ld..], &mut system.B[m * ld..], [n, ld]);
+        at_level(Scale { data, sides, cones, D, B: &mut system.B.rows });
         true
     }
 
@@ -175,7 +191,7 @@ impl Workspace {
         for i in 0..me {
             dy[i] = -re[i];
         }
-        add_product_vector(dx, n, data.K(), &target[..columns]);
+        data.add_transposed(&target[..columns], dx);
         system.solve(data, [dx, dy], &mut Kdx[..columns], refinements, |x| {
             for i in 0..m {
                 x[i] *= D[i];
