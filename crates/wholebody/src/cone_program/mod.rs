@@ -86,7 +86,7 @@ pub(crate) struct Outcome {
     pub warm: bool,
     /// Whether only reduced tolerances are met.
     pub reduced: bool,
-    /// Why x is not the minimiser; it is the last iterate then, and finite.
+    /// Why x is not the minimiser; it is the last iterate then, and finite, or zero where nothing was solved.
     pub stopped: Option<Status>,
 }
 

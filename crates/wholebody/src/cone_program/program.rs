@@ -117,8 +117,15 @@ impl ConeProgram {
 
 /// That the numbers of a column are finite, from one on; `first` is the position of the column.
 fn finite(name: &'static str, column: &[f64], from: usize, first: usize) -> Result<(), Status> {
-    // 0 · x is 0 for each finite x, and NaN for all others.
-    if column[from..].iter().map(|x| 0.0 * x).sum::<f64>() == 0.0 {
+    // 0 · x is 0 for each finite x, and NaN for all others; in eight sums, which do not wait for each other.
+    let (eights, rest) = column[from..].as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for x in eights {
+        for i in 0..8 {
+            sums[i] += 0.0 * x[i];
+        }
+    }
+    if sums.iter().chain(rest).map(|x| 0.0 * x).sum::<f64>() == 0.0 {
         return Ok(());
     }
     let index = (from..column.len()).find(|&i| !column[i].is_finite()).expect("the sum is NaN");

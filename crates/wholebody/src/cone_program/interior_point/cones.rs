@@ -3,8 +3,21 @@
 use super::cone::{apply_inverse, divide, inverse_step, product, scaling};
 use super::scaled::{Cone, Scaled};
 
+/// The expression with `dim` a constant where it is that of a friction cone, so that its loops have no end to ask for.
+macro_rules! by_dimension {
+    ($value:expr, $dim:ident => $expression:expr) => {
+        match $value {
+            3 => {
+                let $dim = 3;
+                $expression
+            }
+            $dim => $expression,
+        }
+    };
+}
+
 /// s = h + F x in the product of cones, and z. Vectors with a tilde are scaled: d̃s = W⁻¹ ds, d̃z = W dz.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Cones {
     pub s: Vec<f64>,
     pub z: Vec<f64>,
@@ -55,13 +68,16 @@ impl Cones {
 
     /// W and λ of each cone; false if a pair is not in the interior.
     pub(super) fn scale(&mut self, cones: &[Cone]) -> bool {
-        for (k, cone) in cones.iter().enumerate() {
-            let at = cone.at..cone.at + cone.dim;
-            let (w, lambda) = (&mut self.w[at.clone()], &mut self.lambda[at.clone()]);
-            match scaling(&self.s[at.clone()], &self.z[at], w, lambda) {
-                Some(eta) => self.eta[k] = eta,
-                None => return false,
-            }
+        cones.iter().enumerate().all(|(k, cone)| by_dimension!(cone.dim, dim => self.scale_one(k, cone.at, dim)))
+    }
+
+    #[inline(always)]
+    fn scale_one(&mut self, k: usize, at: usize, dim: usize) -> bool {
+        let at = at..at + dim;
+        let (w, lambda) = (&mut self.w[at.clone()], &mut self.lambda[at.clone()]);
+        match scaling(&self.s[at.clone()], &self.z[at], w, lambda) {
+            Some(eta) => self.eta[k] = eta,
+            None => return false,
         }
         true
     }
@@ -111,48 +127,59 @@ impl Cones {
     /// W⁻¹ (p − W⁻¹ r).
     pub(super) fn target(&mut self, cones: &[Cone], centre: f64, second_order: bool, target: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
-            let at = cone.at..cone.at + cone.dim;
-            let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
-            let (p, y) = (&mut self.p[at.clone()], &mut self.scratch[at.clone()]);
-            if second_order {
-                product(&self.ds_tilde[at.clone()], &self.dz_tilde[at.clone()], y);
-                y[0] -= centre;
-                divide(lambda, y, p);
-            } else if centre > 0.0 {
-                y.fill(0.0);
-                y[0] = -centre;
-                divide(lambda, y, p);
-            } else {
-                p.fill(0.0);
-            }
-            for i in 0..p.len() {
-                p[i] = -lambda[i] - p[i];
-            }
-            apply_inverse(eta, w, &self.r[at.clone()], y);
-            for i in 0..p.len() {
-                y[i] = p[i] - y[i];
-            }
-            apply_inverse(eta, w, y, &mut target[at]);
+            by_dimension!(cone.dim, dim => self.target_one(k, cone.at, dim, centre, second_order, target));
         }
+    }
+
+    #[inline(always)]
+    fn target_one(&mut self, k: usize, at: usize, dim: usize, centre: f64, second_order: bool, target: &mut [f64]) {
+        let at = at..at + dim;
+        let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
+        let (p, y) = (&mut self.p[at.clone()], &mut self.scratch[at.clone()]);
+        if second_order {
+            product(&self.ds_tilde[at.clone()], &self.dz_tilde[at.clone()], y);
+            y[0] -= centre;
+            divide(lambda, y, p);
+        } else if centre > 0.0 {
+            y.fill(0.0);
+            y[0] = -centre;
+            divide(lambda, y, p);
+        } else {
+            p.fill(0.0);
+        }
+        for i in 0..dim {
+            p[i] = -lambda[i] - p[i];
+        }
+        apply_inverse(eta, w, &self.r[at.clone()], y);
+        for i in 0..dim {
+            y[i] = p[i] - y[i];
+        }
+        apply_inverse(eta, w, y, &mut target[at]);
     }
 
     /// ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds); the inverse of the greatest step, if it is greater.
     pub(super) fn direction(&mut self, cones: &[Cone], Fdx: &[f64], inverse: &mut f64) {
         for (k, cone) in cones.iter().enumerate() {
-            let at = cone.at..cone.at + cone.dim;
-            let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
-            let (ds, dz) = (&mut self.ds[at.clone()], &mut self.dz[at.clone()]);
-            let (ds_tilde, dz_tilde) = (&mut self.ds_tilde[at.clone()], &mut self.dz_tilde[at.clone()]);
-            for i in 0..cone.dim {
-                ds[i] = Fdx[cone.at + i] + self.r[cone.at + i];
-            }
-            apply_inverse(eta, w, ds, ds_tilde);
-            for i in 0..cone.dim {
-                dz_tilde[i] = self.p[cone.at + i] - ds_tilde[i];
-            }
-            apply_inverse(eta, w, dz_tilde, dz);
-            *inverse = inverse.max(inverse_step(lambda, ds_tilde)).max(inverse_step(lambda, dz_tilde));
+            by_dimension!(cone.dim, dim => self.direction_one(k, cone.at, dim, Fdx, inverse));
         }
+    }
+
+    #[inline(always)]
+    fn direction_one(&mut self, k: usize, at: usize, dim: usize, Fdx: &[f64], inverse: &mut f64) {
+        let at = at..at + dim;
+        let (Fdx, r, p) = (&Fdx[at.clone()], &self.r[at.clone()], &self.p[at.clone()]);
+        let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
+        let (ds, dz) = (&mut self.ds[at.clone()], &mut self.dz[at.clone()]);
+        let (ds_tilde, dz_tilde) = (&mut self.ds_tilde[at.clone()], &mut self.dz_tilde[at.clone()]);
+        for i in 0..dim {
+            ds[i] = Fdx[i] + r[i];
+        }
+        apply_inverse(eta, w, ds, ds_tilde);
+        for i in 0..dim {
+            dz_tilde[i] = p[i] - ds_tilde[i];
+        }
+        apply_inverse(eta, w, dz_tilde, dz);
+        *inverse = inverse.max(inverse_step(lambda, ds_tilde)).max(inverse_step(lambda, dz_tilde));
     }
 
     /// s += α ds, z += α dz.

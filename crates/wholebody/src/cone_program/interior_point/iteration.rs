@@ -27,7 +27,8 @@ pub(super) struct Limits {
     pub tolerance: f64,
     /// A count, together with what was counted before.
     pub iterations: u32,
-    pub deadline: Option<Instant>,
+    /// When it began, and the seconds from then on.
+    pub clock: Option<(Instant, f64)>,
 }
 
 impl Workspace {
@@ -58,7 +59,7 @@ impl Workspace {
             if *iterations >= limits.iterations {
                 return stop(Status::IterationLimit);
             }
-            if limits.deadline.is_some_and(|deadline| Instant::now() > deadline) {
+            if limits.clock.is_some_and(|(start, seconds)| start.elapsed().as_secs_f64() > seconds) {
                 return stop(Status::TimeLimit);
             }
             idle = if error < least[0] || measure.exclusion < least[1] { 0 } else { idle + 1 };

@@ -2,7 +2,8 @@
 //!
 //! Mehrotra's predictor and corrector with Nesterov and Todd's scaling on bounds and second-order cones. Each iteration
 //! factorises P + Gᵀ D G + Fᵀ W⁻² F once and solves with it twice. It starts from the data, or from the last solution moved
-//! back into the interior. Nothing allocates after construction.
+//! back into the interior. Blocks of zeros in rows are left out. Nothing allocates after construction, the same numbers give
+//! the same bits, and no result is NaN.
 //!
 //! Sources: Mehrotra (1992); Nesterov and Todd (1998); Vandenberghe, *The CVXOPT linear and quadratic cone program solvers*
 //! (2010), whose formulas these are, with a two-sided row instead of two rows.
@@ -21,14 +22,14 @@ mod workspace;
 use super::{ConeProgram, Multipliers, Outcome, Settings, Size, Solver, Start, Status};
 use iteration::Limits;
 use solution::Solution;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use workspace::Workspace;
 
 /// The iterations after which a warm start gives way to a cold one.
 const WARM_ITERATIONS: u32 = 20;
 
 /// A dense interior point method; see the [module](self).
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct InteriorPoint {
     settings: Settings,
     capacity: Size,
@@ -48,8 +49,8 @@ impl InteriorPoint {
     fn minimise(&mut self, start: Start, iterations: &mut u32) -> (bool, Result<f64, Status>) {
         let Self { settings, work, solution, .. } = self;
         let Settings { tolerance, max_iterations, time_limit } = *settings;
-        let deadline = time_limit.is_finite().then(|| Instant::now() + Duration::from_secs_f64(time_limit.max(0.0)));
-        let limits = Limits { tolerance, iterations: max_iterations, deadline };
+        let clock = time_limit.is_finite().then(|| (Instant::now(), time_limit));
+        let limits = Limits { tolerance, iterations: max_iterations, clock };
         if start == Start::Warm && solution.solves == Some(work.data.n) {
             work.warm_start(solution);
             let few = Limits { iterations: max_iterations.min(WARM_ITERATIONS), ..limits };

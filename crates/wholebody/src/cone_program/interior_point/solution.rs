@@ -5,7 +5,7 @@ use super::workspace::Workspace;
 use crate::cone_program::Size;
 
 /// x and the multipliers, with the size of the capacity.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Solution {
     /// Whether it solves a program, and of how many unknowns.
     pub solves: Option<usize>,

@@ -10,7 +10,8 @@ use condyle_linalg::{View, add_product_vector, max_abs};
 const WEIGHT: f64 = 0.1;
 /// How far inside of its cone s is after it was moved there.
 const INSIDE: f64 = 1.0;
-/// The bounds of μ ρ in a warm start; with slacks of size one, the upper one turns s and ρ z at a tenth of that.
+/// √μ of a warm start as a share of how far the last solution is from solving this program, and the bounds of μ.
+const SHARE: f64 = 0.02;
 const CENTRE: [f64; 2] = [1e-10, 1e-2];
 
 impl Workspace {
@@ -76,11 +77,11 @@ impl Workspace {
         true
     }
 
-    /// x and y of the last solution, and s and z from s − ρ z = (h + F x) − ρ z* at that x with s ∘ z = μ e.
+    /// x and y of the last solution, and s and z from s − z = (h + F x) − z* at that x with s ∘ z = μ e.
     ///
-    /// Each pair is exactly central, and far from where both are small it is the last one but for μ / s; ρ is the ratio of
-    /// the greatest slack and the greatest multiplier. μ ρ is the square of how far the last solution is from solving this
-    /// program, within [`CENTRE`]: changes of that size turn a bound on or off.
+    /// Each pair is exactly central, and but for μ / s the last one where s or z is large. s and z can be compared since
+    /// all is in units of size one. √μ is a share of how far the last solution is from solving this program: changes of
+    /// that size turn a bound on or off.
     ///
     /// Source: Chen and Harker (1993), the smoothing of complementarity; here as a start, in the cones' algebra.
     pub(super) fn warm_start(&mut self, last: &Solution) {
@@ -94,7 +95,6 @@ impl Workspace {
         for (k, (&source, scale)) in data.equality_sources.iter().zip(&data.equality_scales).enumerate() {
             y[k] = (last.of(source, 0) - last.of(source, 1)) * data.cost / scale;
         }
-        let (mut most_s, mut most_z) = (0.0_f64, 0.0_f64);
         multipliers[..m].fill(0.0);
         for (k, (bound, has)) in
             [(&data.lower, &data.has_lower), (&data.upper, &data.has_upper)].into_iter().enumerate()
@@ -104,8 +104,6 @@ impl Workspace {
                 side.s[i] = has[i] * side.sign * (Kx[i] - bound[i]);
                 side.z[i] = has[i] * last.of(data.sources[i], k) * data.cost / data.scales[i];
                 multipliers[i] += side.sign * side.z[i];
-                most_s = most_s.max(side.s[i]);
-                most_z = most_z.max(side.z[i]);
             }
         }
         for cone in &data.cones {
@@ -115,12 +113,8 @@ impl Workspace {
                 cones.z[at] = last.of(Source::Cone(cone.source + i), 0) * data.cost / cone.scale;
                 multipliers[m + at] = cones.z[at];
             }
-            most_s = most_s.max(cones.s[cone.at]);
-            most_z = most_z.max(cones.z[cone.at]);
         }
-        let rho = if most_s > 0.0 && most_z > 0.0 { most_s / most_z } else { 1.0 };
-
-        // How far the last solution is from solving this program: P x + c − Kᵀ z − E y and min(s, ρ z).
+        // How far the last solution is from solving this program: P x + c − Kᵀ z − E y and min(s, z).
         Px[..n].fill(0.0);
         forces[..n].fill(0.0);
         add_product_vector(Px, n, View::new(&data.P, data.ld), &x[..n]);
@@ -132,31 +126,28 @@ impl Workspace {
         let mut distance = 0.0_f64;
         for side in sides.iter() {
             for i in 0..m {
-                distance = distance.max(side.s[i].min(rho * side.z[i]).abs());
+                distance = distance.max(side.s[i].min(side.z[i]).abs());
             }
         }
         for cone in &data.cones {
             distance = distance.max(-margin(&cones.s[cone.at..][..cone.dim]));
         }
-        let distance = distance.max(rho * max_abs(&rd[..n]));
-        let mu = (distance * distance).clamp(CENTRE[0], CENTRE[1]);
+        let root = SHARE * distance.max(max_abs(&rd[..n]));
+        let mu = (root * root).clamp(CENTRE[0], CENTRE[1]);
 
         for (side, has) in sides.iter_mut().zip([&data.has_lower, &data.has_upper]) {
             for i in 0..m {
-                let [s, z] = split_number(side.s[i] - rho * side.z[i], mu);
-                (side.s[i], side.z[i]) = if has[i] > 0.0 { (s, z / rho) } else { (1.0, 1.0) };
+                let [s, z] = split_number(side.s[i] - side.z[i], mu);
+                (side.s[i], side.z[i]) = if has[i] > 0.0 { (s, z) } else { (1.0, 1.0) };
             }
         }
         for cone in &data.cones {
             let at = cone.at..cone.at + cone.dim;
             let v = &mut cones.ds[at.clone()];
             for i in 0..cone.dim {
-                v[i] = cones.s[cone.at + i] - rho * cones.z[cone.at + i];
+                v[i] = cones.s[cone.at + i] - cones.z[cone.at + i];
             }
-            split(v, mu, &mut cones.s[at.clone()], &mut cones.z[at.clone()]);
-            for z in &mut cones.z[at] {
-                *z /= rho;
-            }
+            split(v, mu, &mut cones.s[at.clone()], &mut cones.z[at]);
         }
     }
 }

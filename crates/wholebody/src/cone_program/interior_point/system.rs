@@ -24,7 +24,7 @@ const DUAL_REGULARISATION: f64 = 1e-13;
 const GROWTH: f64 = 1e3;
 const ATTEMPTS: usize = 4;
 
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct System {
     /// The lower triangle of [H; E], then of its factor.
     H: Vec<f64>,

@@ -14,7 +14,7 @@ use condyle_linalg::{
 const SMALL_COST: f64 = 1e-6;
 
 /// All memory but for the results.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Workspace {
     pub data: Scaled,
     pub system: System,

@@ -5,7 +5,8 @@ use super::random::{Draw, Kind};
 use super::walk::Walk;
 use crate::cone_program::{InteriorPoint, Settings, Solver, Start};
 
-const KKT_TOLERANCE: f64 = 1e-8;
+/// The solver's 1e-9 is relative to the greatest term of all, here each row is measured by its own terms.
+const KKT_TOLERANCE: f64 = 1e-7;
 /// Both gaps together, relative to the objective.
 const OBJECTIVE_TOLERANCE: f64 = 1e-8;
 const TICKS: usize = 200;
