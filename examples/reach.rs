@@ -5,7 +5,7 @@
 //! ```
 
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
-use condyle::optimal::{Fddp, Problem};
+use condyle::optimal::{Fddp, Iteration, Problem};
 use condyle::{Data, Vec3, forward_kinematics, robots};
 use std::error::Error;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let end = FreeDynamics::terminal(arm.clone(), terminal)?;
     let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; KNOTS], Box::new(end))?;
     let mut solver = Fddp::new(&problem);
-    let solution = solver.solve_with(&mut problem, &x0.repeat(KNOTS + 1), &hold.repeat(KNOTS), |i| {
+    let solution = solver.solve_with(&mut problem, &x0.repeat(KNOTS + 1), &hold.repeat(KNOTS), |i: &Iteration| {
         println!("iteration {:2}   cost {:12.6}   step {:.3}", i.iteration, i.cost, i.step);
     })?;
 

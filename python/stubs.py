@@ -51,8 +51,8 @@ ARGUMENTS = {
     "Model": "model",
     "Data": "data",
     "ConstraintSet": "constraints",
-    "Sequence[ContactConstraint]": "ConstraintSet.constraints",
-    "str": "contact joint_name name prefix text",
+    "Sequence[ContactConstraint]": "ConstraintSet.constraints casadi_hold.constraints",
+    "str": "contact function joint_name name prefix text",
     "str | int": "body frame",
     "int": "facets grain iterations k knot last max_iterations n nu nx seed size steps threads",
     "float": """
@@ -127,7 +127,7 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Problem.to_json",
+    "str": "Model.name Problem.to_json casadi_hold",
     "None": """
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
@@ -151,6 +151,7 @@ RESULTS = {
     "AssemblySize": "DivideConquer.size",
     "_Status": "Simulation.run Simulation.step",
     "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
+    "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
     "Outcome": "AugmentedLagrangian.outcome",
     "AllTerms": "compute_all_terms",
     "CentroidalMap": "centroidal_map",

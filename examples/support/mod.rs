@@ -3,7 +3,7 @@
 use condyle::optimal::robot::{
     Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Residual, WrenchCone,
 };
-use condyle::optimal::{ActionModel, Error, Fddp, Problem, Solution};
+use condyle::optimal::{ActionModel, Error, Fddp, Iteration, Problem, Solution};
 use condyle::{ContactConstraint, Data, Mat3, Model, ReferenceFrame, Se3, Vec3, forward_kinematics};
 use std::sync::Arc;
 
@@ -166,7 +166,7 @@ impl Gait {
         let mut problem = Problem::new(self.x0, self.models, self.stages, Box::new(end))?;
         let mut solver = Fddp::new(&problem);
         solver.settings.tolerance = TOLERANCE;
-        let solution = solver.solve_with(&mut problem, &xs, &self.us, |i| {
+        let solution = solver.solve_with(&mut problem, &xs, &self.us, |i: &Iteration| {
             println!("iteration {:2}   cost {:14.6}   step {:.3}   gap {:.1e}", i.iteration, i.cost, i.step, i.gap);
         })?;
         let knots = xs.len() / solution.x(0).len() - 1;

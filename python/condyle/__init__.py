@@ -23,6 +23,18 @@ interpreter's lock released, on as many threads as the `Data` was made for:
 >>> condyle.crba(arm, data, np.zeros((100, 7))).shape
 (100, 7, 7)
 
+`out` may be an input, or share memory with one; results that would share memory are refused. While a call computes
+with the lock released, as batches and solves do, no other thread may write to its arrays: it would read some of the old
+numbers and some of the new ones.
+
+A forked process may go on with all that it has inherited, and starts threads of its own. Signals are looked at while a
+call lasts, every 10 ms in batches and 25 ms in solves and simulations: what a handler raises, as KeyboardInterrupt for
+Ctrl-C, ends the call. A solver then has the best iterate as its `solution`, a simulation the state after its last step,
+and `out` is written as far as the call came.
+
+The environment variable `CONDYLE_LEVEL` chooses the vector instructions: "baseline", "neon", "avx2" or "avx512". If
+this processor does not have them, or there are none of that name, the import fails.
+
 Derivatives of one's own function of the state are exact, by `HyperDual` numbers in arrays of objects:
 
 >>> def effort(x):

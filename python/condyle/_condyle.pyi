@@ -689,7 +689,8 @@ class ConstraintSet:
     is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
     sparse resolution of constrained dynamic equations (2021).
 
-    model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always.
+    model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always, 1 to
+    10000.
 
     Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
     'world', a gain is negative or not finite, or two constraints are the same.
@@ -854,7 +855,7 @@ class Data:
     with another robot's model, a `ValueError`.
 
     model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
-    several states side by side in vector registers.
+    several states side by side in vector registers; at most 1024.
 
     >>> arm = condyle.robots.arm7()
     >>> condyle.Data(arm)
@@ -1117,7 +1118,7 @@ class Cholesky:
     `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
     and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
 
-    n: the rows of M.
+    n: the rows of M, at most 4096.
 
     >>> factor = condyle.Cholesky(2)
     >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
@@ -1992,7 +1993,7 @@ def _model_from_bytes(data: bytes) -> Model:
 class Action:
     """An action written in Python.
 
-    nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
+    nx, nu: the numbers of a state and of a control, at most 4096; nu is 0 at a terminal knot.
     calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
     calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
         q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
@@ -2096,10 +2097,18 @@ class AugmentedLagrangian:
     def outcome(self) -> Outcome:
         """The state of the limits after the last solve, an `Outcome`."""
 
+    @property
+    def solution(self) -> Solution | None:
+        """The `Solution` of the last solve, also of one that a signal or an error of an `Action` has ended
+        ("interrupted"); None before the first.
+        """
+
     def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
-        Other threads run meanwhile.
+        Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
+        iteration: what a handler raises, as KeyboardInterrupt, is raised here, and `solution` then is the best
+        iterate, from which `resume` goes on.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
@@ -2132,7 +2141,7 @@ class ConstrainedAction:
     To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
 
     action: the action.
-    size: the number of entries of g.
+    size: the number of entries of g, at most 4096.
     calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
     calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
         space of the state. Without it, central differences of calc.
@@ -2226,9 +2235,9 @@ class Fddp:
         (default: yes): the same steps in less time.
         `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
         `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
-        there are; 1 unless given. The results differ by rounding, and not at all with the number of threads.
-        `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given. The results are
-        the same to the last bit.
+        there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
+        `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given, at most 1024. The
+        results are the same to the last bit.
         `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
         `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
         `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
@@ -2236,10 +2245,18 @@ class Fddp:
     """
 
     def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
+    @property
+    def solution(self) -> Solution | None:
+        """The `Solution` of the last solve, also of one that a signal or an error of an `Action` has ended
+        ("interrupted"); None before the first.
+        """
+
     def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
-        Other threads run meanwhile.
+        Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
+        iteration: what a handler raises, as KeyboardInterrupt, is raised here, and `solution` then is the best
+        iterate, from which `resume` goes on.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
@@ -2305,7 +2322,7 @@ class FreeDynamics:
 class FrictionCone:
     """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    mu: μ; facets: the number of the pyramid's sides; inner: whether the pyramid lies inside of the cone; rotation: the
+    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
     surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
     default 0 and infinite.
 
@@ -2403,7 +2420,7 @@ class Lqr:
     u ≤ upper.
 
     A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
-    bound; without R and B it has no controls, as at a terminal knot.
+    bound; without R and B it has no controls, as at a terminal knot. nx and nu are at most 4096.
 
     >>> from condyle.optimal import Lqr
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -2730,4 +2747,6 @@ class Simulation:
 
         control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
             efforts, then other threads run meanwhile.
+
+        What a handler of a signal raises, as KeyboardInterrupt, ends the run after a step, whose state is kept.
         """

@@ -426,7 +426,15 @@ class Solution(NamedTuple):
     """Largest gap of the trajectory."""
     feasible: bool
     """Whether the trajectory satisfies the dynamics."""
-    status: Literal["converged", "max_iterations", "time_limit", "regularisation_limit", "infeasible", "not_finite"]
+    status: Literal[
+        "converged",
+        "max_iterations",
+        "time_limit",
+        "interrupted",
+        "regularisation_limit",
+        "infeasible",
+        "not_finite",
+    ]
     """The end of the solve in a word."""
     trace: list[Iteration]
     """A record per iteration."""

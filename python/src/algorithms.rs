@@ -25,7 +25,7 @@ functions! {
 fn rnea(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
     condyle::rnea(model, data, &q, &v, &a, &f_ext)
 }
-batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) { b.rnea(model, q, v, a, f_ext) }
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> VECTOR { b.rnea(model, q, v, a, f_ext) }
 
 /// Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 ///
@@ -40,7 +40,7 @@ fn aba(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None;
     regular(model)?;
     condyle::aba(model, data, &q, &v, &tau, &f_ext)
 }
-batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) { b.aba(model, q, v, tau, f_ext) }
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> VECTOR { b.aba(model, q, v, tau, f_ext) }
 
 /// Forward dynamics by a method of choice: the acceleration of `aba`, nv numbers (rad/s², m/s²).
 ///
@@ -70,7 +70,7 @@ fn forward_dynamics(model, data;
 fn crba(model, data; q: Position; out) {
     condyle::crba(model, data, &q)
 }
-batch b: any(q: Position) { b.crba(model, q) }
+batch b: any(q: Position) -> MATRIX { b.crba(model, q) }
 
 /// The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 ///
@@ -84,7 +84,7 @@ fn minv(model, data; q: Position; out) {
     regular(model)?;
     condyle::minv(model, data, &q)
 }
-batch b: regular(q: Position) { b.minv(model, q) }
+batch b: regular(q: Position) -> MATRIX { b.minv(model, q) }
 
 /// The nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 ///
@@ -92,7 +92,7 @@ batch b: regular(q: Position) { b.minv(model, q) }
 fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
     condyle::nonlinear_effects(model, data, &q, &v)
 }
-batch b: any(q: Position, v: Tangent) { b.nonlinear_effects(model, q, v) }
+batch b: any(q: Position, v: Tangent) -> VECTOR { b.nonlinear_effects(model, q, v) }
 
 /// The gravity efforts g(q), nv numbers, which hold the robot still: the efforts of `rnea` with v = a = 0.
 ///
@@ -105,7 +105,7 @@ batch b: any(q: Position, v: Tangent) { b.nonlinear_effects(model, q, v) }
 fn gravity(model, data; q: Position; out) {
     condyle::gravity(model, data, &q)
 }
-batch b: any(q: Position) { b.gravity(model, q) }
+batch b: any(q: Position) -> VECTOR { b.gravity(model, q) }
 
 /// The efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N); O(n).
 ///
@@ -140,7 +140,9 @@ fn coriolis_matrix(model, data; q: Position, v: Tangent; out) {
 fn rnea_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
     condyle::rnea_derivatives(model, data, &q, &v, &a, &f_ext)
 }
-batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) { b.rnea_derivatives(model, q, v, a, f_ext) }
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> RNEA_DERIVATIVES {
+    b.rnea_derivatives(model, q, v, a, f_ext)
+}
 
 /// The acceleration of `aba` and its derivatives with respect to q, v and τ, exact, as
 /// `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
@@ -157,5 +159,7 @@ fn aba_derivatives(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Fo
     regular(model)?;
     condyle::aba_derivatives(model, data, &q, &v, &tau, &f_ext)
 }
-batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) { b.aba_derivatives(model, q, v, tau, f_ext) }
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> ABA_DERIVATIVES {
+    b.aba_derivatives(model, q, v, tau, f_ext)
+}
 }

@@ -7,12 +7,15 @@
 use condyle::{Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
 use numpy::ndarray::Dimension;
-use numpy::{Element, Ix1, Ix2, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{
+    Element, Ix1, Ix2, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadwriteArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyFloat;
 use std::fmt::Write;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 /// A number that functions of the library can be called with.
 pub(crate) trait Number: Scalar {
@@ -115,7 +118,7 @@ fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> P
     let array = array.cast_into::<PyUntypedArray>()?;
     let dtype = array.dtype();
     let kind: char = dtype.getattr("kind")?.extract()?;
-    if !"biuf".contains(kind) {
+    if !"biuf".contains(kind) && array.len() > 0 {
         return Err(PyTypeError::new_err(format!("{argument}: expected real numbers, found dtype {dtype}")));
     }
     check_shape(argument, array.shape(), shape)?;
@@ -147,30 +150,44 @@ pub(crate) fn output<'py>(
     shape: &[usize],
     fill: impl FnOnce(&mut [f64]),
 ) -> PyResult<Bound<'py, PyAny>> {
-    let array = match out {
-        None => PyArray::<f64, _>::zeros(py, shape, false),
-        Some(out) => {
-            let wanted = || format!("expected a writable C-contiguous float64 array of shape {}", tuple(shape));
-            let array = out
-                .cast::<PyUntypedArray>()
-                .map_err(|_| PyTypeError::new_err(format!("out: {}, found {}", wanted(), type_name(out))))?;
-            check_shape("out", array.shape(), shape)?;
-            let double = out.cast::<numpy::PyArrayDyn<f64>>().ok().filter(|a| a.is_c_contiguous() && a.is_aligned());
-            let other = || {
-                PyValueError::new_err(format!(
-                    "out: {}, found dtype {} and strides {:?}",
-                    wanted(),
-                    array.dtype(),
-                    array.strides()
-                ))
-            };
-            double.ok_or_else(other)?.clone()
-        }
-    };
-    let mut numbers = array.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))?;
+    let array = place(py, out, shape)?;
+    let mut numbers = writable(&array)?;
     fill(numbers.as_slice_mut()?);
     drop(numbers);
     Ok(out.cloned().unwrap_or_else(|| array.into_any()))
+}
+
+/// So many numbers and more are asked of NumPy in a way that can fail.
+const LARGE: usize = 1 << 24;
+
+/// An array in C order to be filled: the caller's, if it has the shape, or a new one.
+pub(crate) fn place<'py>(
+    py: Python<'py>,
+    out: Option<&Bound<'py, PyAny>>,
+    shape: &[usize],
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let Some(out) = out else {
+        if shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE) {
+            return Ok(PyArray::<f64, _>::zeros(py, shape, false));
+        }
+        return Ok(py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?.cast_into()?); // or a `MemoryError`
+    };
+    let wanted = || format!("expected a writable C-contiguous float64 array of shape {}", tuple(shape));
+    let array = out
+        .cast::<PyUntypedArray>()
+        .map_err(|_| PyTypeError::new_err(format!("out: {}, found {}", wanted(), type_name(out))))?;
+    check_shape("out", array.shape(), shape)?;
+    let double = out.cast::<PyArrayDyn<f64>>().ok().filter(|a| a.is_c_contiguous() && a.is_aligned());
+    let other = || {
+        let (dtype, strides) = (array.dtype(), array.strides());
+        PyValueError::new_err(format!("out: {}, found dtype {dtype} and strides {strides:?}", wanted()))
+    };
+    Ok(double.ok_or_else(other)?.clone())
+}
+
+/// The numbers of an array, to be written.
+pub(crate) fn writable<'py>(array: &Bound<'py, PyArrayDyn<f64>>) -> PyResult<PyReadwriteArrayDyn<'py, f64>> {
+    array.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))
 }
 
 fn type_name(value: &Bound<'_, PyAny>) -> String {
@@ -367,12 +384,26 @@ pub(crate) fn members<'py>(
     names: &[&str],
 ) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
     let Some(out) = out else { return Ok(Vec::new()) };
-    let members = out.try_iter()?.map(|x| x.map(Some)).collect::<PyResult<Vec<_>>>()?;
-    if members.len() == names.len() {
-        return Ok(members);
+    let members = out.try_iter()?.collect::<PyResult<Vec<_>>>()?;
+    if members.len() != names.len() {
+        let (expected, names, found) = (names.len(), names.join(", "), members.len());
+        return Err(PyValueError::new_err(format!("out: expected {expected} arrays ({names}), found {found}")));
     }
-    let (expected, names, found) = (names.len(), names.join(", "), members.len());
-    Err(PyValueError::new_err(format!("out: expected {expected} arrays ({names}), found {found}")))
+    let places: Vec<_> = members.iter().map(memory).collect();
+    for (k, one) in places.iter().enumerate() {
+        if let Some(other) = places[..k].iter().position(|other| one.start < other.end && other.start < one.end) {
+            let (other, one) = (names[other], names[k]);
+            return Err(PyValueError::new_err(format!("out: the arrays for {other} and {one} share memory")));
+        }
+    }
+    Ok(members.into_iter().map(Some).collect())
+}
+
+/// The addresses of the numbers of a C-contiguous array of doubles; none of anything else, which is refused later.
+fn memory(array: &Bound<'_, PyAny>) -> Range<usize> {
+    let Ok(array) = array.cast::<PyArrayDyn<f64>>() else { return 0..0 };
+    let start = array.data().addr();
+    start..start + array.len() * size_of::<f64>()
 }
 
 /// A pose that is given as a homogeneous 4 × 4 matrix.

@@ -1,14 +1,18 @@
 //! Many states in one call: arguments with one axis more, for the states, and results likewise.
 //!
-//! An argument without that axis is shared by all states. What the library computes in lanes goes there at once, with
-//! the interpreter's lock released, and its result is a `PerState`; everything else is called state after state.
+//! An argument without that axis is shared by all states. What the library computes in lanes goes there in parts of some
+//! milliseconds, with the interpreter's lock released, and each part is written to the arrays that the caller gets;
+//! everything else is called state after state. Between parts and states signals are looked at.
 
-use crate::arrays::{Array, Give, Input, give_named, matrix, output};
-use condyle::{BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices, Scalar};
+use crate::arrays::{Array, Input, matrix, members, place, writable};
+use crate::signals::{self, Signals};
+use condyle::{Batch, BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices, Scalar};
 use numpy::{Ix2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use std::iter;
+use std::ops::{Deref, Range};
 
 /// The number of states of an argument that has `axes` of them for a single one: none if it is given for a single one.
 pub(crate) fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<usize>> {
@@ -85,13 +89,14 @@ pub(crate) fn stack<'py>(
         options.set_item("out", out)?;
         return numpy.call_method("stack", (results,), Some(&options));
     };
-    let out: Vec<Option<Bound<'py, PyAny>>> = match out {
-        None => vec![None; tuple.len()],
-        Some(out) => out.try_iter()?.map(|x| x.map(Some)).collect::<PyResult<_>>()?,
+    let names = match first.getattr("_fields") {
+        Ok(fields) => fields.extract()?,
+        Err(_) => (0..tuple.len()).map(|k| k.to_string()).collect::<Vec<_>>(),
     };
+    let out = members(out, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
     let member = |k: usize| {
-        let members = results.iter().map(|r| r.get_item(k)).collect::<PyResult<Vec<_>>>()?;
-        stack(py, members, out.get(k).and_then(Option::as_ref))
+        let parts = results.iter().map(|r| r.get_item(k)).collect::<PyResult<Vec<_>>>()?;
+        stack(py, parts, out.get(k).and_then(Option::as_ref))
     };
     let members = PyTuple::new(py, (0..tuple.len()).map(member).collect::<PyResult<Vec<_>>>()?)?;
     match first.get_type().getattr("_make") {
@@ -100,42 +105,132 @@ pub(crate) fn stack<'py>(
     }
 }
 
-/// The result of a batch of the library, for so many states.
-pub(crate) struct PerState<T> {
-    pub(crate) result: T,
-    pub(crate) states: usize,
+/// The numbers of an argument for all states, one state after the other.
+pub(crate) enum Rows<'py> {
+    /// As they lie in the caller's array.
+    Array(Input<'py, Ix2>),
+    /// Copied, where results may be written over them.
+    Copy(Vec<f64>),
 }
 
-impl Give for PerState<&[f64]> {
-    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        let shape = [self.states, self.result.len() / self.states.max(1)];
-        output(py, out, &shape, |x| x.copy_from_slice(self.result))
+impl Deref for Rows<'_> {
+    type Target = [f64];
+    fn deref(&self) -> &[f64] {
+        match self {
+            Self::Array(input) => input,
+            Self::Copy(numbers) => numbers,
+        }
     }
 }
 
-impl Give for PerState<Matrices<'_, f64>> {
-    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        let n = self.result.iter().next().map_or(0, |matrix| matrix.nrows());
-        output(py, out, &[self.states, n, n], |x| {
-            self.result.iter().zip(x.chunks_exact_mut((n * n).max(1))).for_each(|(matrix, x)| matrix.write(x));
-        })
+/// The results of a function that computes in lanes: the named tuple of a single state, if they are several, and for each
+/// its name and its axes of length nv beside that of the states.
+pub(crate) struct Kind {
+    class: Option<&'static str>,
+    members: &'static [(&'static str, u32)],
+}
+
+pub(crate) const VECTOR: Kind = Kind { class: None, members: &[("out", 1)] };
+pub(crate) const MATRIX: Kind = Kind { class: None, members: &[("out", 2)] };
+pub(crate) const RNEA_DERIVATIVES: Kind =
+    Kind { class: Some("RneaDerivatives"), members: &[("dtau_dq", 2), ("dtau_dv", 2), ("dtau_da", 2)] };
+pub(crate) const ABA_DERIVATIVES: Kind =
+    Kind { class: Some("AbaDerivatives"), members: &[("a", 1), ("da_dq", 2), ("da_dv", 2), ("da_dtau", 2)] };
+
+/// The results of some states, which know how to write themselves.
+pub(crate) trait Results {
+    /// Writes each result in C order.
+    fn write(&self, to: &mut [&mut [f64]]);
+}
+
+impl Results for &[f64] {
+    fn write(&self, to: &mut [&mut [f64]]) {
+        to[0].copy_from_slice(&self[..to[0].len()]);
     }
 }
 
-/// Implementations of `Give` for results of several members, as the named tuple of a single state.
-macro_rules! per_state {
-    ($($batch:ident as $class:literal { $($member:ident),* })*) => {$(
-        impl Give for PerState<$batch<'_, f64>> {
-            fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-                let Self { result, states } = self;
-                give_named!(py, out, $class, {
-                    $(stringify!($member) => PerState { result: result.$member, states: *states }),*
-                })
+impl Results for Matrices<'_, f64> {
+    fn write(&self, to: &mut [&mut [f64]]) {
+        for (matrix, to) in self.iter().zip(to[0].chunks_exact_mut(self.at(0).len().max(1))) {
+            matrix.write(to);
+        }
+    }
+}
+
+impl Results for BatchRneaDerivatives<'_, f64> {
+    fn write(&self, to: &mut [&mut [f64]]) {
+        [self.dtau_dq, self.dtau_dv, self.dtau_da]
+            .iter()
+            .zip(to.chunks_exact_mut(1))
+            .for_each(|(x, to)| Results::write(x, to));
+    }
+}
+
+impl Results for BatchAbaDerivatives<'_, f64> {
+    fn write(&self, to: &mut [&mut [f64]]) {
+        let (a, to) = to.split_at_mut(1);
+        Results::write(&self.a, a);
+        [self.da_dq, self.da_dv, self.da_dtau]
+            .iter()
+            .zip(to.chunks_exact_mut(1))
+            .for_each(|(x, to)| Results::write(x, to));
+    }
+}
+
+/// The number of states of a part, at most: some thousand multiplications a number of a matrix nv × nv take some
+/// milliseconds, and the matrices of a part some megabytes; each thread has two registers full at least.
+pub(crate) fn part_size(nv: usize, threads: usize) -> usize {
+    const NUMBERS: usize = 1 << 19;
+    (NUMBERS / (nv * nv).max(64)).max(16 * threads)
+}
+
+/// An argument's numbers for some of all states.
+pub(crate) fn part<'a, T>(of: &'a [T], some: &Range<usize>, states: usize) -> &'a [T] {
+    let each = of.len() / states;
+    &of[some.start * each..some.end * each]
+}
+
+/// Computes all states part after part, with the interpreter's lock released, to `out` or to new arrays. If a signal ends
+/// it, `out` is written as far as it came.
+pub(crate) fn run<'py>(
+    py: Python<'py>,
+    batch: &mut Batch,
+    kind: &Kind,
+    (nv, states): (usize, usize),
+    out: Option<&Bound<'py, PyAny>>,
+    mut compute: impl FnMut(&mut Batch, Range<usize>, &mut [&mut [f64]]) + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let names: Vec<_> = kind.members.iter().map(|(name, _)| *name).collect();
+    let given = match kind.class {
+        None => vec![out.cloned()],
+        Some(_) => members(out, &names)?,
+    };
+    let mut given = given.into_iter().chain(iter::repeat(None));
+    let sizes: Vec<usize> = kind.members.iter().map(|(_, axes)| nv.pow(*axes)).collect();
+    let mut arrays = Vec::new();
+    for (_, axes) in kind.members {
+        let shape = iter::once(states).chain(iter::repeat_n(nv, *axes as usize)).collect::<Vec<_>>();
+        arrays.push(place(py, given.next().flatten().as_ref(), &shape)?);
+    }
+    let mut borrowed = arrays.iter().map(writable).collect::<PyResult<Vec<_>>>()?;
+    let mut numbers = borrowed.iter_mut().map(|array| Ok(array.as_slice_mut()?)).collect::<PyResult<Vec<_>>>()?;
+    let mut signals = Signals::new(signals::SHORT);
+    py.detach(|| {
+        let step = batch.capacity();
+        for from in (0..states).step_by(step) {
+            let some = from..states.min(from + step);
+            let places = numbers.iter_mut().zip(&sizes);
+            let mut to: Vec<_> = places.map(|(x, size)| &mut x[some.start * size..some.end * size]).collect();
+            compute(batch, some, &mut to);
+            if signals.go_on().is_break() {
+                return;
             }
         }
-    )*};
-}
-per_state! {
-    BatchRneaDerivatives as "RneaDerivatives" { dtau_dq, dtau_dv, dtau_da }
-    BatchAbaDerivatives as "AbaDerivatives" { a, da_dq, da_dv, da_dtau }
+    });
+    signals.finish()?;
+    drop(borrowed);
+    match kind.class {
+        None => Ok(out.cloned().unwrap_or_else(|| arrays.remove(0).into_any())),
+        Some(class) => py.import("condyle._types")?.getattr(class)?.call1(PyTuple::new(py, arrays)?),
+    }
 }

@@ -6,9 +6,10 @@ use crate::functions::functions;
 use crate::model::Model;
 use condyle::{DifferenceArgument, IntegrateArgument, Scalar};
 use nalgebra::DMatrix;
+use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use rand::SeedableRng;
-use rand::rngs::StdRng;
+use rand::rngs::{StdRng, SysRng};
 
 /// A random position, nq numbers: uniform between its limits, within ±3 (rad, m) where a coordinate has no limits, and
 /// over the whole group for rotations.
@@ -17,7 +18,11 @@ use rand::rngs::StdRng;
 #[pyfunction]
 #[pyo3(signature = (model, seed=None))]
 pub(crate) fn random_configuration<'py>(model: &Bound<'py, Model>, seed: Option<u64>) -> PyResult<Bound<'py, PyAny>> {
-    let mut rng = StdRng::seed_from_u64(seed.unwrap_or_else(rand::random));
+    let mut rng = match seed {
+        Some(seed) => StdRng::seed_from_u64(seed),
+        // from the system: forked processes would go on with the same numbers of their parent
+        None => StdRng::try_from_rng(&mut SysRng).map_err(|error| PyOSError::new_err(error.to_string()))?,
+    };
     condyle::random_configuration(&model.get().inner, &mut rng).give(model.py(), None)
 }
 

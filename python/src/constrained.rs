@@ -2,7 +2,7 @@
 
 use crate::arrays::{Give, array, named_tuples, pose};
 use crate::data::{Holds, Scratch};
-use crate::exceptions::{exception, wrong_word};
+use crate::exceptions::{exception, within, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
 use crate::hyper_dual::Hyper;
 use crate::model::{MadeFor, Model, frame_index};
@@ -74,10 +74,11 @@ fn aim(
 /// is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
 /// sparse resolution of constrained dynamic equations (2021).
 ///
-/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always.
+/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always, 1 to
+/// 10000.
 ///
 /// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
-/// 'world', a gain is negative or not finite, or two constraints are the same.
+/// 'world', a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> trot = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
@@ -136,7 +137,8 @@ impl ConstraintSet {
         if !(mu.is_finite() && mu >= 0.0) {
             return Err(PyValueError::new_err(format!("mu: expected a number of at least 0, found {mu}")));
         }
-        let (made_for, model) = (MadeFor::new(model.get()), &model.get().inner);
+        within("iterations", iterations, 1, 10_000)?;
+        let (made_for, model) = (MadeFor::with_geometry(model.get()), &model.get().inner);
         let constraints = constraints.iter().map(|c| constraint(model, c)).collect::<PyResult<Vec<_>>>()?;
         let mut inner = condyle::ConstraintSet::new(model, &constraints).map_err(exception)?;
         inner.proximal = Proximal { mu, iterations };
@@ -162,6 +164,8 @@ impl ConstraintSet {
 
     /// Changes the target of constraint k: where its frame should be and how it should move there. What is not given
     /// stays as it is.
+    ///
+    /// Raises `ModelError` for numbers that are not finite and a placement that is none; the old target then stays.
     #[pyo3(signature = (k, placement=None, velocity=None, acceleration=None))]
     fn set_target(
         &mut self,
@@ -171,8 +175,10 @@ impl ConstraintSet {
         acceleration: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let k = self.checked(k)?;
-        aim(self.inner.target_mut(k), placement, velocity, acceleration)?;
-        self.constraints[k].target = *self.inner.target_mut(k);
+        let mut target = self.inner.target(k);
+        aim(&mut target, placement, velocity, acceleration)?;
+        self.inner.set_target(k, target).map_err(exception)?;
+        self.constraints[k].target = target;
         self.dual = None;
         Ok(())
     }

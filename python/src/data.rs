@@ -1,9 +1,11 @@
 //! The scratch of the algorithms, and how a call takes it.
 
+use crate::batch;
+use crate::exceptions::within;
 use crate::hyper_dual::Hyper;
 use crate::model::{MadeFor, Model};
 use pyo3::PyClass;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::False;
 
@@ -14,7 +16,7 @@ use pyo3::pyclass::boolean_struct::False;
 /// with another robot's model, a `ValueError`.
 ///
 /// model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
-/// several states side by side in vector registers.
+/// several states side by side in vector registers; at most 1024.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.Data(arm)
@@ -26,7 +28,7 @@ pub(crate) struct Data {
     threads: usize,
     /// The scratch for hyper-dual numbers, made when it is first needed.
     dual: Option<Box<condyle::Data<Hyper>>>,
-    /// The batch for as many states as one call has had at most.
+    /// The batch for as many states as a part of a call has had at most.
     batch: Option<Box<condyle::Batch>>,
 }
 
@@ -35,9 +37,7 @@ impl Data {
     #[new]
     #[pyo3(signature = (model, threads = 1))]
     fn new(model: &Bound<'_, Model>, threads: usize) -> PyResult<Self> {
-        if threads == 0 {
-            return Err(PyValueError::new_err("threads: expected at least 1, found 0"));
-        }
+        within("threads", threads, 1, condyle::Batch::<f64>::MOST_THREADS)?;
         let model = model.get();
         let (inner, made_for) = (condyle::Data::new(&model.inner), MadeFor::new(model));
         Ok(Self { inner, made_for, threads, dual: None, batch: None })
@@ -50,8 +50,9 @@ impl Data {
 }
 
 impl Data {
-    /// A batch with room for so many states.
+    /// A batch with room for so many states, or for a part of them.
     pub(crate) fn batch(&mut self, model: &condyle::Model, states: usize) -> &mut condyle::Batch {
+        let states = states.min(batch::part_size(model.nv(), self.threads));
         let enough = self.batch.take().filter(|batch| batch.capacity() >= states);
         let threads = self.threads;
         self.batch.insert(enough.unwrap_or_else(|| Box::new(condyle::Batch::new(model, states, threads))))

@@ -27,7 +27,6 @@ pub(crate) fn exception(error: Cause) -> PyErr {
         Cause::File { .. }
         | Cause::Package { .. }
         | Cause::Xml { .. }
-        | Cause::Urdf { .. }
         | Cause::Element { .. }
         | Cause::Strict { .. } => ParseError::new_err(error.to_string()),
         _ => ModelError::new_err(error.to_string()),
@@ -42,4 +41,15 @@ pub(crate) fn problem_error(error: condyle::optimal::Error) -> PyErr {
 /// The error for a word that is none of those that an argument may be.
 pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
+}
+
+/// A number that an argument gives, if it is within its limits.
+pub(crate) fn within(name: &str, found: usize, least: usize, most: usize) -> PyResult<usize> {
+    if found < least {
+        return Err(PyValueError::new_err(format!("{name}: expected at least {least}, found {found}")));
+    }
+    if found > most {
+        return Err(PyValueError::new_err(format!("{name}: expected at most {most}, found {found}")));
+    }
+    Ok(found)
 }

@@ -1,6 +1,7 @@
 //! Factors of the inertia matrix, and forward dynamics by divide and conquer: the library's types one to one.
 
 use crate::arrays::{Give, class, matrix, vector};
+use crate::exceptions::within;
 use crate::functions::{Argument, Forces, Position, Tangent, regular, rows};
 use crate::model::{MadeFor, Model};
 use nalgebra::DMatrix;
@@ -146,7 +147,7 @@ factor! {
 /// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
 /// and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
 ///
-/// n: the rows of M.
+/// n: the rows of M, at most 4096.
 ///
 /// >>> factor = condyle.Cholesky(2)
 /// >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
@@ -154,8 +155,9 @@ factor! {
 /// array([1., 2.])
 Cholesky {
     #[new]
-    fn new(n: usize) -> Self {
-        Self { inner: condyle::Cholesky::new(n), size: n, done: false }
+    fn new(n: usize) -> PyResult<Self> {
+        within("n", n, 0, condyle::Cholesky::<f64>::MOST_ROWS)?;
+        Ok(Self { inner: condyle::Cholesky::new(n), size: n, done: false })
     }
 
     /// The factor L, lower triangular.
@@ -195,7 +197,7 @@ impl DivideConquer {
     #[new]
     fn new(model: &Bound<'_, Model>, grain: usize) -> Self {
         let model = model.get();
-        Self { inner: condyle::DivideConquer::new(&model.inner, grain), made_for: MadeFor::new(model) }
+        Self { inner: condyle::DivideConquer::new(&model.inner, grain), made_for: MadeFor::with_geometry(model) }
     }
 
     /// The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`.

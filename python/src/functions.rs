@@ -12,10 +12,10 @@
 //! Each argument is of a kind, a type below that says how it is read; the last expression is what Python gets, an
 //! array or a tuple of arrays, or with `out` what was given as such. Scratch other than `data` stands after it, with its
 //! type. The call takes its scratch before it looks at any other argument, so that a second use of the same one, from
-//! wherever, is an error; it gives its inputs back before it writes to `out`, which may be one of them. Positions,
+//! wherever, is an error; it has done with its inputs before it writes to `out`, which may be one of them. Positions,
 //! tangent vectors and forces may be given for many states, with one axis more: then so are the results, see `batch.rs`.
 
-use crate::arrays::{Input, Number};
+use crate::arrays::Number;
 use crate::batch;
 use crate::exceptions::{ModelError, wrong_word};
 use crate::hyper_dual;
@@ -53,8 +53,8 @@ pub(crate) trait Argument<'a, 'py> {
     fn states(_given: &Self::Given) -> PyResult<Option<usize>> {
         Ok(None)
     }
-    /// Reads the argument for so many states.
-    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All>;
+    /// Reads the argument for so many states; as a copy, if the array may change before all are computed.
+    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize, copy: bool) -> PyResult<Self::All>;
 }
 
 /// Kinds of argument that are one vector a state, with the length of the vector.
@@ -66,7 +66,7 @@ macro_rules! vectors {
         impl<'a, 'py: 'a> Argument<'a, 'py> for $kind {
             type Given = &'a Bound<'py, PyAny>;
             type Read<S: Number> = S::Input<'py, Ix1>;
-            type All = Input<'py, Ix2>;
+            type All = batch::Rows<'py>;
             fn read_at<S: Number>(
                 name: &str,
                 given: &Self::Given,
@@ -81,8 +81,15 @@ macro_rules! vectors {
             fn states(given: &Self::Given) -> PyResult<Option<usize>> {
                 batch::states(given, 1)
             }
-            fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
-                batch::all(name, given, 1, states, model.$length())
+            fn read_all(
+                name: &str,
+                given: &Self::Given,
+                model: &Model,
+                states: usize,
+                copy: bool,
+            ) -> PyResult<Self::All> {
+                let rows = batch::all(name, given, 1, states, model.$length())?;
+                Ok(if copy { batch::Rows::Copy(rows.to_vec()) } else { batch::Rows::Array(rows) })
             }
         }
     )*};
@@ -117,7 +124,7 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     fn states(given: &Self::Given) -> PyResult<Option<usize>> {
         given.map_or(Ok(None), |given| batch::states(given, 2))
     }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize) -> PyResult<Self::All> {
+    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize, _: bool) -> PyResult<Self::All> {
         let Some(given) = given else { return Ok(Vec::new()) };
         Ok(batch::forces(&batch::all(name, given, 2, states, 6 * model.bodies().len())?))
     }
@@ -149,7 +156,7 @@ macro_rules! shared {
             $(fn is_dual(given: &Self::Given) -> bool {
                 $is_dual(given)
             })?
-            fn read_all(_: &str, _: &Self::Given, _: &Model, _: usize) -> PyResult<Self::All> {
+            fn read_all(_: &str, _: &Self::Given, _: &Model, _: usize, _: bool) -> PyResult<Self::All> {
                 unreachable!("{}: not an argument of what runs in lanes", stringify!($kind))
             }
         }
@@ -257,7 +264,7 @@ macro_rules! functions {
         $(#[$doc:meta])*
         fn $name:ident($model:ident $(, $data:ident $(, $scratch:ident: $Scratch:ident)?)?;
             $($arg:ident: $kind:ident $(= $default:tt)?),* $(; $out:ident)?) $body:block
-        $(batch $batch:ident: $check:ident($($all:ident: $all_kind:ident),*) $in_lanes:block)?
+        $(batch $batch:ident: $check:ident($($all:ident: $all_kind:ident),*) -> $results:ident $in_lanes:block)?
     )*) => {$(
         $(#[$doc])*
         #[pyfunction]
@@ -283,13 +290,14 @@ macro_rules! functions {
             let states = batch::agreed(&states)?;
             $(if let (Some(states), false) = (states, dual) {
                 $check($model)?;
-                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all, $model, states)?;)*
-                let $batch = data.batch($model, states);
-                let result = {
-                    $(let $all = &$all[..];)*
-                    py.detach(|| $in_lanes)
-                };
-                return batch::PerState { result, states }.give(py, out);
+                let copy = out.is_some();
+                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all, $model, states, copy)?;)*
+                $(let $all = &$all[..];)*
+                let lanes = data.batch($model, states);
+                return batch::run(py, lanes, &batch::$results, ($model.nv(), states), out, |$batch, some, to| {
+                    $(let $all = batch::part($all, &some, states);)*
+                    batch::Results::write(&$in_lanes, to)
+                });
             })?
             // the same source for doubles and for hyper-dual numbers
             macro_rules! call {
@@ -314,7 +322,12 @@ macro_rules! functions {
             match states {
                 None => call(None, out),
                 Some(states) => {
-                    let results = (0..states).map(|k| call(Some(k), None)).collect::<PyResult<Vec<_>>>()?;
+                    let mut signals = $crate::signals::Signals::new($crate::signals::SHORT);
+                    let mut one = |k| {
+                        signals.look(py)?;
+                        call(Some(k), None)
+                    };
+                    let results = (0..states).map(&mut one).collect::<PyResult<Vec<_>>>()?;
                     batch::stack(py, results, out)
                 }
             }

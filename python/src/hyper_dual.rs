@@ -15,6 +15,21 @@ use pyo3::pyclass::CompareOp;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hyper(HyperDual64);
 
+impl Hyper {
+    /// A number that changes in the first direction at the rate 1.
+    pub(crate) fn first(x: f64) -> Self {
+        Self(HyperDual64::new(x, 1.0, 0.0, 0.0))
+    }
+    /// A number that changes in the second direction at the rate 1.
+    pub(crate) fn second(x: f64) -> Self {
+        Self(HyperDual64::new(x, 0.0, 1.0, 0.0))
+    }
+    /// The derivatives in both directions.
+    pub(crate) fn slopes(self) -> [f64; 2] {
+        [self.0.eps1, self.0.eps2]
+    }
+}
+
 macro_rules! operators {
     ($($trait:ident $name:ident),*; $($assign:ident $assign_name:ident $operator:tt),*) => {
         $(impl $trait for Hyper {

@@ -1,7 +1,8 @@
 //! The Python package `condyle`: its extension module `condyle._condyle`.
 //!
 //! No module uses one that stands after it here:
-//! - `exceptions` and `arrays`: what the package raises, and NumPy arrays in and out; `hyper_dual` numbers;
+//! - `exceptions`, `signals` and `arrays`: what the package raises, what ends a call that lasts, and NumPy arrays in and
+//!   out; `hyper_dual` numbers;
 //! - `joint`, `inertial_parameters`, `model`, `robots`, `builder`: robots, and how they are made;
 //! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
@@ -16,6 +17,7 @@ mod algorithms;
 mod arrays;
 mod batch;
 mod builder;
+mod casadi;
 mod centroidal;
 mod configuration;
 mod constrained;
@@ -32,8 +34,10 @@ mod model;
 mod optimal;
 mod regressors;
 mod robots;
+mod signals;
 mod simulation;
 
+use pyo3::exceptions::PyImportError;
 use pyo3::prelude::*;
 
 /// Rigid-body dynamics with exact derivatives: the compiled part of `condyle`.
@@ -48,6 +52,8 @@ mod _condyle {
     };
     #[pymodule_export]
     use builder::{BodyId, ModelBuilder};
+    #[pymodule_export]
+    use casadi::{casadi_hold, casadi_release};
     #[pymodule_export]
     use centroidal::{
         centroidal_map, centroidal_map_rate, centroidal_momentum, centroidal_momentum_rate, com, com_acceleration,
@@ -109,6 +115,7 @@ mod _condyle {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        condyle::level::requested().map_err(|refused| PyImportError::new_err(refused.to_string()))?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("WORLD", builder::world(module.py())?)?;
         module.add("ARM7", condyle::robots::ARM7)?;

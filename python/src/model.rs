@@ -30,22 +30,33 @@ pub(crate) struct Model {
 /// The models that something was made for: one, and all others of the same bodies and joints.
 pub(crate) struct MadeFor {
     structure: u64,
+    /// Of the places of joints and frames, where they matter.
+    geometry: Option<u64>,
     /// The name of the model that it was made for.
     pub(crate) name: String,
 }
 
 impl MadeFor {
     pub(crate) fn new(model: &Model) -> Self {
-        Self { structure: model.structure, name: model.inner.name().to_owned() }
+        Self { structure: model.structure, geometry: None, name: model.inner.name().to_owned() }
+    }
+
+    /// The models of the same bodies and joints whose joints and frames are in the same places.
+    pub(crate) fn with_geometry(model: &Model) -> Self {
+        Self { geometry: Some(model.inner.geometry_hash()), ..Self::new(model) }
     }
 
     /// Raises a `ValueError` if the model is another one; `argument` names what was made.
     pub(crate) fn check(&self, argument: &str, model: &Model) -> PyResult<()> {
-        if self.structure == model.structure {
+        let elsewhere = self.geometry.is_some_and(|geometry| geometry != model.inner.geometry_hash());
+        if self.structure == model.structure && !elsewhere {
             return Ok(());
         }
         let (made, given) = (&self.name, model.inner.name());
-        Err(PyValueError::new_err(format!("{argument}: made for another model ('{made}'), not for this '{given}'")))
+        let why = if self.structure == model.structure { ", whose joints or frames are elsewhere" } else { "" };
+        Err(PyValueError::new_err(format!(
+            "{argument}: made for another model ('{made}'), not for this '{given}'{why}"
+        )))
     }
 }
 
@@ -83,10 +94,12 @@ pub(crate) fn body_index(
 /// An index from `least` to below `count`.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
     let index: isize = given.extract()?;
-    usize::try_from(index)
-        .ok()
-        .filter(|i| (least..count).contains(i))
-        .ok_or_else(|| PyIndexError::new_err(format!("{expected} or {least} to {}, found {index}", count - 1)))
+    let wrong = || match count {
+        _ if least < count => format!("{expected} or {least} to {}, found {index}", count - 1),
+        _ => format!("{expected}, found {index}: the model has none"),
+    };
+    let inside = usize::try_from(index).ok().filter(|i| (least..count).contains(i));
+    inside.ok_or_else(|| PyIndexError::new_err(wrong()))
 }
 
 impl Model {
@@ -410,18 +423,25 @@ impl Model {
     }
 
     /// The same robot under another gravity (m/s², 3 numbers, in the world's frame).
+    ///
+    /// Raises `ModelError` if it is not finite.
     fn with_gravity(&self, gravity: &Bound<'_, PyAny>) -> PyResult<Self> {
         let gravity = three("gravity", gravity)?;
-        Ok(Self { inner: self.inner.clone().with_gravity(gravity), structure: self.structure })
+        Ok(self.inner.clone().with_gravity(gravity).map_err(exception)?.into())
     }
 
     /// The same robot with another armature, nv numbers (kg m², kg).
+    ///
+    /// Raises `ModelError` if one is negative or not finite.
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
         let armature = vector("armature", armature, self.inner.nv())?;
-        Ok(Self { inner: self.inner.clone().with_armature(&armature), structure: self.structure })
+        Ok(self.inner.clone().with_armature(&armature).map_err(exception)?.into())
     }
 
-    /// The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
+    /// The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
+    /// them is in its `warnings` and `singular_joints`.
+    ///
+    /// Raises `ModelError` if a mass is negative or a number is not finite.
     ///
     /// >>> arm = condyle.robots.arm7()
     /// >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
@@ -434,7 +454,7 @@ impl Model {
             return Err(PyValueError::new_err(format!("inertias: expected {expected}, found {found}")));
         }
         let inertias = inertias.iter().map(|I| read_inertia("inertias", I)).collect::<PyResult<Vec<_>>>()?;
-        Ok(Self { inner: self.inner.with_inertias(|body, _| inertias[body]), structure: self.structure })
+        Ok(self.inner.with_inertias(|body, _| inertias[body]).map_err(exception)?.into())
     }
 
     /// The same robot with some joints locked where they are at q.
@@ -448,7 +468,7 @@ impl Model {
     /// >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
     /// ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
     ///
-    /// Raises `ModelError`.
+    /// Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
     fn lock(&self, joints: Vec<Bound<'_, PyAny>>, q: &Bound<'_, PyAny>) -> PyResult<Self> {
         let joints = joints
             .iter()

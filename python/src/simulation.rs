@@ -4,8 +4,10 @@ use crate::arrays::{Give, class, output};
 use crate::exceptions::wrong_word;
 use crate::functions::{Argument, Forces, Position, Tangent, positive_speed, regular};
 use crate::model::Model;
+use crate::signals::{self, Signals};
 use condyle::simulation as rust;
 use pyo3::exceptions::PyTypeError;
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::{Integrator, Settings, Status};
 
@@ -124,18 +126,37 @@ impl Simulation {
         Ok(word(self.0.with_dependent_mut(|_, simulation| simulation.step(&tau, &f_ext))))
     }
 
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(self.0.borrow_owner())
+    }
+
     /// A number of steps, with a control law that is called before each of them. Returns the status of the last step,
     /// and ends early when a step fails.
     ///
     /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
     ///     efforts, then other threads run meanwhile.
+    ///
+    /// What a handler of a signal raises, as KeyboardInterrupt, ends the run after a step, whose state is kept.
     #[pyo3(signature = (steps, control=None))]
     fn run(slf: &Bound<'_, Self>, steps: usize, control: Option<&Bound<'_, PyAny>>) -> PyResult<&'static str> {
         let py = slf.py();
         let Some(control) = control else {
             let mut this = slf.try_borrow_mut()?;
-            let owned = &mut this.0;
-            return Ok(word(py.detach(|| owned.with_dependent_mut(|_, simulation| simulation.run(steps, |_| {})))));
+            let (owned, mut signals) = (&mut this.0, Signals::new(signals::LONG));
+            let status = py.detach(|| {
+                owned.with_dependent_mut(|_, simulation| {
+                    let mut status = Status::Done;
+                    for _ in 0..steps {
+                        status = simulation.run(1, |_| {});
+                        if !status.is_done() || signals.go_on().is_break() {
+                            break;
+                        }
+                    }
+                    status
+                })
+            });
+            signals.finish()?;
+            return Ok(word(status));
         };
         let class = class!(py, "Control")?;
         let model = slf.try_borrow()?.0.borrow_owner().clone_ref(py);

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sample import Robot
+from sample import Robot, make
 
 import condyle
 
@@ -32,8 +32,10 @@ def argument(name: str, robot: Robot, states: int) -> Any:
         case "f_ext":
             return rng.standard_normal((*shape, model.nbodies, 6))
         case "frame" | "body":
-            return 1
+            return 1 if model.nq else 0
         case "constraints":
+            if model.nq == 0:
+                return condyle.ConstraintSet(model, [])
             return condyle.ConstraintSet(model, [condyle.ContactConstraint(len(model.frames) - 1, "point")])
         case "by" | "argument" | "of":
             return None
@@ -54,6 +56,21 @@ def members(result: Any) -> list[Any]:
     if isinstance(result, tuple):
         return [member for part in result for member in members(part)]
     return [result]
+
+
+FIXED = """<robot name="fixed">
+  <link name="base"/>
+  <link name="arm"><inertial>
+    <mass value="2"/><origin xyz="0 0 1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+  </inertial></link>
+  <joint name="bolt" type="fixed"><origin xyz="1 0 0"/><parent link="base"/><child link="arm"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize("name", functions())
+def test_without_coordinates(name: str) -> None:
+    """A robot of fixed joints only: no function fails, for one state or for many."""
+    test_as_one_by_one(name, make(condyle.Model.from_urdf_str(FIXED)))
 
 
 @pytest.mark.parametrize("name", functions())
@@ -149,3 +166,49 @@ def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
     use()
     worker.join()
     assert errors and "data: in use by another call" in str(errors[0])
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("shift", [0, 1, 40])
+def test_out_over_an_input(shift: int, threads: int) -> None:
+    """`out` may be an input, or share memory with it: all states are computed from what was given."""
+    arm = condyle.robots.arm7()
+    states = 30_000  # more than are computed at a time
+    data, memory = condyle.Data(arm, threads=threads), np.random.default_rng(0).standard_normal((states + 40, 7))
+    q, out = memory[40 - shift : states + 40 - shift], memory[40 : states + 40]
+    expected = condyle.rnea(arm, data, q, q, q)
+    assert condyle.rnea(arm, data, q, q, q, out=out) is out
+    np.testing.assert_array_equal(out, expected)
+    # state after state
+    q, out = memory[40 - shift : 140 - shift], memory[40:140]
+    expected = condyle.integrate(arm, q, q)
+    condyle.integrate(arm, q, q, out=out)
+    np.testing.assert_array_equal(out, expected)
+
+
+def test_out_over_forces() -> None:
+    arm = condyle.robots.arm7()
+    data, forces = condyle.Data(arm), np.random.default_rng(0).standard_normal((50, arm.nbodies, 6))
+    q = np.zeros(7)
+    expected = condyle.rnea(arm, data, q, q, q, forces)
+    out = forces.reshape(-1)[: 50 * 7].reshape(50, 7)
+    np.testing.assert_array_equal(condyle.rnea(arm, data, q, q, q, forces, out=out), expected)
+
+
+@pytest.mark.parametrize("states", [(), (20,)])
+def test_one_array_twice(quadruped: Robot, states: tuple[int, ...]) -> None:
+    """Two results in one array are refused before anything is written; one input twice is none of our business."""
+    model, data = quadruped.model, quadruped.data
+    q = np.broadcast_to(quadruped.q, (*states, 19)).copy()
+    v = np.zeros((*states, 18))
+    memory = np.zeros((4, *states, 18, 18))
+    with pytest.raises(ValueError, match="^out: the arrays for dtau_dq and dtau_da share memory$"):
+        condyle.rnea_derivatives(model, data, q, v, v, out=(memory[0], memory[1], memory[0]))
+    overlapping = memory.reshape(-1)[18 : 18 + memory[0].size].reshape(memory[0].shape)
+    with pytest.raises(ValueError, match="^out: the arrays for dtau_dv and dtau_da share memory$"):
+        condyle.rnea_derivatives(model, data, q, v, v, out=(memory[2], overlapping, memory[0]))
+    with pytest.raises(ValueError, match="share memory$"):  # of these the states are computed one by one
+        condyle.coriolis_derivatives(model, data, q, v, out=(memory[0], memory[0]))
+    assert not memory.any()
+    condyle.rnea_derivatives(model, data, q, v, v, out=tuple(memory[:3]))
+    assert memory.any()

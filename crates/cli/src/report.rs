@@ -150,6 +150,8 @@ pub(crate) fn status(status: Status) -> &'static str {
         Status::Converged => "converged",
         Status::MaxIterations => "iteration limit",
         Status::RegularisationLimit => "no descent found",
+        Status::TimeLimit => "out of time",
+        Status::Interrupted => "interrupted",
         _ => "not finite",
     }
 }

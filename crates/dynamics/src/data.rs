@@ -22,10 +22,10 @@ use crate::passes::minv;
 use crate::passes::regressor;
 use crate::passes::rnea;
 use crate::passes::statics;
-use crate::workspace::Size;
+use crate::workspace::{Long, Short, Size};
 use condyle_model::Model;
 use condyle_spatial::Scalar;
-use condyle_spatial::gate::{Long, Short, is, renamed};
+use condyle_spatial::gate::{is, renamed};
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
 ///

@@ -9,10 +9,11 @@
 //! pair of directions. What has a derivative by hand has it many times faster.
 
 use crate::data::Data;
+use crate::workspace::{Long, Short};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::integrate;
-use condyle_spatial::block::{Block, Real};
+use condyle_spatial::block::Block;
 use condyle_spatial::lane_dual::LaneDual;
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
@@ -119,8 +120,8 @@ pub struct LaneJacobian {
 
 #[derive(Debug)]
 enum Width {
-    Long(Box<Directions<<f64 as Real>::Long>>),
-    Short(Box<Directions<<f64 as Real>::Short>>),
+    Long(Box<Directions<Long>>),
+    Short(Box<Directions<Short>>),
     One(Box<Directions<f64>>),
 }
 

@@ -4,7 +4,21 @@
 
 use condyle_model::Model;
 use condyle_spatial::Scalar;
+use condyle_spatial::gate::{self, Witness};
 use nalgebra::DMatrix;
+
+/// The promise of this crate, by which it names vectors.
+pub(crate) struct Gate;
+
+// SAFETY: vectors are made and used in kernels that are entered through their door, and in functions that choose the vectors
+// of the level in use.
+#[allow(unsafe_code)]
+unsafe impl Witness for Gate {}
+
+/// Four numbers at once, with AVX2 or NEON.
+pub(crate) type Short = gate::Short<Gate>;
+/// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
+pub(crate) type Long = gate::Long<Gate>;
 
 /// How large the arrays of a workspace are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -212,7 +212,7 @@ fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 
 /// Without gravity nothing changes the momentum of a free robot, whatever its joints do.
 #[test]
 fn momentum_is_conserved() {
-    let model = robots::humanoid().with_gravity(Vec3::zero());
+    let model = robots::humanoid().with_gravity(Vec3::zero()).unwrap();
     let mut data = Data::new(&model);
     let (q, v) = (neutral(&model), normal(&mut rng(3), model.nv()));
     let efforts = normal(&mut rng(4), model.nv());

@@ -72,6 +72,26 @@ fn a_missing_package_is_named() {
     assert!(matches!(load("package://", &[&src]), Err(Error::Package { .. })));
 }
 
+/// An address names a file of its package, and no other, whether that is there or not.
+#[test]
+fn addresses_stay_in_their_package() {
+    let workspace = Workspace::new("inside");
+    let (src, dog) = (workspace.0.join("src"), workspace.0.join("src/dog_description/dog.urdf"));
+    for (address, package) in [
+        ("package://arm_description/../dog_description/dog.urdf".to_owned(), "arm_description"),
+        ("package://arm_description/urdf/../../dog_description/dog.urdf".to_owned(), "arm_description"),
+        ("package://arm_description/../../x".to_owned(), "arm_description"),
+        ("package://arm_description//etc/passwd".to_owned(), "arm_description"),
+        (format!("package://arm_description/{}", dog.display()), "arm_description"),
+        ("package://../src/dog_description/dog.urdf".to_owned(), ".."),
+        ("package://./dog_description/dog.urdf".to_owned(), "."),
+    ] {
+        let error = load(&address, &[&src, &src.join("arm_description")]).unwrap_err();
+        assert_eq!(error.to_string(), format!("{address}: its path leads out of the package `{package}`"));
+    }
+    assert!(load("package://arm_description/./urdf//arm.urdf", &[&src]).is_ok());
+}
+
 /// ROS_PACKAGE_PATH, then AMENT_PREFIX_PATH; in a process of its own, whose environment can be chosen.
 #[test]
 fn folders_of_the_environment() {

@@ -75,8 +75,15 @@ pub struct Cholesky<S> {
 }
 
 impl<S: Scalar> Cholesky<S> {
+    /// The most rows: of doubles, the factor is then 128 MiB.
+    pub const MOST_ROWS: usize = 4096;
+
     /// Allocates the factor of an n × n matrix.
+    ///
+    /// # Panics
+    /// If n is above [`MOST_ROWS`](Self::MOST_ROWS).
     pub fn new(n: usize) -> Self {
+        assert!(n <= Self::MOST_ROWS, "n: expected at most {} rows, found {n}", Self::MOST_ROWS);
         Self { L: DMatrix::from_element(n, n, S::zero()) }
     }
 

@@ -23,6 +23,8 @@ mod product;
 mod registers;
 #[doc(hidden)]
 pub mod sparsity;
+#[doc(hidden)]
+pub mod threads;
 mod tile;
 #[doc(hidden)]
 pub mod tree_product;

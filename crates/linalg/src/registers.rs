@@ -1,17 +1,23 @@
 //! Vector registers for the dense kernels, and the choice of those that this machine has.
 
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real};
-use condyle_spatial::lanes::{Element, Lanes};
+use condyle_spatial::block::{Block, Real, Witness};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
 /// The registers of [`Level::Avx512`], and the columns of a tile that suit their number.
 #[cfg(target_arch = "x86_64")]
-pub(crate) type Long = <f64 as Real>::Long;
+pub(crate) type Long = <f64 as Real>::Long<Gate>;
 /// The registers of [`Level::Avx2`] or [`Level::Neon`].
-pub(crate) type Short = <f64 as Real>::Short;
+pub(crate) type Short = <f64 as Real>::Short<Gate>;
+
+/// The promise of this crate, by which it names registers.
+pub(crate) struct Gate;
+
+// SAFETY: registers are used in functions that are called at their level, and in kernels entered through their door.
+#[allow(unsafe_code)]
+unsafe impl Witness for Gate {}
 
 /// A register of N numbers.
 pub trait Vector: Copy {
@@ -79,21 +85,16 @@ impl Vector for Pair {
     }
 }
 
-impl<const N: usize> Vector for Lanes<f64, N>
-where
-    f64: Element<N>,
-{
-    const N: usize = N;
+impl<S: Block<Number = f64>> Vector for S {
+    const N: usize = S::LANES;
 
     #[inline(always)]
     fn load(x: &[f64]) -> Self {
-        let mut numbers = [0.0; N];
-        numbers.copy_from_slice(&x[..N]);
-        Self::from_array(numbers)
+        Block::load(x)
     }
     #[inline(always)]
     fn store(self, x: &mut [f64]) {
-        x[..N].copy_from_slice(&self.to_array());
+        Block::store(self, x);
     }
     #[inline(always)]
     fn splat(x: f64) -> Self {

@@ -2,10 +2,11 @@
 
 use crate::axpy::axpy;
 use crate::cast::{as_f64, as_f64_mut};
+use crate::registers::{Long, Short};
 use crate::sparsity::NonzeroRows;
 use condyle_spatial::Scalar;
 use condyle_spatial::block::Block;
-use condyle_spatial::gate::{Kernel, Level, Long, Short, level};
+use condyle_spatial::gate::{Kernel, Level, level};
 use condyle_spatial::kernel;
 use core::marker::PhantomData;
 

@@ -6,8 +6,8 @@ use crate::joint::{Joint, Mimic};
 use crate::limbs::Plan;
 use crate::model::Model;
 use crate::tree::Tree;
-use crate::validate;
-use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
+use crate::validate::{CoordinateNumbers, check_body, check_frame};
+use condyle_spatial::{Act, Inertia, Se3, Vec3};
 use std::collections::HashSet;
 
 /// The name of a body of a builder. [`WORLD`] is the one that is always there.
@@ -33,6 +33,29 @@ pub struct JointOptions {
     /// Inertia of the rotor as seen at the joint (kg m², kg).
     pub armature: f64,
 }
+
+impl JointOptions {
+    /// Says what is wrong with the numbers of a joint.
+    fn check(&self, joint: &str) -> Result<(), Error> {
+        let (lower, upper) = self.position.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        let infinite = f64::INFINITY;
+        CoordinateNumbers {
+            lower,
+            upper,
+            velocity: self.velocity.unwrap_or(infinite),
+            effort: self.effort.unwrap_or(infinite),
+            damping: self.damping,
+            friction: self.friction,
+            armature: self.armature,
+        }
+        .check(joint)
+    }
+}
+
+/// How many degrees of freedom the joints of a model may have: algorithms have matrices of their number by their number.
+const MAX_DEGREES: usize = 4096;
+/// How many coordinates a model may have whose joints follow others: its inertia matrix is factored as a dense one.
+const MAX_SHARED: usize = 1024;
 
 struct Draft {
     body: Body,
@@ -165,9 +188,13 @@ impl ModelBuilder {
     /// the model.
     ///
     /// # Errors
-    /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`] and [`Error::Frame`]: names, axes, masses, limits,
-    /// placements, numbers that are not finite, what a mimic joint follows.
+    /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`], [`Error::Frame`] and [`Error::Gravity`]: names, axes;
+    /// masses, damping, friction, armature, speeds and efforts below zero; limits that exclude each other; placements that
+    /// are none; numbers that are not finite, or so large that their products are not (above 1e30); what a mimic joint
+    /// follows. Every other way to make a model is checked alike. [`Error::Size`]: more than 4096 degrees of freedom, or
+    /// 1024 coordinates where joints follow others.
     pub fn build(mut self) -> Result<Model, Error> {
+        self.check_size()?;
         self.check()?;
         let order = self.depth_first();
         let mut number = vec![0; order.len()];
@@ -198,10 +225,7 @@ impl ModelBuilder {
                 (bodies[i].idx_q, bodies[i].idx_v, bodies[i].mimic) = (idx_q, idx_v, Some(mimic));
             }
         }
-        let mut warnings = Vec::new();
-        for (body, &old) in bodies.iter().zip(&order).skip(1) {
-            validate::check_inertia(body, self.drafts[old].between, &mut warnings);
-        }
+        let between = order.iter().map(|&old| self.drafts[old].between).collect();
         let Coordinates { nq, nv, limits, damping, friction, armature } = coordinates;
         let tree = Tree::new(&bodies, nq, nv);
         let mut model = Model {
@@ -215,10 +239,13 @@ impl ModelBuilder {
             gravity: self.gravity,
             limbs: Plan::new(&tree),
             tree,
-            warnings,
+            geometry: 0,
+            between,
+            warnings: Vec::new(),
             singular: Vec::new(),
         };
-        model.find_singular();
+        model.validate()?;
+        model.geometry = model.hash_geometry();
         Ok(model)
     }
 
@@ -236,6 +263,22 @@ impl ModelBuilder {
         order
     }
 
+    /// Checks the number of degrees of freedom.
+    pub(crate) fn check_size(&self) -> Result<(), Error> {
+        let degrees = |draft: &Draft| draft.body.joint.nv();
+        let joints = || self.drafts.iter().skip(1);
+        let found = joints().map(degrees).sum();
+        if found > MAX_DEGREES {
+            return Err(Error::Size { what: "degrees of freedom", found, limit: MAX_DEGREES });
+        }
+        let own = joints().filter(|draft| draft.mimic.is_none()).map(degrees).sum();
+        if own < found && own > MAX_SHARED {
+            let what = "coordinates, with joints that follow others";
+            return Err(Error::Size { what, found: own, limit: MAX_SHARED });
+        }
+        Ok(())
+    }
+
     /// Checks names, bodies, joints and frames, and makes axes unit vectors.
     fn check(&mut self) -> Result<(), Error> {
         let (mut bodies, mut joints, mut frames) = (HashSet::new(), HashSet::new(), HashSet::new());
@@ -250,7 +293,8 @@ impl ModelBuilder {
             }
             let wrong = |what: String| Error::Body { body: body.name.clone(), what };
             body.joint = body.joint.normalized().map_err(wrong)?;
-            check_inertia(body).and_then(|()| check_options(options)).map_err(wrong)?;
+            check_body(body)?;
+            options.check(&body.joint_name)?;
             if let Some((leader, mimic)) = *mimic {
                 let wrong = |what: String| Error::Joint { joint: body.joint_name.clone(), what };
                 if !(mimic.ratio.is_finite() && mimic.offset.is_finite()) {
@@ -263,63 +307,13 @@ impl ModelBuilder {
             }
         }
         for frame in &self.frames {
-            let wrong = |what: &str| Error::Frame { frame: frame.name.clone(), what: what.to_owned() };
-            if !squares(frame.placement).is_finite() {
-                return Err(wrong("is not finite"));
-            }
-            if !is_rotation(frame.placement.rotation) {
-                return Err(wrong("placement is no rotation and translation"));
-            }
+            check_frame(frame)?;
             if !frames.insert((frame.name.clone(), frame.kind as u8)) {
                 return Err(Error::Duplicate { kind: "frame", name: frame.name.clone() });
             }
         }
         Ok(())
     }
-}
-
-/// Says what is wrong with a body's inertia or placement.
-fn check_inertia(Body { inertia: I, placement, .. }: &Body) -> Result<(), String> {
-    let Sym3 { xx, yy, zz, xy, xz, yz } = I.rotational;
-    if !(I.mass_com.norm_squared() + (xx + yy + zz + xy + xz + yz) + squares(*placement)).is_finite() {
-        return Err("inertia or placement is not finite".to_owned());
-    }
-    if !is_rotation(placement.rotation) {
-        return Err("placement is no rotation and translation".to_owned());
-    }
-    if !(I.mass >= 0.0 && I.mass.is_finite()) {
-        return Err(format!("mass is {}", I.mass));
-    }
-    Ok(())
-}
-
-/// Says what is wrong with a joint's limits and losses.
-fn check_options(options: &JointOptions) -> Result<(), String> {
-    if let Some((lower, upper)) = options.position
-        && (lower > upper || lower.is_nan() || upper.is_nan())
-    {
-        return Err(format!("lower limit {lower} is above upper limit {upper}"));
-    }
-    let others = [options.damping, options.friction, options.armature];
-    if others.iter().chain(&options.velocity).chain(&options.effort).any(|x| x.is_nan()) {
-        return Err("a limit, damping, friction or armature is not a number".to_owned());
-    }
-    Ok(())
-}
-
-/// The sum of the squares of all numbers of a pose: finite if they are.
-fn squares(X: Se3<f64>) -> f64 {
-    X.rotation.columns().into_iter().chain([X.translation]).map(|c| c.norm_squared()).sum()
-}
-
-/// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
-const ROTATION_ROUNDING: f64 = 1e-6;
-
-/// Whether the columns of R are unit vectors at right angles, right-handed.
-fn is_rotation(R: Mat3<f64>) -> bool {
-    let Mat3 { x, y, z } = R;
-    let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
-    off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
 }
 
 /// The numbers that a model has for each coordinate.

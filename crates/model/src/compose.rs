@@ -103,6 +103,9 @@ impl ModelBuilder {
             };
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
+            if model.between[i] {
+                self.between(id);
+            }
             place.push((id, Se3::identity()));
         }
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
@@ -145,7 +148,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// Those of [`ModelBuilder::build`].
+    /// Those of [`ModelBuilder::build`]; [`Error::Position`] if a number of `q` is not finite, or a rotation in it has not the
+    /// length 1.
     ///
     /// # Panics
     /// If `q` has not nq numbers, or a body does not exist or is the world.
@@ -154,6 +158,7 @@ impl Model {
         for &i in bodies {
             assert!((1..self.bodies.len()).contains(&i), "bodies: there is no joint {i}");
         }
+        self.check_position(q)?;
         let coordinates: Vec<usize> = bodies.iter().map(|&i| self.bodies[i].idx_v).collect();
         let locked: Vec<usize> =
             (1..self.bodies.len()).filter(|&i| coordinates.contains(&self.bodies[i].idx_v)).collect();

@@ -39,8 +39,13 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
         let bound = |limits: &[f64], otherwise: f64| -> Vec<f64> {
             limits.iter().map(|&x| if x.abs() < 1e6 { x } else { otherwise }).collect()
         };
-        let lower = bound(&model.limits.lower[iq.clone()], -UNLIMITED);
-        let upper = bound(&model.limits.upper[iq.clone()], UNLIMITED);
+        let mut lower = bound(&model.limits.lower[iq.clone()], -UNLIMITED);
+        let mut upper = bound(&model.limits.upper[iq.clone()], UNLIMITED);
+        for (k, i) in iq.clone().enumerate() {
+            // a limit beyond ±3 on one side only
+            lower[k] = if lower[k] > upper[k] && model.limits.upper[i] == upper[k] { upper[k] } else { lower[k] };
+            upper[k] = upper[k].max(lower[k]);
+        }
         joint.random(rng, &lower, &upper, &mut q[iq]);
     }
     q

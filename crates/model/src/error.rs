@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file could not be read.
+    /// The file could not be read, or cannot be a robot's: it is no regular file, or too large.
     #[error("{file}: {what}")]
     File {
-        /// Path as given.
+        /// Path as given, or `<string>`.
         file: String,
-        /// The operating system's word.
+        /// The operating system's word, or the size with the limit.
         what: String,
     },
     /// No folder has the file that a `package://` address names.
@@ -34,29 +34,27 @@ pub enum Error {
         /// The parser's word.
         what: String,
     },
-    /// An element of a URDF is wrong.
+    /// An element of a URDF, MJCF or SDF is wrong.
     #[error("{file}:{line}: {element}: {what}")]
-    Urdf {
-        /// Path, or `<string>`.
+    Element {
+        /// Path, or `<string>`; of the included file, where it is in one.
         file: String,
-        /// The line on which the element begins, counted from 1.
+        /// The line on which the element begins, or the part of it that is wrong, counted from 1.
         line: u32,
         /// For example ``joint `elbow` ``.
         element: String,
         /// The fault, with the numbers.
         what: String,
     },
-    /// An element of an MJCF or SDF is wrong.
-    #[error("{file}:{line}: {element}: {what}")]
-    Element {
-        /// Path, or `<string>`; of the included file, where it is in one.
-        file: String,
-        /// The line on which the element begins, counted from 1.
-        line: u32,
-        /// For example ``joint `elbow` ``.
-        element: String,
-        /// The fault, with the numbers.
-        what: String,
+    /// A model would have more of something than a model can have.
+    #[error("{found} {what}, at most {limit} are allowed in a model")]
+    Size {
+        /// The things that are counted, for example `degrees of freedom`.
+        what: &'static str,
+        /// The number that the model would have.
+        found: usize,
+        /// The greatest number that is allowed.
+        limit: usize,
     },
     /// A body given to a builder is wrong.
     #[error("body `{body}`: {what}")]
@@ -79,6 +77,20 @@ pub enum Error {
     Frame {
         /// The frame's name.
         frame: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
+    /// A gravity is infinite or not a number.
+    #[error("gravity: ({}, {}, {}) m/s² is not finite", gravity[0], gravity[1], gravity[2])]
+    Gravity {
+        /// As given (m/s²).
+        gravity: [f64; 3],
+    },
+    /// A position is none of the robot's.
+    #[error("joint `{joint}`: {what}")]
+    Position {
+        /// The joint's name.
+        joint: String,
         /// The fault, with the numbers.
         what: String,
     },
@@ -187,7 +199,21 @@ fn where_looked(looked: &[String]) -> String {
     format!("looked for {}", looked.join(", "))
 }
 
-/// The most similar of some names (optimal string alignment distance).
+/// How much of a name is compared (characters), and the number of pairs of characters that are compared in all: the
+/// distance takes the product of the lengths.
+const COMPARED: [usize; 2] = [128, 1 << 22];
+
+/// The most similar of some names (optimal string alignment distance), as far as so many can be compared.
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
-    names.min_by_key(|n| strsim::osa_distance(n, name)).unwrap_or_default().to_owned()
+    let [length, mut left] = COMPARED;
+    let begin = |name: &str| name.chars().take(length).collect::<String>();
+    let name = begin(name);
+    let enough = |other: &&str| {
+        let pairs = name.len() * other.len().min(4 * length);
+        let enough = pairs <= left;
+        left = left.saturating_sub(pairs);
+        enough
+    };
+    let found = names.take_while(enough).min_by_key(|other| strsim::osa_distance(&begin(other), &name));
+    found.unwrap_or_default().to_owned()
 }

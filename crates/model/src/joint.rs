@@ -133,7 +133,7 @@ impl Joint {
         let Some(axis) = self.axis() else { return Ok(self) };
         let norm = axis.norm_squared().sqrt();
         if !norm.is_normal() {
-            return Err(format!("axis {:?} is no direction", self.axis()));
+            return Err(format!("axis ({}, {}, {}) is no direction", axis.x, axis.y, axis.z));
         }
         let unit = (norm - 1.0).abs() < UNIT; // to the last bit the same when it was normalised before
         let axis = if unit { axis } else { axis.scale(1.0 / norm) };

@@ -10,6 +10,26 @@
 //! assert!(moved[0] > 0.0); // the base has moved forwards
 //! ```
 //!
+//! # Limits of files
+//!
+//! A file is refused, before memory or time is spent on it, if it is no regular file (a folder, a device, a pipe) or is
+//! larger than this; the error has the number and the limit.
+//!
+//! | of | at most |
+//! | --- | --- |
+//! | bytes in the files of a robot, included ones too | 67 108 864 |
+//! | tags in them, ends and comments counted | 1 048 576 |
+//! | equals signs in them | 4 194 304 |
+//! | levels of elements, those of included files counted where they come to stand | 256 |
+//! | attributes of an element | 256 |
+//! | prefixes of namespaces in a file; declarations of them | 256; 65 536 |
+//! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
+//! | degrees of freedom of a model, however it is made | 4096 |
+//! | coordinates of a model whose joints follow others | 1024 |
+//!
+//! A `package://` address stays in its package, but for links there; the files that an MJCF includes may be anywhere. The
+//! nearest name in an error is looked for by the first 128 characters of names, and among as many as that takes a moment.
+//!
 //! What the crates of algorithms need beside it is hidden from the documentation: the verbs by which a pass sees a model
 //! (`layout`), the tree of its turned frames and columns (`tree`), the schedule of its limbs (`limbs`).
 #![allow(non_snake_case)]
@@ -27,6 +47,7 @@ pub mod joint;
 pub mod layout;
 #[doc(hidden)]
 pub mod limbs;
+mod magnitude;
 mod model;
 pub mod robots;
 #[doc(hidden)]

@@ -2,11 +2,12 @@
 
 use crate::body::{Body, Frame, FrameKind, Limits};
 use crate::error::{Error, Warning, nearest};
+use crate::joint::Joint;
 use crate::limbs::Plan;
-use crate::tree::{Column, Node, Tree};
+use crate::tree::{Column, Node, Tree, hash};
 use condyle_linalg::ColumnTree;
 use condyle_linalg::sparsity::NonzeroRows;
-use condyle_spatial::Vec3;
+use condyle_spatial::{Se3, Vec3};
 use core::fmt;
 
 /// A robot: bodies, joints, frames, inertias, limits. Frozen, checked when built, shared between threads.
@@ -38,6 +39,10 @@ pub struct Model<R = f64> {
     pub(crate) tree: Tree<R>,
     /// The plan by which single calls compute several bodies at once, if they do.
     pub(crate) limbs: Option<Plan>,
+    /// A hash of all that constraints on frames are planned from: see `geometry_hash`.
+    pub(crate) geometry: u64,
+    /// Whether each body stands between the joints of a chain, without mass on purpose.
+    pub(crate) between: Vec<bool>,
     pub(crate) warnings: Vec<Warning>,
     /// Bodies whose joints make M singular.
     pub(crate) singular: Vec<usize>,
@@ -166,10 +171,31 @@ impl<R> Model<R> {
     pub fn limbs(&self) -> Option<&Plan> {
         self.limbs.as_ref()
     }
-    /// A hash of the parents, joints and coordinates: tells trees apart.
+    /// A hash of the parents, kinds of joints and coordinates: tells trees apart.
     #[inline(always)]
     pub fn tree_hash(&self) -> u64 {
         self.tree.hash
+    }
+    /// A hash of the tree and of where its joints and frames are. Robots with other inertias, armature, gravity, limits and
+    /// names have the same one, and so has a robot that was written and read again.
+    #[inline(always)]
+    pub fn geometry_hash(&self) -> u64 {
+        self.geometry
+    }
+}
+
+impl Model {
+    /// The hash of the tree and of where its joints and frames are.
+    pub(crate) fn hash_geometry(&self) -> u64 {
+        let pose = |X: Se3<f64>| X.rotation.columns().into_iter().chain([X.translation]).flat_map(Vec3::to_array);
+        let bodies = self.bodies.iter().flat_map(|b| {
+            let (axis, mimic) =
+                (b.joint.axis().unwrap_or(Vec3::zero()), b.mimic.map_or([0.0; 2], |m| [m.ratio, m.offset]));
+            let pitch = if let Joint::Helical { pitch, .. } = b.joint { pitch } else { 0.0 };
+            pose(b.placement).chain(axis.to_array()).chain(mimic).chain([pitch])
+        });
+        let frames = self.frames.iter().flat_map(|f| pose(f.placement).chain([f.body as f64]));
+        hash([self.tree.hash].into_iter().chain(bodies.chain(frames).map(f64::to_bits)))
     }
 }
 

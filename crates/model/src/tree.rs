@@ -86,6 +86,14 @@ pub(crate) struct Tree<R> {
     pub hash: u64,
 }
 
+/// A hash of some numbers: Fowler, Noll, Vo (1991), FNV-1a, with words in place of bytes.
+pub(crate) fn hash(words: impl Iterator<Item = u64>) -> u64 {
+    words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
+        let hash = (hash ^ word).wrapping_mul(0x100_0000_01b3);
+        hash ^ (hash >> 29) // so that the last bits of a number change the first ones of the hash
+    })
+}
+
 impl Tree<f64> {
     /// The tree of some bodies, depth first, whose coordinates are numbered.
     pub(crate) fn new(bodies: &[Body], nq: usize, nv: usize) -> Self {
@@ -104,10 +112,10 @@ impl Tree<f64> {
         tree.close_subtrees();
         tree.add_nonzero_rows();
         tree.add_spaces();
-        // Fowler, Noll, Vo (1991): FNV-1a
         let structure = tree.columns.iter().flat_map(|c| [c.coordinate, c.parent.map_or(0, |p| p + 1)]);
         let structure = structure.chain(tree.nodes.iter().flat_map(|n| [n.parent, n.column]));
-        tree.hash = structure.fold(0xcbf2_9ce4_8422_2325, |hash, x| (hash ^ x as u64).wrapping_mul(0x100_0000_01b3));
+        let kinds = tree.nodes.iter().flat_map(|n| n.joint.kind().bytes().map(u64::from));
+        tree.hash = hash(structure.map(|x| x as u64).chain(kinds));
         tree
     }
 

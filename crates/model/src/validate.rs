@@ -1,12 +1,13 @@
-//! The validation of a model: inertias that no body has, degrees of freedom along which M is singular.
+//! The validation of a model, by whatever way it is made: numbers that none can have are errors; inertias that no body has and
+//! degrees of freedom along which M is singular are warnings.
 
-use crate::body::Body;
+use crate::body::{Body, Frame};
 use crate::configuration::random_configuration;
-use crate::error::Warning;
+use crate::error::{Error, Warning};
 use crate::joint::Joint;
 use crate::layout::{Columns, Layout, Pairs, Single};
 use crate::model::Model;
-use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3};
+use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3, Sym3};
 use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
 
@@ -14,11 +15,82 @@ use rand::{SeedableRng, rngs::StdRng};
 const MOMENT_ROUNDING: f64 = 1e-6;
 /// A pivot that is smaller than this share of the products it is a sum of is rounding, and none.
 const PIVOT_ROUNDING: f64 = 1e-13;
+/// A pivot that is smaller than this is none (kg m², kg): its reciprocal may be no number.
+const LEAST_PIVOT: f64 = 1e-200;
 /// Positions at which M is looked at. A joint is called singular if it is so at all of them.
 const SAMPLES: usize = 3;
 
+/// How far from 1 the length of a quaternion or of (cos, sin) in a position may be: 0.707 in place of √½ is off by 1.5e-4, an
+/// estimate that was integrated in single precision by less.
+const UNIT_ROUNDING: f64 = 1e-3;
+
+/// Says what is wrong with a body's inertia or placement.
+pub(crate) fn check_body(Body { name, inertia: I, placement, .. }: &Body) -> Result<(), Error> {
+    let wrong = |what: String| Err(Error::Body { body: name.clone(), what });
+    if !(I.mass >= 0.0 && I.mass.is_finite()) {
+        return wrong(format!("mass is {} kg, expected a finite number of at least 0", I.mass));
+    }
+    let Sym3 { xx, yy, zz, xy, xz, yz } = I.rotational;
+    if ![xx, yy, zz, xy, xz, yz].into_iter().chain(I.mass_com.to_array()).all(f64::is_finite) {
+        return wrong("inertia is not finite".to_owned());
+    }
+    check_placement(placement).or_else(wrong)
+}
+
+/// Says what is wrong with a frame's placement.
+pub(crate) fn check_frame(Frame { name, placement, .. }: &Frame) -> Result<(), Error> {
+    check_placement(placement).map_err(|what| Error::Frame { frame: name.clone(), what })
+}
+
+fn check_placement(X: &Se3<f64>) -> Result<(), String> {
+    let numbers = X.rotation.columns().into_iter().chain([X.translation]).flat_map(condyle_spatial::Vec3::to_array);
+    if numbers.into_iter().any(|x| !x.is_finite()) {
+        return Err("placement is not finite".to_owned());
+    }
+    if !X.rotation.is_rotation() {
+        return Err("placement is no rotation and translation".to_owned());
+    }
+    Ok(())
+}
+
+/// What a joint has for each coordinate.
+pub(crate) struct CoordinateNumbers {
+    pub lower: f64,
+    pub upper: f64,
+    pub velocity: f64,
+    pub effort: f64,
+    pub damping: f64,
+    pub friction: f64,
+    pub armature: f64,
+}
+
+impl CoordinateNumbers {
+    /// Says what is wrong with the numbers of a joint. Limits may be infinite, losses and armature may not.
+    pub(crate) fn check(&self, joint: &str) -> Result<(), Error> {
+        let wrong = |what: String| Err(Error::Joint { joint: joint.to_owned(), what });
+        let Self { lower, upper, .. } = *self;
+        if lower.is_nan() || upper.is_nan() {
+            return wrong(format!("limits of position {lower} and {upper}: expected numbers"));
+        }
+        if lower > upper || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
+            return wrong(format!("lower limit {lower} is above upper limit {upper}"));
+        }
+        for (name, x) in [("velocity", self.velocity), ("effort", self.effort)] {
+            if x.is_nan() || x < 0.0 {
+                return wrong(format!("limit of {name} is {x}, expected a number of at least 0"));
+            }
+        }
+        for (name, x) in [("damping", self.damping), ("friction", self.friction), ("armature", self.armature)] {
+            if !(x >= 0.0 && x.is_finite()) {
+                return wrong(format!("{name} is {x}, expected a finite number of at least 0"));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Says what is odd about a body's inertia. The bodies between the joints of a chain have no mass on purpose.
-pub(crate) fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
+fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     let (I, name) = (body.inertia, || body.name.clone());
     if I == Inertia::zero() {
         if !between {
@@ -46,8 +118,86 @@ impl Model {
         &self.warnings
     }
 
+    /// Checks all numbers of the model, and finds anew what is odd about it: the end of every way to make a model.
+    ///
+    /// # Errors
+    /// [`Error::Body`], [`Error::Frame`], [`Error::Joint`] and [`Error::Gravity`].
+    pub(crate) fn validate(&mut self) -> Result<(), Error> {
+        self.bodies.iter().try_for_each(check_body)?;
+        self.frames.iter().try_for_each(check_frame)?;
+        for body in self.bodies.iter().skip(1).filter(|body| body.mimic.is_none()) {
+            let (q, v) = (body.idx_q..body.idx_q + body.joint.nq(), body.idx_v..body.idx_v + body.joint.nv());
+            for k in 0..q.len().max(v.len()) {
+                let q = (q.start + k).min(q.end - 1);
+                let v = (v.start + k).min(v.end - 1);
+                CoordinateNumbers {
+                    lower: self.limits.lower[q],
+                    upper: self.limits.upper[q],
+                    velocity: self.limits.velocity[v],
+                    effort: self.limits.effort[v],
+                    damping: self.damping[v],
+                    friction: self.friction[v],
+                    armature: self.armature[v],
+                }
+                .check(&body.joint_name)?;
+            }
+        }
+        let gravity = self.gravity.to_array();
+        if gravity.iter().any(|g| !g.is_finite()) {
+            return Err(Error::Gravity { gravity });
+        }
+        self.check_magnitudes()?;
+        let mut warnings = Vec::new();
+        for (body, &between) in self.bodies.iter().zip(&self.between).skip(1) {
+            check_inertia(body, between, &mut warnings);
+        }
+        self.find_singular();
+        warnings.extend(self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() }));
+        warnings.extend(self.warnings.drain(..).filter(|warning| matches!(warning, Warning::LeftOut { .. })));
+        self.warnings = warnings;
+        Ok(())
+    }
+
+    /// Checks that a position is one of the robot's: finite numbers, and quaternions and (cos, sin) of length 1, up to 1e-3.
+    /// Algorithms take any numbers and do not look.
+    ///
+    /// ```
+    /// use condyle_model::{neutral, robots};
+    /// let quadruped = robots::quadruped();
+    /// let mut q = neutral(&quadruped);
+    /// quadruped.check_position(&q)?;
+    /// q[6] = 0.0;
+    /// let error = quadruped.check_position(&q).unwrap_err().to_string();
+    /// assert_eq!(error, "joint `root_joint`: its rotation, q[3..7], has the length 0, expected 1");
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Position`].
+    ///
+    /// # Panics
+    /// If `q` has not nq numbers.
+    pub fn check_position(&self, q: &[f64]) -> Result<(), Error> {
+        condyle_linalg::check("q", q.len(), self.nq());
+        for body in self.bodies.iter().skip(1).filter(|body| body.mimic.is_none()) {
+            let wrong = |what: String| Err(Error::Position { joint: body.joint_name.clone(), what });
+            for k in body.idx_q..body.idx_q + body.joint.nq() {
+                if !q[k].is_finite() {
+                    return wrong(format!("q[{k}] is {}, which is not finite", q[k]));
+                }
+            }
+            let unit = body.joint.unit_entries();
+            let (from, to) = (body.idx_q + unit.start, body.idx_q + unit.end);
+            let length = q[from..to].iter().map(|x| x * x).sum::<f64>().sqrt();
+            if !unit.is_empty() && (length - 1.0).abs() > UNIT_ROUNDING {
+                return wrong(format!("its rotation, q[{from}..{to}], has the length {length}, expected 1"));
+            }
+        }
+        Ok(())
+    }
+
     /// Finds the joints along which M is singular, wherever the robot is.
-    pub(crate) fn find_singular(&mut self) {
+    fn find_singular(&mut self) {
         let mut always = vec![true; self.bodies.len()];
         let mut rng = StdRng::seed_from_u64(0);
         for _ in 0..SAMPLES {
@@ -58,9 +208,6 @@ impl Model {
             always.iter_mut().zip(here).for_each(|(always, here)| *always &= here);
         }
         self.singular = (1..self.bodies.len()).filter(|&i| always[i]).collect();
-        self.warnings.retain(|w| !matches!(w, Warning::Singular { .. }));
-        let named = self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() });
-        self.warnings.extend(named);
     }
 
     /// The pivots D = Sᵀ Iᴬ S of the articulated bodies; a joint without one is passed over.
@@ -75,7 +222,7 @@ impl Model {
                 let U = Ia * S;
                 let D = S.dot(U) + l.armature(i, k);
                 let products = S.to_array().iter().zip(U.to_array()).map(|(s, u)| (s * u).abs()).sum::<f64>();
-                if D <= PIVOT_ROUNDING * products {
+                if D <= (PIVOT_ROUNDING * products).max(LEAST_PIVOT) {
                     singular[i] = true;
                 } else {
                     Ia = Ia.minus_outer(U, 1.0 / D);
@@ -93,7 +240,7 @@ impl Model {
         let mut singular = vec![false; self.tree.nv];
         for k in (0..self.tree.nv).rev() {
             let D = M[(k, k)];
-            if D <= PIVOT_ROUNDING * diagonal[k] {
+            if D <= (PIVOT_ROUNDING * diagonal[k]).max(LEAST_PIVOT) {
                 singular[k] = true;
                 continue;
             }
@@ -198,7 +345,7 @@ mod tests {
         let said: Vec<String> = model.warnings().iter().map(ToString::to_string).collect();
         assert_eq!(said[0], "body `leaf` moves and has no mass");
         assert!(said[1].starts_with("joint `leaf` moves nothing"), "{said:?}");
-        assert!(model.with_armature(&[0.0, 0.1]).singular_joints().is_empty());
+        assert!(model.with_armature(&[0.0, 0.1]).unwrap().singular_joints().is_empty());
     }
 
     #[test]

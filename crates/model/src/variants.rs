@@ -1,38 +1,51 @@
 //! The same robot with something changed.
 
 use crate::body::Body;
+use crate::error::Error;
 use crate::limbs::Plan;
 use crate::model::Model;
 use condyle_linalg::check;
 use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
 use core::any::Any;
 
-impl<R> Model<R> {
+impl<R: 'static> Model<R> {
     /// The same robot under another gravity (m/s², in the world's frame).
-    #[must_use]
-    pub fn with_gravity(mut self, gravity: Vec3<R>) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Gravity`] if it is of plain numbers and not finite.
+    pub fn with_gravity(mut self, gravity: Vec3<R>) -> Result<Self, Error> {
         self.gravity = gravity;
-        self
+        self.revalidated()
+    }
+
+    /// The model with its checks made anew; of other numbers than `f64` it keeps what was found.
+    fn revalidated(mut self) -> Result<Self, Error> {
+        if let Some(plain) = (&mut self as &mut dyn Any).downcast_mut::<Model>() {
+            plain.validate()?;
+        }
+        Ok(self)
     }
 }
 
 impl Model {
     /// The same robot with another armature, one number for each degree of freedom (kg m², kg).
     ///
+    /// # Errors
+    /// [`Error::Joint`] if one is negative or not finite.
+    ///
     /// # Panics
     /// If `armature` has not nv numbers.
-    #[must_use]
-    pub fn with_armature(mut self, armature: &[f64]) -> Self {
+    pub fn with_armature(mut self, armature: &[f64]) -> Result<Self, Error> {
         check("armature", armature.len(), self.nv());
         self.armature.copy_from_slice(armature);
-        self.find_singular();
-        self
+        self.revalidated()
     }
 
     /// The same robot with constants of another type, its inertias given by a function of (body, inertia).
     ///
     /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters. [`Body::inertia`]
-    /// is a plain number: it follows if the new ones are.
+    /// is a plain number: it follows if the new ones are, and so do [`warnings`](Self::warnings) and
+    /// [`singular_joints`](Self::singular_joints).
     ///
     /// ```
     /// use condyle_model::{Inertia, robots};
@@ -42,13 +55,17 @@ impl Model {
     /// let dual = arm.with_inertias(|body, I| Inertia::<Dual64> {
     ///     mass: Dual64::new(I.mass, if body == 7 { 1.0 } else { 0.0 }),
     ///     ..I.lift()
-    /// });
+    /// })?;
     /// assert_eq!(dual.nv(), arm.nv()); // rnea(&dual, …) gives ∂τ/∂m with τ
+    /// # Ok::<(), condyle_model::Error>(())
     /// ```
+    ///
+    /// # Errors
+    /// [`Error::Body`] if a mass is negative or a number is not finite, of plain numbers.
     pub fn with_inertias<T: Scalar + Constant<T>>(
         &self,
         mut inertia: impl FnMut(usize, Inertia<f64>) -> Inertia<T>,
-    ) -> Model<T> {
+    ) -> Result<Model<T>, Error> {
         let mut bodies = self.bodies.clone();
         let replace = |(i, b): (usize, &mut Body)| {
             let I = inertia(i, b.inertia);
@@ -70,13 +87,15 @@ impl Model {
             damping: self.damping.clone(),
             friction: self.friction.clone(),
             limbs: None,
+            geometry: self.geometry,
+            between: self.between.clone(),
             warnings: self.warnings.clone(),
             singular: self.singular.clone(),
         };
         if let Some(plain) = (&mut model as &mut dyn Any).downcast_mut::<Model>() {
             plain.limbs = self.limbs.as_ref().and_then(|_| Plan::new(&plain.tree));
         }
-        model
+        model.revalidated()
     }
 
     /// The same robot, with its limbs side by side in single calls or one body after the other.

@@ -10,6 +10,10 @@ pub enum Error {
     #[error("the horizon is empty: a problem needs at least one knot before the terminal one")]
     EmptyHorizon,
 
+    /// The actions have states without a number, as robots of fixed joints only have: there is nothing to control.
+    #[error("the states have no numbers: a problem needs at least one")]
+    EmptyState,
+
     /// A knot names an action model that the problem does not hold.
     #[error("knot {knot}: there is no action model {index}, the problem holds {models}")]
     UnknownModel {
@@ -56,6 +60,28 @@ pub enum Error {
         value: f64,
     },
 
+    /// A state is none of the robot's.
+    #[error("`{name}`, knot {knot}: {what}")]
+    State {
+        /// The argument.
+        name: &'static str,
+        /// The knot.
+        knot: usize,
+        /// The fault, with the numbers.
+        what: String,
+    },
+
+    /// A number of things is beyond what memory is asked for.
+    #[error("{name}: {found} is more than the limit of {most}")]
+    Size {
+        /// The thing that is counted.
+        name: &'static str,
+        /// The number.
+        found: usize,
+        /// The limit.
+        most: usize,
+    },
+
     /// No control satisfies the bounds of a knot.
     #[error("knot {knot}: control {control} must be at least {lower} and at most {upper}")]
     Bounds {
@@ -99,6 +125,13 @@ pub enum Error {
         /// The knot, if it is a limit of one.
         knot: Option<usize>,
         /// What does not fit, with the numbers.
+        what: String,
+    },
+
+    /// A friction or wrench cone makes no sense.
+    #[error("cone: {what}")]
+    Cone {
+        /// The fault, with the numbers.
         what: String,
     },
 
@@ -148,6 +181,16 @@ impl Error {
         if found.len() != expected {
             return Err(Self::Length { name, expected, found: found.len() });
         }
+        Self::check_finite(name, found)
+    }
+
+    /// `Ok` if there are at most so many.
+    pub(crate) fn check_size(name: &'static str, found: usize, most: usize) -> Result<(), Self> {
+        if found > most { Err(Self::Size { name, found, most }) } else { Ok(()) }
+    }
+
+    /// `Ok` if all entries are finite.
+    pub(crate) fn check_finite(name: &'static str, found: &[f64]) -> Result<(), Self> {
         match found.iter().position(|x| !x.is_finite()) {
             Some(index) => Err(Self::NotFinite { name, index, value: found[index] }),
             None => Ok(()),

@@ -33,7 +33,7 @@
 //! # Example
 //! A pendulum swings up, from hanging (θ = 0) to upright (θ = π).
 //! ```
-//! use condyle_optimal::{ActionModel, Fddp, Problem, Status};
+//! use condyle_optimal::{ActionModel, Fddp, Iteration, Problem, Status};
 //!
 //! /// x = (θ, θ̇), u = torque: θ̈ = u − sin θ, by semi-implicit Euler steps of 0.1 s.
 //! struct Pendulum { terminal: bool }
@@ -56,7 +56,7 @@
 //! let mut problem = Problem::new(vec![0.0, 0.0], vec![Box::new(knot)], vec![0; 40], Box::new(end))?;
 //!
 //! let mut solver = Fddp::new(&problem);
-//! let solution = solver.solve_with(&mut problem, &[0.0; 2 * 41], &[0.0; 40], |iteration| {
+//! let solution = solver.solve_with(&mut problem, &[0.0; 2 * 41], &[0.0; 40], |iteration: &Iteration| {
 //!     println!("{:3}  cost {:9.6}  step {}", iteration.iteration, iteration.cost, iteration.step);
 //! })?;
 //!
@@ -73,7 +73,7 @@ mod problem;
 pub mod robot;
 
 pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint};
-pub use ddp::{DdpMethod, Fddp, Iteration, Settings, Solution, Status, Timings};
+pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
 pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem};

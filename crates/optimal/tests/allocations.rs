@@ -9,7 +9,7 @@ use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, FrictionCone,
     ImpulseDynamics, Integrator, Limit, Residual,
 };
-use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Problem, Status, Sweep};
+use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Iteration, Problem, Status, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -82,7 +82,7 @@ fn a_solve_allocates_nothing() {
         let mut iterations = 0;
         // The first solve reserves the trace and the step lengths: two allocations.
         let first = allocations(|| {
-            solver.solve_with(&mut problem, &xs, &[0.0; 50], |_| iterations += 1).unwrap();
+            solver.solve_with(&mut problem, &xs, &[0.0; 50], |_: &Iteration| iterations += 1).unwrap();
         });
         let second = allocations(|| {
             solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
@@ -297,6 +297,8 @@ fn active_rows_allocate_nothing() {
     let mut solver = Fddp::new(&problem);
     solver.settings.max_iterations = 3;
     let mut counts = [None; 4];
-    solver.solve_with(&mut problem, &x0.repeat(9), &us, |i| counts[i.iteration] = Some(COUNT.get())).unwrap();
+    solver
+        .solve_with(&mut problem, &x0.repeat(9), &us, |i: &Iteration| counts[i.iteration] = Some(COUNT.get()))
+        .unwrap();
     assert_eq!(counts[0], counts[2], "{counts:?}");
 }

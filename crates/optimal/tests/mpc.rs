@@ -5,7 +5,7 @@ mod common;
 use common::{HANGING, Linear, cartpole, random, random_matrix, random_node, straight};
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Limit, Residual};
-use condyle_optimal::{ActionModel, Error, Fddp, Problem, Solution, Status};
+use condyle_optimal::{ActionModel, Error, Fddp, Iteration, Problem, Solution, Status};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -98,7 +98,7 @@ fn a_solve_without_time_returns_what_it_has() {
     // What an observer spends counts too: the second iteration does not begin.
     solver.settings.time_budget = Some(Duration::from_millis(200));
     let mut seen = 0;
-    let pause = |_: &_| {
+    let pause = |_: &Iteration| {
         seen += 1;
         std::thread::sleep(Duration::from_millis(250));
     };

@@ -1,12 +1,22 @@
 //! What a solve says when something is wrong, and that it does not depend on how its work is grouped.
 
+#![allow(non_snake_case)] // the names of the literature
+
 mod common;
 
 use common::{
     Cartpole, Circle, HANGING, Unicycle, cartpole, cartpole_action, limited_cartpole, limited_unicycle, straight,
     unicycle,
 };
-use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Settings, Status};
+use condyle_dynamics::{Vec3, robots};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle_optimal::{
+    ActionModel, AugmentedLagrangian, Error, Fddp, Iteration, LqNode, NumDiff, Observer, Problem, Settings, Status,
+    Sweep,
+};
+use core::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Duration;
 
 /// The accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
 const FIRST: f64 = 1e-6;
@@ -62,7 +72,7 @@ fn the_pendulum_on_a_cart_stands_up() {
     let xs = problem.rollout(&us).unwrap();
     let mut solver = Fddp::new(&problem);
     let mut seen = 0;
-    let solution = solver.solve_with(&mut problem, &xs, &us, |_| seen += 1).unwrap();
+    let solution = solver.solve_with(&mut problem, &xs, &us, |_: &Iteration| seen += 1).unwrap();
     assert_eq!(solution.status, Status::Converged);
     assert_eq!(seen, solution.trace.len());
     assert!(solution.x(50).iter().all(|x| x.abs() < 0.1), "{:?}", solution.x(50));
@@ -373,4 +383,197 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
         assert!(expected.len() > solution.trace.len());
         assert_eq!(problem.model_mut::<Noting>(0).unwrap().groups, expected, "{lanes} lanes");
     }
+}
+
+/// x⁺ = x + u, ℓ = ½ (x² + u²) + x⁴, with so many controls, at its leisure.
+struct Slow(usize);
+
+impl ActionModel for Slow {
+    fn nx(&self) -> usize {
+        1
+    }
+
+    fn nu(&self) -> usize {
+        self.0
+    }
+
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        std::thread::sleep(Duration::from_millis(3));
+        let u: f64 = u.iter().sum();
+        next[0] = x[0] + u;
+        0.5 * (x[0] * x[0] + u * u) + x[0].powi(4)
+    }
+
+    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut LqNode) {
+        unreachable!("is differentiated by differences")
+    }
+}
+
+/// Ends a solve when it has been asked so often whether to go on, or has seen so many iterations.
+struct Impatient {
+    questions: usize,
+    iterations: usize,
+}
+
+impl Observer for Impatient {
+    fn iteration(&mut self, _: &Iteration) -> ControlFlow<()> {
+        self.iterations -= 1;
+        if self.iterations == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn go_on(&mut self) -> ControlFlow<()> {
+        self.questions -= 1;
+        if self.questions == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// An observer ends a solve after an iteration, or within one that lasts; `resume` goes on from there, to the same end.
+#[test]
+fn observers_end_solves() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let us = [0.0; 50];
+    let xs = problem.rollout(&us).unwrap();
+    let mut solver = Fddp::new(&problem);
+    let end = solver.solve(&mut problem, &xs, &us).unwrap().clone();
+
+    let solution = solver.solve_with(&mut problem, &xs, &us, |now: &Iteration| match now.iteration {
+        3 => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    });
+    let solution = solution.unwrap();
+    assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 4));
+    assert_eq!(solution.cost, end.trace[3].cost);
+    let resumed = solver.resume(&mut problem).unwrap();
+    assert!(resumed.status == Status::Converged && (resumed.cost - end.cost).abs() < 1e-6 * end.cost);
+
+    // a model that takes its time: the iteration is not waited for
+    let mut problem =
+        Problem::new(vec![1.0], vec![Box::new(NumDiff(Slow(1)))], vec![0; 5], Box::new(NumDiff(Slow(0)))).unwrap();
+    let mut solver = Fddp::new(&problem);
+    for questions in [1, 2] {
+        let observer = Impatient { questions, iterations: 9 };
+        let solution = solver.solve_with(&mut problem, &[1.0; 6], &[0.0; 5], observer).unwrap();
+        assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 0));
+    }
+
+    // around them, the augmented Lagrangian
+    let mut solver = AugmentedLagrangian::new(&problem);
+    let observer = Impatient { questions: 9, iterations: 1 };
+    let solution = solver.solve_with(&mut problem, &[1.0; 6], &[0.0; 5], observer).unwrap();
+    assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 1));
+    assert_eq!(solver.outcome().solves, 1);
+    let solution = solver.resume_with(&mut problem, |_: &Iteration| ControlFlow::Break(())).unwrap();
+    assert_eq!(solution.status, Status::Interrupted);
+}
+
+/// Counts that memory depends on are limited; where a number only says when to stop, any is good.
+#[test]
+fn settings_that_count_are_limited() {
+    let mut problem = cartpole(&HANGING, 5, 1);
+    let mut solver = Fddp::new(&problem);
+    for settings in [
+        Settings { threads: 10_000_000, ..Settings::default() },
+        Settings { segments: 10_000_000, ..Settings::default() },
+    ] {
+        solver.settings = settings;
+        let error = solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap_err().to_string();
+        assert!(error.ends_with("is 10000000, but it must be at least 1 and at most 1024"), "{error}");
+    }
+    solver.settings = Settings { max_iterations: usize::MAX, time_budget: Some(Duration::MAX), ..Settings::default() };
+    assert_eq!(solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap().status, Status::Converged);
+}
+
+/// An arm reaches for a point in 50 knots, and nothing but a tiny weight keeps its efforts small.
+fn reckless_reach(dt: f64, effort: f64, point: f64) -> (Problem, Vec<f64>) {
+    let arm = Arc::new(robots::arm7());
+    let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    let there = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: Vec3::new(0.4, 0.2, 0.5) };
+    let effort = Cost::new("effort", effort, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
+    let point = Cost::new("point", point, there, Activation::Quadratic);
+    let knot = FreeDynamics::running(arm.clone(), dt, vec![effort]).unwrap();
+    let end = FreeDynamics::terminal(arm, vec![point]).unwrap();
+    let problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 50], Box::new(end)).unwrap();
+    (problem, x0.repeat(51))
+}
+
+/// Crocoddyl's rules accept a step into an iterate that costs 1e16 times as much, where nothing can be computed any more:
+/// the trace says so, but the solution is the iterate before it, and the next solve begins there.
+#[test]
+fn a_solve_that_blows_up_returns_its_best_iterate() {
+    for (dt, effort, point) in [(0.02, 1e-6, 1e2), (0.02, 1e-6, 1e4), (0.05, 1e-3, 1e4), (0.05, 1e-4, 1e2)] {
+        let run = |threads: usize| {
+            let (mut problem, xs) = reckless_reach(dt, effort, point);
+            let mut solver = Fddp::new(&problem);
+            solver.settings.threads = threads;
+            let first = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+            let next = solver.resume(&mut problem).unwrap().clone();
+            (first, next, problem)
+        };
+        let (solution, next, mut problem) = run(1);
+        let trace = &solution.trace;
+        assert_eq!(solution.status, Status::NotFinite);
+        let last = trace.last().unwrap();
+        assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
+        // the iterate before the blow-up: its cost and gap are in the trace, one record apart
+        let before = (1..trace.len()).find(|&i| trace[i].cost > 1e8 * (1.0 + trace[0].cost)).unwrap();
+        assert!(solution.cost < 1e5, "{}", solution.cost);
+        assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
+        let (mut nodes, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
+        problem.calc(&solution.xs, &solution.us, &mut nodes, &mut numbers);
+        assert!((numbers.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
+        assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
+        assert!(solution.k.iter().any(|k| k.amax() > 0.0));
+        // a resume begins there and ends no worse
+        assert!(next.gap <= solution.gap && next.cost.is_finite(), "{} {}", next.gap, next.cost);
+        assert!(next.trace.first().is_some_and(|first| first.gap == solution.gap));
+        let (other, again, _) = run(2);
+        assert!(other.xs == solution.xs && other.us == solution.us && other.K == solution.K && other.k == solution.k);
+        assert!(again.xs == next.xs && again.trace == next.trace);
+    }
+}
+
+/// The feedback of a solution that a solve went back to is that of the sweep there.
+#[test]
+fn the_feedback_is_that_of_the_iterate() {
+    let (mut problem, xs) = reckless_reach(0.02, 1e-6, 1e2);
+    let mut solver = Fddp::new(&problem);
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+    assert_eq!(solution.status, Status::NotFinite);
+    let (mut nodes, mut next, mut costs) = (problem.nodes(), vec![0.0; 50 * 14], vec![0.0; 51]);
+    problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
+    problem.calc_diff(&solution.xs, &solution.us, &mut nodes);
+    for (t, node) in nodes.iter_mut().enumerate() {
+        for (i, f) in node.f.iter_mut().enumerate() {
+            *f = if t < 50 { next[14 * t + i] - solution.x(t + 1)[i] } else { 0.0 };
+        }
+    }
+    let mut sweep = Sweep::new(&nodes);
+    sweep.run(&nodes, solver.settings.regularisation_start).unwrap();
+    for (t, knot) in sweep.knots()[..50].iter().enumerate() {
+        assert!((&knot.K - &solution.K[t]).amax() < 1e-6 * (1.0 + knot.K.amax()), "knot {t}");
+        assert!((&knot.k - &solution.k[t]).amax() < 1e-6 * (1.0 + knot.k.amax()), "knot {t}");
+    }
+}
+
+/// What blows up within the augmented Lagrangian leaves it its best iterate too, measured.
+#[test]
+fn a_constrained_solve_that_blows_up_says_how_far_its_best_iterate_is() {
+    let (mut problem, xs) = reckless_reach(0.02, 1e-6, 1e2);
+    let mut solver = AugmentedLagrangian::new(&problem);
+    let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+    assert_eq!(solution.status, Status::NotFinite);
+    let outcome = solver.outcome().clone();
+    assert!(solution.cost < 1e2 && solution.gap < 0.35);
+    assert!(outcome.primal == solution.gap && outcome.dual.is_finite() && (outcome.cost - solution.cost).abs() < 1e-9);
+    let next = solver.resume(&mut problem).unwrap();
+    assert!(next.gap <= solution.gap && next.cost.is_finite());
+
+    // nothing finite at all: infinite, not NaN
+    let model = |nu| Bounded { nu, lanes: 1, limit: 1.0, broken: false };
+    let mut problem = Problem::new(vec![0.0], vec![Box::new(model(1))], vec![0; 6], Box::new(model(0))).unwrap();
+    let mut solver = AugmentedLagrangian::new(&problem);
+    let status = solver.solve(&mut problem, &[2.0; 7], &[0.0; 6]).unwrap().status;
+    let outcome = solver.outcome();
+    assert_eq!((status, outcome.primal), (Status::NotFinite, f64::INFINITY));
+    assert!(!outcome.dual.is_nan() && !outcome.cost.is_nan());
 }

@@ -369,6 +369,6 @@ fn a_solve_without_segments_is_refused() {
     let (mut problem, xs, us) = quadruped();
     let mut solver = Fddp::new(&problem);
     solver.settings.segments = 0;
-    let expected = Error::Setting { name: "segments", value: 0.0, allowed: "at least 1" };
+    let expected = Error::Setting { name: "segments", value: 0.0, allowed: "at least 1 and at most 1024" };
     assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap_err(), expected);
 }

@@ -83,9 +83,9 @@ fn copies_follow_their_models() {
     let (mut problem, xs, us) = gait();
     let before = solve(&mut problem, &xs, &us, 3);
     let change = |problem: &mut Problem| {
-        assert!(problem.model_mut::<ContactDynamics>(0).unwrap().set_weight("com", 50.0));
-        assert!(problem.model_mut::<ImpulseDynamics>(1).unwrap().set_weight("state", 0.3));
-        assert!(problem.terminal_mut::<FreeDynamics>().unwrap().set_weight("com", 5.0));
+        assert!(problem.model_mut::<ContactDynamics>(0).unwrap().set_weight("com", 50.0).unwrap());
+        assert!(problem.model_mut::<ImpulseDynamics>(1).unwrap().set_weight("state", 0.3).unwrap());
+        assert!(problem.terminal_mut::<FreeDynamics>().unwrap().set_weight("com", 5.0).unwrap());
     };
     change(&mut problem);
     let after = solve(&mut problem, &xs, &us, 3);
@@ -121,6 +121,6 @@ fn no_thread_at_all_is_refused() {
     let (mut problem, xs, us) = gait();
     let mut solver = Fddp::new(&problem);
     solver.settings.threads = 0;
-    let expected = Error::Setting { name: "threads", value: 0.0, allowed: "at least 1" };
+    let expected = Error::Setting { name: "threads", value: 0.0, allowed: "at least 1 and at most 1024" };
     assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap_err(), expected);
 }

@@ -35,4 +35,4 @@ pub use scalar::{Constant, Scalar};
 pub use scalar::{elementary, lane_dual};
 pub use simd::level;
 #[doc(hidden)]
-pub use simd::{gate, lanes, lanes::moves, pack as block};
+pub use simd::{gate, lanes::moves, pack as block};

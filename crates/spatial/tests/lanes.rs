@@ -1,12 +1,20 @@
 //! Vectors of numbers: in each lane what a single number gives, to the last bit.
 
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real};
-use condyle_spatial::lanes::Lanes;
+use condyle_spatial::block::{Block, Real, Witness};
 use condyle_spatial::level::{Level, Unsupported};
 use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
+
+/// The promise to use vectors at their level.
+struct Here;
+
+// SAFETY: each level is looked for before its vectors are used.
+#[allow(unsafe_code)]
+unsafe impl Witness for Here {}
+
+type Four = <f64 as Real>::Short<Here>;
 
 /// A single number.
 trait Number: Real<Mask = bool> {
@@ -96,12 +104,12 @@ impl Kernel for Moves {
                 let other = (to + 1) % 4;
                 let mut expected = [0.0; 4];
                 (expected[to], expected[other]) = (x[from], x[3 - from]);
-                let found = Move::new(&[(from, to), (3 - from, other)]).apply(Lanes::from_array(x)).to_array();
+                let found = Move::new(&[(from, to), (3 - from, other)]).apply::<Here>(Four::from_array(x)).to_array();
                 assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits));
             }
         }
         let x = [1e16, 3.0, -1e16, 0.1]; // of which each order has another sum
-        assert_eq!(sum(Lanes::from_array(x)).to_array(), [3.1; 4]);
+        assert_eq!(sum::<Here>(Four::from_array(x)).to_array(), [3.1; 4]);
     }
 }
 
@@ -115,13 +123,13 @@ fn each_lane_is_a_number() {
             _ if !level.is_supported() => eprintln!("NOT RUN: {}", Unsupported(level)),
             Level::Baseline => {}
             Level::Neon | Level::Avx2 => {
-                operations::<<f64 as Real>::Short>();
-                operations::<<f32 as Real>::Short>();
-                <f64 as Real>::Short::enter(Moves);
+                operations::<<f64 as Real>::Short<Here>>();
+                operations::<<f32 as Real>::Short<Here>>();
+                Four::enter(Moves);
             }
             Level::Avx512 => {
-                operations::<<f64 as Real>::Long>();
-                operations::<<f32 as Real>::Long>();
+                operations::<<f64 as Real>::Long<Here>>();
+                operations::<<f32 as Real>::Long<Here>>();
             }
         }
     }

@@ -70,7 +70,7 @@ impl Kinematics {
             q: vec![Jet::from(0.0); model.nq()],
             vt: vec![Jet::from(0.0); model.nv()],
             q_of_t: vec![Jet::from(0.0); model.nq()],
-            lifted: axes.map(|g| model.clone().with_gravity(g)),
+            lifted: axes.map(|g| model.clone().with_gravity(g).expect("is finite")),
             mass: model.bodies()[1..].iter().map(|b| b.inertia.mass).sum(),
             com: ComMotion { position: zero, velocity: zero, bias: zero, J: DMatrix::zeros(3, model.nv()) },
             frames: frames.map(|f| FrameMotion::new(model, f)).collect(),

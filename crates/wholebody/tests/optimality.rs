@@ -140,7 +140,7 @@ fn a_slope_is_a_tilted_world() {
     let slope = 0.3f64;
     let (sin, cos) = slope.sin_cos();
     // The ground is level and gravity leans back.
-    let leaning = model.clone().with_gravity(Vec3::new(-9.81 * sin, 0.0, -9.81 * cos));
+    let leaning = model.clone().with_gravity(Vec3::new(-9.81 * sin, 0.0, -9.81 * cos)).unwrap();
     let contacts = feet(0.5);
     let mut level = controller(&leaning, &contacts);
     let references = level.hold(&q);

@@ -72,29 +72,42 @@ impl Activation {
 /// >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
 /// <condyle.optimal.Cost 'effort', weight 0.001>
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct Cost(pub(super) robot::Cost);
+pub(crate) struct Cost {
+    name: String,
+    weight: f64,
+    residual: Residual,
+    activation: robot::Activation,
+}
+
+impl Cost {
+    /// The term for a robot.
+    pub(super) fn of(&self, model: &condyle::Model) -> PyResult<robot::Cost> {
+        let residual = self.residual.resolved(&format!("cost `{}`", self.name), model)?;
+        Ok(robot::Cost::new(&self.name, self.weight, residual, self.activation.clone()))
+    }
+}
 
 #[pymethods]
 impl Cost {
     #[new]
     #[pyo3(signature = (name, weight, residual, activation=None))]
     fn new(
-        name: &str,
+        name: String,
         weight: f64,
         residual: &Bound<'_, Residual>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> Self {
-        let residual = residual.get();
+        let residual = residual.get().clone();
         let activation = match (activation, residual.bounds()) {
             (Some(activation), _) => activation.get().0.clone(),
             (None, Some((lower, upper))) => robot::Activation::Barrier { lower, upper },
             (None, None) => robot::Activation::Quadratic,
         };
-        Self(robot::Cost::new(name, weight, residual.0.clone(), activation))
+        Self { name, weight, residual, activation }
     }
 
     fn __repr__(&self) -> String {
-        format!("<condyle.optimal.Cost '{}', weight {}>", self.0.name, self.0.weight)
+        format!("<condyle.optimal.Cost '{}', weight {}>", self.name, self.weight)
     }
 }
 
@@ -111,19 +124,32 @@ impl Cost {
 /// >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
 /// <condyle.optimal.Limit 'effort'>
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct Limit(pub(super) robot::Limit);
+pub(crate) struct Limit {
+    name: String,
+    residual: Residual,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+impl Limit {
+    /// The limit for a robot.
+    pub(super) fn of(&self, model: &condyle::Model) -> PyResult<robot::Limit> {
+        let residual = self.residual.resolved(&format!("limit `{}`", self.name), model)?;
+        Ok(robot::Limit::new(&self.name, residual, self.lower.clone(), self.upper.clone()))
+    }
+}
 
 #[pymethods]
 impl Limit {
     #[new]
     #[pyo3(signature = (name, residual, lower=None, upper=None))]
     fn new(
-        name: &str,
+        name: String,
         residual: &Bound<'_, Residual>,
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let residual = residual.get();
+        let residual = residual.get().clone();
         let lower = lower.map(|lower| numbers("lower", lower)).transpose()?;
         let upper = upper.map(|upper| numbers("upper", upper)).transpose()?;
         let (lower, upper) = match (lower, upper) {
@@ -132,10 +158,10 @@ impl Limit {
             (None, Some(upper)) => (vec![f64::NEG_INFINITY; upper.len()], upper),
             (None, None) => residual.bounds().unwrap_or_default(), // without any: r = 0
         };
-        Ok(Self(robot::Limit::new(name, residual.0.clone(), lower, upper)))
+        Ok(Self { name, residual, lower, upper })
     }
 
     fn __repr__(&self) -> String {
-        format!("<condyle.optimal.Limit '{}'>", self.0.name)
+        format!("<condyle.optimal.Limit '{}'>", self.name)
     }
 }

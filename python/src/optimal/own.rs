@@ -1,23 +1,74 @@
 //! Actions of one's own: given as matrices, or written in Python.
 
 use crate::arrays::{bounds, matrix, vector};
+use crate::exceptions::within;
 use condyle::optimal as rust;
 use nalgebra::DMatrix;
 use numpy::PyArray1;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rust::{ActionModel, LqNode};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The first error that an action written in Python raised during a solve.
+/// The most numbers of a state, a control or a constraint: of their matrices there is one for each knot.
+const MOST_SIZE: usize = rust::LqNode::MOST_SIZE;
+
+/// The first error that the actions and constraints of a problem which are written in Python raised during a solve. From
+/// then on none of them is called.
 pub(super) type Fault = Arc<Mutex<Option<PyErr>>>;
+
+/// The functions of an action or a constraint that is written in Python. Its object and its copies in problems share them,
+/// and only the object shows them to Python's collector of garbage: a problem shows its objects.
+#[derive(Clone)]
+struct Functions(Arc<Mutex<[Option<Py<PyAny>>; 2]>>);
+
+impl Functions {
+    fn new(calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> Self {
+        Self(Arc::new(Mutex::new([Some(calc), calc_diff])))
+    }
+
+    /// The functions; the lock is never held while Python runs.
+    fn both(&self) -> MutexGuard<'_, [Option<Py<PyAny>>; 2]> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn has_calc_diff(&self) -> bool {
+        self.both()[1].is_some()
+    }
+
+    /// The result of `calc` at (t, x, u).
+    fn calc<'py>(&self, py: Python<'py>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        self.call(py, 0, t, x, u)
+    }
+
+    /// The result of `calc_diff` at (t, x, u).
+    fn calc_diff<'py>(&self, py: Python<'py>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        self.call(py, 1, t, x, u)
+    }
+
+    fn call<'py>(&self, py: Python<'py>, k: usize, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        let function = self.both()[k].as_ref().map(|f| f.clone_ref(py));
+        let gone = || PyRuntimeError::new_err("the action's functions have been collected as garbage");
+        function.ok_or_else(gone)?.bind(py).call1((t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
+    }
+
+    fn traverse(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.both().iter().try_for_each(|function| visit.call(function))
+    }
+
+    fn clear(&self) {
+        let functions = std::mem::take(&mut *self.both());
+        drop(functions); // what they call on their way out must not find the lock held
+    }
+}
 
 /// An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
 /// u ≤ upper.
 ///
 /// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
-/// bound; without R and B it has no controls, as at a terminal knot.
+/// bound; without R and B it has no controls, as at a terminal knot. nx and nu are at most 4096.
 ///
 /// >>> from condyle.optimal import Lqr
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -41,12 +92,13 @@ impl Lqr {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let nx = A.len()?;
+        let nx = within("A, rows", A.len()?, 0, MOST_SIZE)?;
         let nu = match (R, B) {
             (Some(R), _) => R.len()?,
-            (None, Some(B)) => B.get_item(0)?.len()?,
-            (None, None) => 0,
+            (None, Some(B)) if nx > 0 => B.get_item(0)?.len()?,
+            _ => 0,
         };
+        within("R, rows, or B, columns", nu, 0, MOST_SIZE)?;
         let mut node = LqNode::zeros(nx, nu);
         let parts = [("B", B), ("f", f), ("Q", Q), ("S", S), ("R", R), ("q", q), ("r", r)];
         for (name, given) in [("A", Some(A)), ("lower", lower), ("upper", upper)].into_iter().chain(parts) {
@@ -72,8 +124,9 @@ fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()
 
 /// An action written in Python.
 ///
-/// nx, nu: the numbers of a state and of a control; nu is 0 at a terminal knot.
-/// calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+/// nx, nu: the numbers of a state and of a control, at most 4096; nu is 0 at a terminal knot.
+/// calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
+///     state may be None.
 /// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
 ///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
 /// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
@@ -88,8 +141,7 @@ fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()
 pub(crate) struct Action {
     nx: usize,
     nu: usize,
-    calc: Py<PyAny>,
-    calc_diff: Option<Py<PyAny>>,
+    functions: Functions,
     bounds: Option<[Vec<f64>; 2]>,
 }
 
@@ -105,73 +157,81 @@ impl Action {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        Ok(Self { nx, nu, calc, calc_diff, bounds: bounds(nu, lower, upper)? })
+        let (nx, nu) = (within("nx", nx, 0, MOST_SIZE)?, within("nu", nu, 0, MOST_SIZE)?);
+        Ok(Self { nx, nu, functions: Functions::new(calc, calc_diff), bounds: bounds(nu, lower, upper)? })
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.functions.traverse(&visit)
+    }
+
+    fn __clear__(&self) {
+        self.functions.clear();
     }
 }
 
 impl Action {
-    pub(super) fn copy(&self, py: Python<'_>) -> Own {
-        Own {
-            nx: self.nx,
-            nu: self.nu,
-            calc: self.calc.clone_ref(py),
-            calc_diff: self.calc_diff.as_ref().map(|f| f.clone_ref(py)),
-            bounds: self.bounds.clone(),
-            fault: Fault::default(),
-        }
+    /// A copy for a problem, at the end of the horizon or before it, whose errors go to `fault`.
+    pub(super) fn boxed(&self, terminal: bool, fault: &Fault) -> Box<dyn ActionModel> {
+        let Self { nx, nu, ref functions, ref bounds } = *self;
+        let (functions, bounds, fault) = (functions.clone(), bounds.clone(), fault.clone());
+        let differentiated = functions.has_calc_diff();
+        let own = Own { terminal, nx, nu, functions, bounds, fault };
+        if differentiated { Box::new(own) } else { Box::new(rust::NumDiff(own)) }
     }
 }
 
 /// An `Action` as the solver calls it. An error becomes a cost that is not a number, and is raised after the solve.
-pub(super) struct Own {
+struct Own {
+    /// Whether it serves the end, after which there is no state.
+    terminal: bool,
     nx: usize,
     nu: usize,
-    calc: Py<PyAny>,
-    pub(super) calc_diff: Option<Py<PyAny>>,
+    functions: Functions,
     bounds: Option<[Vec<f64>; 2]>,
-    pub(super) fault: Fault,
+    fault: Fault,
 }
 
-/// The value of a result; an error is kept if it is the first one.
-fn keep<T>(fault: &Fault, result: PyResult<T>) -> Option<T> {
-    match result {
+/// What a Python function gives, unless it raises an error, which is kept, or one of the problem's has before.
+fn unless_failed<T>(fault: &Fault, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> Option<T> {
+    let kept = || fault.lock().unwrap_or_else(PoisonError::into_inner);
+    if kept().is_some() {
+        return None;
+    }
+    Python::attach(|py| match call(py) {
         Ok(value) => Some(value),
         Err(error) => {
-            fault.lock().expect("nobody panics while holding it").get_or_insert(error);
+            kept().get_or_insert(error);
             None
         }
-    }
-}
-
-/// The result of a Python function of (t, x, u).
-fn call<'py>(py: Python<'py>, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64]) -> PyResult<Bound<'py, PyAny>> {
-    f.bind(py).call1((t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
+    })
 }
 
 impl Own {
-    fn try_calc(&self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> PyResult<f64> {
-        Python::attach(|py| {
-            let (state, cost): (Bound<'_, PyAny>, f64) = call(py, &self.calc, t, x, u)?.extract()?;
-            if !state.is_none() {
-                next.copy_from_slice(&vector("the next state", &state, self.nx)?);
+    fn try_calc(&self, py: Python<'_>, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> PyResult<f64> {
+        let (state, cost): (Bound<'_, PyAny>, f64) = self.functions.calc(py, t, x, u)?.extract()?;
+        match state.is_none() {
+            false => next.copy_from_slice(&vector("the next state", &state, self.nx)?),
+            true if self.terminal => {}
+            true => {
+                let what = format!("the next state of knot {t}: expected {} numbers, found None", self.nx);
+                return Err(PyValueError::new_err(what));
             }
-            Ok(cost)
-        })
+        }
+        Ok(cost)
     }
 
-    fn try_calc_diff(&self, f: &Py<PyAny>, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) -> PyResult<()> {
-        Python::attach(|py| {
-            let given = call(py, f, t, x, u)?.cast_into::<PyDict>()?;
-            for (name, entry) in given.iter() {
-                let name: String = name.extract()?;
-                if !["A", "B", "Q", "S", "R", "q", "r"].contains(&name.as_str()) {
-                    let what = format!("calc_diff: expected A, B, Q, S, R, q or r, found '{name}'");
-                    return Err(PyValueError::new_err(what));
-                }
-                write(node, &name, &entry)?;
+    fn try_calc_diff(&self, py: Python<'_>, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) -> PyResult<()> {
+        let given = self.functions.calc_diff(py, t, x, u)?.cast_into::<PyDict>()?;
+        for (name, entry) in given.iter() {
+            let name: String = name.extract()?;
+            if !["A", "B", "Q", "S", "R", "q", "r"].contains(&name.as_str()) {
+                let what = format!("calc_diff: expected A, B, Q, S, R, q or r, found '{name}'");
+                return Err(PyValueError::new_err(what));
             }
-            Ok(())
-        })
+            write(node, &name, &entry)?;
+        }
+        Ok(())
     }
 }
 
@@ -189,8 +249,7 @@ impl ActionModel for Own {
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
-        let result = self.try_calc(t, x, u, next);
-        keep(&self.fault, result).unwrap_or(f64::NAN)
+        unless_failed(&self.fault, |py| self.try_calc(py, t, x, u, next)).unwrap_or(f64::NAN)
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
@@ -199,9 +258,7 @@ impl ActionModel for Own {
         }
         node.q.fill(0.0);
         node.r.fill(0.0);
-        let f = self.calc_diff.as_ref().expect("an action without it is differentiated by differences");
-        let result = self.try_calc_diff(f, t, x, u, node);
-        if keep(&self.fault, result).is_none() {
+        if unless_failed(&self.fault, |py| self.try_calc_diff(py, t, x, u, node)).is_none() {
             node.q.fill(f64::NAN);
         }
     }
@@ -212,7 +269,7 @@ impl ActionModel for Own {
 /// To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
 ///
 /// action: the action.
-/// size: the number of entries of g.
+/// size: the number of entries of g, at most 4096.
 /// calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
 /// calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
 ///     space of the state. Without it, central differences of calc.
@@ -228,8 +285,7 @@ impl ActionModel for Own {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct ConstrainedAction {
     pub(super) action: Py<PyAny>,
-    calc: Py<PyAny>,
-    calc_diff: Option<Py<PyAny>>,
+    functions: Functions,
     bounds: [Vec<f64>; 2],
 }
 
@@ -245,33 +301,38 @@ impl ConstrainedAction {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        within("size", size, 0, MOST_SIZE)?;
         let bounds = bounds(size, lower, upper)?.unwrap_or_else(|| [vec![0.0; size], vec![0.0; size]]);
-        Ok(Self { action, calc, calc_diff, bounds })
+        Ok(Self { action, functions: Functions::new(calc, calc_diff), bounds })
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.action)?;
+        self.functions.traverse(&visit)
+    }
+
+    fn __clear__(&self) {
+        self.functions.clear();
     }
 }
 
 impl ConstrainedAction {
-    /// The constraint around its action.
-    pub(super) fn constraint(&self, py: Python<'_>, action: &dyn ActionModel) -> Written {
-        Written {
-            calc: self.calc.clone_ref(py),
-            calc_diff: self.calc_diff.as_ref().map(|f| f.clone_ref(py)),
-            bounds: self.bounds.clone(),
-            columns: [action.ndx(), action.nu()],
-            fault: Fault::default(),
-        }
+    /// A copy around a copy of its action, whose errors go to `fault`.
+    pub(super) fn boxed(&self, action: Box<dyn ActionModel>, fault: &Fault) -> Box<dyn ActionModel> {
+        let (functions, columns) = (self.functions.clone(), [action.ndx(), action.nu()]);
+        let constraint = Written { functions, bounds: self.bounds.clone(), columns, fault: fault.clone() };
+        Box::new(rust::Constrained::new(action, Box::new(constraint)))
     }
 }
 
 /// The constraint of a `ConstrainedAction` as the solver calls it. An error becomes a value that is not a number, and
 /// is raised after the solve.
-pub(super) struct Written {
-    calc: Py<PyAny>,
-    calc_diff: Option<Py<PyAny>>,
+struct Written {
+    functions: Functions,
     bounds: [Vec<f64>; 2],
     /// The numbers of columns of ∂g/∂x and ∂g/∂u.
     columns: [usize; 2],
-    pub(super) fault: Fault,
+    fault: Fault,
 }
 
 impl rust::PathConstraint for Written {
@@ -284,26 +345,29 @@ impl rust::PathConstraint for Written {
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]) {
-        let result = Python::attach(|py| {
-            let value = call(py, &self.calc, t, x, u)?;
+        let written = unless_failed(&self.fault, |py| {
+            let value = self.functions.calc(py, t, x, u)?;
             g.copy_from_slice(&vector("the constraint", &value, g.len())?);
             Ok(())
         });
-        if keep(&self.fault, result).is_none() {
+        if written.is_none() {
             g.fill(f64::NAN);
         }
     }
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
-        let Some(f) = &self.calc_diff else { return false };
+        if !self.functions.has_calc_diff() {
+            return false;
+        }
         let (size, [ndx, nu]) = (self.bounds[0].len(), self.columns);
-        let result = Python::attach(|py| {
-            let (by_x, by_u): (Bound<'_, PyAny>, Bound<'_, PyAny>) = call(py, f, t, x, u)?.extract()?;
+        let written = unless_failed(&self.fault, |py| {
+            let (by_x, by_u): (Bound<'_, PyAny>, Bound<'_, PyAny>) =
+                self.functions.calc_diff(py, t, x, u)?.extract()?;
             gx.copy_from(&matrix("∂g/∂x", &by_x, [size, ndx])?.to_matrix());
             gu.copy_from(&matrix("∂g/∂u", &by_u, [size, nu])?.to_matrix());
             Ok(())
         });
-        if keep(&self.fault, result).is_none() {
+        if written.is_none() {
             gx.fill(f64::NAN);
         }
         true

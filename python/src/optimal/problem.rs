@@ -9,8 +9,9 @@ use crate::arrays::{matrix, numbers, output, vector};
 use crate::exceptions::{ProblemError, problem_error};
 use condyle::optimal as rust;
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The value behind a lock; an error if another call holds it.
 pub(super) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
@@ -39,8 +40,8 @@ pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResu
     Ok(flat)
 }
 
-/// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `faults`.
-fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<Boxed> {
+/// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `fault`.
+fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> PyResult<Boxed> {
     macro_rules! of_a_robot {
         ($($class:ident),*) => {$(
             if let Ok(action) = model.cast::<$class>() {
@@ -49,18 +50,13 @@ fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<Boxed> {
         )*};
     }
     of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics);
-    let py = model.py();
     let action: Box<dyn rust::ActionModel> = if let Ok(lqr) = model.cast::<Lqr>() {
         Box::new(lqr.get().0.clone())
     } else if let Ok(constrained) = model.cast::<ConstrainedAction>() {
-        let inside = boxed(constrained.get().action.bind(py), faults)?.action;
-        let constraint = constrained.get().constraint(py, &*inside);
-        faults.push(constraint.fault.clone());
-        Box::new(rust::Constrained::new(inside, Box::new(constraint)))
+        let constrained = constrained.get();
+        constrained.boxed(boxed(constrained.action.bind(model.py()), terminal, fault)?.action, fault)
     } else if let Ok(action) = model.cast::<Action>() {
-        let written = action.get().copy(py);
-        faults.push(written.fault.clone());
-        if written.calc_diff.is_some() { Box::new(written) } else { Box::new(rust::NumDiff(written)) }
+        action.get().boxed(terminal, fault)
     } else {
         let found = model.get_type().name()?;
         return Err(PyTypeError::new_err(format!("models: expected an action, found '{found}'")));
@@ -76,14 +72,18 @@ fn boxed(model: &Bound<'_, PyAny>, faults: &mut Vec<Fault>) -> PyResult<Boxed> {
 /// stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
 /// terminal: the model of the end, without controls.
 ///
-/// Raises `ProblemError` if they do not fit together.
+/// Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
+/// 1e-3), and for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot, or 2²⁸ in the matrices [A B] of
+/// all knots.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
     /// The models, the terminal one last, as data where they are a robot's.
     described: Mutex<Vec<Option<Described>>>,
-    /// The errors of the actions that are written in Python.
-    faults: Vec<Fault>,
+    /// The actions that are written in Python: the problem's copies of them compute with their functions.
+    written: Vec<Py<PyAny>>,
+    /// Their first error.
+    fault: Fault,
 }
 
 #[pymethods]
@@ -95,15 +95,23 @@ impl Problem {
         stages: Vec<usize>,
         terminal: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let mut faults = Vec::new();
-        let all = models.iter().chain([terminal]).map(|model| boxed(model, &mut faults));
-        let all = all.collect::<PyResult<Vec<_>>>()?;
-        Self::make(numbers("x0", x0)?, all, stages, faults)
+        let fault = Fault::default();
+        let ends = models.iter().map(|model| (model, false)).chain([(terminal, true)]);
+        let all = ends.map(|(model, end)| boxed(model, end, &fault)).collect::<PyResult<Vec<_>>>()?;
+        let is_written =
+            |model: &&Bound<'_, PyAny>| model.cast::<Action>().is_ok() || model.cast::<ConstrainedAction>().is_ok();
+        let written = models.iter().chain([terminal]).filter(is_written).map(|model| model.clone().unbind());
+        Self::make(numbers("x0", x0)?, all, stages, written.collect(), fault)
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.written.iter().try_for_each(|action| visit.call(action))
     }
 
     /// A problem of a robot from the text that `to_json` gave.
     ///
-    /// Raises `ProblemError` for a text that is none, and for what does not fit together in it.
+    /// Raises `ProblemError` for a text that is none, for what does not fit together in it, and for sizes beyond the limits
+    /// that `Problem` has.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let data: rust::robot::RobotProblem =
@@ -114,7 +122,7 @@ impl Problem {
         }
         let knots = data.knots.into_iter().chain([data.terminal]);
         let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
-        Self::make(data.x0, all, data.stages, Vec::new())
+        Self::make(data.x0, all, data.stages, Vec::new(), Fault::default())
     }
 
     /// The problem and its robot as JSON, with the present initial state, weights and stages. An infinite bound is
@@ -167,7 +175,7 @@ impl Problem {
 
     /// Sets the initial state, nx numbers, as an MPC does before each solve.
     ///
-    /// Raises `ProblemError` for a number that is not finite.
+    /// Raises `ProblemError` for a number that is not finite, and for a rotation whose length is not 1 (up to 1e-3).
     fn set_x0(&self, x0: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let x0 = vector("x0", x0, problem.nx())?;
@@ -176,13 +184,14 @@ impl Problem {
 
     /// Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
     ///
-    /// Raises `KeyError` if there is no such term.
+    /// Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
     fn set_weight(&self, name: &str, weight: f64) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let mut described = lock("problem", &self.described)?;
         let mut found = false;
         for k in (0..described.len() - 1).map(Some).chain([None]) {
-            found |= change!(&mut problem, k, |knot| knot.set_weight(name, weight)).unwrap_or(false);
+            let set = change!(&mut problem, k, |knot| knot.set_weight(name, weight)).unwrap_or(Ok(false));
+            found |= set.map_err(problem_error)?;
         }
         described.iter_mut().flatten().for_each(|described| described.set_weight(name, weight));
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
@@ -201,14 +210,18 @@ impl Problem {
             return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {horizon}")));
         }
         let k = problem.stages().get(knot).copied();
-        let costs = terms(&costs);
+        let mut described = lock("problem", &self.described)?;
+        let last = described.len() - 1;
+        let described = &mut described[k.unwrap_or(last)];
+        let Some(model) = described.as_ref().map(|described| described.robot.clone()) else {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
+        };
+        let costs = terms(&model, &costs)?;
         let Some(set) = change!(&mut problem, k, |action| action.set_costs(knot, costs.clone())) else {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
         };
         set.map_err(problem_error)?;
-        let mut described = lock("problem", &self.described)?;
-        let last = described.len() - 1;
-        if let Some(described) = &mut described[k.unwrap_or(last)] {
+        if let Some(described) = described {
             described.knot.costs_at.insert(knot, costs);
         }
         Ok(())
@@ -228,11 +241,17 @@ impl Problem {
 
 impl Problem {
     /// A problem of models, the terminal one last.
-    fn make(x0: Vec<f64>, all: Vec<Boxed>, stages: Vec<usize>, faults: Vec<Fault>) -> PyResult<Self> {
+    fn make(
+        x0: Vec<f64>,
+        all: Vec<Boxed>,
+        stages: Vec<usize>,
+        written: Vec<Py<PyAny>>,
+        fault: Fault,
+    ) -> PyResult<Self> {
         let (mut actions, described): (Vec<_>, _) = all.into_iter().map(|b| (b.action, b.described)).unzip();
         let end = actions.pop().expect("the terminal one is there");
         let problem = rust::Problem::new(x0, actions, stages, end).map_err(problem_error)?;
-        Ok(Self { inner: Mutex::new(problem), described: Mutex::new(described), faults })
+        Ok(Self { inner: Mutex::new(problem), described: Mutex::new(described), written, fault })
     }
 
     /// Moves the data of the models on by a knot.
@@ -245,6 +264,11 @@ impl Problem {
 
     /// Raises the error of an action that is written in Python, if there is one.
     pub(super) fn raise(&self) -> PyResult<()> {
-        self.faults.iter().find_map(|fault| fault.lock().ok()?.take()).map_or(Ok(()), Err)
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+
+    /// Whether there is such an error.
+    pub(super) fn has_failed(&self) -> bool {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 }

@@ -1,60 +1,81 @@
 //! Residuals, and the cones that some of them look at.
 
 use crate::arrays::{Give, array, numbers, pose, rotation, three};
+use crate::exceptions::{ProblemError, problem_error, within};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
-use condyle::{Force, Mat3, Motion};
+use condyle::{Force, FrameKind, Mat3, Motion};
 use pyo3::prelude::*;
 
 /// A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 ///
-/// A frame is given by its name or number, a contact by the name that it has in `ContactDynamics` or `ImpulseDynamics`.
+/// A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics` or
+/// `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it looks at the frame of that
+/// name, or is refused.
 /// A target that is not given is zero, a rotation the identity.
 ///
 /// >>> from condyle.optimal import Residual
 /// >>> Residual.center_of_mass([0.4, 0.2, 0.5])
 /// <condyle.optimal.Residual {"center_of_mass":{"target":{"x":0.4,"y":0.2,"z":0.5}}}>
 #[pyclass(frozen, eq, module = "condyle.optimal")]
-#[derive(PartialEq)]
-pub(crate) struct Residual(pub(super) robot::Residual);
+#[derive(Clone, PartialEq)]
+pub(crate) struct Residual {
+    /// With the number that its frame has in the robot it was made with.
+    pub(super) inner: robot::Residual,
+    /// The name and kind of its frame, if it looks at one: the number is found anew in each robot.
+    frame: Option<FrameName>,
+}
+
+/// A frame as other robots may have it too.
+#[derive(Clone, PartialEq)]
+struct FrameName {
+    name: String,
+    kind: FrameKind,
+}
+
+impl From<robot::Residual> for Residual {
+    fn from(inner: robot::Residual) -> Self {
+        Self { inner, frame: None }
+    }
+}
 
 #[pymethods]
 impl Residual {
     /// The deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v).
     #[staticmethod]
     fn state(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::State { reference: numbers("reference", reference)? }))
+        Ok(Self::from(robot::Residual::State { reference: numbers("reference", reference)? }))
     }
 
     /// The deviation of the controls from a reference, r = u − reference, nu numbers.
     #[staticmethod]
     fn control(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::Control { reference: numbers("reference", reference)? }))
+        Ok(Self::from(robot::Residual::Control { reference: numbers("reference", reference)? }))
     }
 
     /// The efforts and forces beyond those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers.
     #[staticmethod]
     fn control_gravity() -> Self {
-        Self(robot::Residual::ControlGravity)
+        Self::from(robot::Residual::ControlGravity)
     }
 
     /// The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers.
     #[staticmethod]
     fn joint_effort(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::JointEffort { reference: numbers("reference", reference)? }))
+        Ok(Self::from(robot::Residual::JointEffort { reference: numbers("reference", reference)? }))
     }
 
     /// The deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers.
     #[staticmethod]
     fn joint_acceleration(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::JointAcceleration { reference: numbers("reference", reference)? }))
+        Ok(Self::from(robot::Residual::JointAcceleration { reference: numbers("reference", reference)? }))
     }
 
     /// The deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m).
     #[staticmethod]
     fn center_of_mass(target: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::CenterOfMass { target: three("target", target)? }))
+        Ok(Self::from(robot::Residual::CenterOfMass { target: three("target", target)? }))
     }
 
     /// The deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along the
@@ -62,7 +83,7 @@ impl Residual {
     #[staticmethod]
     #[pyo3(signature = (target=None))]
     fn centroidal_momentum(target: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::CentroidalMomentum { target: Force::from(six(target)?) }))
+        Ok(Self::from(robot::Residual::CentroidalMomentum { target: Force::from(six(target)?) }))
     }
 
     /// The deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is a
@@ -74,7 +95,7 @@ impl Residual {
         target: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let (frame, target) = (frame_index(&model.get().inner, frame)?, pose("target", target)?);
-        Ok(Self(robot::Residual::FramePlacement { frame, target }))
+        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FramePlacement { frame, target }))
     }
 
     /// The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m).
@@ -85,14 +106,14 @@ impl Residual {
         target: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let (frame, target) = (frame_index(&model.get().inner, frame)?, three("target", target)?);
-        Ok(Self(robot::Residual::FrameTranslation { frame, target }))
+        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FrameTranslation { frame, target }))
     }
 
     /// The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix.
     #[staticmethod]
     fn frame_rotation(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (frame, target) = (frame_index(&model.get().inner, frame)?, rotation("target", target)?);
-        Ok(Self(robot::Residual::FrameRotation { frame, target }))
+        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FrameRotation { frame, target }))
     }
 
     /// The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
@@ -108,7 +129,7 @@ impl Residual {
         let model = &model.get().inner;
         let (frame, target) = (frame_index(model, frame)?, Motion::from(six(target)?));
         let reference = Reference::read("reference", reference, model)?;
-        Ok(Self(robot::Residual::FrameVelocity { frame, target, reference }))
+        Ok(Self::of_frame(model, frame, robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
     /// The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
@@ -116,19 +137,19 @@ impl Residual {
     #[staticmethod]
     #[pyo3(signature = (contact, target=None))]
     fn contact_force(contact: String, target: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::ContactForce { contact, target: Force::from(six(target)?) }))
+        Ok(Self::from(robot::Residual::ContactForce { contact, target: Force::from(six(target)?) }))
     }
 
     /// The rows r = A f of a friction cone, for a contact's force f.
     #[staticmethod]
     fn friction_cone(contact: String, cone: &Bound<'_, FrictionCone>) -> Self {
-        Self(robot::Residual::FrictionCone { contact, cone: cone.get().0.clone() })
+        Self::from(robot::Residual::FrictionCone { contact, cone: cone.get().0.clone() })
     }
 
     /// The rows r = A w of a wrench cone, for a rigid contact's wrench w.
     #[staticmethod]
     fn wrench_cone(contact: String, cone: &Bound<'_, WrenchCone>) -> Self {
-        Self(robot::Residual::WrenchCone { contact, cone: cone.get().0.clone() })
+        Self::from(robot::Residual::WrenchCone { contact, cone: cone.get().0.clone() })
     }
 
     /// The centre of pressure of a rigid contact in a rectangle: four numbers, none above 0 while it is inside.
@@ -138,26 +159,46 @@ impl Residual {
     #[staticmethod]
     #[pyo3(signature = (contact, size, rotation=None))]
     fn center_of_pressure(contact: String, size: [f64; 2], rotation: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        Ok(Self(robot::Residual::CenterOfPressure { contact, rotation: surface(rotation)?, size }))
+        Ok(Self::from(robot::Residual::CenterOfPressure { contact, rotation: surface(rotation)?, size }))
     }
 
     /// The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s).
     #[staticmethod]
     fn impulse_center_of_mass() -> Self {
-        Self(robot::Residual::ImpulseCenterOfMass)
+        Self::from(robot::Residual::ImpulseCenterOfMass)
     }
 
     /// The residual as the JSON of a problem has it.
     fn __repr__(&self) -> String {
-        let json = serde_json::to_string(&self.0).expect("is made of numbers and words");
+        let json = serde_json::to_string(&self.inner).expect("is made of numbers and words");
         format!("<condyle.optimal.Residual {json}>")
     }
 }
 
 impl Residual {
+    /// A residual that looks at a frame of a model.
+    fn of_frame(model: &condyle::Model, frame: usize, inner: robot::Residual) -> Self {
+        let frame = &model.frames()[frame];
+        Self { inner, frame: Some(FrameName { name: frame.name.clone(), kind: frame.kind }) }
+    }
+
+    /// The residual with the number that its frame has in a model, or an error of what it belongs to.
+    pub(super) fn resolved(&self, what: &str, model: &condyle::Model) -> PyResult<robot::Residual> {
+        let mut residual = self.inner.clone();
+        let (Some(number), Some(FrameName { name, kind })) = (frame_mut(&mut residual), &self.frame) else {
+            return Ok(residual);
+        };
+        let same = |f: &condyle::Frame| f.name == *name && f.kind == *kind;
+        *number = match model.frames().iter().position(same) {
+            Some(number) => number,
+            None => model.frame(name).map_err(|error| ProblemError::new_err(format!("{what}: {error}")))?,
+        };
+        Ok(residual)
+    }
+
     /// The bounds that a residual has of its own: those of a cone, or of a centre of pressure.
     pub(super) fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
-        match &self.0 {
+        match &self.inner {
             robot::Residual::FrictionCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::WrenchCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::CenterOfPressure { .. } => Some((vec![f64::NEG_INFINITY; 4], vec![0.0; 4])),
@@ -166,11 +207,24 @@ impl Residual {
     }
 }
 
+/// The number of the frame that a residual looks at.
+fn frame_mut(residual: &mut robot::Residual) -> Option<&mut usize> {
+    match residual {
+        robot::Residual::FramePlacement { frame, .. }
+        | robot::Residual::FrameTranslation { frame, .. }
+        | robot::Residual::FrameRotation { frame, .. }
+        | robot::Residual::FrameVelocity { frame, .. } => Some(frame),
+        _ => None,
+    }
+}
+
 /// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 ///
-/// mu: μ; facets: the number of the pyramid's sides; inner: whether the pyramid lies inside of the cone; rotation: the
+/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
 /// surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
 /// default 0 and infinite.
+///
+/// Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
 ///
 /// >>> condyle.optimal.FrictionCone(0.5).rows()[0]
 /// array([ 1. ,  0. , -0.5])
@@ -189,8 +243,11 @@ impl FrictionCone {
         least: f64,
         greatest: f64,
     ) -> PyResult<Self> {
+        within("facets", facets, 0, robot::FrictionCone::MOST_FACETS)?;
         let rotation = surface(rotation)?;
-        Ok(Self(robot::FrictionCone { rotation, mu, facets, inner, least, greatest }))
+        let cone = robot::FrictionCone { rotation, mu, facets, inner, least, greatest };
+        cone.check().map_err(problem_error)?;
+        Ok(Self(cone))
     }
 
     /// The matrix A, (facets + 1, 3).
@@ -209,6 +266,8 @@ impl FrictionCone {
 ///
 /// friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 ///
+/// Raises `ProblemError` if a side is negative or not finite.
+///
 /// >>> from condyle.optimal import FrictionCone, WrenchCone
 /// >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
 /// (17, 6)
@@ -218,8 +277,10 @@ pub(crate) struct WrenchCone(robot::WrenchCone);
 #[pymethods]
 impl WrenchCone {
     #[new]
-    fn new(friction: &Bound<'_, FrictionCone>, size: [f64; 2]) -> Self {
-        Self(robot::WrenchCone { friction: friction.get().0.clone(), size })
+    fn new(friction: &Bound<'_, FrictionCone>, size: [f64; 2]) -> PyResult<Self> {
+        let cone = robot::WrenchCone { friction: friction.get().0.clone(), size };
+        cone.check().map_err(problem_error)?;
+        Ok(Self(cone))
     }
 
     /// The matrix A, (facets + 13, 6).

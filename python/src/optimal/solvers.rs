@@ -3,8 +3,10 @@
 use super::problem::{Problem, common_nu, controls, lock};
 use crate::arrays::{Array, Give, class, matrix, output};
 use crate::exceptions::{problem_error, wrong_word};
+use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 use std::sync::Mutex;
@@ -35,8 +37,9 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     }
     fn duration(given: &Bound<'_, PyAny>) -> PyResult<Option<Duration>> {
         let seconds: Option<f64> = given.extract()?;
-        let wrong = |_| PyValueError::new_err(format!("time_budget: expected at least 0 seconds, found {seconds:?}"));
-        seconds.map(Duration::try_from_secs_f64).transpose().map_err(wrong)
+        let wrong =
+            |seconds| PyValueError::new_err(format!("time_budget: expected at least 0 seconds, found {seconds}"));
+        seconds.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
     }
     set!(s, given, {
         method by method, second_order, inverse_dynamics_form, max_iterations, time_budget by duration, segments, threads,
@@ -53,7 +56,12 @@ fn run<'py, S: Send>(
     problem: &Py<Problem>,
     solver: &Mutex<S>,
     warm_start: Option<[&Bound<'_, PyAny>; 2]>,
-    solve: impl for<'a> FnOnce(&'a mut S, &mut rust::Problem, &[f64], &[f64]) -> Result<&'a rust::Solution, rust::Error>
+    solve: impl for<'a> FnOnce(
+        &'a mut S,
+        &mut rust::Problem,
+        [&[f64]; 2],
+        &mut Interruptions<'_>,
+    ) -> Result<&'a rust::Solution, rust::Error>
     + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut inner = lock("problem", &problem.get().inner)?;
@@ -64,9 +72,13 @@ fn run<'py, S: Send>(
         u = controls(&inner, us)?;
     }
     let (inner, solver) = (&mut *inner, &mut *solver);
-    let solution = py.detach(|| solve(solver, inner, &x, &u)).map_err(problem_error)?;
-    problem.get().raise()?;
-    give(py, inner, solution)
+    let failed = || problem.get().has_failed();
+    let mut interruptions = Interruptions { signals: Signals::new(signals::LONG), failed: &failed };
+    let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions));
+    let raised = problem.get().raise(); // and forgotten, whatever else there is to be raised
+    interruptions.signals.finish()?;
+    raised?;
+    give(py, inner, result.map_err(problem_error)?)
 }
 
 /// A solver: the methods that both kinds have, beside those that make and show it.
@@ -85,7 +97,9 @@ macro_rules! solver {
 
             /// Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
             ///
-            /// Other threads run meanwhile.
+            /// Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
+            /// iteration: what a handler raises, as KeyboardInterrupt, is raised here, and `solution` then is the best
+            /// iterate, from which `resume` goes on.
             ///
             /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
             /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
@@ -97,14 +111,32 @@ macro_rules! solver {
                 xs: &Bound<'_, PyAny>,
                 us: &Bound<'_, PyAny>,
             ) -> PyResult<Bound<'py, PyAny>> {
-                run(py, &self.problem, &self.solver, Some([xs, us]), rust::$class::solve)
+                run(py, &self.problem, &self.solver, Some([xs, us]), |solver, problem, [xs, us], interruptions| {
+                    solver.solve_with(problem, xs, us, interruptions)
+                })
             }
 
             /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
             ///
             /// Raises `ProblemError` as `solve`.
             fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-                run(py, &self.problem, &self.solver, None, |solver, problem, _, _| solver.resume(problem))
+                run(py, &self.problem, &self.solver, None, |solver, problem, _, interruptions| {
+                    solver.resume_with(problem, interruptions)
+                })
+            }
+
+            /// The `Solution` of the last solve, also of one that a signal or an error of an `Action` has ended
+            /// ("interrupted"); None before the first.
+            #[getter]
+            fn solution<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+                let problem = lock("problem", &self.problem.get().inner)?;
+                let solver = lock("solver", &self.solver)?;
+                let solution = solver.solution();
+                (!solution.timings.total.is_zero()).then(|| give(py, &problem, solution)).transpose()
+            }
+
+            fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+                visit.call(&self.problem)
             }
 
             /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
@@ -142,9 +174,9 @@ solver! {
 ///     (default: yes): the same steps in less time.
 ///     `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
 ///     `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
-///     there are; 1 unless given. The results differ by rounding, and not at all with the number of threads.
-///     `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given. The results are
-///     the same to the last bit.
+///     there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
+///     `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given, at most 1024. The
+///     results are the same to the last bit.
 ///     `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
 ///     `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
 ///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
@@ -155,6 +187,7 @@ Fddp {
     fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut solver = rust::Fddp::new(&*lock("problem", &problem.get().inner)?);
         set(&mut solver.settings, settings)?;
+        solver.settings.check().map_err(problem_error)?;
         Ok(Self { problem: problem.unbind(), solver: Mutex::new(solver) })
     }
 }
@@ -204,6 +237,7 @@ AugmentedLagrangian {
     ) -> PyResult<Self> {
         let mut solver = rust::AugmentedLagrangian::new(&*lock("problem", &problem.get().inner)?);
         set(&mut solver.inner, inner)?;
+        solver.inner.check().map_err(problem_error)?;
         set!(solver.settings, settings, {
             max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor
         });
@@ -265,6 +299,7 @@ fn give<'py>(py: Python<'py>, problem: &rust::Problem, s: &rust::Solution) -> Py
         rust::Status::MaxIterations => "max_iterations",
         rust::Status::TimeLimit => "time_limit",
         rust::Status::RegularisationLimit => "regularisation_limit",
+        rust::Status::Interrupted => "interrupted",
         rust::Status::Infeasible => "infeasible",
         _ => "not_finite",
     };

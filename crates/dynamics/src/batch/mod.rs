@@ -8,6 +8,7 @@
 //! however many threads.
 
 mod pass;
+use crate::workspace::Gate;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::Force;
@@ -23,11 +24,13 @@ use pass::{
 ///
 /// Every function takes its arguments as the one of the same name for a single state does, with those of all states one
 /// after the other: q has `states` · nq numbers, and how many states that is may change from call to call. Results stay
-/// until the next call. `T` is `f64` or `f32`.
+/// until the next call. `T` is `f64` or `f32`. Of a robot without coordinates, of which nothing says how many states are
+/// meant, they are as many as there are forces for, or without forces as many as there is room for.
 ///
-/// All memory is allocated by [`new`](Self::new), but for what rayon allocates by itself on more than one thread. The
-/// level of vector instructions is the one in use when the batch is made. Made for one thread, it never leaves the
-/// caller's; else it runs in the pool of rayon in which it is called.
+/// Memory is allocated by [`new`](Self::new) for scratch, once for each thread, and for a vector of nv numbers for each
+/// state; by the first call of a function that gives matrices for those matrices, nv² numbers each; and by rayon for itself
+/// on more than one thread. The level of vector instructions is the one in use when the batch is made. Made for one thread,
+/// it never leaves the caller's; else it runs in the pool of rayon in which it is called, or else in the global one.
 ///
 /// ```
 /// use condyle_dynamics::{Batch, Data, rnea, robots};
@@ -51,17 +54,27 @@ pub struct Batch<T: Real = f64> {
 #[derive(Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
-    Short(Group<T::Short>),
-    Long(Group<T::Long>),
+    Short(Group<T::Short<Gate>>),
+    Long(Group<T::Long<Gate>>),
 }
 
 impl<T: Real> Batch<T> {
+    /// The most threads: each has scratch of its own.
+    pub const MOST_THREADS: usize = 1024;
+
+    /// The most states, of which there may be less memory for.
+    pub const MOST_STATES: usize = 1 << 32;
+
     /// Room for up to `states` states at once, on `threads` threads.
     ///
     /// # Panics
-    /// If `threads` is 0.
+    /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
+    /// [`MOST_STATES`](Self::MOST_STATES).
     pub fn new(model: &Model, states: usize, threads: usize) -> Self {
+        let (most_threads, most_states) = (Self::MOST_THREADS, Self::MOST_STATES);
         assert!(threads > 0, "threads: expected at least 1, found 0");
+        assert!(threads <= most_threads, "threads: expected at most {most_threads}, found {threads}");
+        assert!(states <= most_states, "states: expected at most {most_states}, found {states}");
         Self {
             states,
             lanes: match level() {
@@ -92,7 +105,12 @@ impl<T: Real> Batch<T> {
             InLanes::Short(g) => g.check(model),
             InLanes::Long(g) => g.check(model),
         }
-        let states = from.q.len() / model.nq().max(1);
+        let bodies = model.nodes().len();
+        let states = match from.q.len().checked_div(model.nq()) {
+            Some(states) => states,
+            None if from.f_ext.is_empty() => self.states,
+            None => from.f_ext.len() / bodies,
+        };
         assert!(
             states * model.nq() == from.q.len() && states <= self.states,
             "q: expected {} numbers for each of at most {} states, found {}",
@@ -103,7 +121,7 @@ impl<T: Real> Batch<T> {
         for (name, found) in names.into_iter().zip([from.v.len(), from.x.len()]).filter(|(name, _)| !name.is_empty()) {
             check(name, found, states * model.nv());
         }
-        let (found, forces) = (from.f_ext.len(), states * model.nodes().len());
+        let (found, forces) = (from.f_ext.len(), states * bodies);
         assert!(
             found == 0 || found == forces,
             "f_ext: expected no force or {forces} (one for each body of each state), found {found}"

@@ -7,6 +7,7 @@ use crate::calls::inertia::{crba, minv};
 use crate::calls::inverse_dynamics::{gravity, nonlinear_effects, rnea};
 use crate::data::Data;
 use crate::workspace::{filled, zero_matrix};
+use condyle_linalg::threads;
 use condyle_model::Model;
 use condyle_spatial::Force;
 use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter};
@@ -17,7 +18,9 @@ use nalgebra::{DMatrix, DMatrixView};
 pub(super) struct Group<S: Block> {
     /// One for each thread.
     workers: Vec<Worker<S>>,
-    /// One for as many states as there are lanes.
+    /// How many groups of as many states as there are lanes there may be.
+    groups: usize,
+    /// One for each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
     matrices: Vec<[DMatrix<S>; KINDS]>,
 }
 
@@ -57,11 +60,25 @@ impl<S: Block> Worker<S> {
 
 impl<S: Block> Group<S> {
     pub(super) fn new(model: &Model, states: usize, threads: usize) -> Self {
-        let square = || zero_matrix(model.nv(), model.nv());
-        let matrices = |_| core::array::from_fn(|_| square());
         Self {
             workers: (0..threads).map(|_| Worker::new(model)).collect(),
-            matrices: (0..states.div_ceil(S::LANES)).map(matrices).collect(),
+            groups: states.div_ceil(S::LANES),
+            matrices: Vec::new(),
+        }
+    }
+
+    /// Makes the matrices of a pass, for as many states as there is room for, if it is run for the first time.
+    fn keep(&mut self, kinds: &[usize], nv: usize) {
+        if kinds.is_empty() {
+            return;
+        }
+        self.matrices.resize_with(self.groups, || core::array::from_fn(|_| zero_matrix(0, 0)));
+        for matrices in &mut self.matrices {
+            for &kind in kinds {
+                if matrices[kind].nrows() != nv {
+                    matrices[kind] = zero_matrix(nv, nv);
+                }
+            }
         }
     }
 }
@@ -77,20 +94,23 @@ pub(super) struct Arguments<'a, T> {
 
 /// Where the results of some states go.
 struct Results<'a, S: Block> {
-    /// Empty where a function has none.
+    /// Both are empty where a function has none.
     vectors: &'a mut [S::Number],
     matrices: &'a mut [[DMatrix<S>; KINDS]],
 }
 
 /// What is done with a group of states: with the arguments of a worker, to where its vectors and matrices go.
 pub(super) trait Pass<T: Real>: Copy + Sync {
+    /// The kinds of matrices that it gives.
+    const KINDS: &'static [usize];
+
     fn run<S: Block<Number = T>>(
         self,
         model: &Model,
         worker: &mut Worker<S>,
         states: usize,
         vectors: &mut [T],
-        matrices: &mut [DMatrix<S>; KINDS],
+        matrices: Option<&mut [DMatrix<S>; KINDS]>,
     );
 }
 
@@ -111,7 +131,7 @@ impl<S: Block> Results<'_, S> {
     /// As for the arguments.
     fn split(self, n: usize, states: usize) -> (Self, Self) {
         let vectors = self.vectors.split_at_mut(self.vectors.len() / states * n);
-        let matrices = self.matrices.split_at_mut(n.div_ceil(S::LANES));
+        let matrices = self.matrices.split_at_mut(n.div_ceil(S::LANES).min(self.matrices.len()));
         (Self { vectors: vectors.0, matrices: matrices.0 }, Self { vectors: vectors.1, matrices: matrices.1 })
     }
 }
@@ -132,7 +152,7 @@ fn spread<T: Real, S: Block<Number = T>>(
     let (some, others) = workers.split_at_mut(workers.len() / 2);
     let n = (groups * some.len() / (some.len() + others.len())).max(1) * S::LANES;
     let (first, second) = (from.split(n, states), to.split(n, states));
-    rayon::join(
+    threads::join(
         || spread(pass, model, some, n, first.0, second.0),
         || spread(pass, model, others, states - n, first.1, second.1),
     );
@@ -158,7 +178,7 @@ fn one_by_one<T: Real, S: Block<Number = T>>(
         }
         w.f_ext.resize(here.f_ext.len() / n, Force::zero());
         gather(flat(here.f_ext), n, flat_mut(&mut w.f_ext));
-        pass.run(model, w, n, place.vectors, &mut place.matrices[0]);
+        pass.run(model, w, n, place.vectors, place.matrices.first_mut());
         (states, from, to) = (states - n, others, places);
     }
 }
@@ -169,8 +189,10 @@ macro_rules! vectors {
         #[derive(Clone, Copy)]
         pub(super) struct $pass;
         impl<T: Real> Pass<T> for $pass {
+            const KINDS: &'static [usize] = &[];
+
             fn run<S: Block<Number = T>>(
-                self, model: &Model, w: &mut Worker<S>, n: usize, to: &mut [T], _: &mut [DMatrix<S>; KINDS],
+                self, model: &Model, w: &mut Worker<S>, n: usize, to: &mut [T], _: Option<&mut [DMatrix<S>; KINDS]>,
             ) {
                 scatter($function(model, &mut w.data $(, &w.$argument)*), n, to);
             }
@@ -191,9 +213,17 @@ macro_rules! matrices {
         #[derive(Clone, Copy)]
         pub(super) struct $pass;
         impl<T: Real> Pass<T> for $pass {
+            const KINDS: &'static [usize] = &[$($kind),*];
+
             fn run<S: Block<Number = T>>(
-                self, model: &Model, w: &mut Worker<S>, n: usize, to: &mut [T], matrices: &mut [DMatrix<S>; KINDS],
+                self,
+                model: &Model,
+                w: &mut Worker<S>,
+                n: usize,
+                to: &mut [T],
+                matrices: Option<&mut [DMatrix<S>; KINDS]>,
             ) {
+                let matrices = matrices.expect("a pass that gives matrices has them");
                 $(swap(&mut w.data.$($place).*, &mut matrices[$kind]);)*
                 $function(model, &mut w.data $(, &w.$argument)*);
                 if !to.is_empty() {
@@ -220,9 +250,9 @@ impl<S: Block> Group<S> {
         self.workers[0].data.check(model);
     }
 
-    pub(super) fn run<T: Real>(
+    pub(super) fn run<T: Real, P: Pass<T>>(
         &mut self,
-        pass: impl Pass<T>,
+        pass: P,
         model: &Model,
         states: usize,
         from: Arguments<'_, T>,
@@ -230,7 +260,9 @@ impl<S: Block> Group<S> {
     ) where
         S: Block<Number = T>,
     {
-        let to = Results { vectors, matrices: &mut self.matrices };
+        self.keep(P::KINDS, model.nv());
+        let matrices = if P::KINDS.is_empty() { &mut [] } else { &mut self.matrices[..] };
+        let to = Results { vectors, matrices };
         spread(pass, model, &mut self.workers, states, from, to);
     }
 

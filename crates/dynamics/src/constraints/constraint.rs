@@ -4,6 +4,7 @@ use crate::passes::frames::ReferenceFrame;
 use condyle_model::Error;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Motion, Scalar, Se3};
+use core::any::Any;
 use serde::{Deserialize, Serialize};
 
 /// What a constraint holds.
@@ -42,6 +43,16 @@ impl<S: Scalar> Target<S> {
     /// Both frames in one place, at rest.
     pub fn identity() -> Self {
         Self { placement: Se3::identity(), velocity: Motion::zero(), acceleration: Motion::zero() }
+    }
+
+    /// A message for a target of plain numbers that is none.
+    pub(crate) fn wrong(&self) -> Option<&'static str> {
+        let Target { placement: X, velocity, acceleration } = (self as &dyn Any).downcast_ref::<Target<f64>>()?;
+        let motions = velocity.to_array().into_iter().chain(acceleration.to_array());
+        if X.translation.to_array().into_iter().chain(motions).any(|x| !x.is_finite()) {
+            return Some("its target is not finite");
+        }
+        (!X.rotation.is_rotation()).then_some("its target's placement is no rotation and translation")
     }
 
     /// The same target on another scalar.
@@ -101,7 +112,7 @@ pub struct ContactConstraint {
     pub kp: f64,
     /// How fast an error of velocity decays (1/s).
     pub kd: f64,
-    /// Where and how; can be changed later ([`ConstraintSet::target_mut`](crate::ConstraintSet::target_mut)).
+    /// Where and how; can be changed later ([`ConstraintSet::set_target`](crate::ConstraintSet::set_target)).
     pub target: Target<f64>,
 }
 
@@ -138,6 +149,9 @@ impl ContactConstraint {
             if !(gain.is_finite() && gain >= 0.0) {
                 return wrong(format!("{name} must be a number of at least 0, found {gain}"));
             }
+        }
+        if let Some(what) = self.target.wrong() {
+            return wrong(what.to_owned());
         }
         let same = |c: &Self| (c.frame, c.other) == (self.frame, self.other) && c.kind == self.kind;
         if let Some(twin) = before.iter().position(same) {

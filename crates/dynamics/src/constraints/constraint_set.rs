@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 /// Constraints of one model: contacts and loops, and the scratch and results of [`constrained_dynamics`] and its like.
 ///
 /// All memory is allocated here. Make one set for each combination of contacts, and change where they shall be through
-/// [`target_mut`](Self::target_mut); the [`Data`](crate::Data) can be the same for all sets.
+/// [`set_target`](Self::set_target); the [`Data`](crate::Data) can be the same for all sets.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, robots};
@@ -34,8 +34,8 @@ pub struct ConstraintSet<S> {
     pub(crate) plans: Vec<Plan>,
     pub(crate) targets: Vec<Target<S>>,
     pub(crate) nv: usize,
-    /// Of the tree that it was made for.
-    tree: u64,
+    /// Of the robot that it was made for: the frames and the axes of its joints are in here.
+    geometry: u64,
     /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
     pub(crate) nonzero_rows: Vec<NonzeroRows>,
     /// For each coordinate, the rows of J in which it may differ from zero.
@@ -68,7 +68,7 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Errors
     /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
-    /// is `World`, a gain is negative or not finite, or two constraints are the same.
+    /// is `World`, a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let plans = Plan::of_constraints(model, constraints)?;
         let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));
@@ -78,7 +78,7 @@ impl<S: Scalar> ConstraintSet<S> {
             proximal: Proximal::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
             nv,
-            tree: model.tree_hash(),
+            geometry: model.geometry_hash(),
             nonzero_rows: nonzero_rows(model, &plans),
             touching: (0..nv).map(|k| touching(&plans, k)).collect(),
             J: vec![o; entries],
@@ -121,12 +121,29 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
-    /// Where constraint k wants its frame to be: to be changed between calls, in each lane by itself.
+    /// Where constraint k wants its frame to be, in each lane by itself.
     ///
     /// # Panics
     /// If there is no such constraint.
-    pub fn target_mut(&mut self, k: usize) -> &mut Target<S> {
-        &mut self.targets[k]
+    pub fn target(&self, k: usize) -> Target<S> {
+        self.targets[k]
+    }
+
+    /// Changes where constraint k wants its frame to be, between calls. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Constraint`] for a target of plain numbers that is not finite or whose rotation is none; that of before then
+    /// stays.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    pub fn set_target(&mut self, k: usize, target: Target<S>) -> Result<(), Error> {
+        let to = &mut self.targets[k];
+        if let Some(what) = target.wrong() {
+            return Err(Error::Constraint { constraint: k, what: what.to_owned() });
+        }
+        *to = target;
+        Ok(())
     }
 
     /// J, rows × nv, as the last call left it: J is overwritten.
@@ -147,10 +164,10 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// Panics unless this was made for a model of the same tree.
+    /// Panics unless this was made for a model with the same joints and frames in the same places.
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
-        assert!(self.tree == model.tree_hash(), "constraints: made for another model than `{}`", model.name());
+        assert!(self.geometry == model.geometry_hash(), "constraints: made for another model than `{}`", model.name());
     }
 }

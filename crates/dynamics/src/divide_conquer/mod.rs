@@ -17,7 +17,7 @@ use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::divide_conquer::mimic::Ties;
 use crate::divide_conquer::scratch::{Body, Dof, Part};
-use condyle_linalg::check;
+use condyle_linalg::{check, threads};
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Single};
@@ -48,8 +48,8 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// ```
 #[derive(Clone, Debug)]
 pub struct DivideConquer<S> {
-    /// Of the tree that it was planned for.
-    tree: u64,
+    /// Of the robot that it was planned for.
+    geometry: u64,
     assembly: Assembly,
     /// In the order of the assembly. Shape: moving bodies.
     bodies: Vec<Body<S>>,
@@ -87,7 +87,7 @@ impl<S: Scalar> DivideConquer<S> {
             qdd: S::zero(),
         };
         Self {
-            tree: model.tree_hash(),
+            geometry: model.geometry_hash(),
             bodies: vec![body; assembly.links.len()],
             dofs: vec![dof; model.columns().len()],
             handles: vec![ArticulatedPair::nothing(); assembly.pieces.len()],
@@ -111,12 +111,12 @@ impl<S: Scalar> DivideConquer<S> {
     /// and steps, and O(n z + z³) for the ties.
     ///
     /// # Panics
-    /// If an argument has the wrong length, `model` is not of the tree of the one that was planned for, or M is singular
+    /// If an argument has the wrong length, `model` has joints or frames elsewhere than the one that was planned for, or M is singular
     /// ([`Model::singular_joints`]).
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);
-        let other = if bodies == planned { " in another tree" } else { "" };
-        assert!(model.tree_hash() == self.tree, "model: planned for {planned} bodies, found {bodies}{other}");
+        let other = if bodies == planned { " of another robot" } else { "" };
+        assert!(model.geometry_hash() == self.geometry, "model: planned for {planned} bodies, found {bodies}{other}");
         model.check_regular();
         check("q", q.len(), model.nq());
         check("v", v.len(), model.nv());
@@ -134,12 +134,12 @@ impl<S: Scalar> DivideConquer<S> {
         }
         self.ties.prepare(model);
         let world = Motion::new(l.minus_gravity(), Vec3::zero());
-        let parallel = self.assembly.pieces.len() > 1 && rayon::current_num_threads() > 1;
+        let parallel = self.assembly.pieces.len() > 1 && threads::threads() > 1;
         let Self { assembly, bodies, dofs, handles, ties, zero, qdd, .. } = self;
         let all = Part { pieces: &assembly.pieces, links: &assembly.links, bodies, dofs, handles };
         let job = Job { l: &l, q, qd: v, f_ext, world, parallel };
         if parallel {
-            rayon::scope(|_| job.run(all, ties, zero)); // enters the pool once, not three times
+            threads::enter(|| job.run(all, ties, zero)); // enters the pool once, not three times
         } else {
             job.run(all, ties, zero);
         }
@@ -203,7 +203,7 @@ impl<L: Layout + Sync> Job<'_, L> {
     #[inline(always)]
     fn both(&self, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
         if self.parallel {
-            rayon::join(one, other);
+            threads::join(one, other);
         } else {
             one();
             other();

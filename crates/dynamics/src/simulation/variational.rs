@@ -266,7 +266,7 @@ mod tests {
         let mut rng = StdRng::seed_from_u64(1);
         let model = robot(&mut rng);
         let nv = model.nv();
-        let model = model.with_armature(&(0..nv).map(|k| 0.1 * k as f64).collect::<Vec<_>>());
+        let model = model.with_armature(&(0..nv).map(|k| 0.1 * k as f64).collect::<Vec<_>>()).unwrap();
         let q = crate::random_configuration(&model, &mut rng);
         let mut numbers = || (0..nv).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
         let (p, w, tau) = (numbers(), numbers(), numbers());

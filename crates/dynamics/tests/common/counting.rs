@@ -6,6 +6,7 @@ use std::cell::Cell;
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
+    static BYTES: Cell<usize> = const { Cell::new(0) };
 }
 
 struct Counting;
@@ -15,6 +16,7 @@ struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.set(COUNT.get() + 1);
+        BYTES.set(BYTES.get() + layout.size());
         // SAFETY: the caller's promise about `layout` is the one that is asked for.
         unsafe { System.alloc(layout) }
     }
@@ -35,7 +37,16 @@ pub(crate) fn allocations(f: impl FnOnce()) -> usize {
     COUNT.get() - before
 }
 
+/// How many bytes a call allocates on this thread, freed or not.
+#[allow(dead_code)] // by some of the tests
+pub(crate) fn bytes(f: impl FnOnce()) -> usize {
+    let before = BYTES.get();
+    f();
+    BYTES.get() - before
+}
+
 #[test]
 fn the_counter_counts() {
+    assert_eq!(bytes(|| drop(std::hint::black_box(Box::new(7_u64)))), 8);
     assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(7)))), 1);
 }

@@ -55,7 +55,7 @@ pub(crate) fn embedded() -> [Model; 3] {
         let first = if model.bodies()[1].joint == Joint::FreeFlyer { 6 } else { 0 };
         let armature: Vec<f64> =
             (0..model.nv()).map(|k| if k < first { 0.0 } else { 0.01 + 1e-3 * k as f64 }).collect();
-        model.with_armature(&armature)
+        model.with_armature(&armature).unwrap()
     })
 }
 
@@ -182,6 +182,17 @@ impl Tree {
         builder.gravity(self.gravity);
         builder.build().expect("a random tree is well-formed")
     }
+}
+
+/// A robot that does not move: two bodies that are fixed to the world, and a frame.
+#[allow(dead_code)] // by some of the tests
+pub(crate) fn fixed() -> Model {
+    let rng = &mut rng(0);
+    let mut builder = ModelBuilder::new("fixed");
+    builder.merge(WORLD, random_pose(rng), random_inertia(rng));
+    builder.merge(WORLD, random_pose(rng), random_inertia(rng));
+    builder.frame("tool", WORLD, random_pose(rng));
+    builder.build().expect("a robot need not move")
 }
 
 /// The embedded robots, and random trees without and with mimic joints.

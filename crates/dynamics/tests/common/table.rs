@@ -105,9 +105,12 @@ impl<'m, S: Scalar> Output<'m, S> {
     }
 }
 
-/// A contact and a loop, with a round more than is needed.
+/// A contact and a loop, with a round more than is needed; nothing for a robot that cannot move.
 fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     let bodies = model.bodies().len();
+    if bodies == 1 {
+        return ConstraintSet::new(model, &[]).expect("no constraint is wrong");
+    }
     let frame = |body: usize| model.frames().iter().position(|f| f.body == body).expect("each body has a frame");
     let (reference, other) = (ReferenceFrame::LocalWorldAligned, Some(frame(bodies / 2)));
     let contact = ContactConstraint { reference, kp: 2.0, kd: 3.0, ..ContactConstraint::point(frame(bodies - 1)) };
@@ -121,7 +124,8 @@ fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
 fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
     use condyle_dynamics::Input::*;
     let last = model.bodies().len() - 1;
-    [Force(last), Inertia(last), Gravity, Armature, Damping, Friction { smoothing: 0.1 }]
+    let inertia = if last > 0 { Inertia(last) } else { Gravity }; // the world has none
+    [Force(last), inertia, Gravity, Armature, Damping, Friction { smoothing: 0.1 }]
 }
 
 /// The functions that need no `Data`, or bring their own.
@@ -212,7 +216,7 @@ pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
         ("rnea_second_derivatives", |m, d, i, o| {
             rnea_second_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext, &mut o.tensors);
             let t = &o.tensors;
-            let last = m.nv() - 1;
+            let Some(last) = m.nv().checked_sub(1) else { return };
             let some = [&t.dqdq[0], &t.dvdq[last], &t.dvdv[0], &t.dadq[last]];
             some.into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
         }),
@@ -357,7 +361,7 @@ pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
             o.numbers.extend_from_slice(&o.v);
         }),
         ("log-Cholesky parameters", |_, _, i, o| {
-            let theta = core::array::from_fn(|k| i.v[k % i.v.len()]);
+            let theta = core::array::from_fn(|k| i.v.get(k % i.v.len().max(1)).copied().unwrap_or(S::zero()));
             o.numbers.extend_from_slice(&inertial_parameters::from_inertia(from_log_cholesky(theta)));
             o.numbers.extend_from_slice(log_cholesky_jacobian(theta).as_slice());
         }),

@@ -300,7 +300,9 @@ fn moving_targets() {
     let mut set =
         ConstraintSet::new(&model, &[ContactConstraint::rigid(left), ContactConstraint::point(right)]).unwrap();
     constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
-    set.target_mut(1).acceleration.linear.y = 0.7;
+    let mut target = set.target(1);
+    target.acceleration.linear.y = 0.7;
+    set.set_target(1, target).unwrap();
     let a = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]).a.to_vec();
     let motion = forward_accelerations(&model, &mut data, &s.q, &s.v, &a);
     let found = motion.frame_classical_acceleration(right, ReferenceFrame::Local).linear;

@@ -197,13 +197,15 @@ fn with_respect_to_a_mass() {
         let M_inverse = minv(model, &mut data, &q).clone();
         for heavy in 1..model.bodies().len() {
             let add = |i: usize, I: Inertia<f64>| Inertia { mass: I.mass + f64::from(u8::from(i == heavy)), ..I };
-            let heavier = model.with_inertias(add);
+            let heavier = model.with_inertias(add).unwrap();
             let after = rnea(&heavier, &mut data, &q, &v, &a, &f_ext).to_vec();
             let quotient: Vec<f64> = after.iter().zip(&before).map(|(after, before)| after - before).collect();
-            let seeded = model.with_inertias(|i, I| Inertia {
-                mass: Dual64::new(I.mass, f64::from(u8::from(i == heavy))),
-                ..I.lift::<Dual64>()
-            });
+            let seeded = model
+                .with_inertias(|i, I| Inertia {
+                    mass: Dual64::new(I.mass, f64::from(u8::from(i == heavy))),
+                    ..I.lift::<Dual64>()
+                })
+                .unwrap();
             let (q, v, f) = (lift(&q), lift(&v), lift_forces(&f_ext));
             let mut data = Data::new(&seeded);
             let derivative = eps(rnea(&seeded, &mut data, &q, &v, &lift(&a), &f));

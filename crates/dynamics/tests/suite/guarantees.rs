@@ -3,11 +3,12 @@
 use crate::common;
 
 use common::table::{Input, Output, functions, has_data, in_step};
-use common::{all_models, embedded, rng};
+use common::{all_models, embedded, fixed, rng};
 use condyle_dynamics::{
-    Data, DifferenceArgument, Error, Force, Inertia, IntegrateArgument, Joint, Model, ModelBuilder, ReferenceFrame,
-    Se3, Sym3, Vec3, WORLD, aba, aba_derivatives, crba, difference, difference_jacobian, forward_kinematics, gravity,
-    integrate, integrate_jacobian, minv, neutral, nonlinear_effects, rnea, rnea_derivatives, robots,
+    Data, DifferenceArgument, DivideConquer, Error, Force, Inertia, IntegrateArgument, Joint, Model, ModelBuilder,
+    ReferenceFrame, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives, crba, difference, difference_jacobian,
+    forward_kinematics, gravity, integrate, integrate_jacobian, minv, neutral, nonlinear_effects, rnea,
+    rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -35,6 +36,36 @@ fn no_hidden_order() {
                 }
             }
         }
+    }
+}
+
+/// A robot of fixed joints only has no coordinates; every function gives what is left, which is finite, but for the centre of
+/// mass of what moves: nothing does, and it is documented to be no number.
+#[test]
+fn robots_without_coordinates() {
+    const CENTRE_OF_MASS: [&str; 6] = [
+        "forward_velocities",
+        "forward_accelerations",
+        "centroidal_map",
+        "centroidal_map_rate",
+        "compute_all_terms",
+        "centroidal_derivatives",
+    ];
+    let nothing = ModelBuilder::new("nothing").build().unwrap();
+    for model in &[fixed(), nothing] {
+        let input = Input::<f64>::random(model, &mut rng(0));
+        assert!(input.q.is_empty() && input.v.is_empty());
+        for (name, function) in functions() {
+            let (mut data, mut output) = (Data::new(model), Output::new(model));
+            function(model, &mut data, &input, &mut output);
+            let has_com = CENTRE_OF_MASS.contains(&name);
+            assert!(has_com || output.numbers.iter().all(|x| x.is_finite()), "{name}, on\n{model}");
+            assert!(!in_step(name) || output.numbers == [1.0], "{name} takes no step, on\n{model}");
+        }
+        let mut divided = DivideConquer::<f64>::new(model, 1);
+        assert!(divided.aba(model, &[], &[], &[], &input.f_ext).is_empty());
+        assert!(neutral(model).is_empty());
+        assert!(model.with_inertias(|_, I| I.scale(2.0)).unwrap().total_mass().is_finite());
     }
 }
 
@@ -140,7 +171,7 @@ fn data_of_another_tree() {
     let sizes = "(4, 3, 3) bodies, joint axes and coordinates, found (4, 3, 3)";
     assert_eq!(found, format!("data: made for a model of {sizes} in another tree"));
     // the same tree with other constants is welcome
-    let heavy = chain.with_inertias(|_, I| I.scale(2.0));
+    let heavy = chain.with_inertias(|_, I| I.scale(2.0)).unwrap();
     minv(&heavy, &mut Data::new(&chain), &[0.0; 3]);
     assert_eq!(heavy.total_mass(), 2.0 * chain.total_mass());
 }

@@ -204,7 +204,7 @@ fn moved_as_a_whole() {
         let rng = &mut rng(seed as u64);
         let State { q, v, a, tau, f_ext } = State::random(model, rng);
         let (by, place) = (Se3::new(common::random_rotation(rng), common::normal3(rng)), model.bodies()[1].placement);
-        let turned = model.clone().with_gravity(by.rotation * *model.gravity());
+        let turned = model.clone().with_gravity(by.rotation * *model.gravity()).unwrap();
         let base = Se3::new(Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(q[0], q[1], q[2]));
         let moved = place.inverse() * by * place * base;
         let mut q_moved = q.clone();

@@ -21,7 +21,7 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
     let nv = model.nv();
     let mut f_ext: Vec<Force<Dual64>> = lift_forces(&s.f_ext);
     let mut passive = vec![Dual64::from(0.0); nv]; // the losses of one unit of damping or friction in a joint
-    let mut seeded: Model<Dual64> = model.with_inertias(|_, I| I.lift());
+    let mut seeded: Model<Dual64> = model.with_inertias(|_, I| I.lift()).unwrap();
     let one = |on: bool| Dual64::new(0.0, f64::from(u8::from(on)));
     match input {
         Input::Force(b) => {
@@ -30,16 +30,18 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
             f_ext[b] = Force::from(six);
         }
         Input::Inertia(b) => {
-            seeded = model.with_inertias(|i, I| {
-                let pi = inertial_parameters::from_inertia(I);
-                let pi: [Dual64; 10] = core::array::from_fn(|j| one(i == b && j == k) + pi[j]);
-                inertial_parameters::to_inertia(pi)
-            });
+            seeded = model
+                .with_inertias(|i, I| {
+                    let pi = inertial_parameters::from_inertia(I);
+                    let pi: [Dual64; 10] = core::array::from_fn(|j| one(i == b && j == k) + pi[j]);
+                    inertial_parameters::to_inertia(pi)
+                })
+                .unwrap();
         }
         Input::Gravity => {
             let g = model.gravity().to_array();
             let g: [Dual64; 3] = core::array::from_fn(|j| one(j == k) + g[j]);
-            seeded = seeded.with_gravity(Vec3::from(g));
+            seeded = seeded.with_gravity(Vec3::from(g)).unwrap();
         }
         Input::Armature => return by_differences(model, s, qdd, k),
         Input::Damping => passive[k] -= one(true) * s.v[k],
@@ -54,18 +56,19 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
     [eps(&effort), eps(aba(&seeded, &mut data, &q, &v, &tau, &f_ext))]
 }
 
-/// The same for the armature: τ is linear in it, q̈ nearly so.
+/// The same for the armature, to one side: τ is linear in it, q̈ nearly so.
 fn by_differences(model: &Model, s: &State, qdd: &[f64], k: usize) -> [Vec<f64>; 2] {
     const STEP: f64 = 1e-5;
     let run = |h: f64| {
         let armature: Vec<f64> = model.armature().iter().zip(unit(model.nv(), k)).map(|(x, e)| x + h * e).collect();
-        let other = model.clone().with_armature(&armature);
+        let other = model.clone().with_armature(&armature).unwrap();
         let mut data = Data::new(&other);
         let tau = rnea(&other, &mut data, &s.q, &s.v, qdd, &s.f_ext).to_vec();
         [tau, aba(&other, &mut data, &s.q, &s.v, &s.tau, &s.f_ext).to_vec()]
     };
-    let (plus, minus) = (run(STEP), run(-STEP));
-    core::array::from_fn(|i| plus[i].iter().zip(&minus[i]).map(|(p, m)| (p - m) / (2.0 * STEP)).collect())
+    let [here, near, far] = [0.0, STEP, 2.0 * STEP].map(run); // an armature is never negative
+    let slope = |i: usize, j: usize| (4.0 * near[i][j] - far[i][j] - 3.0 * here[i][j]) / (2.0 * STEP);
+    core::array::from_fn(|i| (0..here[i].len()).map(|j| slope(i, j)).collect())
 }
 
 #[test]

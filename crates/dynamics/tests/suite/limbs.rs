@@ -212,9 +212,9 @@ fn of_the_model_that_is_given() {
     let State { q, v, a, .. } = State::random(&quadruped, &mut rng(0));
     let heavier = |_, I: Inertia<f64>| I.scale(2.0);
     for other in [
-        quadruped.clone().with_armature(&[0.3; 18]),
-        quadruped.clone().with_gravity([1.0, 2.0, 3.0].into()),
-        quadruped.with_inertias(heavier),
+        quadruped.clone().with_armature(&[0.3; 18]).unwrap(),
+        quadruped.clone().with_gravity([1.0, 2.0, 3.0].into()).unwrap(),
+        quadruped.with_inertias(heavier).unwrap(),
     ] {
         let found = rnea(&other, &mut data, &q, &v, &a, &[]).to_vec();
         let M = crba(&other, &mut data, &q).clone();

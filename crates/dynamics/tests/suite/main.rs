@@ -33,4 +33,4 @@ mod sdf;
 mod second_order;
 mod urdf;
 mod urdf_errors;
-mod urdf_fuzz;
+mod validity;

@@ -3,8 +3,6 @@
 use condyle_dynamics::{
     Data, Error, FrameKind, Joint, MjcfOptions, Model, Vec3, Warning, crba, forward_kinematics, rnea,
 };
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -158,10 +156,7 @@ fn joints_that_cannot_follow() {
         Model::from_mjcf_str(&text, &options).map(|m| m.warnings().iter().map(ToString::to_string).collect::<Vec<_>>())
     };
     let left_out = [
-        (
-            "<joint joint1='a' joint2='b' polycoef='0 1 2'/>",
-            "<joint>: polycoef [0.0, 1.0, 2.0, 0.0, 0.0] is not linear",
-        ),
+        ("<joint joint1='a' joint2='b' polycoef='0 1 2'/>", "<joint>: polycoef 0 1 2 0 0 is not linear"),
         ("<joint joint1='a'/>", "<joint>: holds `a` where it is: <equality> has no part in a tree of bodies"),
         (
             "<joint joint1='a' joint2='b'/><joint joint1='a' joint2='b' polycoef='1 2'/>",
@@ -200,7 +195,7 @@ const BALL: &str = "<geom size='0.1'/>";
 #[test]
 fn errors_name_file_line_and_element() {
     let cases = [
-        ("<joint name='j' axis='0 0 0'/><geom size='1'/>", "<string>:4: joint `j`: axis"),
+        ("<joint name='j' axis='0 0 0'/><geom size='1'/>", "<string>:4: joint `j`: axis (0, 0, 0) is no direction"),
         ("<joint axis='0 0'/>", "<string>:4: <joint>: axis: expected 3 numbers, found 2"),
         ("<joint type='hing'/>", "<string>:4: <joint>: type: `hing` is none of hinge, slide, ball and free"),
         ("<joint range='2 1'/>", "<string>:4: <joint>: range: lower limit"),
@@ -209,7 +204,10 @@ fn errors_name_file_line_and_element() {
         ("<joint/><freejoint/>", "<string>:4: <freejoint>: a free joint is the only joint"),
         ("<joint/><geom type='mesh' mesh='m'/>", "<string>:4: <geom>: has mass, and meshes are not read"),
         ("<joint/><geom type='plane' size='1 1 1'/>", "<string>:4: <geom>: a moving body has no geom of type `plane`"),
-        ("<joint/><geom type='box' size='1 1'/>", "<string>:4: <geom>: size: a box needs 3 positive numbers"),
+        (
+            "<joint/><geom type='box' size='1 1'/>",
+            "<string>:4: <geom>: size: a box needs 3 positive numbers, found 1 1",
+        ),
         ("<joint/><inertial pos='0 0 0'/>", "<string>:4: <inertial>: has no mass"),
         ("<joint/><inertial pos='0 0 0' mass='-1'/>", "<string>:4: <inertial>: mass is -1 kg"),
         ("<replicate count='3'/>", "<string>:4: <replicate>: is not supported"),
@@ -225,7 +223,7 @@ fn errors_name_file_line_and_element() {
     assert!(said("<mujoco>").starts_with("<string>:1: not well-formed XML"));
     assert!(said(&"<body>".repeat(300)).starts_with("<string>:"));
     let deep = format!("<mujoco>{}{}</mujoco>", "<worldbody>".repeat(300), "</worldbody>".repeat(300));
-    assert!(said(&deep).contains("is nested more than 256 levels deep"));
+    assert!(said(&deep).contains("elements are nested 301 levels deep, at most 256 are allowed"));
     let missing = Model::from_mjcf(data("nowhere.xml"), &MjcfOptions::default()).unwrap_err();
     assert!(matches!(missing, Error::File { .. }));
 }
@@ -267,52 +265,4 @@ fn meshes_weigh_nothing_if_asked() {
     assert_eq!(light.total_mass(), load(&body(&format!("<joint/>{BALL}"))).unwrap().total_mass());
     let said: Vec<String> = light.warnings().iter().map(ToString::to_string).collect();
     assert_eq!(said, ["geom `cover`: the mass of a mesh on body `b` is left out"]);
-}
-
-const PIECES: [&str; 14] = [
-    "<",
-    ">",
-    "\"",
-    "/",
-    "nan",
-    "-1",
-    "1e999",
-    "<body>",
-    "</body>",
-    "<freejoint/>",
-    "<joint type=\"ball\"/>",
-    "<geom/>",
-    "<default class=\"dog\"/>",
-    "é",
-];
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 500, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
-
-    /// Whatever a file contains, reading it gives a model that can be used, or an error.
-    #[test]
-    fn fuzz(
-        arm in any::<bool>(),
-        changes in prop::collection::vec((0.0..1.0, 0.0..1.0, 0..120_usize, 0..4_u8, prop::sample::select(&PIECES[..])), 1..5),
-    ) {
-        let include = "<include file=\"arm_defaults.xml\"/>";
-        let defaults = text("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
-        let mut bytes = if arm { text("arm.xml").replace(include, &defaults) } else { text("quadruped.xml") }.into_bytes();
-        prop_assert!(load(std::str::from_utf8(&bytes).unwrap()).is_ok());
-        for (at, to, length, change, piece) in changes {
-            let place = |x: f64| (x * bytes.len() as f64) as usize;
-            let (at, to) = (place(at), place(to));
-            let end = (at + length).min(bytes.len());
-            match change {
-                0 => drop(bytes.drain(at..end)),
-                1 => drop(bytes.splice(at..at, piece.bytes())),
-                2 => { let copy = bytes[at..end].to_vec(); drop(bytes.splice(to..to, copy)); }
-                _ => if let Some(b) = bytes.get_mut(at) { *b = b'0' + (length % 10) as u8; },
-            }
-        }
-        match load(&String::from_utf8_lossy(&bytes)) {
-            Ok(model) => drop(crba(&model, &mut Data::new(&model), &condyle_dynamics::neutral(&model)).clone()),
-            Err(error) => prop_assert!(!error.to_string().is_empty()),
-        }
-    }
 }

@@ -31,10 +31,10 @@ fn mistakes_have_names() {
     expect("/bodies/3/parent", json!(5), "body `link3`: number 3 on body 5: bodies stand parents first, depth first");
     expect("/bodies/3/parent", json!(3), "body `link3`: number 3 on body 3");
     expect("/bodies/3/name", json!("link2"), "two bodys are named `link2`");
-    expect("/bodies/3/idx_v", json!(3), "body `link3`: its coordinates in q and v begin at (2, 3), expected (2, 2)");
+    expect("/bodies/3/idx_v", json!(3), "body `link3`: begins at 2 in q and 3 in v, expected 2 and 2");
     expect("/bodies/3/inertia/mass", json!(-1.0), "body `link3`: mass is -1");
     expect("/bodies/3/placement/rotation/x/x", json!(0.5), "body `link3`: placement is no rotation");
-    expect("/bodies/3/joint", json!("Planar"), "body `link4`: its coordinates in q and v begin at (3, 3)");
+    expect("/bodies/3/joint", json!("Planar"), "body `link4`: begins at 3 in q and 3 in v");
     let none = json!({"Revolute": {"axis": {"x": 0.0, "y": 0.0, "z": 0.0}}});
     expect("/bodies/3/joint", none, "body `link3`: axis");
     let mimic = json!({"ratio": 2.0, "offset": 0.0});
@@ -46,6 +46,15 @@ fn mistakes_have_names() {
     expect("/limits/lower/2", json!(9.0), "joint `joint3`: lower limit 9 is above upper limit");
     expect("/damping", json!([0.0]), "damping: expected 7 entries, found 1");
     expect("/armature", json!([]), "armature: expected 7 entries, found 0");
+    expect("/damping/2", json!(-1.0), "joint `joint3`: damping is -1, expected a finite number of at least 0");
+    expect("/friction/2", json!(-1.0), "joint `joint3`: friction is -1");
+    expect("/armature/0", json!(-1e-3), "joint `joint1`: armature is -0.001");
+    expect(
+        "/limits/velocity/0",
+        json!(-1.0),
+        "joint `joint1`: limit of velocity is -1, expected a number of at least 0",
+    );
+    expect("/limits/effort/6", json!(-1.0), "joint `joint7`: limit of effort is -1");
     expect("/gravity/z", json!(null), "invalid type: null, expected f64");
     let mut file = arm();
     file["nodes"] = json!([]);

@@ -1,8 +1,8 @@
 //! Many states at once: the same bits as one by one.
 
-use crate::common::rng;
 use crate::common::table::Input;
-use crate::counting::allocations;
+use crate::common::{fixed, rng};
+use crate::counting::{allocations, bytes};
 use crate::{each_level, models};
 use condyle_dynamics::{
     Batch, Data, Force, Model, aba, aba_derivatives, crba, gravity, minv, nonlinear_effects, rnea, rnea_derivatives,
@@ -74,7 +74,8 @@ fn one_by_one(model: &Model, s: &States) -> Vec<f64> {
     numbers
 }
 
-/// Whatever the number of states, full groups or not, and of threads; and without allocating on one thread.
+/// Whatever the number of states, full groups or not, and of threads; and on one thread, once each function has been called,
+/// without allocating.
 #[test]
 fn every_state_is_a_single_call() {
     const MOST: usize = 19;
@@ -82,6 +83,8 @@ fn every_state_is_a_single_call() {
     each_level(|level| {
         for (seed, model) in all.iter().enumerate() {
             let mut batches = [1, 2, 3].map(|threads| Batch::new(model, MOST, threads));
+            let first = States::random(model, 1, 0);
+            batches.iter_mut().for_each(|batch| of_batch(model, batch, &first, &mut Vec::new()));
             for n in [1, 8, MOST] {
                 let states = States::random(model, n, seed as u64);
                 let expected = one_by_one(model, &states);
@@ -125,6 +128,57 @@ fn in_single_precision() {
         let expected = wide.rnea(model, &states.q, &states.v, &states.x, &[]);
         let largest = narrow(expected).iter().fold(1.0, |m: f32, x| m.max(x.abs()));
         assert!(tau.iter().zip(narrow(expected)).all(|(x, y)| (x - y).abs() < TOLERANCE * largest), "{level}");
+    });
+}
+
+/// A robot without coordinates has no numbers, in as many states as there are forces or room for.
+#[test]
+fn no_coordinates() {
+    let model = &fixed();
+    let forces = vec![Force::zero(); 3 * model.bodies().len()];
+    each_level(|_| {
+        let (mut batch, none): (_, &[f64]) = (Batch::new(model, 19, 2), &[]);
+        assert!(batch.rnea(model, none, none, none, &[]).is_empty());
+        assert!(batch.rnea(model, none, none, none, &forces).is_empty());
+        assert!(batch.nonlinear_effects(model, none, none).is_empty() && batch.gravity(model, none).is_empty());
+        assert!(batch.aba(model, none, none, none, &forces).is_empty());
+        assert_eq!(batch.crba(model, none).iter().map(|M| M.shape()).collect::<Vec<_>>(), [(0, 0); 19]);
+        assert_eq!(batch.minv(model, none).at(18).shape(), (0, 0));
+        let d = batch.rnea_derivatives(model, none, none, none, &forces);
+        assert!([d.dtau_dq, d.dtau_dv, d.dtau_da].iter().all(|x| x.iter().count() == 3 && x.at(2).shape() == (0, 0)));
+        let d = batch.aba_derivatives(model, none, none, none, &[]);
+        assert!(d.a.is_empty() && d.da_dq.iter().count() == 19);
+    });
+}
+
+/// A batch takes memory for what is asked of it: its results, and the scratch of its threads.
+#[test]
+fn memory_by_state() {
+    const STATES: [usize; 2] = [1000, 3000];
+    const BESIDE: usize = 48; // for each matrix, where it is and how large, and of all kinds of a group
+    let model = &models(0)[2];
+    let (nq, nv) = (model.nq(), model.nv());
+    let q: Vec<f64> = condyle_dynamics::neutral(model).repeat(STATES[1]);
+    let zero = vec![0.0; nv * STATES[1]];
+    type Call = fn(&mut Batch, &Model, &[f64], &[f64]);
+    let calls: [(&str, usize, usize, Call); 8] = [
+        ("rnea", 1, 0, |b, m, q, v| _ = b.rnea(m, q, v, v, &[])),
+        ("nonlinear_effects", 1, 0, |b, m, q, v| _ = b.nonlinear_effects(m, q, v)),
+        ("gravity", 1, 0, |b, m, q, _| _ = b.gravity(m, q)),
+        ("aba", 1, 0, |b, m, q, v| _ = b.aba(m, q, v, v, &[])),
+        ("crba", 1, 1, |b, m, q, _| _ = b.crba(m, q)),
+        ("minv", 1, 1, |b, m, q, _| _ = b.minv(m, q)),
+        ("rnea_derivatives", 1, 3, |b, m, q, v| _ = b.rnea_derivatives(m, q, v, v, &[])),
+        ("aba_derivatives", 1, 3, |b, m, q, v| _ = b.aba_derivatives(m, q, v, v, &[])),
+    ];
+    each_level(|level| {
+        for (name, vectors, matrices, call) in calls {
+            let [few, many] =
+                STATES.map(|n| bytes(|| call(&mut Batch::new(model, n, 1), model, &q[..n * nq], &zero[..n * nv])));
+            let by_state = (many - few) / (STATES[1] - STATES[0]);
+            let expected = 8 * (vectors * nv + matrices * nv * nv) + if matrices > 0 { 7 * BESIDE } else { 0 };
+            assert!(by_state <= expected, "{name}, {level}: {by_state} bytes a state, expected {expected}");
+        }
     });
 }
 

@@ -5,8 +5,7 @@ use crate::common::{long_branches, rng};
 use crate::{each_level, models};
 use condyle_dynamics::level::Level;
 use condyle_dynamics::{Data, Force, Model, Scalar};
-use condyle_spatial::block::Real;
-use condyle_spatial::lanes::{Element, Lanes};
+use condyle_spatial::block::{Block, Real, Witness};
 
 /// A vector of numbers as the tests see it.
 trait Vector: Scalar {
@@ -14,17 +13,23 @@ trait Vector: Scalar {
     fn unpack(self) -> Vec<f64>;
 }
 
-impl<const N: usize> Vector for Lanes<f64, N>
-where
-    f64: Element<N>,
-{
+impl<S: Block<Number = f64>> Vector for S {
     fn pack(x: &[f64]) -> Self {
-        Self::from_array(x.try_into().unwrap())
+        Self::load(x)
     }
     fn unpack(self) -> Vec<f64> {
-        self.to_array().to_vec()
+        let mut numbers = vec![0.0; S::LANES];
+        self.store(&mut numbers);
+        numbers
     }
 }
+
+/// The promise to use vectors at their level.
+struct Here;
+
+// SAFETY: `each_level` runs what this processor has.
+#[allow(unsafe_code)]
+unsafe impl Witness for Here {}
 
 fn side_by_side<S: Vector>(knots: &[Input<f64>]) -> Input<S> {
     let pack = |part: fn(&Input<f64>) -> &[f64]| -> Vec<S> {
@@ -76,7 +81,7 @@ fn every_lane_is_a_single_call() {
     let all: Vec<Model> = models(4).into_iter().chain(long).collect();
     each_level(|level| match level {
         Level::Baseline => {}
-        Level::Neon | Level::Avx2 => knots_are_single_calls::<<f64 as Real>::Short>(&all),
-        Level::Avx512 => knots_are_single_calls::<<f64 as Real>::Long>(&all),
+        Level::Neon | Level::Avx2 => knots_are_single_calls::<<f64 as Real>::Short<Here>>(&all),
+        Level::Avx512 => knots_are_single_calls::<<f64 as Real>::Long<Here>>(&all),
     });
 }

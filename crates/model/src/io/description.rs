@@ -5,8 +5,9 @@ use crate::body::{Body, Frame, Limits};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::{Error, Warning};
 use crate::model::Model;
-use condyle_spatial::{Se3, Vec3};
+use condyle_spatial::{Inertia, Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::HashSet;
 
 /// The fields of a model that stand in a file, each as in [`Model`].
 #[derive(Serialize, Deserialize)]
@@ -63,15 +64,23 @@ impl Description {
         for (built, body) in model.bodies.iter().zip(&self.bodies).skip(1) {
             let (expected, found) = ((built.idx_q, built.idx_v), (body.idx_q, body.idx_v));
             if expected != found {
-                let what = format!("its coordinates in q and v begin at {found:?}, expected {expected:?}");
+                let ((q, v), (expected_q, expected_v)) = (found, expected);
+                let what = format!("begins at {q} in q and {v} in v, expected {expected_q} and {expected_v}");
                 return Err(Error::Body { body: body.name.clone(), what });
             }
         }
         self.check_coordinates(model.tree.nq, model.tree.nv)?;
-        let Self { limits, damping, friction, armature, warnings, .. } = self;
+        let Self { bodies, limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
+        // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
+        let warned: HashSet<&str> = warnings
+            .iter()
+            .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })
+            .collect();
+        let massless = |b: &Body| b.inertia == Inertia::zero() && !warned.contains(&*b.name);
+        model.between = bodies.iter().map(|b| b.name.contains('#') && massless(b)).collect();
         model.warnings = warnings;
-        model.find_singular();
+        model.validate()?;
         Ok(model)
     }
 
@@ -95,6 +104,7 @@ impl Description {
             let options = Default::default();
             ids.push(builder.body_with(names, parent, body.joint, body.placement, body.inertia, options));
         }
+        builder.check_size()?; // before leaders are looked for among all bodies
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             let Some(mimic) = body.mimic else { continue };
             let leads = |b: &Body| b.mimic.is_none() && b.idx_v == body.idx_v;
@@ -107,7 +117,7 @@ impl Description {
         Ok(ids)
     }
 
-    /// Checks what has a number for each coordinate.
+    /// Checks how many numbers there are for each coordinate.
     fn check_coordinates(&self, nq: usize, nv: usize) -> Result<(), Error> {
         let Limits { lower, upper, velocity, effort } = &self.limits;
         for (name, numbers, expected) in [
@@ -121,14 +131,6 @@ impl Description {
         ] {
             if numbers.len() != expected {
                 return Err(Error::Length { name, expected, found: numbers.len() });
-            }
-        }
-        for body in self.bodies.iter().skip(1).filter(|b| b.mimic.is_none()) {
-            for k in body.idx_q..body.idx_q + body.joint.nq() {
-                if lower[k].is_nan() || upper[k].is_nan() || lower[k] > upper[k] {
-                    let what = format!("lower limit {} is above upper limit {}", lower[k], upper[k]);
-                    return Err(Error::Joint { joint: body.joint_name.clone(), what });
-                }
             }
         }
         Ok(())

@@ -5,7 +5,7 @@ mod equality;
 mod geometry;
 mod include;
 
-use super::xml::{self, Element};
+use super::xml::Element;
 use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::{Error, Warning};
@@ -14,8 +14,9 @@ use crate::model::Model;
 use attributes::{Attributes, Compiler, Defaults, FromGeoms, MAIN, turn};
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use equality::Joints;
+use include::Includes;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// How an MJCF becomes a model.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,12 +54,9 @@ impl Model {
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and what
-    /// [`ModelBuilder::build`] finds.
+    /// [`ModelBuilder::build`] finds. What the files may have at most stands at the [beginning](crate#limits-of-files).
     pub fn from_mjcf(path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
-        let path = path.as_ref();
-        let root = Element::parse(&xml::read(path)?, &path.display().to_string())?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        model(root, Some(folder), vec![path.to_owned()], options)
+        model(&Includes::read(path.as_ref())?, options)
     }
 
     /// Reads an MJCF from a string, which may not include files; see [`from_mjcf`](Self::from_mjcf).
@@ -81,26 +79,20 @@ impl Model {
     /// # Errors
     /// As [`from_mjcf`](Self::from_mjcf).
     pub fn from_mjcf_str(text: &str, options: &MjcfOptions) -> Result<Self, Error> {
-        model(Element::parse(text, "<string>")?, None, Vec::new(), options)
+        model(&Includes::parse(text)?, options)
     }
 }
 
-fn model(
-    mut root: Element,
-    folder: Option<&Path>,
-    mut seen: Vec<PathBuf>,
-    options: &MjcfOptions,
-) -> Result<Model, Error> {
+fn model(root: &Element, options: &MjcfOptions) -> Result<Model, Error> {
     if root.tag != "mujoco" {
         return Err(root.wrong("the root element of an MJCF is <mujoco>"));
     }
-    include::resolve(&mut root, folder, &mut seen, 0)?;
-    let defaults = Defaults::read(&root)?;
-    let compiler = Compiler::read(&root)?;
+    let defaults = Defaults::read(root)?;
+    let compiler = Compiler::read(root)?;
     let (names, joints) = (HashMap::new(), HashMap::new());
     let (defaults, warnings) = (&defaults, Vec::new());
     let reader = Reader { options, compiler, defaults, bodies: 0, names, joints, mass: 0.0, warnings };
-    let model = reader.model(&root)?;
+    let model = reader.model(root)?;
     match model.warnings().first() {
         Some(warning) if options.strict => Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() }),
         _ => Ok(model),
@@ -134,7 +126,7 @@ struct Waiting<'a> {
 struct Reader<'a> {
     options: &'a MjcfOptions,
     compiler: Compiler,
-    defaults: &'a Defaults,
+    defaults: &'a Defaults<'a>,
     /// The number of bodies so far: MuJoCo's number of the last one.
     bodies: usize,
     /// The elements that have names, by kind and name.
@@ -319,7 +311,7 @@ impl<'a> Reader<'a> {
             "ball" => (Joint::Spherical, self.compiler.angle),
             _ => return Err(wrong(format!("type: `{kind}` is none of hinge, slide, ball and free"))),
         };
-        let joint = joint.normalized().map_err(|_| wrong(format!("axis {axis:?} is no direction")))?;
+        let joint = joint.normalized().map_err(wrong)?;
         let anchor = a.vector("pos")?.filter(|_| kind != "slide").unwrap_or(Vec3::zero());
         let at_zero = a.number("ref")?.unwrap_or(0.0) * unit;
         let lXj = match joint {

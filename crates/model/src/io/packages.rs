@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// How an address of a file in a package begins.
 const SCHEME: &str = "package://";
@@ -28,9 +28,15 @@ fn folders(packages: &[PathBuf], ros: Option<OsString>, ament: Option<OsString>)
     packages.iter().cloned().chain(split(ros)).chain(installed).collect()
 }
 
-/// The first such file: of a package in a folder, or of a folder that is the package itself.
+/// The first such file: of a package in a folder, or of a folder that is the package itself. The path stays in the
+/// package, but for links that are in it.
 fn find(address: &str, folders: &[PathBuf]) -> Result<PathBuf, Error> {
     let (package, path) = address.split_once('/').unwrap_or((address, ""));
+    let down = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
+    if package.starts_with('.') || ![package, path].into_iter().flat_map(|p| Path::new(p).components()).all(down) {
+        let what = format!("its path leads out of the package `{package}`");
+        return Err(Error::File { file: format!("{SCHEME}{address}"), what });
+    }
     let mut looked = Vec::new();
     for folder in folders {
         let itself = folder.file_name().is_some_and(|name| name == package).then(|| folder.join(path));

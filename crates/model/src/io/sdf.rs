@@ -3,7 +3,7 @@
 mod mimics;
 mod poses;
 
-use super::xml::{self, Element};
+use super::xml::{Amount, Element};
 use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::{Error, Warning};
@@ -50,10 +50,11 @@ impl Model {
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and what
-    /// [`ModelBuilder::build`] finds.
+    /// [`ModelBuilder::build`] finds. What a file may have at most stands at the [beginning](crate#limits-of-files).
     pub fn from_sdf(path: impl AsRef<Path>, options: &SdfOptions) -> Result<Self, Error> {
-        let path = path.as_ref();
-        model(&Element::parse(&xml::read(path)?, &path.display().to_string())?, options)
+        let (path, mut amount) = (path.as_ref(), Amount::default());
+        let text = amount.read(path)?;
+        model(&Element::parse(&text, &path.display().to_string(), &mut amount)?, options)
     }
 
     /// Reads an SDF from a string; see [`from_sdf`](Self::from_sdf).
@@ -78,7 +79,7 @@ impl Model {
     /// # Errors
     /// As [`from_sdf`](Self::from_sdf).
     pub fn from_sdf_str(text: &str, options: &SdfOptions) -> Result<Self, Error> {
-        model(&Element::parse(text, "<string>")?, options)
+        model(&Element::parse(text, "<string>", &mut Amount::default())?, options)
     }
 }
 
@@ -131,10 +132,10 @@ struct Reader<'a> {
 impl<'a> Reader<'a> {
     fn new(model: &'a Element) -> Result<Self, Error> {
         let links: HashMap<_, _> = model.all("link").filter_map(|l| Some((l.attribute("name")?, l))).collect();
-        let poses = Poses::new(model)?;
+        let mut poses = Poses::new(model)?;
         let mut edges = Vec::new();
         for element in model.all("joint") {
-            let end = |tag: &str| {
+            let mut end = |tag: &str| {
                 let name = element.child(tag).map(|e| e.text.trim()).filter(|n| !n.is_empty());
                 let name = name.ok_or_else(|| element.wrong(format!("has no {tag}")))?;
                 if tag == "parent" && name == WORLD_LINK { Ok(WORLD_LINK) } else { poses.link(element, name) }

@@ -1,17 +1,13 @@
 //! Robots from URDF: kinematics, inertias, limits. Meshes are never looked at.
-//!
-//! roxmltree reads the file and knows the line of each element; urdf-rs then reads each link and joint on its own, with
-//! `<visual>` and `<collision>` left out, so that whatever it refuses has a name and a line, and no mesh can be in the
-//! way.
 
-use super::{packages, xml};
+use super::packages;
+use super::xml::{self, Amount, Element};
 use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::{Joint, Mimic};
 use crate::model::Model;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
-use roxmltree::{Document, Node};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -39,12 +35,13 @@ impl Model {
     /// their joints' names (bytes), as Pinocchio does.
     ///
     /// # Errors
-    /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Urdf`] (with file, line and element), and what
-    /// [`ModelBuilder::build`] finds.
+    /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), and what
+    /// [`ModelBuilder::build`] finds. What a file may have at most stands at the [beginning](crate#limits-of-files).
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
         let path = packages::locate(path.as_ref(), &options.packages)?;
-        let file = path.display().to_string();
-        Reader::new(&xml::read(&path)?, &file)?.model(options)
+        let mut amount = Amount::default();
+        let text = amount.read(&path)?;
+        Reader::new(&Element::parse(&text, &path.display().to_string(), &mut amount)?)?.model(options)
     }
 
     /// Reads a URDF from a string; see [`from_urdf`](Self::from_urdf).
@@ -67,192 +64,133 @@ impl Model {
     /// # Errors
     /// As [`from_urdf`](Self::from_urdf).
     pub fn from_urdf_str(text: &str, options: &UrdfOptions) -> Result<Self, Error> {
-        Reader::new(text, "<string>")?.model(options)
+        Reader::new(&Element::parse(text, "<string>", &mut Amount::default())?)?.model(options)
     }
 }
 
-/// How deep elements may be nested (urdf-rs is recursive); a URDF needs six levels.
-const MAX_DEPTH: usize = 32;
-
-/// A link or joint, and the line on which it begins.
-struct Element<T> {
-    line: u32,
-    content: T,
-    /// Whether it is a joint with a `<limit>`: to urdf-rs, none is the same as zeros.
-    limit: bool,
+/// A joint, and the links that it connects.
+struct Edge<'a> {
+    element: &'a Element,
+    parent: &'a str,
+    child: &'a str,
 }
 
 struct Reader<'a> {
-    file: &'a str,
-    name: String,
-    links: HashMap<String, Element<urdf_rs::Link>>,
-    joints: HashMap<String, Element<urdf_rs::Joint>>,
+    robot: &'a Element,
+    links: HashMap<&'a str, &'a Element>,
+    /// The names of the joints, in the order of the file.
+    order: Vec<&'a str>,
+    joints: HashMap<&'a str, Edge<'a>>,
     /// The root link.
-    root: String,
+    root: &'a str,
     /// The joints on each link, in the order of their names.
-    children: HashMap<String, Vec<String>>,
+    children: HashMap<&'a str, Vec<&'a str>>,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads all elements, and finds the tree.
-    fn new(text: &'a str, file: &'a str) -> Result<Self, Error> {
-        let document = Document::parse(text).map_err(|e| Error::Xml {
-            file: file.to_owned(),
-            line: e.pos().row,
-            what: e.to_string(),
-        })?;
-        let robot = document.root_element();
-        let mut reader = Self {
-            file,
-            name: robot.attribute("name").unwrap_or_default().to_owned(),
-            links: HashMap::new(),
-            joints: HashMap::new(),
-            root: String::new(),
-            children: HashMap::new(),
-        };
-        if robot.tag_name().name() != "robot" {
-            let what = "the root element of a URDF is <robot>".to_owned();
-            let line = document.text_pos_at(robot.range().start).row;
-            return Err(reader.wrong(line, format!("<{}>", robot.tag_name().name()), what));
+    /// Finds all links and joints, and their tree.
+    fn new(robot: &'a Element) -> Result<Self, Error> {
+        if robot.tag != "robot" {
+            return Err(robot.wrong("the root element of a URDF is <robot>"));
         }
-        let mut order = Vec::new();
-        for node in robot.children().filter(|n| n.is_element()) {
-            let tag = node.tag_name().name();
-            if (tag != "link" && tag != "joint") || node.tag_name().namespace() != robot.tag_name().namespace() {
-                continue;
-            }
-            let line = document.text_pos_at(node.range().start).row;
-            let Some(name) = node.attribute("name").filter(|n| !n.is_empty()) else {
-                return Err(reader.wrong(line, format!("<{tag}>"), "has no name".to_owned()));
+        let (links, joints, children) = (HashMap::new(), HashMap::new(), HashMap::new());
+        let mut reader = Self { robot, links, order: Vec::new(), joints, root: "", children };
+        for element in robot.children.iter().filter(|c| matches!(&*c.tag, "link" | "joint")) {
+            let Some(name) = element.attribute("name").filter(|n| !n.is_empty()) else {
+                return Err(element.wrong("has no name"));
             };
-            let limit = node.children().any(|c| c.has_tag_name("limit"));
-            let parsed = reader.parse(text, node, line, name)?;
-            let other = if tag == "link" {
-                let content = parsed.links.into_iter().next().expect("one element in, one out");
-                order.push(name.to_owned());
-                reader.links.insert(name.to_owned(), Element { line, content, limit }).map(|e| e.line)
+            let other = if element.tag == "link" {
+                reader.links.insert(name, element)
             } else {
-                let content = parsed.joints.into_iter().next().expect("one element in, one out");
-                reader.joints.insert(name.to_owned(), Element { line, content, limit }).map(|e| e.line)
+                let end = |tag: &str| text(element, needed(element, tag)?, "link");
+                reader.order.push(name);
+                let edge = Edge { element, parent: end("parent")?, child: end("child")? };
+                reader.joints.insert(name, edge).map(|e| e.element)
             };
             if let Some(other) = other {
-                let what = format!("the name is taken by the {tag} on line {other}");
-                return Err(reader.wrong(line, format!("{tag} `{name}`"), what));
+                return Err(element.wrong(format!("the name is taken by the {} on line {}", other.tag, other.line)));
             }
         }
-        reader.find_tree(&order)?;
+        reader.find_tree()?;
         Ok(reader)
     }
 
-    fn wrong(&self, line: u32, element: String, what: String) -> Error {
-        Error::Urdf { file: self.file.to_owned(), line, element, what }
-    }
-
-    fn wrong_joint(&self, joint: &Element<urdf_rs::Joint>, what: String) -> Error {
-        self.wrong(joint.line, format!("joint `{}`", joint.content.name), what)
-    }
-
-    /// One link or joint, without its shapes, as urdf-rs reads it.
-    fn parse(&self, text: &str, node: Node, line: u32, name: &str) -> Result<urdf_rs::Robot, Error> {
-        let tag = node.tag_name().name();
-        let wrong = |what: String| self.wrong(line, format!("{tag} `{name}`"), what);
-        if node.descendants().any(|n| n.ancestors().nth(MAX_DEPTH).is_some()) {
-            return Err(wrong(format!("is nested more than {MAX_DEPTH} levels deep")));
-        }
-        let mut element = String::from("<robot name=\"_\"");
-        for prefix in node.namespaces().filter_map(|n| n.name()).filter(|&p| p != "xml") {
-            element.push_str(&format!(" xmlns:{prefix}=\"_\""));
-        }
-        element.push('>');
-        let mut from = node.range().start;
-        for shape in node.children().filter(|c| c.has_tag_name("visual") || c.has_tag_name("collision")) {
-            element.push_str(&text[from..shape.range().start]);
-            from = shape.range().end;
-        }
-        element.push_str(&text[from..node.range().end]);
-        element.push_str("</robot>");
-        urdf_rs::read_from_string(&element).map_err(|e| wrong(e.to_string().replace("custom: ", "")))
-    }
-
     /// Finds root and children: every link but one is the child of one joint, and all hang together.
-    fn find_tree(&mut self, order: &[String]) -> Result<(), Error> {
-        let mut parent: HashMap<&str, &Element<urdf_rs::Joint>> = HashMap::new();
-        let mut joints: Vec<_> = self.joints.values().collect();
-        joints.sort_by(|a, b| a.content.name.as_bytes().cmp(b.content.name.as_bytes()));
-        let mut children: HashMap<String, Vec<String>> = HashMap::new();
-        for &joint in &joints {
-            for link in [&joint.content.parent.link, &joint.content.child.link] {
+    fn find_tree(&mut self) -> Result<(), Error> {
+        let links: Vec<&str> = self.robot.all("link").filter_map(|l| l.attribute("name")).collect();
+        let mut parent: HashMap<&str, &str> = HashMap::new();
+        let mut names = self.order.clone();
+        names.sort_unstable();
+        for &name in &names {
+            let Edge { element, parent: on, child } = self.joints[name];
+            for link in [on, child] {
                 if !self.links.contains_key(link) {
-                    let near = crate::error::nearest(link, order.iter().map(String::as_str));
-                    return Err(self.wrong_joint(joint, format!("no link is named `{link}`; nearest is `{near}`")));
+                    let near = crate::error::nearest(link, links.iter().copied());
+                    return Err(element.wrong(format!("no link is named `{link}`; nearest is `{near}`")));
                 }
             }
-            if let Some(other) = parent.insert(&joint.content.child.link, joint) {
-                let (child, other) = (&joint.content.child.link, &other.content.name);
-                return Err(self.wrong_joint(joint, format!("link `{child}` is already the child of joint `{other}`")));
+            if let Some(other) = parent.insert(child, name) {
+                return Err(element.wrong(format!("link `{child}` is already the child of joint `{other}`")));
             }
-            children.entry(joint.content.parent.link.clone()).or_default().push(joint.content.name.clone());
+            self.children.entry(on).or_default().push(name);
         }
-        let roots: Vec<&String> = order.iter().filter(|l| !parent.contains_key(l.as_str())).collect();
-        let root = match roots[..] {
-            [root] => root.clone(),
-            [] if order.is_empty() => return Err(self.wrong(1, "<robot>".to_owned(), "has no links".to_owned())),
-            [] => return Err(self.wrong_joint(joints[0], "is part of a cycle: every link has a parent".to_owned())),
+        let roots: Vec<&str> = links.iter().copied().filter(|l| !parent.contains_key(l)).collect();
+        self.root = match roots[..] {
+            [root] => root,
+            [] if links.is_empty() => return Err(self.robot.wrong("has no links")),
+            [] => return Err(self.joints[names[0]].element.wrong("is part of a cycle: every link has a parent")),
             [first, second, ..] => {
                 let what = format!("has no parent, and neither has link `{first}`: a robot has one root");
-                return Err(self.wrong(self.links[second].line, format!("link `{second}`"), what));
+                return Err(self.links[second].wrong(what));
             }
         };
         let mut reached = HashSet::new();
-        let mut stack = vec![root.as_str()];
+        let mut stack = vec![self.root];
         while let Some(link) = stack.pop() {
             reached.insert(link);
-            let below = children.get(link).into_iter().flatten();
-            stack.extend(below.map(|j| self.joints[j].content.child.link.as_str()));
+            stack.extend(self.children.get(link).into_iter().flatten().map(|j| self.joints[j].child));
         }
-        if let Some(joint) = joints.iter().find(|j| !reached.contains(j.content.child.link.as_str())) {
-            return Err(self.wrong_joint(joint, "is part of a cycle that does not reach the root".to_owned()));
+        match names.iter().map(|j| &self.joints[j]).find(|j| !reached.contains(j.child)) {
+            Some(joint) => Err(joint.element.wrong("is part of a cycle that does not reach the root")),
+            None => Ok(()),
         }
-        (self.root, self.children) = (root, children);
-        Ok(())
     }
 
     fn model(&self, options: &UrdfOptions) -> Result<Model, Error> {
-        let mut builder = ModelBuilder::new(&self.name);
-        let inertia = self.inertia(&self.root)?;
+        let mut builder = ModelBuilder::new(self.robot.attribute("name").unwrap_or_default());
+        let own = inertia(self.links[self.root])?;
         let root = match options.root_joint {
             None => {
-                builder.merge(WORLD, Se3::identity(), inertia);
+                builder.merge(WORLD, Se3::identity(), own);
                 WORLD
             }
             Some(joint) => {
-                let names = (self.root.as_str(), "root_joint");
-                let root = builder.body_with(names, WORLD, joint, Se3::identity(), inertia, JointOptions::default());
+                let names = (self.root, "root_joint");
+                let root = builder.body_with(names, WORLD, joint, Se3::identity(), own, JointOptions::default());
                 builder.frame_of_kind("root_joint", FrameKind::Joint, root, Se3::identity());
                 root
             }
         };
-        builder.frame_of_kind(&self.root, FrameKind::Link, root, Se3::identity());
+        builder.frame_of_kind(self.root, FrameKind::Link, root, Se3::identity());
         // depth first: each joint waits with the body that it sits on, and its link's placement there
         let mut bodies = HashMap::new();
         let mut waiting: Vec<(&str, BodyId, Se3<f64>)> = Vec::new();
         let wait = |waiting: &mut Vec<_>, link: &str, body: BodyId, bXl: Se3<f64>| {
-            let joints: &[String] = self.children.get(link).map_or(&[], |j| j);
-            waiting.extend(joints.iter().rev().map(|j| (self.joints[j].content.name.as_str(), body, bXl)));
+            let joints: &[&str] = self.children.get(link).map_or(&[], |j| j);
+            waiting.extend(joints.iter().rev().map(|&j| (j, body, bXl)));
         };
-        wait(&mut waiting, &self.root, root, Se3::identity());
+        wait(&mut waiting, self.root, root, Se3::identity());
         while let Some((name, parent, pXl)) = waiting.pop() {
-            let joint = &self.joints[name];
-            let link = joint.content.child.link.as_str();
-            let pXj = pXl * pose(&joint.content.origin);
-            let inertia = self.inertia(link)?;
-            let (body, bXl) = match self.kind(joint)? {
+            let Edge { element, child: link, .. } = self.joints[name];
+            let pXj = pXl * pose(element, element)?;
+            let inertia = inertia(self.links[link])?;
+            let (body, bXl) = match kind(element)? {
                 None => {
                     builder.merge(parent, pXj, inertia);
                     (parent, pXj)
                 }
                 Some(kind) => {
-                    let body = builder.body_with((link, name), parent, kind, pXj, inertia, self.options(joint)?);
+                    let body = builder.body_with((link, name), parent, kind, pXj, inertia, joint_options(element)?);
                     bodies.insert(name, body);
                     (body, Se3::identity())
                 }
@@ -267,122 +205,173 @@ impl<'a> Reader<'a> {
         let model = builder.build().map_err(|e| self.locate(e))?;
         match model.warnings().first() {
             Some(warning) if options.strict => {
-                Err(Error::Strict { file: self.file.to_owned(), warning: warning.clone() })
+                Err(Error::Strict { file: self.robot.file.to_string(), warning: warning.clone() })
             }
             _ => Ok(model),
         }
     }
 
-    /// The error that the builder found, with the line of the link or joint.
-    fn locate(&self, error: Error) -> Error {
-        let own = || "the name belongs to the library".to_owned();
-        match &error {
-            Error::Body { body: name, what } if self.links.contains_key(name) => {
-                self.wrong(self.links[name].line, format!("link `{name}`"), what.clone())
-            }
-            Error::Joint { joint: name, what } if self.joints.contains_key(name) => {
-                self.wrong_joint(&self.joints[name], what.clone())
-            }
-            Error::Duplicate { kind: "body", name } if self.links.contains_key(name) => {
-                self.wrong(self.links[name].line, format!("link `{name}`"), own())
-            }
-            Error::Duplicate { kind: "joint", name } if self.joints.contains_key(name) => {
-                self.wrong_joint(&self.joints[name], own())
-            }
-            _ => error,
-        }
-    }
-}
-
-/// The kind of joint, its options, its inertia: one element at a time.
-impl Reader<'_> {
-    /// The joint, or none if it is fixed.
-    fn kind(&self, joint: &Element<urdf_rs::Joint>) -> Result<Option<Joint>, Error> {
-        let (axis, origin) = (Vec3::from(joint.content.axis.xyz.0), &joint.content.origin);
-        if origin.xyz.0.iter().chain(&origin.rpy.0).any(|x| !x.is_finite()) {
-            return Err(self.wrong_joint(joint, "its origin is not finite".to_owned()));
-        }
-        let kind = match joint.content.joint_type {
-            urdf_rs::JointType::Fixed => return Ok(None),
-            urdf_rs::JointType::Revolute => Joint::Revolute { axis },
-            urdf_rs::JointType::Continuous => Joint::Continuous { axis },
-            urdf_rs::JointType::Prismatic => Joint::Prismatic { axis },
-            urdf_rs::JointType::Spherical => Joint::Spherical,
-            urdf_rs::JointType::Planar => Joint::Planar,
-            urdf_rs::JointType::Floating => Joint::FreeFlyer,
-        };
-        let direction = |_| format!("its axis ({} {} {}) is no direction", axis.x, axis.y, axis.z);
-        kind.normalized().map(Some).map_err(|what| self.wrong_joint(joint, direction(what)))
-    }
-
-    fn options(&self, joint: &Element<urdf_rs::Joint>) -> Result<JointOptions, Error> {
-        let (limit, dynamics) = (&joint.content.limit, joint.content.dynamics.clone().unwrap_or_default());
-        let limited = matches!(joint.content.joint_type, urdf_rs::JointType::Revolute | urdf_rs::JointType::Prismatic);
-        if limited && !joint.limit {
-            return Err(self.wrong_joint(joint, "is revolute or prismatic and has no <limit>".to_owned()));
-        }
-        // a continuous joint may have limits of speed and effort; what a URDF says of joints without an axis has no unit
-        let with_axis = limited || matches!(joint.content.joint_type, urdf_rs::JointType::Continuous);
-        let bounded = with_axis && joint.limit;
-        let numbers = [limit.lower, limit.upper, limit.effort, limit.velocity, dynamics.damping, dynamics.friction];
-        if numbers.iter().any(|x| x.is_nan()) {
-            return Err(self.wrong_joint(joint, "a limit, damping or friction is not a number".to_owned()));
-        }
-        if limited && limit.lower > limit.upper {
-            let what = format!("lower limit {} is above upper limit {}", limit.lower, limit.upper);
-            return Err(self.wrong_joint(joint, what));
-        }
-        Ok(JointOptions {
-            position: limited.then_some((limit.lower, limit.upper)),
-            velocity: bounded.then_some(limit.velocity),
-            effort: bounded.then_some(limit.effort),
-            damping: if with_axis { dynamics.damping } else { 0.0 },
-            friction: if with_axis { dynamics.friction } else { 0.0 },
-            armature: 0.0,
-        })
-    }
-
-    /// The link's inertia in the link's frame.
-    fn inertia(&self, link: &str) -> Result<Inertia<f64>, Error> {
-        let element = &self.links[link];
-        let inertial = &element.content.inertial;
-        let (mass, I) = (inertial.mass.value, &inertial.inertia);
-        let numbers = [I.ixx, I.ixy, I.ixz, I.iyy, I.iyz, I.izz, mass];
-        let wrong = |what| Err(self.wrong(element.line, format!("link `{link}`"), what));
-        let origin = inertial.origin.xyz.0.iter().chain(&inertial.origin.rpy.0);
-        if numbers.iter().chain(origin).any(|x| !x.is_finite()) {
-            return wrong("mass, inertia or its origin is not finite".to_owned());
-        }
-        if mass < 0.0 {
-            return wrong(format!("mass is {mass} kg"));
-        }
-        let rotational = Sym3 { xx: I.ixx, xy: I.ixy, yy: I.iyy, xz: I.ixz, yz: I.iyz, zz: I.izz };
-        Ok(pose(&inertial.origin).act(Inertia::from_com(mass, Vec3::zero(), rotational)))
-    }
-
     /// Lets joints follow others.
     fn add_mimics(&self, builder: &mut ModelBuilder, bodies: &HashMap<&str, BodyId>) -> Result<(), Error> {
-        for joint in self.joints.values() {
-            let Some(mimic) = &joint.content.mimic else { continue };
-            let Some(&follower) = bodies.get(joint.content.name.as_str()) else { continue };
-            let Some(&leader) = bodies.get(mimic.joint.as_str()) else {
-                let what = format!("mimics `{}`, which is no moving joint", mimic.joint);
-                return Err(self.wrong_joint(joint, what));
+        for &name in &self.order {
+            let joint = self.joints[name].element;
+            let (Some(mimic), Some(&follower)) = (only(joint, "mimic")?, bodies.get(name)) else { continue };
+            let leader = text(joint, mimic, "joint")?;
+            let Some(&leader) = bodies.get(leader) else {
+                return Err(joint.wrong(format!("mimics `{leader}`, which is no moving joint")));
             };
-            let (ratio, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+            let number = |name, otherwise| Ok(array(joint, mimic, name)?.map_or(otherwise, |[x]| x));
+            let (ratio, offset) = (number("multiplier", 1.0)?, number("offset", 0.0)?);
             builder.mimic(follower, leader, Mimic { ratio, offset });
         }
         Ok(())
     }
+
+    /// The error that the builder found, with the line of the link or joint.
+    fn locate(&self, error: Error) -> Error {
+        let own = "the name belongs to the library";
+        let (link, joint) =
+            (|name: &str| self.links.get(name).copied(), |name: &str| self.joints.get(name).map(|j| j.element));
+        let (element, what) = match &error {
+            Error::Body { body, what } => (link(body), &**what),
+            Error::Joint { joint: name, what } => (joint(name), &**what),
+            Error::Duplicate { kind: "body", name } => (link(name), own),
+            Error::Duplicate { kind: "joint", name } => (joint(name), own),
+            _ => (None, own),
+        };
+        element.map_or(error.clone(), |element| element.wrong(what))
+    }
 }
 
-/// xyz and rpy as a pose: R = Rz(yaw) Ry(pitch) Rx(roll).
-fn pose(origin: &urdf_rs::Pose) -> Se3<f64> {
-    let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.0.map(f64::sin_cos);
+/// The joint, or none if it is fixed.
+fn kind(joint: &Element) -> Result<Option<Joint>, Error> {
+    let axis = match only(joint, "axis")? {
+        Some(axis) => vector(joint, axis, "xyz")?.ok_or_else(|| joint.wrong_inside(axis, "axis has no xyz"))?,
+        None => Vec3::new(1.0, 0.0, 0.0),
+    };
+    let kind = match text(joint, joint, "type")? {
+        "fixed" => return Ok(None),
+        "revolute" => Joint::Revolute { axis },
+        "continuous" => Joint::Continuous { axis },
+        "prismatic" => Joint::Prismatic { axis },
+        "spherical" => Joint::Spherical,
+        "planar" => Joint::Planar,
+        "floating" => Joint::FreeFlyer,
+        other => {
+            let kinds = "revolute, continuous, prismatic, fixed, floating, planar, spherical";
+            return Err(joint.wrong(format!("type `{other}` is none of {kinds}")));
+        }
+    };
+    kind.normalized().map(Some).map_err(|what| joint.wrong(what))
+}
+
+/// The limits and losses of a joint that moves.
+fn joint_options(joint: &Element) -> Result<JointOptions, Error> {
+    let kind = joint.attribute("type").unwrap_or_default();
+    let limited = matches!(kind, "revolute" | "prismatic");
+    // a continuous joint may have limits of speed and effort; what a URDF says of joints without an axis has no unit
+    let with_axis = limited || kind == "continuous";
+    let (limit, dynamics) = (only(joint, "limit")?, only(joint, "dynamics")?);
+    let mut options = JointOptions::default();
+    if let Some(limit) = limit {
+        let number = |name| read(joint, limit, name, xml::bound);
+        let [lower, upper, effort, velocity] = ["lower", "upper", "effort", "velocity"].map(number);
+        let (lower, upper, effort) = (lower?.unwrap_or(0.0), upper?.unwrap_or(0.0), effort?.unwrap_or(0.0));
+        let velocity = velocity?.ok_or_else(|| joint.wrong_inside(limit, "limit has no velocity"))?;
+        if limited && lower > upper {
+            return Err(joint.wrong_inside(limit, format!("lower limit {lower} is above upper limit {upper}")));
+        }
+        options.position = limited.then_some((lower, upper));
+        options.velocity = with_axis.then_some(velocity);
+        options.effort = with_axis.then_some(effort);
+    } else if limited {
+        return Err(joint.wrong("is revolute or prismatic and has no <limit>"));
+    }
+    if let Some(dynamics) = dynamics {
+        let number = |name| Ok(array(joint, dynamics, name)?.map_or(0.0, |[x]| x));
+        let (damping, friction) = (number("damping")?, number("friction")?);
+        (options.damping, options.friction) = if with_axis { (damping, friction) } else { (0.0, 0.0) };
+    }
+    Ok(options)
+}
+
+/// The link's inertia in the link's frame.
+fn inertia(link: &Element) -> Result<Inertia<f64>, Error> {
+    let Some(inertial) = only(link, "inertial")? else { return Ok(Inertia::zero()) };
+    let number = |inside: &Element, name: &str| match array(link, inside, name)? {
+        Some([x]) => Ok(x),
+        None => Err(link.wrong_inside(inside, format!("{} has no {name}", inside.tag))),
+    };
+    let part = |tag: &str| {
+        let found = only_inside(link, inertial, tag)?;
+        found.ok_or_else(|| link.wrong_inside(inertial, format!("inertial has no <{tag}>")))
+    };
+    let (mass, I) = (number(part("mass")?, "value")?, part("inertia")?);
+    if mass < 0.0 {
+        return Err(link.wrong(format!("mass is {mass} kg")));
+    }
+    let rotational = Sym3 {
+        xx: number(I, "ixx")?,
+        xy: number(I, "ixy")?,
+        yy: number(I, "iyy")?,
+        xz: number(I, "ixz")?,
+        yz: number(I, "iyz")?,
+        zz: number(I, "izz")?,
+    };
+    Ok(pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
+}
+
+/// The `<origin>` inside something, or none: R = Rz(yaw) Ry(pitch) Rx(roll). Errors name `of`.
+fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
+    let Some(origin) = only_inside(of, inside, "origin")? else { return Ok(Se3::identity()) };
+    let rpy = array(of, origin, "rpy")?.unwrap_or_default();
+    let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(f64::sin_cos);
     let rotation = Mat3 {
         x: Vec3::new(cy * cp, sy * cp, -sp),
         y: Vec3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),
         z: Vec3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
     };
-    Se3::new(rotation, origin.xyz.0.into())
+    Ok(Se3::new(rotation, vector(of, origin, "xyz")?.unwrap_or(Vec3::zero())))
+}
+
+/// The child with a tag, of which there is at most one.
+fn only<'a>(of: &'a Element, tag: &str) -> Result<Option<&'a Element>, Error> {
+    only_inside(of, of, tag)
+}
+
+/// As [`only`], of something inside the link or joint that errors name.
+fn only_inside<'a>(of: &Element, inside: &'a Element, tag: &str) -> Result<Option<&'a Element>, Error> {
+    let mut found = inside.children.iter().filter(|c| c.tag == tag);
+    match (found.next(), found.next()) {
+        (_, Some(second)) => Err(of.wrong_inside(second, format!("has a second <{tag}>"))),
+        (first, None) => Ok(first),
+    }
+}
+
+fn needed<'a>(of: &'a Element, tag: &str) -> Result<&'a Element, Error> {
+    only(of, tag)?.ok_or_else(|| of.wrong(format!("has no <{tag}>")))
+}
+
+/// The attribute, which has to be there. Errors name `of`.
+fn text<'a>(of: &Element, inside: &'a Element, name: &str) -> Result<&'a str, Error> {
+    inside.attribute(name).ok_or_else(|| of.wrong_inside(inside, format!("{} has no {name}", inside.tag)))
+}
+
+/// The attribute as a reader of text understands it, if it is there. Errors name `of`, the attribute and its value.
+fn read<T>(
+    of: &Element,
+    inside: &Element,
+    name: &str,
+    f: impl Fn(&str) -> Result<T, String>,
+) -> Result<Option<T>, Error> {
+    let wrong = |what| of.wrong_inside(inside, format!("{} {name}: {what}", inside.tag));
+    inside.attribute(name).map(f).transpose().map_err(wrong)
+}
+
+fn array<const N: usize>(of: &Element, inside: &Element, name: &str) -> Result<Option<[f64; N]>, Error> {
+    read(of, inside, name, xml::array)
+}
+
+fn vector(of: &Element, inside: &Element, name: &str) -> Result<Option<Vec3<f64>>, Error> {
+    Ok(array(of, inside, name)?.map(Vec3::from))
 }

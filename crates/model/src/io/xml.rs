@@ -1,12 +1,28 @@
 //! XML as the readers want it: elements that know their file and line.
+//!
+//! What is read is measured first, so that neither memory nor time nor the stack can be spent on it: a parser compares each
+//! attribute of an element with the others, and each namespace with those in scope.
 
 use crate::error::Error;
 use roxmltree::{Document, Node};
+use std::collections::HashSet;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 use std::rc::Rc;
 
+/// How many bytes the files of one robot may have together.
+const MAX_BYTES: usize = 64 << 20;
+/// How many tags they may have together, each comment and each end of an element counted.
+const MAX_TAGS: usize = 1 << 20;
+/// How many equals signs they may have together: as many attributes, and memory for them.
+const MAX_EQUALS: usize = 1 << 22;
+/// How many attributes an element may have.
+const MAX_ATTRIBUTES: usize = 256;
+/// How many prefixes of namespaces a file may have, and how often it may declare one.
+const MAX_NAMESPACES: [usize; 2] = [256, 1 << 16];
 /// How deep elements may be nested: one level for each body of a chain in MJCF, and then some.
-const MAX_DEPTH: usize = 256;
+pub(crate) const MAX_DEPTH: usize = 256;
 
 /// An element, with all that is in it.
 #[derive(Debug)]
@@ -21,43 +37,122 @@ pub(crate) struct Element {
     pub(crate) line: u32,
 }
 
-/// The text of a file.
-pub(crate) fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| Error::File { file: path.display().to_string(), what: e.to_string() })
+/// The amount of text that has been read for one robot.
+#[derive(Default)]
+pub(crate) struct Amount {
+    bytes: usize,
+    tags: usize,
+    equals: usize,
+}
+
+impl Amount {
+    /// The text of a file, unless it is no regular file or too large.
+    pub(crate) fn read(&self, path: &Path) -> Result<String, Error> {
+        let wrong = |what: String| Error::File { file: path.display().to_string(), what };
+        let said = |e: std::io::Error| wrong(e.to_string());
+        // before it is opened: to open a pipe is to wait for its writer
+        let kind = std::fs::metadata(path).map_err(said)?;
+        if !kind.is_file() {
+            let found = if kind.is_dir() { "a folder" } else { "a device, pipe or socket" };
+            return Err(wrong(format!("expected a file, found {found}")));
+        }
+        let mut bytes = Vec::new();
+        let left = MAX_BYTES.saturating_sub(self.bytes);
+        if kind.len() <= left as u64 {
+            let file = File::open(path).map_err(said)?;
+            file.take(left as u64 + 1).read_to_end(&mut bytes).map_err(said)?;
+        }
+        let found = kind.len().max(bytes.len() as u64);
+        if found > left as u64 {
+            return Err(wrong(too_many(self.bytes as u64 + found, "bytes", MAX_BYTES)));
+        }
+        String::from_utf8(bytes).map_err(|e| wrong(format!("byte {} is not UTF-8", e.utf8_error().valid_up_to())))
+    }
+
+    /// Counts what is in a text, and says which limit it is above.
+    fn add(&mut self, text: &str) -> Result<(), String> {
+        let bytes = text.as_bytes();
+        let count = |c: u8| bytes.iter().filter(|&&b| b == c).count();
+        (self.bytes, self.tags, self.equals) =
+            (self.bytes + bytes.len(), self.tags + count(b'<'), self.equals + count(b'='));
+        for (found, what, limit) in
+            [(self.bytes, "bytes", MAX_BYTES), (self.tags, "tags", MAX_TAGS), (self.equals, "equals signs", MAX_EQUALS)]
+        {
+            if found > limit {
+                return Err(too_many(found as u64, what, limit));
+            }
+        }
+        // a value cannot have a `<` in it; where there is none, there may be a comment
+        let attributes = |tag: &str| tag.split('=').skip(1).filter(|s| s.trim_start().starts_with(['"', '\''])).count();
+        let mut line = 1;
+        for tag in text.split('<') {
+            let found = attributes(tag);
+            if found > MAX_ATTRIBUTES {
+                return Err(format!(
+                    "the element on line {line} has {found} attributes, at most {MAX_ATTRIBUTES} are allowed"
+                ));
+            }
+            line += tag.matches('\n').count();
+        }
+        let (mut prefixes, mut declared) = (HashSet::new(), 0);
+        for rest in text.split("xmlns").skip(1) {
+            prefixes.insert(rest.split(['=', ' ', '\t', '\r', '\n']).next());
+            declared += 1;
+        }
+        for (found, what, limit) in [
+            (prefixes.len(), "prefixes of namespaces (xmlns)", MAX_NAMESPACES[0]),
+            (declared, "declarations of namespaces (xmlns)", MAX_NAMESPACES[1]),
+        ] {
+            if found > limit {
+                return Err(format!("{found} {what}, at most {limit} are allowed"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn too_many(found: u64, what: &str, limit: usize) -> String {
+    format!("{found} {what}, at most {limit} are allowed in the files of a robot")
 }
 
 impl Element {
     /// The root element of a text.
-    pub(crate) fn parse(text: &str, file: &str) -> Result<Self, Error> {
+    pub(crate) fn parse(text: &str, file: &str, amount: &mut Amount) -> Result<Self, Error> {
+        amount.add(text).map_err(|what| Error::File { file: file.to_owned(), what })?;
         let document = Document::parse(text).map_err(|e| Error::Xml {
             file: file.to_owned(),
             line: e.pos().row,
             what: e.to_string(),
         })?;
         let ends: Vec<usize> = text.match_indices('\n').map(|(i, _)| i).collect();
-        Self::own(document.root_element(), &ends, &file.into(), 0)
+        let (file, root) = (file.into(), document.root_element());
+        match too_deep(root) {
+            None => Ok(Self::with_children(root, &ends, &file)),
+            Some((node, levels)) => {
+                let what = format!("elements are nested {levels} levels deep, at most {MAX_DEPTH} are allowed");
+                Err(Self::new(node, &ends, &file).wrong(what))
+            }
+        }
     }
 
-    /// An element without its document; `ends` are the places at which lines end.
-    fn own(node: Node, ends: &[usize], file: &Rc<str>, depth: usize) -> Result<Self, Error> {
+    /// An element without its document and what is in it; `ends` are the places at which lines end.
+    fn new(node: Node, ends: &[usize], file: &Rc<str>) -> Self {
         let line = 1 + ends.partition_point(|&end| end < node.range().start) as u32;
         let plain = node.attributes().filter(|a| a.namespace().is_none());
-        let mut element = Self {
+        Self {
             tag: node.tag_name().name().to_owned(),
             attributes: plain.map(|a| (a.name().to_owned(), a.value().to_owned())).collect(),
             text: node.children().filter(Node::is_text).filter_map(|n| n.text()).collect(),
             children: Vec::new(),
             file: file.clone(),
             line,
-        };
-        if depth == MAX_DEPTH {
-            return Err(element.wrong(format!("is nested more than {MAX_DEPTH} levels deep")));
         }
+    }
+
+    fn with_children(node: Node, ends: &[usize], file: &Rc<str>) -> Self {
         let ours = |n: &Node| n.is_element() && n.tag_name().namespace() == node.tag_name().namespace();
-        for child in node.children().filter(ours) {
-            element.children.push(Self::own(child, ends, file, depth + 1)?);
-        }
-        Ok(element)
+        let children = node.children().filter(ours).map(|child| Self::with_children(child, ends, file)).collect();
+        Self { children, ..Self::new(node, ends, file) }
     }
 
     pub(crate) fn attribute(&self, name: &str) -> Option<&str> {
@@ -74,7 +169,7 @@ impl Element {
 
     /// For example ``joint `elbow` ``.
     pub(crate) fn label(&self) -> String {
-        match self.attribute("name") {
+        match self.attribute("name").filter(|n| !n.is_empty()) {
             Some(name) => format!("{} `{name}`", self.tag),
             None => format!("<{}>", self.tag),
         }
@@ -82,7 +177,36 @@ impl Element {
 
     /// An error that names this element.
     pub(crate) fn wrong(&self, what: impl Into<String>) -> Error {
-        Error::Element { file: self.file.to_string(), line: self.line, element: self.label(), what: what.into() }
+        self.wrong_inside(self, what)
+    }
+
+    /// An error that names this element, and the line of one inside it.
+    pub(crate) fn wrong_inside(&self, inside: &Self, what: impl Into<String>) -> Error {
+        Error::Element { file: inside.file.to_string(), line: inside.line, element: self.label(), what: what.into() }
+    }
+}
+
+/// The first element below the deepest level that is read, and the number of levels that there are.
+fn too_deep<'a, 'input>(root: Node<'a, 'input>) -> Option<(Node<'a, 'input>, usize)> {
+    let (mut node, mut level, mut levels, mut first) = (root, 1, 1, None);
+    loop {
+        if level > levels {
+            levels = level;
+            if level > MAX_DEPTH {
+                first = first.or(Some(node));
+            }
+        }
+        if let Some(child) = node.first_element_child() {
+            (node, level) = (child, level + 1);
+            continue;
+        }
+        while level > 1 && node.next_sibling_element().is_none() {
+            (node, level) = (node.parent()?, level - 1);
+        }
+        match node.next_sibling_element() {
+            Some(next) if level > 1 => node = next,
+            _ => return first.map(|node| (node, levels)),
+        }
     }
 }
 
@@ -99,4 +223,15 @@ pub(crate) fn array<const N: usize>(text: &str) -> Result<[f64; N], String> {
         let s = if N == 1 { "" } else { "s" };
         format!("expected {N} number{s}, found {}", x.len())
     })
+}
+
+/// A number that may be infinite, but is one.
+pub(crate) fn bound(text: &str) -> Result<f64, String> {
+    let x: Option<f64> = text.trim().parse().ok().filter(|x: &f64| !x.is_nan());
+    x.ok_or_else(|| format!("`{}` is no number", text.trim()))
+}
+
+/// Numbers as they stand in a file.
+pub(crate) fn words(numbers: &[f64]) -> String {
+    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }

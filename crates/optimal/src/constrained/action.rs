@@ -160,6 +160,10 @@ impl ActionModel for Constrained {
         self.action.dynamics_hessian(t, x, u, lambda, hessian)
     }
 
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        self.action.check_state(x)
+    }
+
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         self.action.integrate(x, dx, out);
     }

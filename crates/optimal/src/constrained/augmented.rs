@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 use super::settings::ConstraintSettings;
-use crate::ddp::{Fddp, Settings, Solution, Status};
+use crate::ddp::{Fddp, Observer, Settings, Solution, Status, Unobserved};
 use crate::error::Error;
 use crate::problem::Problem;
 use nalgebra::DVector;
@@ -123,7 +123,21 @@ impl AugmentedLagrangian {
     /// # Errors
     /// [`Error`] as for [`Fddp::solve`], or if a constraint's bounds leave no value.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]))
+        self.run(problem, Some([xs, us]), &mut Unobserved)
+    }
+
+    /// As [`solve`](Self::solve), and shows each iteration of the inner solves to `observer`, who may end the solve.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_with(
+        &mut self,
+        problem: &mut Problem,
+        xs: &[f64],
+        us: &[f64],
+        mut observer: impl Observer,
+    ) -> Result<&Solution, Error> {
+        self.run(problem, Some([xs, us]), &mut observer)
     }
 
     /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new references
@@ -133,7 +147,15 @@ impl AugmentedLagrangian {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.run(problem, None)
+        self.run(problem, None, &mut Unobserved)
+    }
+
+    /// As [`resume`](Self::resume), and shows each iteration of the inner solves to `observer`, who may end the solve.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
+        self.run(problem, None, &mut observer)
     }
 
     /// Makes the solution and its multipliers a warm start for a problem that was [shifted](Problem::shift) by a knot
@@ -154,8 +176,13 @@ impl AugmentedLagrangian {
         Ok(())
     }
 
-    fn run(&mut self, problem: &mut Problem, warm_start: Option<[&[f64]; 2]>) -> Result<&Solution, Error> {
-        let result = self.iterate(problem, warm_start);
+    fn run(
+        &mut self,
+        problem: &mut Problem,
+        warm_start: Option<[&[f64]; 2]>,
+        observer: &mut dyn Observer,
+    ) -> Result<&Solution, Error> {
+        let result = self.iterate(problem, warm_start, observer);
         if result.is_ok() {
             problem.multipliers(&mut self.outcome.multipliers);
         }
@@ -165,7 +192,12 @@ impl AugmentedLagrangian {
     }
 
     /// The outer iterations.
-    fn iterate(&mut self, problem: &mut Problem, warm_start: Option<[&[f64]; 2]>) -> Result<Status, Error> {
+    fn iterate(
+        &mut self,
+        problem: &mut Problem,
+        warm_start: Option<[&[f64]; 2]>,
+        observer: &mut dyn Observer,
+    ) -> Result<Status, Error> {
         let begin = Instant::now();
         self.settings.check()?;
         self.solver.settings = self.inner.clone();
@@ -189,20 +221,13 @@ impl AugmentedLagrangian {
             (self.solver.settings.tolerance, self.solver.settings.tolerance_bounded) = (dual * dual, dual * dual);
             let over = begin.elapsed() + self.measuring;
             self.solver.settings.time_budget = self.inner.time_budget.map(|budget| budget.saturating_sub(over));
-            let result = match warm_start {
-                Some([xs, us]) if solve == 0 => self.solver.solve(problem, xs, us)?,
-                _ => self.solver.resume(problem)?,
-            };
+            let result = self.solver.run(problem, warm_start.filter(|_| solve == 0), observer)?;
             self.outcome.solves += 1;
             self.outcome.iterations += result.trace.len();
             let stopped = result.status;
-            if stopped == Status::NotFinite {
-                (self.outcome.primal, self.outcome.dual) = (f64::NAN, f64::NAN);
-                return Ok(stopped);
-            }
             // z − Π z at the iterate, and how far it is from a solution
             self.measure(problem);
-            if stopped == Status::TimeLimit {
+            if matches!(stopped, Status::TimeLimit | Status::Interrupted | Status::NotFinite) {
                 return Ok(stopped);
             }
             if self.outcome.primal <= eta.max(tolerance) {
@@ -248,7 +273,7 @@ impl AugmentedLagrangian {
         }
         problem.calc_diff(xs, us, &mut solver.nodes);
         let (violation, terms) = problem.measure_constraints();
-        (outcome.primal, outcome.cost, outcome.dual) = (gap.max(violation), cost - terms, 0.0);
+        (outcome.primal, outcome.cost, outcome.dual) = (larger(*gap, violation), cost - terms, 0.0);
         lambda.copy_from(&solver.nodes[horizon].q);
         for t in (0..horizon).rev() {
             let node = &solver.nodes[t];
@@ -260,12 +285,21 @@ impl AugmentedLagrangian {
                     None => (f64::NEG_INFINITY, f64::INFINITY),
                 };
                 // u = the projection of u − ∂L/∂u into its bounds
-                outcome.dual = outcome.dual.max((u - (u - slope).min(upper).max(lower)).abs());
+                let projected = if slope.is_nan() { slope } else { (u - slope).min(upper).max(lower) };
+                outcome.dual = larger(outcome.dual, (u - projected).abs());
             }
             before.copy_from(&node.q);
             before.gemv_tr(1.0, &node.A, lambda, 1.0);
             std::mem::swap(lambda, before);
         }
+        for number in [&mut outcome.cost, &mut outcome.primal, &mut outcome.dual] {
+            *number = if number.is_nan() { f64::INFINITY } else { *number };
+        }
         self.measuring = begin.elapsed();
     }
+}
+
+/// The larger of two numbers, or NaN if one is.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
 }

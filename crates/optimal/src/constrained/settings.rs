@@ -40,6 +40,7 @@ impl ConstraintSettings {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         for (name, value, good, allowed) in [
+            ("max_solves", self.max_solves as f64, self.max_solves > 0, "at least 1"),
             ("tolerance", self.tolerance, positive(self.tolerance), "above 0"),
             ("tolerance_dual", self.tolerance_dual, positive(self.tolerance_dual), "above 0"),
             (

@@ -1,5 +1,7 @@
-//! Time that a solve may take.
+//! Time that a solve may take, and other reasons to stop.
 
+use super::observer::Watch;
+use super::solution::Status;
 use std::time::{Duration, Instant};
 
 /// A phase of an iteration.
@@ -20,18 +22,22 @@ pub(crate) struct Clock {
 impl Clock {
     /// A solve begins that may take `budget`.
     pub(crate) fn start(&mut self, begin: Instant, budget: Option<Duration>) {
-        self.end = budget.map(|budget| begin + budget);
+        self.end = budget.and_then(|budget| begin.checked_add(budget));
     }
 
-    /// Whether there is time for a phase. A refusal halves what is expected of it, so that one late phase does not stop all
-    /// solves to come.
-    pub(crate) fn allows(&mut self, phase: Phase) -> bool {
-        let expected = &mut self.last[phase as usize];
-        let allowed = self.end.is_none_or(|end| Instant::now() + *expected <= end);
-        if !allowed {
-            *expected /= 2;
+    /// `Ok` if there is time for a phase and the observer wants to go on, else why not. A refusal halves what is expected of
+    /// the phase, so that one late phase does not stop all solves to come.
+    pub(super) fn allows(&mut self, phase: Phase, watch: &mut Watch<'_>) -> Result<(), Status> {
+        let now = Instant::now();
+        if watch.go_on(now).is_break() {
+            return Err(Status::Interrupted);
         }
-        allowed
+        let expected = &mut self.last[phase as usize];
+        if self.end.is_none_or(|end| now + *expected <= end) {
+            return Ok(());
+        }
+        *expected /= 2;
+        Err(Status::TimeLimit)
     }
 
     /// A phase was run; returns its duration.

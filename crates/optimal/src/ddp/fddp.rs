@@ -1,7 +1,9 @@
 //! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
+use super::best::{Best, Value};
 use super::clock::{Clock, Phase};
+use super::observer::{Observer, Unobserved, Watch};
 use super::rollout::Sum;
 use super::search::{Iterate, LineSearch, Search};
 use super::settings::{DdpMethod, Settings};
@@ -83,10 +85,15 @@ pub struct Fddp {
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
     gaps: Vec<f64>,
+    /// What the solution becomes if the last iterate is worse.
+    pub(super) best: Best,
     clock: Clock,
     /// Whether knots may come as equations of inverse dynamics.
     inverse_dynamics: bool,
 }
+
+/// The iterations for which there is room in the trace when a solve begins; with more it grows.
+const FORESEEN: usize = 10_000;
 
 /// The state that goes from one iteration to the next.
 struct Progress {
@@ -97,6 +104,8 @@ struct Progress {
     tolerance: f64,
     /// Whether there are gains of this solve.
     swept: bool,
+    /// Whether they are those of the best iterate, which the last step left.
+    swept_best: bool,
 }
 
 impl Fddp {
@@ -114,6 +123,7 @@ impl Fddp {
             next: vec![0.0; horizon * shape.nx],
             costs: vec![0.0; horizon + 1],
             gaps: vec![0.0; (horizon + 1) * shape.ndx],
+            best: Best::new(problem),
             clock: Clock::default(),
             inverse_dynamics: false,
         }
@@ -123,12 +133,12 @@ impl Fddp {
     ///
     /// # Errors
     /// [`Error`] if the dimensions of `problem` are not those given to [`new`](Self::new), the warm start has a wrong
-    /// length or is not finite, or a setting makes no sense. How the solve went is no error: see [`Solution::status`].
+    /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.solve_with(problem, xs, us, |_| ())
+        self.run(problem, Some([xs, us]), &mut Unobserved)
     }
 
-    /// As [`solve`](Self::solve), and shows each iteration to `observer` as it ends.
+    /// As [`solve`](Self::solve), and shows each iteration as it ends to `observer`, who may end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -137,14 +147,9 @@ impl Fddp {
         problem: &mut Problem,
         xs: &[f64],
         us: &[f64],
-        observer: impl FnMut(&Iteration),
+        mut observer: impl Observer,
     ) -> Result<&Solution, Error> {
-        check_shape(self.solution.shape(), problem.shape())?;
-        Error::check("xs", xs, self.solution.xs.len())?;
-        Error::check("us", us, self.solution.us.len())?;
-        self.solution.xs.copy_from_slice(xs);
-        self.solution.us.copy_from_slice(us);
-        self.resume_with(problem, observer)
+        self.run(problem, Some([xs, us]), &mut observer)
     }
 
     /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
@@ -153,19 +158,35 @@ impl Fddp {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.resume_with(problem, |_| ())
+        self.run(problem, None, &mut Unobserved)
     }
 
-    /// As [`resume`](Self::resume), and shows each iteration to `observer` as it ends.
+    /// As [`resume`](Self::resume), and shows each iteration as it ends to `observer`, who may end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
-    pub fn resume_with(
+    pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
+        self.run(problem, None, &mut observer)
+    }
+
+    /// A solve, from a warm start or the trajectory of the last one.
+    pub(crate) fn run(
         &mut self,
         problem: &mut Problem,
-        mut observer: impl FnMut(&Iteration),
+        warm_start: Option<[&[f64]; 2]>,
+        observer: &mut dyn Observer,
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
+        if let Some([xs, us]) = warm_start {
+            check_shape(self.solution.shape(), problem.shape())?;
+            Error::check("xs", xs, self.solution.xs.len())?;
+            Error::check("us", us, self.solution.us.len())?;
+            for (knot, x) in xs.chunks_exact(problem.nx()).enumerate() {
+                problem.action(knot).check_state(x).map_err(|what| Error::State { name: "xs", knot, what })?;
+            }
+            self.solution.xs.copy_from_slice(xs);
+            self.solution.us.copy_from_slice(us);
+        }
         self.settings.check()?;
         check_shape(self.solution.shape(), problem.shape())?;
         let bounded = problem.check_bounds()?;
@@ -174,16 +195,23 @@ impl Fddp {
 
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
-        self.solution.trace.reserve(self.settings.max_iterations);
+        self.solution.trace.reserve(self.settings.max_iterations.min(FORESEEN));
         self.line_search.start(self.settings.step_lengths);
         let start = self.settings.regularisation_start;
-        let mut progress =
-            Progress { regularisation: start, feasible: false, was_feasible: false, tolerance, swept: false };
+        let mut progress = Progress {
+            regularisation: start,
+            feasible: false,
+            was_feasible: false,
+            tolerance,
+            swept: false,
+            swept_best: false,
+        };
         self.sweep.set_segments(self.settings.segments);
         self.sweep.forget();
+        self.best.start();
         self.clock.start(begin, self.settings.time_budget);
-        let status = self.iterate(problem, &mut progress, &mut observer);
-        self.finish(problem, &progress, status);
+        let status = self.iterate(problem, &mut progress, &mut Watch::new(observer, begin));
+        self.finish(problem, &mut progress, status);
         self.solution.timings.total = begin.elapsed();
         Ok(&self.solution)
     }
@@ -194,7 +222,7 @@ impl Fddp {
     }
 
     /// The iterations, until one of the reasons to stop.
-    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, observer: &mut dyn FnMut(&Iteration)) -> Status {
+    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, watch: &mut Watch<'_>) -> Status {
         self.calc(problem);
         let mut gap = self.update_gaps(problem);
         if !(self.solution.cost.is_finite() && gap.is_finite()) {
@@ -206,14 +234,15 @@ impl Fddp {
                 gap = self.update_gaps(problem);
             }
             if search.accepted || iteration == 0 {
-                if !self.clock.allows(Phase::CalcDiff) {
-                    return Status::TimeLimit;
+                if let Err(status) = self.clock.allows(Phase::CalcDiff, watch) {
+                    return status;
                 }
                 self.calc_diff(problem, now.feasible);
             }
-            if !self.clock.allows(Phase::Sweep) {
-                return Status::TimeLimit;
+            if let Err(status) = self.clock.allows(Phase::Sweep, watch) {
+                return status;
             }
+            now.swept_best = false;
             self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
             while let Err(error) = self.sweep(problem, now.regularisation) {
                 now.regularisation = self.increased(now.regularisation);
@@ -223,19 +252,21 @@ impl Fddp {
                         SweepError::NotFinite { .. } => Status::NotFinite,
                     };
                 }
-                if !self.clock.allows(Phase::Sweep) {
-                    return Status::TimeLimit;
+                if let Err(status) = self.clock.allows(Phase::Sweep, watch) {
+                    return status;
                 }
             }
             now.swept = true;
-            let Self { line_search, solution, next, gaps, sweep, settings, clock, .. } = self;
+            let Self { line_search, solution, next, gaps, best, sweep, settings, clock, .. } = self;
             let (knots, feasible) = (sweep.knots(), now.feasible);
-            let iterate = Iterate { solution, next, gaps, knots, feasible, settings, clock };
+            let value = Value { gap, cost: solution.cost, feasible, regularisation: now.regularisation };
+            let iterate = Iterate { solution, next, value, best, gaps, knots, feasible, settings, clock, watch };
             search = line_search.run(problem, iterate, search);
-            if search.out_of_time {
-                return Status::TimeLimit;
+            if let Some(status) = search.stopped {
+                return status;
             }
             if search.accepted {
+                now.swept_best = search.left_best;
                 now.was_feasible = now.feasible;
                 now.feasible |= search.step == 1.0 || self.settings.method == DdpMethod::Ddp;
             }
@@ -261,12 +292,15 @@ impl Fddp {
                 accepted: search.accepted,
             };
             self.solution.trace.push(record);
-            observer(&record);
+            let verdict = watch.iteration(&record);
             if now.regularisation == self.settings.regularisation_max {
                 return Status::RegularisationLimit;
             }
             if now.was_feasible && stop < now.tolerance {
                 return Status::Converged;
+            }
+            if verdict.is_break() {
+                return Status::Interrupted;
             }
         }
         Status::MaxIterations
@@ -352,14 +386,31 @@ impl Fddp {
         (regularisation / self.settings.regularisation_factor).max(self.settings.regularisation_min)
     }
 
-    /// Fills what the iterations leave open in the solution.
-    fn finish(&mut self, problem: &Problem, now: &Progress, status: Status) {
+    /// Fills what the iterations leave open in the solution, of the last iterate or of a better one.
+    fn finish(&mut self, problem: &mut Problem, now: &mut Progress, status: Status) {
         let infinite_if_nan = |x: f64| if x.is_nan() { f64::INFINITY } else { x };
         self.solution.gap = infinite_if_nan(self.update_gaps(problem));
+        self.solution.cost = infinite_if_nan(self.solution.cost);
+        let Solution { gap, cost, .. } = self.solution;
+        let last = Value { gap, cost, feasible: now.feasible, regularisation: now.regularisation };
+        let regularisation = now.regularisation;
+        let goes_back = match status {
+            Status::Converged => false,
+            Status::NotFinite => true, // there is no direction at the last one
+            _ => self.best.is_better_than(&last),
+        };
+        if goes_back && let Some(best) = self.best.restore(&mut self.solution, &mut self.next) {
+            (self.solution.gap, self.solution.cost, now.feasible) = (best.gap, best.cost, best.feasible);
+            self.update_gaps(problem);
+            if !now.swept_best {
+                self.calc_diff(problem, best.feasible);
+                self.sweep.keep_values(false);
+                now.swept = self.sweep(problem, best.regularisation).is_ok();
+            }
+        }
         let solution = &mut self.solution;
-        solution.cost = infinite_if_nan(solution.cost);
         solution.feasible = now.feasible;
-        solution.regularisation = now.regularisation;
+        solution.regularisation = regularisation;
         solution.status = status;
         if !now.swept {
             return; // the gains of the solve before, shifted or not

@@ -1,7 +1,9 @@
 //! Differential dynamic programming, feasibility-driven or not.
 
+mod best;
 mod clock;
 mod fddp;
+mod observer;
 mod rollout;
 mod search;
 mod settings;
@@ -9,5 +11,7 @@ mod shift;
 mod solution;
 
 pub use fddp::Fddp;
+pub(crate) use observer::Unobserved;
+pub use observer::{Observer, Verdict};
 pub use settings::{DdpMethod, Settings};
 pub use solution::{Iteration, Solution, Status, Timings};

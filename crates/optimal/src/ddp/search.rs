@@ -1,9 +1,11 @@
 //! The line search of differential dynamic programming: what a step should gain, and whether it does.
 
+use super::best::{Best, Value};
 use super::clock::{Clock, Phase};
+use super::observer::Watch;
 use super::rollout::{Nominal, Trials};
 use super::settings::{DdpMethod, Settings};
-use super::solution::Solution;
+use super::solution::{Solution, Status};
 use crate::lq::LqKnot;
 use crate::problem::Problem;
 use condyle_linalg::{View, add_scaled_product, dot};
@@ -22,16 +24,21 @@ pub(super) struct Search {
     pub(super) decrease: f64,
     pub(super) expected_decrease: f64,
     pub(super) accepted: bool,
-    /// There was no time for another trial.
-    pub(super) out_of_time: bool,
+    /// Why there was no other trial, if the solve must stop.
+    pub(super) stopped: Option<Status>,
+    /// The iterate before the accepted step is the best one now.
+    pub(super) left_best: bool,
 }
 
 /// An iterate, its feedback, and how to search around it.
-pub(super) struct Iterate<'a> {
+pub(super) struct Iterate<'a, 'o> {
     /// The iterate is in here; it becomes the accepted trial.
     pub(super) solution: &'a mut Solution,
     /// φₜ(xₜ, uₜ), N·nx.
-    pub(super) next: &'a mut [f64],
+    pub(super) next: &'a mut Vec<f64>,
+    /// What it is worth, and the best one before it.
+    pub(super) value: Value,
+    pub(super) best: &'a mut Best,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
     pub(super) gaps: &'a [f64],
     /// The feedback and value functions.
@@ -40,6 +47,7 @@ pub(super) struct Iterate<'a> {
     pub(super) feasible: bool,
     pub(super) settings: &'a Settings,
     pub(super) clock: &'a mut Clock,
+    pub(super) watch: &'a mut Watch<'o>,
 }
 
 /// The line search, with its workspace.
@@ -85,9 +93,9 @@ impl LineSearch {
     /// A trial that leaves all bounds keeps the expectation of the trial before it; the first one has that of the line
     /// search before, `last`, or in DDP, where it does not depend on the trial, that of this one.
     #[inline(never)] // `benches/instructions.py` counts it by its name
-    pub(super) fn run(&mut self, problem: &mut Problem, mut iterate: Iterate<'_>, last: Search) -> Search {
+    pub(super) fn run(&mut self, problem: &mut Problem, mut iterate: Iterate<'_, '_>, last: Search) -> Search {
         self.expect(&iterate);
-        let mut search = Search { accepted: false, ..last };
+        let mut search = Search { accepted: false, left_best: false, ..last };
         let gaps = iterate.settings.counts_gaps(iterate.feasible);
         if iterate.settings.method == DdpMethod::Ddp {
             [search.d1, search.d2] = self.expected;
@@ -100,8 +108,8 @@ impl LineSearch {
                 _ => count,
             };
             let width = most.min(self.trials.width()).min(count - tried);
-            if !iterate.clock.allows(Phase::Rollout) {
-                search.out_of_time = true;
+            if let Err(status) = iterate.clock.allows(Phase::Rollout, iterate.watch) {
+                search.stopped = Some(status);
                 return search;
             }
             self.roll_out(problem, &mut iterate, gaps, tried, width);
@@ -115,6 +123,7 @@ impl LineSearch {
                 search.expected_decrease = search.step * (search.d1 + 0.5 * search.step * search.d2);
                 search.decrease = iterate.solution.cost - cost;
                 if search.is_good(iterate.settings, iterate.feasible) {
+                    search.left_best = iterate.best.leave(iterate.solution, iterate.next, iterate.value);
                     let Solution { xs, us, .. } = iterate.solution;
                     self.trials.copy_to(i, xs, us, iterate.next);
                     iterate.solution.cost = cost;
@@ -128,7 +137,7 @@ impl LineSearch {
     }
 
     /// dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP leaves the gaps f out.
-    fn expect(&mut self, iterate: &Iterate<'_>) {
+    fn expect(&mut self, iterate: &Iterate<'_, '_>) {
         let (mut dg, mut dq) = (0.0, 0.0);
         let gaps = iterate.settings.counts_gaps(iterate.feasible);
         for (t, knot) in iterate.knots.iter().enumerate() {
@@ -159,7 +168,14 @@ impl LineSearch {
     }
 
     /// The trials `from`, `from` + 1, … of the line search, side by side; with what is left of the `gaps`.
-    fn roll_out(&mut self, problem: &mut Problem, iterate: &mut Iterate<'_>, gaps: bool, from: usize, width: usize) {
+    fn roll_out(
+        &mut self,
+        problem: &mut Problem,
+        iterate: &mut Iterate<'_, '_>,
+        gaps: bool,
+        from: usize,
+        width: usize,
+    ) {
         let start = Instant::now();
         let gaps = gaps.then_some(iterate.gaps);
         let Solution { xs, us, .. } = &*iterate.solution;

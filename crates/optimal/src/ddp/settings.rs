@@ -32,23 +32,23 @@ pub struct Settings {
     /// forces as unknowns instead of the controls, where that is possible: without bounds on controls and without
     /// `second_order`. The same steps and gains, up to rounding, in about half the time.
     pub inverse_dynamics_form: bool,
-    /// Iterations after which a solve stops. With a tolerance of 0 it makes exactly so many.
+    /// Iterations after which a solve stops, at most 1 000 000. With a tolerance of 0 it makes exactly so many.
     pub max_iterations: usize,
     /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
     pub tolerance: f64,
     /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
     pub tolerance_bounded: f64,
     /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
-    /// as the last of its kind. `None` for no limit.
+    /// as the last of its kind. `None` for no limit. A solve that goes back to a better iterate may take a sweep longer.
     pub time_budget: Option<Duration>,
     /// How many segments of the horizon a sweep works on at the same time: see [`Sweep::set_segments`]. It is not the number
-    /// of threads, which are those of rayon's pool, and any number of them finds the same.
+    /// of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.
     ///
     /// [`Sweep::set_segments`]: crate::Sweep::set_segments
     pub segments: usize,
     /// Threads on which derivatives are computed, of rayon's pool in which a solve is called, else of the global one. Any
     /// number finds the same to the last bit. More than 1 need copies of the actions ([`fork`]), which are made when
-    /// there are none yet, or not of a model as it is now.
+    /// there are none yet, or not of a model as it is now. At most 1024.
     ///
     /// [`fork`]: crate::ActionModel::fork
     pub threads: usize,
@@ -74,6 +74,12 @@ pub struct Settings {
     /// The regularisation rises after a step of this length or shorter.
     pub regularisation_increase_below: f64,
 }
+
+/// The most segments, and the most threads: each has memory of its own.
+const MOST_AT_ONCE: usize = 1024;
+
+/// `MOST_AT_ONCE` in words.
+const AT_ONCE: &str = "at least 1 and at most 1024";
 
 impl Default for Settings {
     fn default() -> Self {
@@ -107,17 +113,23 @@ impl Settings {
         !feasible && self.method == DdpMethod::Fddp
     }
 
+    /// Checks the settings, as each solve does.
+    ///
     /// # Errors
     /// [`Error::Setting`] for the first field that makes no sense.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<(), Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();
         let [steps, segments, threads] = [self.step_lengths, self.segments, self.threads].map(|count| count as f64);
+        let number = |x: f64| x.is_finite();
+        let (above, below) = (self.regularisation_decrease_above, self.regularisation_increase_below);
         for (name, value, good, allowed) in [
+            ("regularisation_decrease_above", above, number(above), "a finite number"),
+            ("regularisation_increase_below", below, number(below), "a finite number"),
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
-            ("segments", segments, self.segments > 0, "at least 1"),
-            ("threads", threads, self.threads > 0, "at least 1"),
+            ("segments", segments, (1..=MOST_AT_ONCE).contains(&self.segments), AT_ONCE),
+            ("threads", threads, (1..=MOST_AT_ONCE).contains(&self.threads), AT_ONCE),
             ("step_lengths", steps, (1..=60).contains(&self.step_lengths), "from 1 to 60"),
             ("accept", self.accept, from_zero(self.accept), "at least 0"),
             ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),

@@ -36,6 +36,7 @@ impl Fddp {
             self.sweep = Sweep::new(&self.nodes);
         }
         self.line_search.reshape(problem);
+        self.best.reshape(problem);
         // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
         let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
         let next = &mut self.next[..end.len()];

@@ -6,7 +6,9 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// How a solve ended. Whatever it says, the [`Solution`] holds the best iterate found.
+/// How a solve ended. Whatever it says, the [`Solution`] holds the best iterate found: a converged one; else, of those from
+/// which a step could be computed and of the last one, the one with the smallest gap, and among equals that of least cost. An
+/// iterate that costs 1e8 times as much as the cheapest one and 1 has run away and is no candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -17,12 +19,15 @@ pub enum Status {
     MaxIterations,
     /// The time allowed is over, or what is left of it is too short to go on.
     TimeLimit,
+    /// An [`Observer`](crate::Observer) has ended the solve.
+    Interrupted,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
     /// The constraints do not hold, however much leaving them costs: there may be no solution.
     Infeasible,
-    /// Cost, dynamics or derivatives of the iterate are infinite or NaN, so that no direction can be computed. States
-    /// and controls of the solution are finite nevertheless; its cost may be infinite.
+    /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so that no direction can be computed. The
+    /// solution is the best iterate before it; if it is the warm start itself, its cost may be infinite. States and controls
+    /// are finite.
     NotFinite,
 }
 

@@ -46,8 +46,16 @@ pub struct LqNode {
 }
 
 impl LqNode {
+    /// The most states, and the most controls: a knot has matrices of them.
+    pub const MOST_SIZE: usize = 4096;
+
     /// A knot of zeros with ndx states and nu controls without bounds.
+    ///
+    /// # Panics
+    /// If a number is above [`MOST_SIZE`](Self::MOST_SIZE).
     pub fn zeros(ndx: usize, nu: usize) -> Self {
+        let most = Self::MOST_SIZE;
+        assert!(ndx <= most && nu <= most, "expected at most {most} states and controls, found {ndx} and {nu}");
         Self {
             A: DMatrix::zeros(ndx, ndx),
             B: DMatrix::zeros(ndx, nu),

@@ -22,7 +22,7 @@
 use super::conditional_value::{Link, SegmentValue, Value};
 use super::node::{Hessian, LqKnot, LqNode};
 use super::step::{Sizes, Step, SweepError};
-use condyle_linalg::{SLACK, max_abs};
+use condyle_linalg::{SLACK, max_abs, threads};
 use core::ops::Range;
 
 /// The largest difference, relative to the largest entry, between the value function with which a segment was swept and the
@@ -89,10 +89,10 @@ impl Segments {
         if !nodes.iter().all(Self::serve) {
             return None;
         }
-        let parallel = rayon::current_num_threads() > 1;
+        let parallel = threads::threads() > 1;
         let begin = SegmentTask { pass: Pass::Begin, nodes, regularisation, parallel };
         if parallel {
-            rayon::scope(|_| self.sweep(begin, knots)) // enters the pool once, not for each step of it
+            threads::enter(|| self.sweep(begin, knots)) // enters the pool once, not for each step of it
         } else {
             self.sweep(begin, knots)
         }
@@ -178,7 +178,7 @@ impl SegmentTask<'_> {
         let (some, others) = segments.split_at_mut(segments.len() / 2);
         let (first, second) = knots.split_at_mut(others[0].knots.start - some[0].knots.start);
         if self.parallel {
-            rayon::join(|| self.run(some, first), || self.run(others, second));
+            threads::join(|| self.run(some, first), || self.run(others, second));
         } else {
             self.run(some, first);
             self.run(others, second);

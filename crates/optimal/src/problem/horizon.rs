@@ -8,6 +8,13 @@ use crate::lq::LqNode;
 use std::any::Any;
 use std::ops::Range;
 
+/// The most knots of a horizon.
+pub(crate) const MOST_KNOTS: usize = 1 << 20;
+/// The most entries of a state, a change of state, or the controls of a knot: matrices of that size take 128 MiB each.
+pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
+/// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
+const MOST_NUMBERS: usize = 1 << 28;
+
 /// An optimal control problem in discrete time, with N knots and a terminal one:
 ///
 /// ```text
@@ -68,8 +75,9 @@ impl Problem {
     /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon is empty, an index has no model, nx or ndx differ, the terminal model has controls, or
-    /// x̂₀ has a wrong length or an entry that is not finite.
+    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has a
+    /// wrong length or an entry that is not finite or is no state, a state or the controls of a knot have more than 4096
+    /// entries, or there are more than 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
@@ -80,6 +88,11 @@ impl Problem {
             return Err(Error::EmptyHorizon);
         }
         let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
+        Error::check_size("knots", horizon, MOST_KNOTS)?;
+        for (name, found) in [("nx", nx), ("ndx", ndx)] {
+            Error::check_size(name, found, MOST_ENTRIES)?;
+        }
+        let mut numbers = 0;
         for (knot, &index) in stages.iter().enumerate() {
             let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
             for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
@@ -87,11 +100,18 @@ impl Problem {
                     return Err(Error::Dimension { node: knot, name, expected, found });
                 }
             }
+            Error::check_size("nu", model.nu(), MOST_ENTRIES)?;
+            numbers += ndx * (ndx + model.nu());
+            Error::check_size("numbers in the matrices of all knots", numbers, MOST_NUMBERS)?;
+        }
+        if ndx == 0 {
+            return Err(Error::EmptyState);
         }
         if terminal.nu() != 0 {
             return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
         }
         Error::check("x0", &x0, nx)?;
+        terminal.check_state(&x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
         let (copies, unread) = (Copies::default(), vec![0.0; nx]);
@@ -182,9 +202,10 @@ impl Problem {
     /// Sets the initial state, as an MPC does before each solve.
     ///
     /// # Errors
-    /// [`Error`] if its length is not nx or an entry is not finite; the old one then stays.
+    /// [`Error`] if its length is not nx, an entry is not finite, or it is no state; the old one then stays.
     pub fn set_x0(&mut self, x0: &[f64]) -> Result<(), Error> {
         Error::check("x0", x0, self.nx())?;
+        self.terminal.check_state(x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
         self.x0.copy_from_slice(x0);
         Ok(())
     }
@@ -206,7 +227,7 @@ impl Problem {
     /// The states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates them.
     ///
     /// # Errors
-    /// [`Error`] if `us` has a wrong length or an entry that is not finite.
+    /// [`Error`] if `us` has a wrong length or an entry that is not finite, or a state `xs` becomes infinite.
     pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
         let mut xs = vec![0.0; (self.horizon() + 1) * self.nx()];
@@ -216,6 +237,7 @@ impl Problem {
             let u = &us[self.shape.u(t)];
             self.models[self.stages[t]].calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
         }
+        Error::check("xs", &xs, xs.len())?;
         Ok(xs)
     }
 
@@ -363,7 +385,6 @@ impl Problem {
         assert_length("us", us.len(), self.shape.offsets[self.horizon()]);
     }
 }
-
 impl std::fmt::Debug for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Problem")

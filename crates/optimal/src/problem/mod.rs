@@ -13,6 +13,7 @@ pub use action::ActionModel;
 pub(crate) use action::differences;
 pub use autodiff::{AutoDiff, GenericAction};
 pub use horizon::Problem;
+pub(crate) use horizon::{MOST_ENTRIES, MOST_KNOTS};
 pub use lqr::Lqr;
 pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Visit, leave_a_value};
 pub use numdiff::NumDiff;

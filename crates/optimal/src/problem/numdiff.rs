@@ -95,6 +95,10 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
         true
     }
 
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        self.0.check_state(x)
+    }
+
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         self.0.integrate(x, dx, out)
     }

@@ -2,6 +2,7 @@
 
 use super::action::ActionModel;
 use crate::lq::LqNode;
+use condyle_linalg::threads;
 use core::ops::Range;
 
 /// Copies of actions for threads, and which thread computes which knots.
@@ -101,7 +102,7 @@ impl Copies {
         self.share(threads, models, knots.runs);
         let Self { of, copied, cuts } = self;
         let (own, others) = nodes.split_at_mut(cuts[1]);
-        rayon::join(
+        threads::join(
             || {
                 knots.visit(0..own.len(), own, |model, run, nodes| {
                     if copied[model] {
@@ -166,6 +167,6 @@ impl Knots<'_> {
         let half = copies.len() / 2;
         let (some, others) = copies.split_at_mut(half);
         let (first, second) = nodes.split_at_mut(cuts[half] - cuts[0]);
-        rayon::join(|| self.spread(&cuts[..=half], some, first), || self.spread(&cuts[half..], others, second));
+        threads::join(|| self.spread(&cuts[..=half], some, first), || self.spread(&cuts[half..], others, second));
     }
 }

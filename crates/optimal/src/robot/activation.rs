@@ -1,5 +1,6 @@
 //! Activations: functions that say how much a residual costs.
 
+use crate::problem::leave_a_value;
 use serde::{Deserialize, Serialize};
 
 /// A function a(r) that says how much a residual r costs.
@@ -16,7 +17,7 @@ pub enum Activation {
     Quadratic,
     /// ½ Σ wᵢ rᵢ².
     Weighted(
-        /// w, a number for each entry of the residual.
+        /// w, a number of at least 0 for each entry of the residual.
         Vec<f64>,
     ),
     /// ½ Σ (excess of rᵢ over its bounds)²: nothing inside them.
@@ -36,7 +37,7 @@ pub enum Activation {
         /// Greatest values; ∞ for none.
         #[serde(with = "condyle_spatial::finite::upper")]
         upper: Vec<f64>,
-        /// w.
+        /// w, numbers of at least 0.
         weights: Vec<f64>,
     },
     /// Σ √(ε + rᵢ²): nearly Σ |rᵢ|.
@@ -109,8 +110,15 @@ impl Activation {
             true => None,
             false => Some(format!("its {name} has {} numbers, expected {n}", numbers.len())),
         };
+        let weighting = |w: &[f64]| {
+            let bad = |i: usize| format!("its weight {i} is {}, expected a finite number of at least 0", w[i]);
+            if w.len() != n {
+                return length("weighting", w);
+            }
+            w.iter().position(|x| !(*x >= 0.0 && x.is_finite())).map(bad)
+        };
         let ordered = |lower: &[f64], upper: &[f64]| {
-            let i = lower.iter().zip(upper).position(|(l, u)| l > u)?;
+            let i = lower.iter().zip(upper).position(|(&lower, &upper)| !leave_a_value(lower, upper))?;
             Some(format!("its bounds of entry {i} exclude each other: {} and {}", lower[i], upper[i]))
         };
         let bounds = |lower: &[f64], upper: &[f64]| {
@@ -119,11 +127,9 @@ impl Activation {
         };
         match self {
             Self::Quadratic => None,
-            Self::Weighted(w) => length("weighting", w),
+            Self::Weighted(w) => weighting(w),
             Self::Barrier { lower, upper } => bounds(lower, upper),
-            Self::WeightedBarrier { lower, upper, weights } => {
-                bounds(lower, upper).or_else(|| length("weighting", weights))
-            }
+            Self::WeightedBarrier { lower, upper, weights } => bounds(lower, upper).or_else(|| weighting(weights)),
             Self::Smooth1 { epsilon } | Self::Smooth2 { epsilon } => {
                 let wrong = !(*epsilon > 0.0 && epsilon.is_finite());
                 wrong.then(|| format!("its ε is {epsilon}, but it must be above 0"))

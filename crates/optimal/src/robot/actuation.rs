@@ -166,6 +166,9 @@ impl Actuation {
                 Map::Matrix(S) => map.column_mut(j).copy_from(&S.column(j)),
             }
         }
+        if map.is_empty() {
+            return vec![0.0; nu];
+        }
         map.columns_mut(nu, J.nrows()).copy_from(&J.transpose());
         let singular = map.svd(true, true);
         let least = f64::EPSILON * self.nv.max(nu + J.nrows()) as f64 * singular.singular_values.max();

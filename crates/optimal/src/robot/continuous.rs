@@ -112,6 +112,15 @@ pub trait ContinuousModel: Send + 'static {
         &[]
     }
 
+    /// Says what is wrong with a position that is none: for example the length of a quaternion. All are good by default.
+    ///
+    /// # Errors
+    /// The fault, with the numbers.
+    fn check_position(&self, q: &[f64]) -> Result<(), String> {
+        let _ = q;
+        Ok(())
+    }
+
     /// Writes q ⊕ δq to `out` (nq).
     fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
         (0..out.len()).for_each(|k| out[k] = q[k] + dq[k]);

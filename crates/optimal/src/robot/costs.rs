@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub struct Cost {
     /// The name of the term.
     pub name: String,
-    /// The weight w; a term whose weight is 0 is not computed.
+    /// The weight w, finite; a term whose weight is 0 is not computed.
     pub weight: f64,
     /// The residual r.
     pub residual: Residual,
@@ -57,11 +57,16 @@ impl Cost {
     fn plan(&self, model: &Model, capabilities: &Capabilities) -> Result<Plan, Error> {
         let wrong = |what: String| Error::Cost { name: self.name.clone(), what };
         let plan = Plan::new(model, capabilities, &self.residual).map_err(wrong)?;
-        if !self.weight.is_finite() {
-            return Err(wrong(format!("its weight is {}", self.weight)));
-        }
+        check_weight(&self.name, self.weight)?;
         self.activation.wrong(plan.n).map_or(Ok(plan), |what| Err(wrong(what)))
     }
+}
+
+/// Refuses the weight of the term called `name` if it is not finite.
+pub(super) fn check_weight(name: &str, weight: f64) -> Result<(), Error> {
+    let wrong =
+        || Error::Cost { name: name.to_owned(), what: format!("its weight is {weight}, expected a finite number") };
+    weight.is_finite().then_some(()).ok_or_else(wrong)
 }
 
 /// A factor times w a(r).
@@ -101,9 +106,13 @@ impl Costs {
     }
 
     /// Changes the weight of the term called `name`, between solves; says whether there is one.
-    pub fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+    ///
+    /// # Errors
+    /// [`Error::Cost`] if the weight is not finite; the old one then stays.
+    pub fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
+        check_weight(name, weight)?;
         let cost = self.terms.all_mut().iter_mut().find(|cost| cost.name == name);
-        cost.map(|cost| cost.weight = weight).is_some()
+        Ok(cost.map(|cost| cost.weight = weight).is_some())
     }
 
     /// Changes what the term called `name` looks at, between solves: its target, for example. Allocates.

@@ -1,7 +1,7 @@
 //! Terms of a horizon: which costs and limits serve which knot.
 
 use super::capabilities::Capabilities;
-use super::costs::{Cost, Costs, WeightedActivations};
+use super::costs::{Cost, Costs, WeightedActivations, check_weight};
 use super::knot::{KnotState, Sensitivities};
 use super::limits::{Limit, Limits};
 use super::per_knot::PerKnot;
@@ -10,6 +10,7 @@ use super::residuals::terms::{KinematicTerms, KnotTerms};
 use super::residuals::view::{ResidualView, Scratch};
 use crate::Error;
 use crate::lq::LqNode;
+use crate::problem::MOST_KNOTS;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
@@ -40,16 +41,18 @@ impl HorizonTerms {
     }
 
     /// Changes the weights of the terms called `name`, of all knots; says whether there is one.
-    pub(crate) fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+    pub(crate) fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
+        check_weight(name, weight)?;
         let mut found = false;
         for costs in self.costs.all_mut() {
-            found |= costs.set_weight(name, weight);
+            found |= costs.set_weight(name, weight)?;
         }
-        found
+        Ok(found)
     }
 
     /// Gives knot t costs of its own.
     pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
+        Error::check_size("knot", t, MOST_KNOTS)?;
         self.costs.set(Some(t), Costs::new(self.model.clone(), self.capabilities.clone(), costs)?);
         self.reserve();
         Ok(())
@@ -57,6 +60,7 @@ impl HorizonTerms {
 
     /// Gives knot t limits of its own, or all knots that have none of their own.
     pub(crate) fn set_limits(&mut self, t: Option<usize>, limits: Vec<Limit>) -> Result<(), Error> {
+        Error::check_size("knot", t.unwrap_or(0), MOST_KNOTS)?;
         self.limits.set(&self.model, &self.capabilities, t, limits)?;
         self.reserve();
         Ok(())

@@ -29,6 +29,11 @@ const ROUNDING: f64 = 1e-13;
 const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
+/// Numbers of at least 0, for weights.
+fn magnitudes(n: usize, rng: &mut StdRng) -> Vec<f64> {
+    random(n, 1.0, rng).iter().map(|x| x.abs()).collect()
+}
+
 fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
     (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
 }
@@ -104,7 +109,7 @@ fn contact_costs(model: &Model, contacts: &[Contact], nu: usize, rng: &mut StdRn
     let mut costs = vec![
         Cost::new("state", 0.3, Residual::State { reference: random_state(model, rng) }, Activation::Quadratic),
         Cost::new("effort", 0.1, Residual::Control { reference: random(nu, 1.0, rng) }, barrier(nu)),
-        Cost::new("gravity", 1e-4, Residual::ControlGravity, Activation::Weighted(random(nv, 1.0, rng))),
+        Cost::new("gravity", 1e-4, Residual::ControlGravity, Activation::Weighted(magnitudes(nv, rng))),
         Cost::new(
             "torque",
             1e-2,
@@ -132,7 +137,7 @@ fn contact_costs(model: &Model, contacts: &[Contact], nu: usize, rng: &mut StdRn
             Activation::WeightedBarrier {
                 lower: vec![-0.5; rows],
                 upper: vec![0.3; rows],
-                weights: random(rows, 1.0, rng),
+                weights: magnitudes(rows, rng),
             },
         ),
         Cost::new(
@@ -359,7 +364,10 @@ fn a_knot_can_have_costs_of_its_own() {
     let (x, u, mut next) = ([0.0; 14], [1.0; 7], [0.0; 14]);
     let costs: Vec<f64> = (0..5).map(|t| action.calc(t, &x, &u, &mut next)).collect();
     assert_eq!(costs, [7.0, 7.0, 7.0, 35.0, 7.0]);
-    assert!(action.costs_at_mut(3).set_weight("effort", 4.0) && action.costs_mut().set_weight("effort", 0.0));
+    assert!(
+        action.costs_at_mut(3).set_weight("effort", 4.0).unwrap()
+            && action.costs_mut().set_weight("effort", 0.0).unwrap()
+    );
     assert_eq!([2, 3].map(|t| action.calc(t, &x, &u, &mut next)), [0.0, 14.0]);
     let moved = Residual::Control { reference: vec![1.0; 7] };
     action.costs_at_mut(3).set_residual("effort", moved).unwrap();

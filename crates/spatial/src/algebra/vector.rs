@@ -247,6 +247,25 @@ impl<S: Scalar> Mat3<S> {
     }
 }
 
+/// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
+const ROTATION_ROUNDING: f64 = 1e-6;
+
+impl Mat3<f64> {
+    /// Whether it is a rotation: its columns are unit vectors at right angles, right-handed, all up to 1e-6 (in length, in
+    /// cosines of right angles). It is none if a number is not finite.
+    ///
+    /// ```
+    /// use condyle_spatial::{Mat3, Vec3};
+    /// let turn = Mat3::<f64>::identity();
+    /// assert!(turn.is_rotation() && !Mat3 { z: Vec3::new(0.0, 0.0, -1.0), ..turn }.is_rotation());
+    /// ```
+    pub fn is_rotation(self) -> bool {
+        let Self { x, y, z } = self;
+        let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
+        off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
+    }
+}
+
 impl<S: Scalar> Mul<Vec3<S>> for Mat3<S> {
     type Output = Vec3<S>;
     #[inline(always)]

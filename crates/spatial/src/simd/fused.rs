@@ -6,7 +6,7 @@ use crate::scalar::number::Number;
 use crate::scalar::operators::operators;
 use crate::simd::kernel::{Kernel, short};
 use crate::simd::lanes::{Element, Lanes};
-use crate::simd::level::{Level, level};
+use crate::simd::level::{Level, assert_supported, level};
 use crate::simd::pack::Block;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -75,8 +75,7 @@ impl Scalar for Fused {
     #[inline(always)]
     fn enter(kernel: impl Kernel) {
         assert!(level() > Level::Baseline, "products are fused from AVX2 and NEON on");
-        // SAFETY: the processor has the level.
-        unsafe { short(kernel) }
+        short(kernel);
     }
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -105,6 +104,7 @@ impl Scalar for Fused {
     /// Four at a time: where products are fused, there are vectors of four.
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
+        assert_supported(if cfg!(target_arch = "aarch64") { Level::Neon } else { Level::Avx2 });
         let (angles, others) = angles.as_chunks_mut::<4>();
         let (cosines, other_cosines) = cosines.as_chunks_mut::<4>();
         for (x, y) in angles.iter_mut().zip(cosines) {

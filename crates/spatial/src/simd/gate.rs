@@ -15,14 +15,14 @@
 pub use crate::simd::fused::Fused;
 pub use crate::simd::kernel::Kernel;
 pub use crate::simd::level::{Level, level};
-use crate::simd::pack::Real;
+pub use crate::simd::pack::{Real, Witness};
 use core::any::TypeId;
 use core::mem::ManuallyDrop;
 
 /// Four numbers at once, with AVX2 or NEON.
-pub type Short = <f64 as Real>::Short;
+pub type Short<W> = <f64 as Real>::Short<W>;
 /// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
-pub type Long = <f64 as Real>::Long;
+pub type Long<W> = <f64 as Real>::Long<W>;
 
 /// Whether two types are the same one.
 #[inline(always)]
@@ -54,7 +54,13 @@ macro_rules! kernel {
         #[inline]
         #[allow(unsafe_code, clippy::too_many_arguments)]
         $vis fn $name<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?>($($arg: $type),*) {
-            use $crate::simd::gate::{Fused, Kernel, Level, Long, Short, is, level};
+            use $crate::simd::gate::{Fused, Kernel, Level, is, level};
+
+            struct Gate;
+            // SAFETY: each scalar's code is entered through its door.
+            unsafe impl $crate::simd::gate::Witness for Gate {}
+            type Short = $crate::simd::gate::Short<Gate>;
+            type Long = $crate::simd::gate::Long<Gate>;
 
             struct Work<T, Scalars>(T, ::core::marker::PhantomData<Scalars>);
             impl<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
@@ -101,9 +107,15 @@ macro_rules! kernel {
 macro_rules! register_kernel {
     ($(#[$doc:meta])* $vis:vis fn $name:ident<$V:ident>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$doc])*
-        #[allow(clippy::too_many_arguments)]
+        #[allow(unsafe_code, clippy::too_many_arguments)]
         $vis fn $name($($arg: $type),*) {
-            use $crate::simd::gate::{Kernel, Level, Long, Short, level};
+            use $crate::simd::gate::{Kernel, Level, level};
+
+            struct Gate;
+            // SAFETY: the registers' code is entered through their door.
+            unsafe impl $crate::simd::gate::Witness for Gate {}
+            type Short = $crate::simd::gate::Short<Gate>;
+            type Long = $crate::simd::gate::Long<Gate>;
 
             struct Work<T, V>(T, ::core::marker::PhantomData<V>);
             impl<$V: $crate::simd::pack::Block<Number = f64>> Kernel for Work<($($type,)*), $V> {

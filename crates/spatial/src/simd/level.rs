@@ -81,18 +81,66 @@ impl fmt::Display for Unsupported {
 
 impl std::error::Error for Unsupported {}
 
+/// A `CONDYLE_LEVEL` that cannot be obeyed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Refused {
+    /// The value names no level.
+    Unknown(
+        /// The value.
+        String,
+    ),
+    /// This processor does not have the level.
+    Unsupported(
+        /// The level.
+        Level,
+    ),
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown(name) => write!(f, "CONDYLE_LEVEL: expected {}, found `{name}`", List(&Level::ALL))?,
+            Self::Unsupported(level) => write!(f, "CONDYLE_LEVEL: {}", Unsupported(*level))?,
+        }
+        let here: Vec<Level> = Level::ALL.into_iter().filter(|level| level.is_supported()).collect();
+        write!(f, " (this processor has {})", List(&here))
+    }
+}
+
+impl std::error::Error for Refused {}
+
+/// Levels as a sentence names them.
+struct List<'a>(&'a [Level]);
+
+impl fmt::Display for List<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, level) in self.0.iter().enumerate() {
+            let before = if i == 0 {
+                ""
+            } else if i + 1 == self.0.len() {
+                " or "
+            } else {
+                ", "
+            };
+            write!(f, "{before}{level}")?;
+        }
+        Ok(())
+    }
+}
+
 /// The level in use; 0 until it is first asked for.
 static LEVEL: AtomicU8 = AtomicU8::new(0);
 
 /// The level in use: the one pinned, else `CONDYLE_LEVEL`, else the best that this processor has.
 ///
+/// A `CONDYLE_LEVEL` that cannot be obeyed ([`requested`]) is reported on the standard error, once, and the best level is
+/// used.
+///
 /// ```
 /// let level = condyle_spatial::level::level();
 /// assert!(level.is_supported());
 /// ```
-///
-/// # Panics
-/// At the first call, if `CONDYLE_LEVEL` names no level, or one that this processor cannot run.
 #[inline]
 pub fn level() -> Level {
     match LEVEL.load(Ordering::Relaxed) {
@@ -104,22 +152,56 @@ pub fn level() -> Level {
     }
 }
 
+/// The level that `CONDYLE_LEVEL` asks for, if it is set.
+///
+/// ```
+/// let requested = condyle_spatial::level::requested()?; // a program that would rather stop than run another level
+/// assert!(requested.is_none_or(|level| level.is_supported()));
+/// # Ok::<(), condyle_spatial::level::Refused>(())
+/// ```
+///
+/// # Errors
+/// [`Refused`], if it names no level, or one that this processor does not have.
+pub fn requested() -> Result<Option<Level>, Refused> {
+    let Some(name) = std::env::var_os("CONDYLE_LEVEL") else { return Ok(None) };
+    let Some(level) = Level::ALL.into_iter().find(|level| name == level.name()) else {
+        return Err(Refused::Unknown(name.to_string_lossy().into_owned()));
+    };
+    if level.is_supported() { Ok(Some(level)) } else { Err(Refused::Unsupported(level)) }
+}
+
+/// Asserts that this processor has a level: at each door to code that is compiled for it.
+#[inline(always)]
+pub(crate) fn assert_supported(level: Level) {
+    /// The best level of this processor; 0 until it is first asked for. (Each has all below, Arm's only one too.)
+    static BEST: AtomicU8 = AtomicU8::new(0);
+    #[cold]
+    fn find(level: Level) {
+        let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap_or(Level::Baseline);
+        BEST.store(best as u8, Ordering::Relaxed);
+        assert!(level <= best, "{}", Unsupported(level));
+    }
+    if BEST.load(Ordering::Relaxed) < level as u8 {
+        find(level);
+    }
+}
+
 #[cold]
 fn choose() -> Level {
-    let level = match std::env::var("CONDYLE_LEVEL") {
-        Ok(name) => {
-            let level = Level::ALL.into_iter().find(|level| level.name() == name);
-            let level =
-                level.unwrap_or_else(|| panic!("CONDYLE_LEVEL: expected baseline, neon, avx2 or avx512, found {name}"));
-            assert!(level.is_supported(), "CONDYLE_LEVEL: {}", Unsupported(level));
+    let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap_or(Level::Baseline);
+    let (level, refused) = match requested() {
+        Ok(level) => (level.unwrap_or(best), None),
+        Err(refused) => (best, Some(refused)),
+    };
+    // another thread may have chosen or pinned one meanwhile
+    match LEVEL.compare_exchange(0, level as u8, Ordering::Relaxed, Ordering::Relaxed) {
+        Ok(_) => {
+            if let Some(refused) = refused {
+                eprintln!("{refused}; using {best}");
+            }
             level
         }
-        Err(_) => Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap_or(Level::Baseline),
-    };
-    // another thread may have pinned one meanwhile
-    match LEVEL.compare_exchange(0, level as u8, Ordering::Relaxed, Ordering::Relaxed) {
-        Ok(_) => level,
-        Err(pinned) => Level::from_number(pinned).unwrap_or(level),
+        Err(chosen) => Level::from_number(chosen).unwrap_or(level),
     }
 }
 

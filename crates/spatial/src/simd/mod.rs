@@ -3,7 +3,7 @@
 pub mod fused;
 pub mod gate;
 pub mod kernel;
-pub mod lanes;
+pub(crate) mod lanes;
 pub mod level;
 pub mod pack;
 

@@ -223,21 +223,48 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
 }
 
+/// A promise, by which the types of vectors can be named. Their operations are instructions that not every processor has, and
+/// no operation looks whether this one does; so nobody else can name them, and code that is generic over its scalar meets
+/// them only where it was entered through a door that does look ([`Scalar::enter`]).
+///
+/// ```compile_fail
+/// use condyle_spatial::{Scalar, block::Real};
+/// type Eight = <f64 as Real>::Long<()>; // the promise was not made
+/// let sum = Eight::splat(1.0) + Eight::splat(2.0);
+/// ```
+///
+/// ```compile_fail
+/// let four = condyle_spatial::lanes::Lanes::<f64, 4>::from_array([1.0; 4]);
+/// ```
+///
+/// ```compile_fail
+/// let four = condyle_spatial::Constant::lift([1.0; 4]); // of no type in particular
+/// ```
+///
+/// ```compile_fail
+/// let four = condyle_spatial::moves::sum(condyle_spatial::Scalar::splat(1.0));
+/// ```
+///
+/// # Safety
+/// Whoever implements this uses vectors only where the processor has their instructions: in kernels that were entered through
+/// their door, and in functions that were called at their level.
+pub unsafe trait Witness: 'static {}
+
 /// A number with its vectors.
 pub trait Real: Block<Number = Self> {
     /// Those of [`Level::Avx2`](crate::simd::level::Level::Avx2), or of [`Level::Neon`](crate::simd::level::Level::Neon).
-    type Short: Block<Number = Self>;
+    type Short<W: Witness>: Block<Number = Self>;
     /// Those of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as short ones where there is none.
-    type Long: Block<Number = Self>;
+    type Long<W: Witness>: Block<Number = Self>;
 }
 
 impl Real for f64 {
-    type Short = Lanes<Self, 4>;
-    type Long = lanes::LongF64;
+    type Short<W: Witness> = Lanes<Self, 4>;
+    type Long<W: Witness> = lanes::LongF64;
 }
 impl Real for f32 {
-    type Short = Lanes<Self, 8>;
-    type Long = lanes::LongF32;
+    type Short<W: Witness> = Lanes<Self, 8>;
+    type Long<W: Witness> = lanes::LongF32;
 }
 
 #[cfg(test)]
@@ -307,12 +334,12 @@ mod tests {
                     f32::enter(kernel::<f32>());
                 }
                 Level::Neon | Level::Avx2 => {
-                    <f64 as Real>::Short::enter(kernel::<<f64 as Real>::Short>());
-                    <f32 as Real>::Short::enter(kernel::<<f32 as Real>::Short>());
+                    Lanes::<f64, 4>::enter(kernel::<Lanes<f64, 4>>());
+                    Lanes::<f32, 8>::enter(kernel::<Lanes<f32, 8>>());
                 }
                 Level::Avx512 => {
-                    <f64 as Real>::Long::enter(kernel::<<f64 as Real>::Long>());
-                    <f32 as Real>::Long::enter(kernel::<<f32 as Real>::Long>());
+                    lanes::LongF64::enter(kernel::<lanes::LongF64>());
+                    lanes::LongF32::enter(kernel::<lanes::LongF32>());
                 }
             }
         }

@@ -56,10 +56,10 @@ pub(crate) fn pairs<S: Scalar, R>(model: &Model<R>, w: &World<S>, d: &mut Worksp
 
 mod vectors {
     use super::*;
+    use crate::workspace::Short as Four;
     use condyle_spatial::Motion;
-    use condyle_spatial::lanes::Lanes;
 
-    type Four = Lanes<f64, SIDE>;
+    const _: () = assert!(Four::LANES == SIDE);
 
     #[inline(always)]
     pub(super) fn pairs<R>(model: &Model<R>, w: &World<Fused>, d: &mut Workspace<Fused>) {

@@ -23,6 +23,7 @@ use crate::constraints::constraint_lanes::{All, ConstraintLanes, WIDE};
 use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::plan::Plan as ConstraintPlan;
+use crate::workspace::Gate;
 use condyle_spatial::block::Block;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::gate::renamed;
@@ -35,7 +36,7 @@ fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
     for n in 1..N {
         sum = Four::load(&x[n * LANES..]).mul_add(Four::load(&y[n * LANES..]), sum);
     }
-    moves::sum(sum)
+    moves::sum::<Gate>(sum)
 }
 
 impl ConstraintLanes {

@@ -2,18 +2,19 @@
 #![allow(unsafe_code)]
 
 use super::{LANES, Plan};
+use crate::workspace::{Gate, Short};
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Columns, Layout};
 use condyle_model::limbs::column_map::{ColumnMap, LaneColumn, Pair, Predecessor};
 use condyle_model::limbs::steps::{Parents, Source, Step};
-use condyle_spatial::lanes::Lanes;
 use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::simd::Fused;
-use condyle_spatial::{Act, Force, Inertia, Se3, Vec3};
+use condyle_spatial::{Act, Force, Inertia, Scalar, Se3, Vec3};
 use core::ops::{AddAssign, Range};
 
-pub(crate) type Four = Lanes<f64, LANES>;
+pub(crate) type Four = Short;
+const _: () = assert!(<Four as Scalar>::LANES == LANES);
 
 /// Steps in place of bodies, lanes in place of numbers.
 pub(crate) struct Limbs<'a> {
@@ -66,7 +67,7 @@ fn moved<T: Copy>(mut x: T, by: &Move) -> T {
     // SAFETY: passes keep structs of vectors.
     let numbers = unsafe { vectors(&mut x) };
     for k in 0..numbers.len() {
-        numbers[k] = by.apply(numbers[k]);
+        numbers[k] = by.apply::<Gate>(numbers[k]);
     }
     x
 }
@@ -168,7 +169,7 @@ impl Layout for Limbs<'_> {
             // SAFETY: passes keep structs of vectors.
             let numbers = unsafe { vectors(&mut x) };
             for k in 0..numbers.len() {
-                numbers[k] = sum(numbers[k]);
+                numbers[k] = sum::<Gate>(numbers[k]);
             }
         }
         x

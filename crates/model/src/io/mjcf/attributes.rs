@@ -6,34 +6,46 @@ use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 use std::collections::HashMap;
 
 /// Attributes of a class, for each kind of element.
-type Class = HashMap<String, HashMap<String, String>>;
+type Class<'a> = HashMap<&'a str, HashMap<&'a str, &'a str>>;
+
+/// How many attributes all classes may have together, what they inherit included.
+const MAX_INHERITED: usize = 1 << 20;
 
 /// The name of the class that elements have without being asked.
 pub(super) const MAIN: &str = "main";
 
 /// All default classes, each complete with what it inherits.
-pub(super) struct Defaults(HashMap<String, Class>);
+pub(super) struct Defaults<'a> {
+    classes: HashMap<&'a str, Class<'a>>,
+    /// The number of attributes, and of kinds of elements, of all classes.
+    size: usize,
+}
 
-impl Defaults {
-    pub(super) fn read(root: &Element) -> Result<Self, Error> {
-        let mut defaults = Self(HashMap::from([(MAIN.to_owned(), Class::new())]));
+impl<'a> Defaults<'a> {
+    pub(super) fn read(root: &'a Element) -> Result<Self, Error> {
+        let mut defaults = Self { classes: HashMap::from([(MAIN, Class::new())]), size: 0 };
         for element in root.all("default") {
             let name = element.attribute("class").unwrap_or(MAIN);
             if name != MAIN {
                 return Err(element.wrong(format!("the outermost class is `{MAIN}`, not `{name}`")));
             }
-            let main = defaults.0.remove(MAIN).unwrap_or_default();
+            let main = defaults.classes.remove(MAIN).unwrap_or_default();
             defaults.add(element, MAIN, main)?;
         }
         Ok(defaults)
     }
 
     /// Adds a class that begins as another one, and the classes inside it.
-    fn add(&mut self, element: &Element, name: &str, mut class: Class) -> Result<(), Error> {
+    fn add(&mut self, element: &'a Element, name: &'a str, mut class: Class<'a>) -> Result<(), Error> {
         for kind in element.children.iter().filter(|c| c.tag != "default") {
-            class.entry(kind.tag.clone()).or_default().extend(kind.attributes.iter().cloned());
+            class.entry(&kind.tag).or_default().extend(kind.attributes.iter().map(|(name, value)| (&**name, &**value)));
         }
-        if self.0.insert(name.to_owned(), class.clone()).is_some() {
+        self.size += class.values().map(|attributes| 1 + attributes.len()).sum::<usize>();
+        if self.size > MAX_INHERITED {
+            let what = "attributes of default classes so far, what they inherit included";
+            return Err(element.wrong(format!("{} {what}: at most {MAX_INHERITED} are allowed", self.size)));
+        }
+        if self.classes.insert(name, class.clone()).is_some() {
             return Err(element.wrong(format!("there are two classes `{name}`")));
         }
         for inner in element.all("default") {
@@ -44,17 +56,17 @@ impl Defaults {
     }
 
     /// The element with the defaults of its class or, failing one, of the class around it.
-    pub(super) fn of<'a>(&'a self, element: &'a Element, around: &'a str) -> Result<Attributes<'a>, Error> {
+    pub(super) fn of<'e>(&'e self, element: &'e Element, around: &'e str) -> Result<Attributes<'e>, Error> {
         let name = self.known(element, element.attribute("class").unwrap_or(around))?;
-        Ok(Attributes { element, class: self.0[name].get(element.tag.as_str()) })
+        Ok(Attributes { element, class: self.classes[name].get(element.tag.as_str()) })
     }
 
     /// The class's name, if there is such a class.
-    pub(super) fn known<'a>(&self, element: &Element, name: &'a str) -> Result<&'a str, Error> {
-        if self.0.contains_key(name) {
+    pub(super) fn known<'e>(&self, element: &Element, name: &'e str) -> Result<&'e str, Error> {
+        if self.classes.contains_key(name) {
             return Ok(name);
         }
-        let mut names: Vec<&str> = self.0.keys().map(String::as_str).collect();
+        let mut names: Vec<&str> = self.classes.keys().copied().collect();
         names.sort_unstable();
         let near = nearest(name, names.into_iter());
         Err(element.wrong(format!("no default class is named `{name}`; nearest is `{near}`")))
@@ -64,7 +76,7 @@ impl Defaults {
 /// The attributes of an element, those of its class where it has none of its own.
 pub(super) struct Attributes<'a> {
     pub(super) element: &'a Element,
-    class: Option<&'a HashMap<String, String>>,
+    class: Option<&'a HashMap<&'a str, &'a str>>,
 }
 
 impl<'a> Attributes<'a> {
@@ -74,7 +86,7 @@ impl<'a> Attributes<'a> {
     }
 
     pub(super) fn get(&self, name: &str) -> Option<&'a str> {
-        self.element.attribute(name).or_else(|| self.class?.get(name).map(String::as_str))
+        self.element.attribute(name).or_else(|| self.class?.get(name).copied())
     }
 
     /// The value of an attribute, as a reader of text understands it, if it is there.

@@ -3,7 +3,7 @@
 use super::attributes::Attributes;
 use crate::builder::{BodyId, ModelBuilder};
 use crate::error::{Error, Warning};
-use crate::io::xml::Element;
+use crate::io::xml::{Element, words};
 use crate::joint::Mimic;
 use std::collections::{HashMap, HashSet};
 
@@ -47,7 +47,7 @@ pub(super) fn add(
                     builder.mimic(follower, leader, Mimic { ratio: a1, offset: y0 + a0 - a1 * x0 });
                 }
                 (Some(_), &[_, _, 0.0, 0.0, 0.0]) => warn(format!("`{name}` follows another joint already")),
-                (Some(_), _) => warn(format!("polycoef {coefficients:?} is not linear")),
+                (Some(_), _) => warn(format!("polycoef {} is not linear", words(&coefficients))),
                 (None, _) => warn(format!("holds `{name}` where it is: <equality> has no part in a tree of bodies")),
             }
         }

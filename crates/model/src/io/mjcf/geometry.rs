@@ -2,7 +2,7 @@
 
 use super::attributes::{Attributes, Compiler};
 use crate::error::Error;
-use crate::io::xml::Element;
+use crate::io::xml::{Element, words};
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use core::f64::consts::PI;
 use nalgebra::Matrix3;
@@ -110,7 +110,7 @@ pub(super) fn geom(compiler: &Compiler, a: &Attributes) -> Result<Inertia<f64>, 
         }
     };
     if size.len() < length || size[..length].iter().any(|&x| x <= 0.0) {
-        return Err(wrong(format!("size: a {kind} needs {length} positive numbers, found {size:?}")));
+        return Err(wrong(format!("size: a {kind} needs {length} positive numbers, found {}", words(&size))));
     }
     let (volume, unit) = shape(kind, &size);
     let mass = mass.unwrap_or(density * volume);

@@ -13,11 +13,13 @@ const MODEL: &str = "__model__";
 pub(super) struct Poses<'a> {
     elements: HashMap<&'a str, &'a Element>,
     mXe: HashMap<&'a str, Se3<f64>>,
+    /// The links to which frames and joints are attached, as far as they have been asked for; none is the model itself.
+    attached: HashMap<&'a str, Option<&'a str>>,
 }
 
 impl<'a> Poses<'a> {
     pub(super) fn new(model: &'a Element) -> Result<Self, Error> {
-        let mut poses = Self { elements: HashMap::new(), mXe: HashMap::new() };
+        let mut poses = Self { elements: HashMap::new(), mXe: HashMap::new(), attached: HashMap::new() };
         let named = |e: &&Element| matches!(&*e.tag, "link" | "joint" | "frame");
         for element in model.children.iter().filter(named) {
             let name =
@@ -56,7 +58,7 @@ impl<'a> Poses<'a> {
                 let at = path.last().map_or(element, |p| p.1);
                 at.wrong(format!("no link, joint or frame is named `{name}`; nearest is `{}`", self.near(name, "")))
             })?;
-            if path.iter().any(|p| p.0 == name) {
+            if path.len() == self.elements.len() {
                 return Err(e.wrong("its pose depends on itself"));
             }
             path.push((name, e));
@@ -101,35 +103,40 @@ impl<'a> Poses<'a> {
     }
 
     /// The link that a joint's parent or child names, perhaps through frames.
-    pub(super) fn link(&self, joint: &Element, name: &'a str) -> Result<&'a str, Error> {
-        let unknown =
-            |name| joint.wrong(format!("no link is named `{name}`; nearest is `{}`", self.near(name, "link")));
-        match self.elements.get(name) {
-            Some(e) if e.tag == "link" => Ok(name),
-            Some(e) if e.tag == "frame" => self.attached(e, name)?.ok_or_else(|| unknown(name)),
-            _ => Err(unknown(name)),
-        }
+    pub(super) fn link(&mut self, joint: &Element, name: &'a str) -> Result<&'a str, Error> {
+        let link = match self.elements.get(name) {
+            Some(e) if e.tag == "link" => Some(name),
+            Some(e) if e.tag == "frame" => self.attached(e, name)?,
+            _ => None,
+        };
+        link.ok_or_else(|| joint.wrong(format!("no link is named `{name}`; nearest is `{}`", self.near(name, "link"))))
     }
 
     /// The link that a frame is attached to; none is the model itself.
-    pub(super) fn attached(&self, frame: &Element, name: &'a str) -> Result<Option<&'a str>, Error> {
-        let mut at = name;
-        for _ in 0..=self.elements.len() {
-            let e = match self.elements.get(at) {
-                _ if at == MODEL || at == WORLD_LINK => return Ok(None),
-                Some(e) => *e,
-                None => {
+    pub(super) fn attached(&mut self, frame: &Element, name: &'a str) -> Result<Option<&'a str>, Error> {
+        let (mut at, mut path) = (name, Vec::new());
+        let link = loop {
+            let e = match (self.attached.get(at), self.elements.get(at)) {
+                _ if at == MODEL || at == WORLD_LINK => break None,
+                (Some(&known), _) => break known,
+                (None, Some(e)) => *e,
+                (None, None) => {
                     let near = self.near(at, "");
                     return Err(frame.wrong(format!("attached to `{at}`, which is not there; nearest is `{near}`")));
                 }
             };
+            if path.len() == self.elements.len() {
+                return Err(frame.wrong("is attached to itself"));
+            }
+            path.push(at);
             at = match &*e.tag {
-                "link" => return Ok(Some(at)),
+                "link" => break Some(at),
                 "joint" => e.child("child").map_or("", |c| c.text.trim()),
                 _ => e.attribute("attached_to").filter(|a| !a.is_empty()).unwrap_or(MODEL),
             };
-        }
-        Err(frame.wrong("is attached to itself"))
+        };
+        self.attached.extend(path.into_iter().map(|name| (name, link)));
+        Ok(link)
     }
 
     /// A joint's axis, in the joint's frame.
@@ -167,7 +174,7 @@ fn reference(e: &Element) -> &str {
 /// The `<pose>` inside something, or none: x y z, then roll pitch yaw or a quaternion x y z w. Errors name `of`.
 pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
     let Some(pose) = inside.child("pose").filter(|p| !p.text.trim().is_empty()) else { return Ok(Se3::identity()) };
-    let wrong = |what: String| of.wrong(format!("pose: {what}"));
+    let wrong = |what: String| of.wrong_inside(pose, format!("pose: {what}"));
     if pose.attribute("rotation_format") == Some("quat_xyzw") {
         let [x, y, z, qx, qy, qz, qw] = xml::array(&pose.text).map_err(wrong)?;
         let norm = (qx * qx + qy * qy + qz * qz + qw * qw).sqrt();
@@ -190,12 +197,13 @@ pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
 
 /// The three numbers in an element. Errors name `of`.
 pub(super) fn three(of: &Element, element: &Element) -> Result<Vec3<f64>, Error> {
-    Ok(Vec3::from(xml::array::<3>(&element.text).map_err(|what| of.wrong(format!("{}: {what}", element.tag)))?))
+    Ok(Vec3::from(
+        xml::array::<3>(&element.text).map_err(|what| of.wrong_inside(element, format!("{}: {what}", element.tag)))?,
+    ))
 }
 
 /// The number in a child, which may be infinite; `otherwise` if there is no child. Errors name `of`.
 pub(super) fn optional(of: &Element, inside: &Element, tag: &str, otherwise: f64) -> Result<f64, Error> {
     let Some(e) = inside.child(tag) else { return Ok(otherwise) };
-    let x: Option<f64> = e.text.trim().parse().ok().filter(|x: &f64| !x.is_nan());
-    x.ok_or_else(|| of.wrong(format!("{tag}: `{}` is no number", e.text.trim())))
+    xml::bound(&e.text).map_err(|what| of.wrong_inside(e, format!("{tag}: {what}")))
 }

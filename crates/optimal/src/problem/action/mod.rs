@@ -158,6 +158,16 @@ pub trait ActionModel: Any + Send {
         None
     }
 
+    /// Says what is wrong with a state that is none: for example the length of a quaternion. All are good by default. A
+    /// problem asks of its initial state, a solver of the states that it is given.
+    ///
+    /// # Errors
+    /// The fault, with the numbers.
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        let _ = x;
+        Ok(())
+    }
+
     /// x ⊕ δx into `out` (nx); the sum in a vector space.
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         for ((o, x), dx) in out.iter_mut().zip(x).zip(dx) {

@@ -165,6 +165,11 @@ impl ActionModel for ImpulseDynamics {
         below.columns_mut(nv, nv).zip_apply(by_v, |a, change| *a += change);
     }
 
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        let model = &self.robot.model;
+        model.check_position(&x[..model.nq()]).map_err(|error| error.to_string())
+    }
+
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         state_integrate(&self.robot.model, x, dx, out);
     }

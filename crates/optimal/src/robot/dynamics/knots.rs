@@ -62,7 +62,10 @@ macro_rules! robot_knots {
             }
 
             /// Changes the weights of the terms called `name` of all knots, between solves; says whether there is one.
-            pub fn set_weight(&mut self, name: &str, weight: f64) -> bool {
+            ///
+            /// # Errors
+            /// [`Error::Cost`] if the weight is not finite; the old ones then stay.
+            pub fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
                 self.robot_mut().terms.set_weight(name, weight)
             }
 
@@ -70,7 +73,7 @@ macro_rules! robot_knots {
             /// targets. They move with their knot when the horizon is [shifted](crate::Problem::shift). Allocates.
             ///
             /// # Errors
-            /// [`Error::Cost`] for a term that does not fit.
+            /// [`Error::Cost`] for a term that does not fit; [`Error::Size`] for a knot beyond 2²⁰.
             pub fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
                 self.robot_mut().terms.set_costs(t, costs)
             }
@@ -87,7 +90,7 @@ macro_rules! robot_knots {
             /// Gives knot t of the horizon limits of its own, between solves; they too move with their knot. Allocates.
             ///
             /// # Errors
-            /// [`Error::Limit`] for one that does not fit.
+            /// [`Error::Limit`] for one that does not fit; [`Error::Size`] for a knot beyond 2²⁰.
             pub fn set_limits(&mut self, t: usize, limits: Vec<Limit>) -> Result<(), Error> {
                 self.robot_mut().terms.set_limits(Some(t), limits)
             }
@@ -160,6 +163,10 @@ macro_rules! robot_models {
 
             fn groups(&self) -> &[Range<usize>] {
                 &self.0.groups
+            }
+
+            fn check_position(&self, q: &[f64]) -> Result<(), String> {
+                self.0.model.check_position(q).map_err(|error| error.to_string())
             }
 
             fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {

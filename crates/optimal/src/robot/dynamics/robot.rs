@@ -16,13 +16,20 @@ use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{IntegrateArgument, Model, aba_hessian, integrate_jacobian};
 use condyle_spatial::Scalar;
-use condyle_spatial::block::Real;
+use condyle_spatial::block::{Real, Witness};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-type Short = <f64 as Real>::Short;
-type Long = <f64 as Real>::Long;
+/// The promise of this crate, by which it names vectors.
+struct Gate;
+
+// SAFETY: vectors are used by the kernels of `condyle_dynamics`, and by what enters through their door.
+#[allow(unsafe_code)]
+unsafe impl Witness for Gate {}
+
+type Short = <f64 as Real>::Short<Gate>;
+type Long = <f64 as Real>::Long<Gate>;
 
 /// Fewer knots than this are computed one by one.
 const WORTHWHILE: usize = 3;
@@ -79,7 +86,9 @@ impl RobotDynamics {
         let singular = model.singular_joints();
         if !singular.is_empty() && (capabilities.impulse || matches!(law, Law::Free | Law::Contact(..))) {
             let why = "nothing with a mass moves with the joints";
-            return Err(Error::Actuation { what: format!("{why} {singular:?}: their accelerations are undefined") });
+            let names: Vec<_> = singular.iter().map(|&i| format!("`{}`", model.bodies()[i].joint_name)).collect();
+            let what = format!("{why} {}: their accelerations are undefined", names.join(", "));
+            return Err(Error::Actuation { what });
         }
         let (lanes, vectors) = match (law, level()) {
             (Law::None, _) | (_, Level::Baseline) => (1, None),

@@ -233,6 +233,10 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         curvature.run(inner, *dt, KnotInput { lane: 0, t, x, u }, lambda, retraction, hessian)
     }
 
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        self.inner.check_position(&x[..self.inner.nq()])
+    }
+
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         let (nq, nv) = (self.inner.nq(), self.inner.nv());
         self.inner.integrate(&x[..nq], &dx[..nv], &mut out[..nq]);

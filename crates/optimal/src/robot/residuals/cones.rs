@@ -3,6 +3,8 @@
 //! A contact's force is along the axes of the contact's rows; a cone's rotation R turns the surface's axes (its normal is
 //! z) into those. Rows are in Crocoddyl's order, so that its residuals are the same numbers.
 
+use crate::Error;
+use crate::problem::leave_a_value;
 use condyle_dynamics::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +24,7 @@ pub struct FrictionCone {
     pub rotation: Mat3<f64>,
     /// μ.
     pub mu: f64,
-    /// The number of sides of the pyramid; even.
+    /// The number of sides of the pyramid; even, 4 to [`MOST_FACETS`](Self::MOST_FACETS).
     pub facets: usize,
     /// Whether the pyramid lies inside of the cone, or around it.
     pub inner: bool,
@@ -54,6 +56,9 @@ pub struct WrenchCone {
 }
 
 impl FrictionCone {
+    /// The most sides of a pyramid: 1000 of them are within 5e-6 of the round cone.
+    pub const MOST_FACETS: usize = 1000;
+
     /// A pyramid of four sides around the cone on a surface whose normal is z, for any normal force that pushes.
     pub fn new(mu: f64) -> Self {
         Self { rotation: Mat3::identity(), mu, facets: 4, inner: false, least: 0.0, greatest: f64::INFINITY }
@@ -66,7 +71,11 @@ impl FrictionCone {
     }
 
     /// A: a row for each side of the pyramid, and the normal.
+    ///
+    /// # Panics
+    /// If there are no sides, or more than 1000.
     pub fn rows(&self) -> Vec<[f64; 3]> {
+        self.assert_facets();
         let mut rows = Vec::new();
         for side in 0..self.facets / 2 {
             let angle = 2.0 * core::f64::consts::PI * side as f64 / self.facets as f64;
@@ -79,25 +88,56 @@ impl FrictionCone {
         rows
     }
 
+    #[track_caller]
+    fn assert_facets(&self) {
+        let (facets, most) = (self.facets, Self::MOST_FACETS);
+        assert!((1..=most).contains(&facets), "`facets` is {facets}, expected from 4 to {most}");
+    }
+
     /// The least and greatest values of A f.
+    ///
+    /// # Panics
+    /// If there are no sides, or more than 1000.
     pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
+        self.assert_facets();
         let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; self.facets], vec![0.0; self.facets]);
         lower.push(self.least);
         upper.push(self.greatest);
         (lower, upper)
     }
 
+    /// Checks the numbers of the cone, as problems do that it comes into.
+    ///
+    /// # Errors
+    /// [`Error::Cone`] if μ is negative or not finite, the number of sides is odd, below 4 or above 1000, the rotation is none,
+    /// or no normal force is between the bounds.
+    pub fn check(&self) -> Result<(), Error> {
+        self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
+    }
+
     /// A message for what makes no sense.
     pub(crate) fn wrong(&self) -> Option<String> {
-        let rotation = self.rotation.columns().map(Vec3::to_array).concat();
+        let Self { least, greatest, .. } = *self;
         if !(self.mu >= 0.0 && self.mu.is_finite()) {
             return Some(format!("its friction is {}, but it must be at least 0", self.mu));
         }
-        if self.facets < 4 || self.facets % 2 == 1 {
-            return Some(format!("its cone has {} sides, but they must be even and at least 4", self.facets));
+        if !(4..=Self::MOST_FACETS).contains(&self.facets) || self.facets % 2 == 1 {
+            let allowed = format!("they must be even, at least 4 and at most {}", Self::MOST_FACETS);
+            return Some(format!("its cone has {} sides, but {allowed}", self.facets));
         }
-        rotation.iter().any(|x| !x.is_finite()).then(|| "its cone's rotation is not finite".to_owned())
+        if !leave_a_value(least, greatest) {
+            return Some(format!("its cone's normal force must be at least {least} and at most {greatest}"));
+        }
+        let turns = self.rotation.is_rotation();
+        (!turns).then(|| "its cone's rotation is none: expected three unit vectors at right angles".to_owned())
     }
+}
+
+/// A message for sides of a rectangle that are none.
+pub(crate) fn wrong_size([length, width]: [f64; 2]) -> Option<String> {
+    let good = |side: f64| side >= 0.0 && side.is_finite();
+    (!(good(length) && good(width)))
+        .then(|| format!("its sides are {length} and {width} m, expected finite numbers of at least 0"))
 }
 
 /// The four rows that keep the centre of pressure within a rectangle: |τ_x| ≤ ½ size_y f_z, |τ_y| ≤ ½ size_x f_z.
@@ -110,7 +150,23 @@ pub(crate) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6
 }
 
 impl WrenchCone {
+    /// Checks the numbers of the cone, as problems do that it comes into.
+    ///
+    /// # Errors
+    /// [`Error::Cone`] for those of [`FrictionCone::check`], and a side that is negative or not finite.
+    pub fn check(&self) -> Result<(), Error> {
+        self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
+    }
+
+    /// A message for what makes no sense.
+    pub(crate) fn wrong(&self) -> Option<String> {
+        self.friction.wrong().or_else(|| wrong_size(self.size))
+    }
+
     /// A: the rows of the friction cone, four of the centre of pressure, eight of the yaw moment.
+    ///
+    /// # Panics
+    /// If there are no sides, or more than 1000.
     pub fn rows(&self) -> Vec<[f64; 6]> {
         let (R, mu) = (self.friction.rotation, self.friction.slope());
         let mut rows: Vec<_> = self.friction.rows().iter().map(|&[a, b, c]| [a, b, c, 0.0, 0.0, 0.0]).collect();
@@ -129,6 +185,9 @@ impl WrenchCone {
     }
 
     /// The least and greatest values of A w.
+    ///
+    /// # Panics
+    /// If there are no sides, or more than 1000.
     pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut lower, mut upper) = self.friction.bounds();
         lower.extend([f64::NEG_INFINITY; 12]);

@@ -1,6 +1,6 @@
 //! Residuals: what a cost looks at.
 
-use super::cones::{FrictionCone, WrenchCone, pressure_rows};
+use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use crate::robot::capabilities::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -227,8 +227,21 @@ impl Residual {
             _ => Err(format!("{what} needs a rigid contact, of 6 rows; this one has {rows}")),
         };
         finite("target", &self.target())?;
+        let turns = |name: &str, R: &Mat3<f64>| match R.is_rotation() {
+            true => Ok(()),
+            false => Err(format!("its {name} is no rotation: expected three unit vectors at right angles")),
+        };
+        match self {
+            Self::FramePlacement { target, .. } => turns("target", &target.rotation)?,
+            Self::FrameRotation { target, .. } => turns("target", target)?,
+            _ => {}
+        }
         let n = match self {
-            Self::State { reference } => length(reference, nx).map(|()| 2 * nv)?,
+            Self::State { reference } => {
+                length(reference, nx)?;
+                model.check_position(&reference[..model.nq()]).map_err(|error| format!("its reference: {error}"))?;
+                2 * nv
+            }
             Self::Control { reference } => length(reference, nu).map(|()| nu)?,
             Self::JointEffort { reference } | Self::JointAcceleration { reference } => {
                 length(reference, nv).map(|()| nv)?
@@ -238,15 +251,14 @@ impl Residual {
             Self::CentroidalMomentum { .. } | Self::FramePlacement { .. } | Self::FrameVelocity { .. } => 6,
             Self::ContactForce { .. } => rows,
             Self::FrictionCone { cone, .. } => cone.wrong().map_or(Ok(cone.facets + 1), Err)?,
-            Self::WrenchCone { cone: WrenchCone { friction, size }, .. } => {
+            Self::WrenchCone { cone, .. } => {
                 rigid("a wrench cone")?;
-                finite("size", size)?;
-                friction.wrong().map_or(Ok(friction.facets + 13), Err)?
+                cone.wrong().map_or(Ok(cone.friction.facets + 13), Err)?
             }
             Self::CenterOfPressure { rotation, size, .. } => {
                 rigid("a centre of pressure")?;
-                finite("size", size)?;
-                finite("rotation", rotation.columns().map(Vec3::to_array).as_flattened()).map(|()| 4)?
+                wrong_size(*size).map_or(Ok(()), Err)?;
+                turns("rotation", rotation).map(|()| 4)?
             }
             Self::ImpulseCenterOfMass if !capabilities.impulse => {
                 return Err("only an impact changes velocities at once".to_owned());

@@ -4,11 +4,12 @@
 use super::{Element, Lanes, Register};
 use crate::scalar::number::Number;
 use crate::simd::kernel::Kernel;
+use crate::simd::pack::Witness;
 
 /// The widest vectors of `f64`.
-pub type LongF64 = Lanes<f64, 4>;
+pub(crate) type LongF64 = Lanes<f64, 4>;
 /// The widest vectors of `f32`.
-pub type LongF32 = Lanes<f32, 8>;
+pub(crate) type LongF32 = Lanes<f32, 8>;
 impl Element<4> for f64 {
     type Register = [Self; 4];
 }
@@ -62,7 +63,7 @@ impl<T: Number, const N: usize> Register<T, N> for [T; N] {
 
 /// Numbers that change their lane, in vectors of four.
 pub mod moves {
-    use super::Lanes;
+    use super::{Lanes, Witness};
 
     /// Which lane's number goes to which lane; a lane to which none goes becomes 0.
     #[derive(Clone, Copy, Debug)]
@@ -83,7 +84,7 @@ pub mod moves {
 
         /// The numbers in their new lanes.
         #[inline(always)]
-        pub fn apply(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             let [a, b, c, d] = x.0;
             let numbers = [a, b, c, d, 0.0];
             Lanes(self.from.map(|k| numbers[k]))
@@ -92,7 +93,7 @@ pub mod moves {
 
     /// The sum of the numbers, in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         let [a, b, c, d] = x.0;
         Lanes([(a + c) + (b + d); 4])
     }

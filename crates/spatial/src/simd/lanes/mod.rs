@@ -4,7 +4,7 @@
 //! `Lanes<f64, 8>` and `Lanes<f32, 16>` AVX-512; and [`Fused`](super::Fused) is a single `f64` where products and sums are fused. They are
 //! for code that has been entered through a function compiled for their [`Level`](crate::simd::level::Level), which is the
 //! business of a dispatcher: anywhere else each operation would be a function call, and on a processor without the
-//! instructions an illegal one. Every operation treats each lane alone, so what one lane holds (not-a-numbers included) never
+//! instructions an illegal one. Only who promises to keep to this can name them ([`Witness`](crate::simd::pack::Witness)). Every operation treats each lane alone, so what one lane holds (not-a-numbers included) never
 //! reaches another.
 //!
 //! What a processor does is in the file of its kind, x86.rs or neon.rs, as an implementation of [`Register`].
@@ -16,7 +16,8 @@ use crate::scalar::{Constant, Scalar};
 use crate::simd::kernel::Kernel;
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-pub use processor::{LongF32, LongF64, moves};
+pub use processor::moves;
+pub(crate) use processor::{LongF32, LongF64};
 
 #[cfg_attr(target_arch = "x86_64", path = "x86.rs")]
 #[cfg_attr(target_arch = "aarch64", path = "neon.rs")]
@@ -166,6 +167,20 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
             (a[k], b[k]) = f(x[k]);
         }
         (Self::from_array(a), Self::from_array(b))
+    }
+}
+
+/// The constants of nobody: because of it an array alone does not say that it becomes lanes, whose type not everybody may name
+/// ([`Witness`](crate::simd::pack::Witness)).
+#[derive(Clone, Copy)]
+pub struct Unused<T, const N: usize>([T; N]);
+
+impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
+    fn lift(self) -> Unused<T, N> {
+        Unused(self)
+    }
+    fn of(x: f64) -> Self {
+        [T::splat(x); N]
     }
 }
 

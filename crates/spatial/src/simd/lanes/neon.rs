@@ -3,12 +3,13 @@
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, short};
+use crate::simd::pack::Witness;
 use core::arch::aarch64::*;
 
 /// The widest vectors of `f64`.
-pub type LongF64 = Lanes<f64, 4>;
+pub(crate) type LongF64 = Lanes<f64, 4>;
 /// The widest vectors of `f32`.
-pub type LongF32 = Lanes<f32, 8>;
+pub(crate) type LongF32 = Lanes<f32, 8>;
 
 /// A mask is two vectors with all bits of a lane set or none.
 macro_rules! pair {
@@ -101,7 +102,7 @@ pub mod moves {
 
         /// The numbers in their new lanes.
         #[inline(always)]
-        pub fn apply(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             // SAFETY: a vector of this kind exists, so the level is supported; two rows of the array have 16 bytes.
             unsafe {
                 let bytes = uint8x16x2_t(vreinterpretq_u8_f64(x.0.0), vreinterpretq_u8_f64(x.0.1));
@@ -114,7 +115,7 @@ pub mod moves {
 
     /// The sum of the numbers, in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the level is supported.
         unsafe {
             let pairs = vaddq_f64(x.0.0, x.0.1);

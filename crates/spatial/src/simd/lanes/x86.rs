@@ -2,21 +2,29 @@
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, short};
+use crate::simd::level::{Level, assert_supported};
+use crate::simd::pack::Witness;
 use core::arch::x86_64::*;
 
 /// The widest vectors of `f64`.
-pub type LongF64 = Lanes<f64, 8>;
+pub(crate) type LongF64 = Lanes<f64, 8>;
 /// The widest vectors of `f32`.
-pub type LongF32 = Lanes<f32, 16>;
+pub(crate) type LongF32 = Lanes<f32, 16>;
 
 /// Runs a kernel with the instructions of [`Level::Avx512`](crate::simd::level::Level::Avx512).
 ///
-/// # Safety
-/// The processor must have them.
-#[inline(never)]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
-unsafe fn long(kernel: impl Kernel) {
-    kernel.run();
+/// # Panics
+/// If the processor does not have them.
+#[inline(always)]
+fn long(kernel: impl Kernel) {
+    #[inline(never)]
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+    fn with_instructions(kernel: impl Kernel) {
+        kernel.run();
+    }
+    assert_supported(Level::Avx512);
+    // SAFETY: the processor has the instructions.
+    unsafe { with_instructions(kernel) }
 }
 
 /// What is done alike in all registers, by the names of the instructions, and what is not.
@@ -177,7 +185,7 @@ pub mod moves {
 
         /// The numbers in their new lanes.
         #[inline(always)]
-        pub fn apply(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             // SAFETY: a vector of this kind exists, so the level is supported; the arrays have 32 bytes each.
             unsafe {
                 let from = _mm256_loadu_si256(self.from.as_ptr().cast());
@@ -190,7 +198,7 @@ pub mod moves {
 
     /// The sum of the numbers, in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the level is supported.
         unsafe {
             let pairs = _mm256_add_pd(x.0, _mm256_permute2f128_pd::<1>(x.0, x.0));

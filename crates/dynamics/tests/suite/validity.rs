@@ -1,0 +1,169 @@
+//! Every way to make a model goes through the same checks: what is odd is found anew, and what is impossible is refused.
+
+use condyle_dynamics::{
+    ConstraintSet, ContactConstraint, Data, DivideConquer, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD,
+    Warning, aba, neutral, robots,
+};
+use std::panic::catch_unwind;
+
+/// An arm whose last link has no mass, so that forward dynamics has no answer.
+fn massless_tip() -> Model {
+    let mut builder = ModelBuilder::new("tip");
+    let hinge = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
+    let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.1));
+    let arm = builder.body("arm", WORLD, hinge, Se3::identity(), rod);
+    let elbow = Se3 { translation: Vec3::new(0.0, 0.0, -1.0), ..Se3::identity() };
+    let tip = builder.body("tip", arm, hinge, elbow, Inertia::zero());
+    builder.frame("end", tip, elbow);
+    builder.build().unwrap()
+}
+
+fn read_again(model: &Model) -> Model {
+    serde_json::from_str(&serde_json::to_string(model).unwrap()).unwrap()
+}
+
+#[test]
+fn other_inertias_are_judged_anew() {
+    let ball = Inertia::from_com(0.3, Vec3::zero(), Sym3::diagonal(0.01));
+    let sick = massless_tip();
+    assert_eq!(sick.singular_joints(), [2]);
+    // cured: accepted by everything, and nobody is warned any more
+    let cured = sick.with_inertias(|body, I| if body == 2 { ball } else { I }).unwrap();
+    assert!(cured.singular_joints().is_empty() && cured.warnings().is_empty());
+    let a: Vec<f64> = aba(&cured, &mut Data::new(&cured), &[0.1, 0.2], &[0.0; 2], &[0.0; 2], &[]).to_vec();
+    assert!(a.iter().all(|a: &f64| a.is_finite()));
+    // made sick: refused as if it had been built so, not NaN
+    let again = cured.with_inertias(|body, I| if body == 2 { Inertia::<f64>::zero() } else { I }).unwrap();
+    assert_eq!((again.singular_joints(), again.warnings()), (sick.singular_joints(), sick.warnings()));
+    let refused = catch_unwind(|| aba(&again, &mut Data::new(&again), &[0.0; 2], &[0.0; 2], &[0.0; 2], &[]).to_vec());
+    let message = refused.unwrap_err().downcast::<String>().unwrap();
+    assert!(message.starts_with("joint `tip` moves nothing"), "{message}");
+    // armature cures as well
+    assert!(again.clone().with_armature(&[0.0, 0.1]).unwrap().singular_joints().is_empty());
+    // a file says the same
+    for model in [&sick, &cured, &again] {
+        let read = read_again(model);
+        assert_eq!((read.singular_joints(), read.warnings()), (model.singular_joints(), model.warnings()));
+        assert_eq!(read.geometry_hash(), model.geometry_hash());
+    }
+}
+
+#[test]
+fn impossible_numbers_are_refused_by_name() {
+    let model = robots::arm7();
+    let with = |change: fn(Inertia<f64>) -> Inertia<f64>| {
+        let result = model.with_inertias(|body, I| if body == 3 { change(I) } else { I });
+        result.map(|_| ()).unwrap_err().to_string()
+    };
+    let finite = "expected a finite number of at least 0";
+    assert_eq!(with(|I| Inertia { mass: -1.0, ..I }), format!("body `link3`: mass is -1 kg, {finite}"));
+    assert_eq!(with(|I| Inertia { mass: f64::NAN, ..I }), format!("body `link3`: mass is NaN kg, {finite}"));
+    let far = |I| Inertia { mass_com: Vec3::new(f64::INFINITY, 0.0, 0.0), ..I };
+    assert_eq!(with(far), "body `link3`: inertia is not finite");
+    let gravity = model.clone().with_gravity(Vec3::new(0.0, 0.0, f64::NAN)).unwrap_err();
+    assert_eq!(gravity.to_string(), "gravity: (0, 0, NaN) m/s² is not finite");
+    for (bad, said) in [(-0.1, "-0.1"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
+        let mut armature = [0.0; 7];
+        armature[4] = bad;
+        let error = model.clone().with_armature(&armature).unwrap_err().to_string();
+        assert_eq!(error, format!("joint `joint5`: armature is {said}, {finite}"));
+    }
+    let mut q = neutral(&model);
+    q[2] = f64::NAN;
+    let error = model.lock(&[3], &q).unwrap_err().to_string();
+    assert_eq!(error, "joint `joint3`: q[2] is NaN, which is not finite");
+    let quadruped = robots::quadruped();
+    let mut q = neutral(&quadruped);
+    q[6] = 0.9;
+    let error = quadruped.lock(&[3], &q).unwrap_err().to_string();
+    assert_eq!(error, "joint `root_joint`: its rotation, q[3..7], has the length 0.9, expected 1");
+}
+
+/// The bodies between the joints of a chain have no mass on purpose, whatever is made of the robot.
+#[test]
+fn chains_stay_without_warnings() {
+    let mut builder = ModelBuilder::new("chain");
+    let ball = Inertia::from_com(1.0, Vec3::new(0.1, 0.0, 0.0), Sym3::diagonal(0.01));
+    builder.spherical_zyx("ball", WORLD, Se3::identity(), ball);
+    let chain = builder.build().unwrap();
+    let mut two = ModelBuilder::new("two");
+    two.append(WORLD, Se3::identity(), &chain, "left_");
+    let made = [
+        chain.with_inertias(|_, I| I.scale(2.0)).unwrap(),
+        chain.clone().with_gravity(Vec3::zero()).unwrap(),
+        chain.clone().with_armature(&[0.1; 3]).unwrap(),
+        read_again(&chain),
+        two.build().unwrap(),
+    ];
+    assert!(made.iter().all(|model| model.warnings().is_empty() && model.singular_joints().is_empty()));
+}
+
+/// What is left out of a file stays said, after what is odd, in the same order however the model came to be.
+#[test]
+fn warnings_keep_their_order() {
+    let text = r#"<mujoco><worldbody><body name="a"><joint axis="0 1 0"/><geom type="sphere" size="0.1" mass="1"/>
+        <body name="b" pos="0 0 1"><joint axis="0 0 1"/><site name="s"/></body></body></worldbody>
+        <equality><weld body1="a" body2="b"/></equality></mujoco>"#;
+    let model = Model::from_mjcf_str(text, &condyle_dynamics::MjcfOptions::default()).unwrap();
+    let said = model.warnings().to_vec();
+    assert!(
+        matches!(said[..], [Warning::Massless { .. }, Warning::Singular { .. }, Warning::LeftOut { .. }]),
+        "{said:?}"
+    );
+    assert_eq!(read_again(&model).warnings(), said);
+    assert_eq!(model.clone().with_gravity(Vec3::zero()).unwrap().warnings(), said);
+    let cured = model.with_armature(&[0.1; 2]).unwrap();
+    assert!(matches!(cured.warnings(), [Warning::Massless { .. }, Warning::LeftOut { .. }]));
+}
+
+/// What was planned for one robot is refused for another one with the same tree, whose frames or axes are elsewhere.
+#[test]
+fn plans_know_their_robot() {
+    let robot = |length: f64, axis: Vec3<f64>| {
+        let mut builder = ModelBuilder::new("arm");
+        let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.1));
+        let mut on = WORLD;
+        for k in 0..4 {
+            let there = Se3 { translation: Vec3::new(0.0, 0.0, -length), ..Se3::identity() };
+            on = builder.body(&format!("b{k}"), on, Joint::Revolute { axis }, there, rod);
+        }
+        builder.frame("tip", on, Se3::identity());
+        builder.build().unwrap()
+    };
+    let (x, y) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0));
+    let (one, longer, turned) = (robot(1.0, y), robot(2.0, y), robot(1.0, x));
+    let accepted = |model: &Model| {
+        let model = model.clone();
+        let one = one.clone();
+        let (q, v) = ([0.3; 4], [0.0; 4]);
+        let contact = ContactConstraint::point(one.frame("tip").unwrap());
+        let mut set = ConstraintSet::<f64>::new(&one, &[contact]).unwrap();
+        let mut divided = DivideConquer::<f64>::new(&one, 1);
+        let constrained = {
+            let model = model.clone();
+            catch_unwind(move || {
+                drop(
+                    condyle_dynamics::constrained_dynamics(&model, &mut Data::new(&model), &mut set, &q, &v, &v, &[])
+                        .a
+                        .to_vec(),
+                );
+            })
+        };
+        let divided = catch_unwind(move || drop(divided.aba(&model, &q, &v, &v, &[]).to_vec()));
+        (constrained.is_ok(), divided.is_ok())
+    };
+    assert_eq!(accepted(&longer), (false, false));
+    assert_eq!(accepted(&turned), (false, false));
+    // the same robot with other constants, or from a file, is welcome
+    let heavier = one.with_inertias(|_, I| I.scale(2.0)).unwrap().with_gravity(Vec3::zero()).unwrap();
+    assert_eq!(accepted(&heavier), (true, true));
+    assert_eq!(accepted(&read_again(&one)), (true, true));
+    // another kind of joint is another tree
+    let mut builder = ModelBuilder::new("slides");
+    let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.1));
+    builder.body("b", WORLD, Joint::Prismatic { axis: y }, Se3::identity(), rod);
+    let slides = builder.build().unwrap();
+    let mut builder = ModelBuilder::new("turns");
+    builder.body("b", WORLD, Joint::Revolute { axis: y }, Se3::identity(), rod);
+    assert_ne!(slides.tree_hash(), builder.build().unwrap().tree_hash());
+}

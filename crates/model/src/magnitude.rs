@@ -1,0 +1,48 @@
+//! The magnitudes of a model's numbers: products of the largest ones are still numbers.
+
+use crate::error::Error;
+use crate::joint::Joint;
+use crate::model::Model;
+use condyle_spatial::{Inertia, Se3, Sym3};
+
+/// The largest mass, length, inertia, gravity, armature, pitch or ratio of a model, in SI units. Inertia about a point that
+/// far away, the third power, can be multiplied by itself.
+const LARGEST: f64 = 1e30;
+
+impl Model {
+    /// Checks that no number is so large that dynamics overflow.
+    pub(crate) fn check_magnitudes(&self) -> Result<(), Error> {
+        for body in &self.bodies {
+            let Inertia { mass, mass_com, rotational: Sym3 { xx, xy, yy, xz, yz, zz } } = body.inertia;
+            let pitch = if let Joint::Helical { pitch, .. } = body.joint { pitch } else { 0.0 };
+            let [ratio, offset] = body.mimic.map_or([0.0; 2], |m| [m.ratio, m.offset]);
+            let numbers = [mass, xx, xy, yy, xz, yz, zz, pitch, ratio, offset];
+            let numbers = numbers.into_iter().chain(mass_com.to_array()).chain(translation(&body.placement));
+            check(numbers).map_err(|what| Error::Body { body: body.name.clone(), what })?;
+        }
+        for frame in &self.frames {
+            let wrong = |what| Error::Frame { frame: frame.name.clone(), what };
+            check(translation(&frame.placement)).map_err(wrong)?;
+        }
+        for body in self.bodies.iter().skip(1).filter(|body| body.mimic.is_none()) {
+            let armature = &self.armature[body.idx_v..body.idx_v + body.joint.nv()];
+            let wrong = |what| Error::Joint { joint: body.joint_name.clone(), what };
+            check(armature.iter().copied()).map_err(wrong)?;
+        }
+        let wrong = |what| Error::Body { body: self.bodies[0].name.clone(), what };
+        check(self.gravity.to_array()).map_err(wrong)
+    }
+}
+
+fn translation(X: &Se3<f64>) -> impl Iterator<Item = f64> + use<> {
+    X.translation.to_array().into_iter()
+}
+
+fn check(numbers: impl IntoIterator<Item = f64>) -> Result<(), String> {
+    match numbers.into_iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
+        Some(x) => {
+            Err(format!("has a mass, inertia, length, ratio or acceleration of {x:e}, at most {LARGEST:e} is allowed"))
+        }
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,98 @@
+//! The best iterate of a solve, to go back to when a later one is worse.
+
+use super::solution::Solution;
+use crate::problem::Problem;
+
+/// Gaps that differ by less are the same: they are differences of states, which are rounded.
+const SAME_GAP: f64 = 1e-12;
+/// Costs that differ by less, beside 1 + their size, are the same: they are sums, which are rounded.
+const SAME_COST: f64 = 1e-12;
+/// An iterate that costs so many times as much as the cheapest one of the solve, and 1, has run away, whatever its gaps: those
+/// that close gaps may cost much more than the warm start, but a weight of 1e6 at a distance of ten is still within it.
+const RUNAWAY: f64 = 1e8;
+
+/// The best iterate from which a direction could be computed: the one with the smallest gap, and among equals the cheapest.
+///
+/// An iterate comes here when a step from it is accepted, by an exchange of buffers; nothing is copied.
+#[derive(Debug, Clone)]
+pub(super) struct Best {
+    xs: Vec<f64>,
+    us: Vec<f64>,
+    /// φₜ(xₜ, uₜ), N·nx.
+    next: Vec<f64>,
+    value: Option<Value>,
+    /// The lowest cost of an iterate of this solve, that of the warm start included.
+    lowest: f64,
+}
+
+/// What an iterate is worth, and how its feedback was found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Value {
+    pub(super) gap: f64,
+    pub(super) cost: f64,
+    pub(super) feasible: bool,
+    /// The regularisation of the sweep at it.
+    pub(super) regularisation: f64,
+}
+
+impl Best {
+    /// Room for an iterate of `problem`.
+    pub(super) fn new(problem: &Problem) -> Self {
+        let shape = problem.shape();
+        let horizon = shape.horizon();
+        Self {
+            xs: vec![0.0; (horizon + 1) * shape.nx],
+            us: vec![0.0; shape.offsets[horizon]],
+            next: vec![0.0; horizon * shape.nx],
+            value: None,
+            lowest: f64::INFINITY,
+        }
+    }
+
+    /// Makes room for a problem of which only the numbers of controls changed.
+    pub(super) fn reshape(&mut self, problem: &Problem) {
+        self.us.resize(problem.shape().offsets[problem.horizon()], 0.0);
+    }
+
+    /// A solve begins.
+    pub(super) fn start(&mut self) {
+        (self.value, self.lowest) = (None, f64::INFINITY);
+    }
+
+    /// Exchanges the iterate that a step leaves with the best one, if it is not worse. Returns whether it is the best one now.
+    pub(super) fn leave(&mut self, solution: &mut Solution, next: &mut Vec<f64>, value: Value) -> bool {
+        self.lowest = self.lowest.min(value.cost);
+        let good = !self.is_better_than(&value);
+        if good {
+            self.exchange(solution, next);
+            self.value = Some(value);
+        }
+        good
+    }
+
+    /// Whether there is an iterate that is better than one of this value.
+    pub(super) fn is_better_than(&self, other: &Value) -> bool {
+        let Some(best) = &self.value else { return false };
+        let lowest = self.lowest.min(other.cost);
+        let ran_away = |cost: f64| cost - lowest > RUNAWAY * (1.0 + lowest.abs());
+        match (ran_away(best.cost), ran_away(other.cost)) {
+            (false, true) => true,
+            (true, false) => false,
+            _ if (other.gap - best.gap).abs() > SAME_GAP => other.gap > best.gap,
+            _ => other.cost - best.cost > SAME_COST * (1.0 + best.cost.abs()),
+        }
+    }
+
+    /// Makes the best iterate that of the solution, if there is one. Returns what it is worth.
+    pub(super) fn restore(&mut self, solution: &mut Solution, next: &mut Vec<f64>) -> Option<Value> {
+        let value = self.value.take()?;
+        self.exchange(solution, next);
+        Some(value)
+    }
+
+    fn exchange(&mut self, solution: &mut Solution, next: &mut Vec<f64>) {
+        std::mem::swap(&mut self.xs, &mut solution.xs);
+        std::mem::swap(&mut self.us, &mut solution.us);
+        std::mem::swap(&mut self.next, next);
+    }
+}

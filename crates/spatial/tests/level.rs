@@ -1,0 +1,36 @@
+//! The environment variable that chooses the level of vector instructions.
+
+use condyle_spatial::level::{Level, level};
+use std::process::Command;
+
+/// A program that uses vectors; `refused_levels` runs it.
+#[test]
+fn program() {
+    println!("level {}, then {}", level(), level());
+}
+
+/// What the program prints and complains of with this value of the variable.
+fn run(value: &str) -> [String; 2] {
+    let mut program = Command::new(std::env::current_exe().unwrap());
+    let output = program.args(["--exact", "program", "--nocapture"]).env("CONDYLE_LEVEL", value).output().unwrap();
+    assert!(output.status.success(), "`{value}`: {output:?}");
+    [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
+}
+
+/// A value that cannot be obeyed is reported once, and the best level is used.
+#[test]
+fn refused_levels() {
+    let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap();
+    let missing = Level::ALL.into_iter().filter(|level| !level.is_supported()).map(Level::name);
+    for value in ["", "avx3", " baseline", "AVX2"].into_iter().chain(missing) {
+        let [printed, complaint] = run(value);
+        assert!(printed.contains(&format!("level {best}, then {best}")), "`{value}`: {printed}");
+        assert_eq!(complaint.matches("CONDYLE_LEVEL: ").count(), 1, "`{value}`: {complaint}");
+        assert!(complaint.contains("baseline") && complaint.contains(&format!("using {best}")), "{complaint}");
+    }
+    for level in Level::ALL.into_iter().filter(|level| level.is_supported()) {
+        let [printed, complaint] = run(level.name());
+        assert!(printed.contains(&format!("level {level}, then {level}")), "{printed}");
+        assert!(!complaint.contains("CONDYLE_LEVEL"), "{complaint}");
+    }
+}

@@ -1,0 +1,4 @@
+//! Models in Python's pickles.
+#![no_main]
+
+condyle_fuzz::target!(condyle_fuzz::Kind::Pickle);

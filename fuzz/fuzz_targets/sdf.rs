@@ -1,0 +1,4 @@
+//! Robots from SDF.
+#![no_main]
+
+condyle_fuzz::target!(condyle_fuzz::Kind::Sdf);

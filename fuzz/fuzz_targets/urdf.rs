@@ -1,0 +1,4 @@
+//! Robots from URDF.
+#![no_main]
+
+condyle_fuzz::target!(condyle_fuzz::Kind::Urdf);

@@ -1,0 +1,456 @@
+//! What may come from outside: seeds, mutations, and the property that all of it has.
+//!
+//! A robot or a problem is refused with an error, or can be used. Nothing panics, nothing hangs, and what can be used gives
+//! numbers.
+
+use condyle::optimal::robot::{
+    Activation, Contact, ControlBounds, Cost, Dynamics, Integrator, Knot, Limit, Residual, RobotProblem,
+};
+use condyle::{
+    ContactConstraint, Data, Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, aba, crba, neutral,
+    random_configuration, rnea, robots,
+};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use serde_json::{Value, json};
+use std::sync::OnceLock;
+
+/// A way in which a robot or a problem comes from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A URDF.
+    Urdf,
+    /// An MJCF.
+    Mjcf,
+    /// An SDF.
+    Sdf,
+    /// A model in JSON.
+    Model,
+    /// A problem in JSON.
+    Problem,
+    /// A model as pickles have it.
+    Pickle,
+}
+
+macro_rules! file {
+    ($name:literal) => {
+        include_str!(concat!("../../crates/dynamics/tests/data/", $name))
+    };
+}
+
+impl Kind {
+    /// The seeds: all good.
+    pub fn seeds(self) -> Vec<Vec<u8>> {
+        static SEEDS: [OnceLock<Vec<Vec<u8>>>; 6] = [const { OnceLock::new() }; 6];
+        SEEDS[self as usize].get_or_init(|| self.new_seeds()).clone()
+    }
+
+    fn new_seeds(self) -> Vec<Vec<u8>> {
+        let texts = match self {
+            Self::Urdf => {
+                [robots::ARM7, robots::QUADRUPED, robots::HUMANOID, file!("mimic.urdf")].map(str::to_owned).into()
+            }
+            Self::Mjcf => {
+                let defaults = file!("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
+                let arm = file!("arm.xml").replace("<include file=\"arm_defaults.xml\"/>", &defaults);
+                vec![arm, file!("quadruped.xml").to_owned(), file!("gripper.xml").to_owned()]
+            }
+            Self::Sdf => vec![file!("linkage.sdf").to_owned()],
+            Self::Model => {
+                models().iter().map(|m| serde_json::to_string(m).expect("is made of numbers and words")).collect()
+            }
+            Self::Problem => {
+                problems().iter().map(|p| serde_json::to_string(p).expect("is made of numbers and words")).collect()
+            }
+            Self::Pickle => return models().iter().map(|m| postcard::to_allocvec(m).expect("has room")).collect(),
+        };
+        texts.into_iter().map(String::into_bytes).collect()
+    }
+
+    /// Reads what has come, and uses what could be read. Returns whether it could.
+    ///
+    /// # Panics
+    /// If what could be read cannot be used.
+    pub fn check(self, input: &[u8]) -> bool {
+        let text = String::from_utf8_lossy(input);
+        // what a user may ask for, by a bit that a mutation changes as well
+        let (some, other) = (input.len().is_multiple_of(2), input.len().is_multiple_of(3));
+        let root_joint = some.then_some(Joint::FreeFlyer);
+        let said = match self {
+            Self::Urdf => {
+                let options = UrdfOptions { root_joint, mimic: other, ..UrdfOptions::default() };
+                Model::from_urdf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
+            }
+            Self::Mjcf => {
+                let options = MjcfOptions { mimic: some, weightless_meshes: other, ..MjcfOptions::default() };
+                Model::from_mjcf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
+            }
+            Self::Sdf => {
+                let options = SdfOptions { root_joint, mimic: other, ..SdfOptions::default() };
+                Model::from_sdf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
+            }
+            Self::Model => serde_json::from_str(&text).map(|model: Model| use_model(&model)).map_err(|e| e.to_string()),
+            Self::Pickle => {
+                postcard::from_bytes(input).map(|model: Model| use_model(&model)).map_err(|e| e.to_string())
+            }
+            Self::Problem => serde_json::from_str(&text).map_err(|e| e.to_string()).and_then(|p| use_problem(&p)),
+        };
+        if let Err(said) = &said {
+            assert!(!said.is_empty() && !said.contains("Some(") && !said.contains("{ "), "{said}");
+        }
+        said.is_ok()
+    }
+}
+
+/// Robots with all that a file of a model can have.
+fn models() -> Vec<Model> {
+    let mimic = UrdfOptions { mimic: true, ..UrdfOptions::default() };
+    let mimic = Model::from_urdf_str(file!("mimic.urdf"), &mimic).expect("is a good robot");
+    let linkage = Model::from_sdf_str(file!("linkage.sdf"), &SdfOptions::default()).expect("is a good robot");
+    vec![robots::arm7(), robots::quadruped(), mimic, linkage]
+}
+
+/// Problems with all kinds of dynamics, and the terms that a file can have.
+fn problems() -> Vec<RobotProblem> {
+    let (arm, quadruped) = (robots::arm7(), robots::quadruped());
+    let state = |model: &Model| [neutral(model), vec![0.0; model.nv()]].concat();
+    let rest = |model: &Model| Residual::State { reference: state(model) };
+    let effort = |n: usize| Residual::Control { reference: vec![0.0; n] };
+    let integrator = Integrator::SemiImplicitEuler;
+    let mut reach = Knot::new(
+        Dynamics::Free { actuation: None, integrator, dt: 0.05 },
+        vec![
+            Cost::new("rest", 1e-2, rest(&arm), Activation::Quadratic),
+            Cost::new("effort", 1e-3, effort(7), Activation::Weighted(vec![1.0; 7])),
+            Cost::new(
+                "centre",
+                1.0,
+                Residual::CenterOfMass { target: [0.1, 0.0, 0.4].into() },
+                Activation::Smooth1 { epsilon: 1.0 },
+            ),
+        ],
+    );
+    reach.limits = vec![Limit::new("effort", effort(7), vec![-30.0; 7], vec![f64::INFINITY; 7])];
+    reach.costs_at.insert(1, reach.costs.clone());
+    reach.bounds = Some(ControlBounds { lower: vec![f64::NEG_INFINITY; 7], upper: vec![40.0; 7] });
+    let end = Knot::new(Dynamics::End, vec![Cost::new("rest", 1.0, rest(&arm), Activation::Quadratic)]);
+    let inverse = Knot::new(Dynamics::Inverse { integrator, dt: 0.02 }, reach.costs[..1].to_vec());
+    let foot = |name: &str| Contact::new(name, ContactConstraint::point(quadruped.frame(name).expect("has feet")));
+    let contacts = vec![foot("LF_foot"), foot("RH_foot")];
+    let stand = Knot::new(
+        Dynamics::Contact { contacts: contacts.clone(), damping: 1e-8, actuation: None, integrator, dt: 0.02 },
+        vec![Cost::new("rest", 1.0, rest(&quadruped), Activation::Quadratic)],
+    );
+    let land = Knot::new(Dynamics::Impulse { contacts, restitution: 0.0, damping: 1e-8 }, stand.costs.clone());
+    let still = Knot::new(Dynamics::End, stand.costs.clone());
+    vec![
+        RobotProblem { x0: state(&arm), model: arm, knots: vec![reach, inverse], stages: vec![0, 0, 1], terminal: end },
+        RobotProblem {
+            x0: state(&quadruped),
+            model: quadruped,
+            knots: vec![stand, land],
+            stages: vec![0, 1, 0],
+            terminal: still,
+        },
+    ]
+}
+
+/// Inverse dynamics and the inertia matrix at the neutral position are numbers and, where that matrix has an inverse, forward
+/// dynamics somewhere else (at the neutral position, axes may coincide).
+fn use_model(model: &Model) {
+    let (mut data, mut q) = (Data::new(model), neutral(model));
+    let zeros = vec![0.0; model.nv()];
+    let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
+    assert!(finite(rnea(model, &mut data, &q, &zeros, &zeros, &[])), "rnea: {model}");
+    assert!(finite(crba(model, &mut data, &q).as_slice()), "crba: {model}");
+    q = random_configuration(model, &mut StdRng::seed_from_u64(1));
+    assert!(finite(&q), "random_configuration: {model}");
+    if model.singular_joints().is_empty() {
+        assert!(finite(aba(model, &mut data, &q, &zeros, &zeros, &[])), "aba: {model}");
+    }
+}
+
+/// A problem that can be built can be rolled out: to numbers, or to an error.
+fn use_problem(data: &RobotProblem) -> Result<(), String> {
+    let mut problem = data.build().map_err(|e| e.to_string())?;
+    let us = vec![0.0; (0..problem.horizon()).map(|t| problem.nu(t)).sum()];
+    let xs = problem.rollout(&us).map_err(|e| e.to_string())?;
+    assert!(xs.iter().all(|x| x.is_finite()), "rollout: {xs:?}");
+    Ok(())
+}
+
+/// An input with one to four things changed.
+pub fn mutated(kind: Kind, input: &[u8], seeds: &[Vec<u8>], rng: &mut StdRng) -> Vec<u8> {
+    let mut bytes = input.to_vec();
+    for _ in 0..rng.random_range(1..5) {
+        bytes = match (kind, rng.random_range(0..10)) {
+            (Kind::Pickle, _) | (_, 0) => mutate_bytes(bytes, &seeds[rng.random_range(0..seeds.len())], rng),
+            (Kind::Model | Kind::Problem, 1..=6) => mutate_value(&bytes, rng),
+            (_, 1 | 2) => mutate_tokens(&String::from_utf8_lossy(&bytes), rng).into(),
+            (_, 3..=6) => mutate_words(&String::from_utf8_lossy(&bytes), rng).into(),
+            _ => mutate_elements(&String::from_utf8_lossy(&bytes), rng).into(),
+        };
+    }
+    bytes
+}
+
+/// Numbers that files should not have, or not there.
+const NUMBERS: &[&str] = &[
+    "nan",
+    "inf",
+    "-inf",
+    "1e308",
+    "-1e308",
+    "1e200",
+    "1e150",
+    "1e-308",
+    "5e-324",
+    "-0",
+    "0",
+    "1",
+    "-1",
+    "0.5",
+    "2",
+    "1e999",
+    "99999999999999999999",
+    "1000000",
+    "",
+    "0x10",
+    "1 2",
+    "null",
+];
+
+/// Words that mean something in one of the formats or in XML.
+const PIECES: &[&str] = &[
+    "<",
+    ">",
+    "\"",
+    "'",
+    "/",
+    "=",
+    "&",
+    "&amp;",
+    "&#9;",
+    "&#10;",
+    "&#0;",
+    "&nothing;",
+    "\t",
+    "\n",
+    "\r\n",
+    "\u{0}",
+    "é",
+    "\u{feff}",
+    " ",
+    "<!--",
+    "-->",
+    "<![CDATA[",
+    "]]>",
+    "<?x",
+    "<!DOCTYPE a [<!ENTITY b 'b'>]>",
+    " xmlns:a=\"b\"",
+    " xmlns=\"\"",
+    "a:",
+    "world",
+    "universe",
+    "root_joint",
+    "__model__",
+    "floating",
+    "planar",
+    "ball",
+    "free",
+];
+
+fn any<T: Clone>(of: &[T], rng: &mut StdRng) -> T {
+    of[rng.random_range(0..of.len())].clone()
+}
+
+/// Bytes flipped, left out, swapped, repeated, or from another input.
+fn mutate_bytes(mut bytes: Vec<u8>, donor: &[u8], rng: &mut StdRng) -> Vec<u8> {
+    if bytes.is_empty() {
+        return donor.to_vec();
+    }
+    let (at, other) = (rng.random_range(0..bytes.len()), rng.random_range(0..bytes.len()));
+    let end = (at + rng.random_range(1..200)).min(bytes.len());
+    match rng.random_range(0..7) {
+        0 => bytes[at] ^= 1 << rng.random_range(0..8),
+        1 => bytes[at] = rng.random_range(0..=255),
+        2 => drop(bytes.drain(at..end)),
+        3 => bytes.swap(at, other),
+        4 => drop(bytes.splice(other..other, bytes[at..end].to_vec())),
+        5 => bytes.truncate(at),
+        _ => {
+            let from = rng.random_range(0..donor.len());
+            let piece = donor[from..(from + end - at).min(donor.len())].to_vec();
+            drop(bytes.splice(at..end, piece));
+        }
+    }
+    bytes
+}
+
+/// Where words stand between signs: ranges of bytes.
+fn words(text: &str) -> Vec<(usize, usize)> {
+    let (mut found, mut begin) = (Vec::new(), None);
+    for (i, c) in text.char_indices().chain([(text.len(), ' ')]) {
+        let sign = c.is_whitespace() || "<>\"'/=,:[]{}".contains(c);
+        match begin {
+            None if !sign => begin = Some(i),
+            Some(from) if sign => {
+                found.push((from, i));
+                begin = None;
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+fn replaced(text: &str, (from, to): (usize, usize), by: &str) -> String {
+    [&text[..from], by, &text[to..]].concat()
+}
+
+/// A piece of a format put somewhere, a word left out or in the place of another one.
+fn mutate_tokens(text: &str, rng: &mut StdRng) -> String {
+    let words = words(text);
+    if words.is_empty() {
+        return any(PIECES, rng).to_string();
+    }
+    let (at, other) = (any(&words, rng), any(&words, rng));
+    match rng.random_range(0..4) {
+        0 => replaced(text, (at.0, at.0), any(PIECES, rng)),
+        1 => replaced(text, at, ""),
+        2 => replaced(text, at, any(PIECES, rng)),
+        _ => replaced(text, at, &text[other.0..other.1]),
+    }
+}
+
+/// A number, or a name, in place of another one; at times of all its like.
+fn mutate_words(text: &str, rng: &mut StdRng) -> String {
+    let words = words(text);
+    let is_number = |&(from, to): &(usize, usize)| text[from..to].parse::<f64>().is_ok();
+    let (numbers, names): (Vec<_>, Vec<_>) = words.into_iter().partition(is_number);
+    if numbers.is_empty() || names.is_empty() {
+        return text.to_owned();
+    }
+    let name = |rng: &mut StdRng| {
+        let (from, to) = any(&names, rng);
+        text[from..to].to_owned()
+    };
+    match rng.random_range(0..6) {
+        0..=2 => replaced(text, any(&numbers, rng), any(NUMBERS, rng)),
+        3 => replaced(text, any(&names, rng), &name(rng)),
+        4 => {
+            let (from, to) = (name(rng), name(rng));
+            text.replace(&from, &to)
+        }
+        _ => {
+            let (from, to) = any(&numbers, rng);
+            text.replacen(&text[from..to], any(NUMBERS, rng), rng.random_range(1..20))
+        }
+    }
+}
+
+/// Where elements stand, from the sign that opens one to the sign that closes it, as far as they are closed.
+fn elements(text: &str) -> Vec<(usize, usize)> {
+    let (mut found, mut open) = (Vec::new(), Vec::new());
+    for (from, _) in text.match_indices('<') {
+        let Some(length) = text[from..].find('>') else { break };
+        let to = from + length + 1;
+        match text.as_bytes().get(from + 1) {
+            Some(b'/') => found.extend(open.pop().map(|begin| (begin, to))),
+            Some(b'!' | b'?') => {}
+            _ if text[..to].ends_with("/>") => found.push((from, to)),
+            _ => open.push(from),
+        }
+    }
+    found
+}
+
+/// An element left out, twice, elsewhere, inside itself, or in the place of another one.
+fn mutate_elements(text: &str, rng: &mut StdRng) -> String {
+    let elements = elements(text);
+    if elements.is_empty() {
+        return text.to_owned();
+    }
+    // small ones first: the root and the like are copied too often otherwise
+    let pick = |rng: &mut StdRng| {
+        let (a, b) = (any(&elements, rng), any(&elements, rng));
+        if a.1 - a.0 < b.1 - b.0 { a } else { b }
+    };
+    let (at, other) = (pick(rng), pick(rng));
+    let own = &text[at.0..at.1];
+    match rng.random_range(0..6) {
+        0 => replaced(text, at, ""),
+        1 => replaced(text, (at.1, at.1), own),
+        2 => replaced(text, (other.1, other.1), own),
+        3 => replaced(text, other, own),
+        4 => match own.find('>').filter(|_| !own.ends_with("/>")) {
+            Some(end) => replaced(text, (at.0 + end + 1, at.0 + end + 1), own),
+            None => text.to_owned(),
+        },
+        _ => {
+            let attributes = own.find(char::is_whitespace).zip(own.find('>'));
+            let Some((from, to)) = attributes.filter(|(from, to)| from < to) else { return text.to_owned() };
+            replaced(text, (at.0 + from, at.0 + to), if own[..to].ends_with('/') { "/" } else { "" })
+        }
+    }
+}
+
+/// A value of JSON changed, left out, twice, or in the place of another one.
+fn mutate_value(bytes: &[u8], rng: &mut StdRng) -> Vec<u8> {
+    let Ok(mut file) = serde_json::from_slice::<Value>(bytes) else {
+        return mutate_words(&String::from_utf8_lossy(bytes), rng).into();
+    };
+    let numbers = [
+        json!(0),
+        json!(-1),
+        json!(1e300),
+        json!(-1e300),
+        json!(1e-300),
+        json!(u64::MAX),
+        json!(1 << 30),
+        json!(null),
+        json!(0.5),
+    ];
+    let (change, other, number) = (rng.random_range(0..5), anywhere(&mut file, rng).clone(), any(&numbers, rng));
+    let place = anywhere(&mut file, rng);
+    match place {
+        Value::Array(list) if change == 0 && !list.is_empty() => drop(list.remove(rng.random_range(0..list.len()))),
+        Value::Array(list) if change == 1 => list.push(list.last().cloned().unwrap_or(number)),
+        Value::Array(list) if change == 2 && !list.is_empty() => {
+            let (a, b) = (rng.random_range(0..list.len()), rng.random_range(0..list.len()));
+            list.swap(a, b);
+        }
+        Value::Object(map) if change < 2 => {
+            let key = map.keys().nth(rng.random_range(0..map.len().max(1))).cloned().unwrap_or_default();
+            let value = map.remove(&key);
+            if let (1, Some(value)) = (change, value) {
+                map.insert(
+                    any(&["0", "1", "1000000000", "18446744073709551615", "-1", "name"], rng).to_string(),
+                    value,
+                );
+            }
+        }
+        Value::Number(_) => *place = number,
+        _ => *place = other,
+    }
+    file.to_string().into_bytes()
+}
+
+/// A place in a file, chosen at random.
+fn anywhere<'a>(file: &'a mut Value, rng: &mut StdRng) -> &'a mut Value {
+    let inside = match file {
+        Value::Array(list) => list.len(),
+        Value::Object(map) => map.len(),
+        _ => 0,
+    };
+    if inside == 0 || rng.random::<f64>() < 0.1 {
+        return file;
+    }
+    let at = rng.random_range(0..inside);
+    let next = match file {
+        Value::Array(list) => list.get_mut(at),
+        Value::Object(map) => map.values_mut().nth(at),
+        _ => None,
+    };
+    anywhere(next.expect("it has so many"), rng)
+}

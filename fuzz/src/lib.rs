@@ -1,0 +1,39 @@
+//! Hostile input for cargo-fuzz (`cargo +nightly fuzz run urdf`): one target for each way in which a robot or a problem comes
+//! from outside. The corpora begin with the robots that the repository has; none is copied.
+//!
+//! `tests/hostile.rs` of the workspace runs the same mutations and the same property a fixed number of times.
+
+mod hostile;
+
+pub use hostile::Kind;
+use hostile::mutated;
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+
+/// The bytes from which some bytes come by mutation, no more than `room`: of the kind's own seeds where there is nothing
+/// yet, and at times by libFuzzer's own mutations.
+pub fn mutate(kind: Kind, data: &mut [u8], size: usize, seed: u32) -> usize {
+    let (room, mut rng) = (data.len(), StdRng::seed_from_u64(seed.into()));
+    if seed.is_multiple_of(4) && size > 64 {
+        return libfuzzer_sys::fuzzer_mutate(data, size, room);
+    }
+    let seeds = kind.seeds();
+    let from = if size > 64 { &data[..size] } else { &seeds[seed as usize % seeds.len()] };
+    let new = mutated(kind, from, &seeds, &mut rng);
+    let size = new.len().min(room);
+    data[..size].copy_from_slice(&new[..size]);
+    size
+}
+
+/// A target of libFuzzer for a kind of input.
+#[macro_export]
+macro_rules! target {
+    ($kind:expr) => {
+        libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+            $kind.check(data);
+        });
+        libfuzzer_sys::fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+            $crate::mutate($kind, &mut data[..max_size], size, seed)
+        });
+    };
+}

@@ -1,0 +1,119 @@
+"""Functions of a robot as `casadi.Function`s, with exact derivatives and without Python in the loop.
+
+>>> import condyle, condyle.casadi, casadi
+>>> arm = condyle.robots.arm7()
+>>> rnea = condyle.casadi.rnea(arm)
+>>> rnea
+Function(condyle_0:(q[7],v[7],a[7])->(tau[7]) External)
+>>> q, v = casadi.MX.sym("q", 7), casadi.MX.sym("v", 7)
+>>> damping = casadi.jacobian(rnea(q, v, 0), v)  # ∂τ/∂v, in closed form
+
+Each function computes with the library's own code: values, Jacobians with the zeros of the robot's tree, products with
+them, and the Hessian of λᵀf, in closed form for `rnea` and `aba` and by hyper-dual numbers for the others. They may be
+called from several threads at a time (`Function.map` with "thread").
+
+A position q has nq numbers. Quaternions and the points of a circle of continuous joints are divided by their lengths
+first, so that derivatives by all nq numbers exist and are exact; of length 0 they give NaN. An optimisation holds their
+lengths at 1 by a constraint, or by integrating in the tangent space.
+
+A function lives in the process that made it. One that was saved or pickled, alone or inside another, and is loaded
+raises an error when it is called, with a line on the standard error: make it anew. There can be 64 at a time, each used
+by any number of expressions; the same function of the same robot counts once.
+
+CasADi is an extra: `pip install condyle[casadi]`.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from . import _condyle
+from ._condyle import Model
+from ._types import ContactConstraint
+
+try:
+    import casadi as _casadi
+except ImportError as error:
+    raise ImportError("condyle.casadi needs CasADi: pip install condyle[casadi]") from error
+
+__all__ = [
+    "aba",
+    "centroidal_momentum",
+    "com",
+    "constrained_dynamics",
+    "crba",
+    "forward_kinematics",
+    "frame_velocity",
+    "rnea",
+]
+
+
+def _function(model: Model, function: str, **options: Any) -> "_casadi.Function":
+    name = _condyle.casadi_hold(model, function, **options)
+    try:
+        return _casadi.external(name, _condyle.__file__)
+    finally:
+        _condyle.casadi_release(name)  # CasADi holds it now
+
+
+def rnea(model: Model) -> "_casadi.Function":
+    """The efforts τ = M(q) a + h(q, v) that make a robot accelerate with a: (q, v, a) -> tau.
+
+    >>> tau = condyle.casadi.rnea(condyle.robots.arm7())(0.3, 0, 0)
+    >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
+    True
+    """
+    return _function(model, "rnea")
+
+
+def aba(model: Model) -> "_casadi.Function":
+    """The accelerations a of a robot under efforts τ: (q, v, tau) -> a.
+
+    Raises `ModelError` if the inertia matrix is singular.
+    """
+    return _function(model, "aba")
+
+
+def crba(model: Model) -> "_casadi.Function":
+    """The inertia matrix: q -> M, (nv, nv), with the zeros of the robot's tree."""
+    return _function(model, "crba")
+
+
+def forward_kinematics(model: Model, frame: str | int) -> "_casadi.Function":
+    """The placement of a frame in the world's frame: q -> (position, rotation), 3 numbers (m) and (3, 3).
+
+    >>> tool = condyle.casadi.forward_kinematics(condyle.robots.arm7(), "tool")
+    >>> position, rotation = tool(0)
+    >>> bool(position[2] > 0.5)  # stretched upwards
+    True
+    """
+    return _function(model, "forward_kinematics", frame=frame)
+
+
+def frame_velocity(
+    model: Model, frame: str | int, reference: Literal["local", "world", "local_world_aligned"] = "local"
+) -> "_casadi.Function":
+    """The velocity of a frame, linear numbers first: (q, v) -> velocity, 6 numbers (m/s, rad/s)."""
+    return _function(model, "frame_velocity", frame=frame, reference=reference)
+
+
+def com(model: Model) -> "_casadi.Function":
+    """The centre of mass of the moving bodies in the world's frame: q -> com, 3 numbers (m)."""
+    return _function(model, "com")
+
+
+def centroidal_momentum(model: Model) -> "_casadi.Function":
+    """The momentum about the centre of mass, linear numbers first: (q, v) -> momentum, 6 numbers (kg m/s, kg m²/s)."""
+    return _function(model, "centroidal_momentum")
+
+
+def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint]) -> "_casadi.Function":
+    """The accelerations under constraints and the forces that hold them: (q, v, tau) -> (a, forces).
+
+    The constraints' targets stay as they are given. Raises `ModelError` as `ConstraintSet` does.
+
+    >>> quadruped = condyle.robots.quadruped()
+    >>> stance = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
+    >>> condyle.casadi.constrained_dynamics(quadruped, stance).size_out(1)
+    (6, 1)
+    """
+    return _function(model, "constrained_dynamics", constraints=list(constraints))

@@ -1,0 +1,192 @@
+//! Positions as CasADi has them: vectors of nq numbers, of which some are quaternions or points of a circle.
+//!
+//! A function f of a robot's position is defined on the group; for all vectors q it is taken as f(q̂), with quaternions and
+//! points of circles divided by their lengths. Its derivatives by q follow from those by the tangent vector δ = q' ⊖ q̂:
+//!
+//! ```text
+//! δ = T dq + ½ Σ dqᵀ C_k dq e_k + …      ∂f/∂q = ∂f/∂δ T      ∂²f/∂q² = Tᵀ ∂²f/∂δ² T + Σ_k ∂f/∂δ_k C_k
+//! ```
+
+use condyle::{Joint, Mat3, Model, Vec3};
+use core::ops::Range;
+use nalgebra::{DMatrix, SMatrix};
+
+/// T of a group, in its leading rows and columns.
+type Block = SMatrix<f64, 6, 7>;
+
+/// The coordinates of a joint.
+#[derive(Clone, Debug)]
+struct Group {
+    joint: Joint,
+    q: Range<usize>,
+    v: Range<usize>,
+}
+
+impl Group {
+    /// The coordinates that are a quaternion or a point of a circle.
+    fn unit(&self) -> Option<Range<usize>> {
+        let Range { start, end } = self.q;
+        match self.joint {
+            Joint::Continuous { .. } | Joint::Spherical => Some(start..end),
+            Joint::Planar => Some(start + 2..end),
+            Joint::FreeFlyer => Some(start + 3..end),
+            _ => None,
+        }
+    }
+}
+
+/// How the coordinates of a robot's position follow those of its tangent space.
+#[derive(Clone, Debug)]
+pub(super) struct Chart {
+    groups: Vec<Group>,
+    nq: usize,
+}
+
+/// A position, and T at it.
+#[derive(Clone, Debug)]
+pub(super) struct Position {
+    /// q̂, nq numbers.
+    pub(super) q: Vec<f64>,
+    /// T of each group that is none of numbers.
+    T: Vec<Block>,
+    /// The lengths of what q̂ has with length 1, for each group.
+    lengths: Vec<f64>,
+}
+
+impl Chart {
+    pub(super) fn new(model: &Model) -> Self {
+        let own = model.bodies().iter().skip(1).filter(|body| body.mimic.is_none());
+        let group = |body: &condyle::Body| {
+            let (q, v) = (body.idx_q..body.idx_q + body.joint.nq(), body.idx_v..body.idx_v + body.joint.nv());
+            Group { joint: body.joint, q, v }
+        };
+        Self { groups: own.map(group).collect(), nq: model.nq() }
+    }
+
+    pub(super) fn position(&self) -> Position {
+        let groups = self.groups.len();
+        Position { q: vec![0.0; self.nq], T: vec![Block::zeros(); groups], lengths: vec![1.0; groups] }
+    }
+
+    /// The tangent coordinates that a coordinate of q moves.
+    pub(super) fn moved_by(&self, q: usize) -> Range<usize> {
+        let group = self.groups.iter().find(|group| group.q.contains(&q)).expect("each coordinate is a joint's");
+        match group.unit() {
+            None => group.v.start + (q - group.q.start)..group.v.start + (q - group.q.start) + 1,
+            Some(_) => group.v.clone(),
+        }
+    }
+
+    /// Fills q̂ and T at q.
+    pub(super) fn update(&self, q: &[f64], at: &mut Position) {
+        at.q.copy_from_slice(q);
+        for (k, group) in self.groups.iter().enumerate() {
+            let Some(unit) = group.unit() else { continue };
+            let unit = &mut at.q[unit];
+            let length = unit.iter().map(|x| x * x).sum::<f64>().sqrt();
+            unit.iter_mut().for_each(|x| *x /= length);
+            at.lengths[k] = length;
+            at.T[k] = tangent_map(group.joint, &at.q[group.q.clone()], length);
+        }
+    }
+
+    /// Y = X T, of as many rows, into columns from `first` on; X stands in nv columns from `from` on.
+    pub(super) fn multiply(&self, at: &Position, X: &DMatrix<f64>, from: usize, Y: &mut DMatrix<f64>, first: usize) {
+        for (group, T) in self.groups.iter().zip(&at.T) {
+            if group.unit().is_none() {
+                for (q, v) in group.q.clone().zip(group.v.clone()) {
+                    Y.column_mut(first + q).copy_from(&X.column(from + v));
+                }
+                continue;
+            }
+            for (j, q) in group.q.clone().enumerate() {
+                let mut column = Y.column_mut(first + q);
+                column.fill(0.0);
+                for (i, v) in group.v.clone().enumerate() {
+                    column.axpy(T[(i, j)], &X.column(from + v), 1.0);
+                }
+            }
+        }
+    }
+
+    /// H += Σ_k g_k C_k, in nq rows and columns from `first` on.
+    pub(super) fn add_curvature(&self, at: &Position, g: &[f64], H: &mut DMatrix<f64>, first: usize) {
+        for (k, group) in self.groups.iter().enumerate() {
+            let Some(unit) = group.unit() else { continue };
+            let (T, q, start) = (&at.T[k], &at.q[unit.clone()], unit.start - group.q.start);
+            let turns = group.v.len() - if q.len() == 4 { 3 } else { 1 }; // the first tangent coordinate that turns
+            // the angles: δ = T dq (1 − q̂ᵀ dq / length), so C = −(q̂ Tᵀ + T q̂ᵀ) / length
+            for i in 0..unit.len() {
+                for j in 0..unit.len() {
+                    let mut sum = 0.0;
+                    for r in turns..group.v.len() {
+                        let slope = g[group.v.start + r];
+                        sum -= slope * (q[i] * T[(r, start + j)] + q[j] * T[(r, start + i)]);
+                    }
+                    H[(first + unit.start + i, first + unit.start + j)] += sum / at.lengths[k];
+                }
+            }
+            // the lengths: δ_v = (1 − ½ δ_ω×) Rᵀ dp
+            for a in 0..start {
+                for j in 0..unit.len() {
+                    let (p, w) = (T.column(a), T.column(start + j));
+                    let half = if q.len() == 4 {
+                        let (p, w) = (Vec3::new(p[0], p[1], p[2]), Vec3::new(w[3], w[4], w[5]));
+                        w.cross(p).to_array()
+                    } else {
+                        [-w[2] * p[1], w[2] * p[0], 0.0]
+                    };
+                    let slopes = &g[group.v.start..][..turns];
+                    let sum: f64 = slopes.iter().zip(half).map(|(g, half)| -0.5 * g * half).sum();
+                    H[(first + group.q.start + a, first + unit.start + j)] += sum;
+                    H[(first + unit.start + j, first + group.q.start + a)] += sum;
+                }
+            }
+        }
+    }
+}
+
+/// T of a joint at coordinates whose quaternion or point of a circle was divided by its length.
+fn tangent_map(joint: Joint, q: &[f64], length: f64) -> Block {
+    let mut T = Block::zeros();
+    match joint {
+        Joint::Continuous { .. } => circle(&mut T, (0, 0), q[0], q[1], length),
+        Joint::Planar => {
+            let (c, s) = (q[2], q[3]);
+            T[(0, 0)] = c;
+            T[(0, 1)] = s;
+            T[(1, 0)] = -s;
+            T[(1, 1)] = c;
+            circle(&mut T, (2, 2), c, s, length);
+        }
+        Joint::Spherical => quaternion(&mut T, (0, 0), q, length),
+        Joint::FreeFlyer => {
+            let R: Mat3<f64> = condyle::Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation();
+            for (i, column) in [R.x, R.y, R.z].into_iter().enumerate() {
+                for (j, x) in column.to_array().into_iter().enumerate() {
+                    T[(i, j)] = x; // Rᵀ
+                }
+            }
+            quaternion(&mut T, (3, 3), &q[3..], length);
+        }
+        _ => {}
+    }
+    T
+}
+
+/// δθ = (c ds − s dc) / length.
+fn circle(T: &mut Block, (i, j): (usize, usize), c: f64, s: f64, length: f64) {
+    T[(i, j)] = -s / length;
+    T[(i, j + 1)] = c / length;
+}
+
+/// δω = 2 vec(q̂* dq) / length.
+fn quaternion(T: &mut Block, (i, j): (usize, usize), q: &[f64], length: f64) {
+    let [x, y, z, w] = [q[0], q[1], q[2], q[3]].map(|x| 2.0 * x / length);
+    let rows = [[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]];
+    for (r, row) in rows.into_iter().enumerate() {
+        for (c, x) in row.into_iter().enumerate() {
+            T[(i + r, j + c)] = x;
+        }
+    }
+}
