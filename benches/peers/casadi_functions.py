@@ -3,8 +3,8 @@
 
     .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--free-flyer] [--json]
 
-Without robots: the embedded arm and humanoid. Prints, for RNEA and ABA, the time of the function, of its Jacobian by all
-arguments and of the Hessian of λᵀf, in microseconds, medians of alternating rounds on one core, and how many times
+Without robots: the embedded arm and humanoid. Prints, for RNEA and ABA, the time of the function, of its Jacobian by
+all arguments and of the Hessian of λᵀf, in microseconds, medians of alternating rounds on one core, and how many times
 faster ours are. The expressions run in CasADi's own virtual machine, as those of pinocchio.casadi do.
 """
 

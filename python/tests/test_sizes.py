@@ -61,7 +61,9 @@ def test_sizes_are_limited(name: str) -> None:
 
 def test_a_horizon_is_limited() -> None:
     """By the size of its knots, as a solver has matrices of them."""
-    with pytest.raises(ProblemError, match="^numbers in the matrices of all knots: .* is more than the limit of 268435456$"):
+    with pytest.raises(
+        ProblemError, match="^numbers in the matrices of all knots: .* more than the limit of 268435456$"
+    ):
         problem(nx=2000, knots=1000)
     problem(nx=20, knots=1000)
 

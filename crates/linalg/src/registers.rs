@@ -6,8 +6,7 @@ use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// The registers of [`Level::Avx512`], and the columns of a tile that suit their number.
-#[cfg(target_arch = "x86_64")]
+/// The registers of [`Level::Avx512`]; on other processors the same as `Short`.
 pub(crate) type Long = <f64 as Real>::Long<Gate>;
 /// The registers of [`Level::Avx2`] or [`Level::Neon`].
 pub(crate) type Short = <f64 as Real>::Short<Gate>;
