@@ -10,6 +10,29 @@ use condyle_wholebody::{Error, Plan, PlanData};
 /// touches from each knot to the next, flat: N·contacts. fade: over how long contacts are loaded and unloaded (s). Controls
 /// and gains are taken over from knots that have one control for each actuated coordinate; impacts have none.
 ///
+/// ```
+/// use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+/// use condyle::optimal::{Fddp, Problem};
+/// use condyle::{plan_of, robots};
+/// use std::sync::Arc;
+/// let arm = Arc::new(robots::arm7());
+/// let x0 = vec![0.1; 14];
+/// let rest = Cost::new("rest", 1.0, Residual::State { reference: vec![0.0; 14] }, Activation::Quadratic);
+/// let mut step = FreeDynamics::running(arm.clone(), 0.05, vec![rest.clone()])?;
+/// let us = step.quasi_static(&x0).repeat(10);
+/// let end = FreeDynamics::terminal(arm.clone(), vec![rest])?;
+/// let mut problem = Problem::new(x0.clone(), vec![Box::new(step)], vec![0; 10], Box::new(end))?;
+/// let mut solver = Fddp::new(&problem);
+/// let solution = solver.solve(&mut problem, &x0.repeat(11), &us)?;
+///
+/// let times: Vec<f64> = (0..=10).map(|k| 0.05 * f64::from(k)).collect();
+/// let plan = plan_of(&arm, solution, &times, &[], 0.0)?; // an arm without contacts
+/// let mut tau = [0.0; 7];
+/// plan.feedback(0.0, &x0[..7], &x0[7..], &mut tau);
+/// assert_eq!(tau[..], *solution.u(0)); // on the plan, the plan's control
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`Error`] for arrays of the wrong length.
 pub fn plan_of(model: &Model, solution: &Solution, times: &[f64], touches: &[bool], fade: f64) -> Result<Plan, Error> {

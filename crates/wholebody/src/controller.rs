@@ -49,9 +49,9 @@ pub struct Command {
     /// What the environment then does to the robot at each contact, about the frame's origin along the world's axes (N,
     /// N m). Of a safe command, the last one's.
     pub forces: Vec<Force<f64>>,
-    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²).
+    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²). Of a safe command, the last one's.
     pub com_acceleration: Vec3<f64>,
-    /// The violation of the worst constraint (N, N m, m/s²).
+    /// The violation of the worst constraint (N, N m, m/s²). Of a safe command, the last one's.
     pub violation: f64,
     /// Iterations of the solver.
     pub iterations: u32,

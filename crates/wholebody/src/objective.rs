@@ -85,7 +85,7 @@ impl ResolvedTask {
 
     /// Rows of the centroidal momentum matrix, from one on, along some axes.
     fn add_map(&self, k: &Kinematics, axes: Mat3<f64>, from: usize, scale: f64, b: Vec3<f64>, out: &mut LeastSquares) {
-        for (_, e) in axes.columns().into_iter().enumerate().filter(|(axis, _)| self.task.mask[*axis]) {
+        for (e, _) in axes.columns().into_iter().zip(self.task.mask).filter(|(_, counts)| *counts) {
             let s = e.scale(scale);
             out.add_row(self.task.weight, e.dot(b), |row| {
                 for (x, A) in row.iter_mut().zip(k.Ag.as_slice().chunks_exact(6)) {
