@@ -36,6 +36,8 @@ pub(crate) struct Gait {
     stages: Vec<usize>,
     us: Vec<f64>,
     times: Vec<f64>,
+    /// Whether each foot touches, knot by knot.
+    touches: Vec<bool>,
 }
 
 impl Gait {
@@ -50,7 +52,7 @@ impl Gait {
         feet.iter_mut().for_each(|foot| foot.1.z -= ground); // it stands at height 0
         (com.z, x0[2]) = (com.z - ground, x0[2] - ground);
         let (models, stages, us) = (Vec::new(), Vec::new(), Vec::new());
-        Self { x0, dt, foot, feet, com, models, stages, us, times: vec![0.0], model }
+        Self { x0, dt, foot, feet, com, models, stages, us, times: vec![0.0], touches: Vec::new(), model }
     }
 
     fn contacts(&self, frames: &[usize], kd: f64) -> Vec<Contact> {
@@ -119,6 +121,8 @@ impl Gait {
         }
         self.us.extend(hold.repeat(knots));
         self.stages.extend(vec![self.models.len(); knots]);
+        let touching: Vec<bool> = self.feet.iter().map(|foot| support.contains(&foot.0)).collect();
+        self.touches.extend(touching.repeat(knots));
         let last = self.times.last().copied().unwrap_or(0.0);
         self.times.extend((1..=knots).map(|k| last + k as f64 * self.dt));
         self.models.push(Box::new(action));
@@ -154,8 +158,15 @@ impl Gait {
         let contacts = self.contacts(&landing, 0.0);
         self.models.push(Box::new(ImpulseDynamics::new(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
         self.stages.push(self.models.len() - 1);
+        self.touches.extend(vec![true; self.feet.len()]);
         self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact takes no time
         Ok(())
+    }
+
+    /// Whether each foot touches from each knot to the next, in the order of their names.
+    #[allow(dead_code)] // by those who do not track it
+    pub(crate) fn touches(&self) -> Vec<bool> {
+        self.touches.clone()
     }
 
     /// Solves it, with a line for each iteration; returns the solution and the time of each knot.

@@ -58,6 +58,71 @@ compiled! {
         }
     }
 
+    /// x ← L⁻¹ x for the L of an H of which columns were eliminated, with the inverse of L's diagonal; x has slack.
+    pub fn forward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
+        let (m, mut j) = (inverse_diagonal.len(), 0);
+        while j < m {
+            let (width, block) = (V::N.min(m - j), h.at(j, j));
+            let mut y = [0.0; SLACK];
+            for k in 0..width {
+                y[k] += x[j + k];
+                y[k] *= inverse_diagonal[j + k];
+                let column = &block.data[k * h.stride..][..width];
+                for i in k + 1..width {
+                    y[i] -= column[i] * y[k];
+                }
+                x[j + k] = y[k];
+            }
+            let mut i = j + V::N;
+            while i < m {
+                let mut sum = V::load(&x[i..]);
+                for k in 0..V::N {
+                    sum = V::load(&h.data[(j + k) * h.stride + i..]).mul_add(V::splat(-y[k]), sum);
+                }
+                sum.store(&mut x[i..]);
+                i += V::N;
+            }
+            j += V::N;
+        }
+    }
+
+    /// x ← L⁻ᵀ x, as [`forward_solve`]; the slack of x becomes zero.
+    pub fn backward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
+        let m = inverse_diagonal.len();
+        x[m..m + V::N].fill(0.0);
+        let mut block = m.div_ceil(V::N);
+        while block > 0 {
+            block -= 1;
+            let j = block * V::N;
+            let width = V::N.min(m - j);
+            // Σ over the rows below the block, for its columns together.
+            let mut products = [0.0; SLACK];
+            if j + V::N < m {
+                let (mut sums, mut i) = ([V::splat(0.0); SLACK], j + V::N);
+                while i < m {
+                    let x = V::load(&x[i..]);
+                    for k in 0..V::N {
+                        sums[k] = V::load(&h.data[(j + k) * h.stride + i..]).mul_add(x, sums[k]);
+                    }
+                    i += V::N;
+                }
+                V::transpose(&mut sums[..V::N]);
+                let mut sum = sums[0];
+                for k in 1..V::N {
+                    sum = sum.add(sums[k]);
+                }
+                sum.store(&mut products);
+            }
+            for k in (0..width).rev() {
+                let y = (x[j + k] - products[k]) * inverse_diagonal[j + k];
+                for i in 0..k {
+                    products[i] += h.data[(j + i) * h.stride + j + k] * y;
+                }
+                x[j + k] = y;
+            }
+        }
+    }
+
     /// X ← X L⁻¹, for the X in the rows `first`..`rows` of H's first m columns and the L in the lower triangle above them;
     /// `shape` = [first, rows, m]. H has slack rows.
     ///
@@ -183,6 +248,16 @@ mod tests {
                     solve_transposed(&mut x, ldx, below, View::new(&h, stride), m);
                     for (x, h) in x.chunks_exact(ldx).zip(h.chunks_exact(stride)) {
                         assert!(x[..below].iter().zip(&h[m..rows]).all(|(x, h)| (x - h).abs() < TOLERANCE));
+                    }
+
+                    let (mut y, factor) = (vec![0.0; m + SLACK], View::new(&h, stride));
+                    (0..m).for_each(|i| y[i] = entry(i, 3));
+                    let inverse: Vec<f64> = (0..m).map(|i| h[i * stride + i].recip()).collect();
+                    forward_solve(factor, &inverse, &mut y);
+                    backward_solve(factor, &inverse, &mut y);
+                    for i in 0..m {
+                        let b: f64 = (0..m).map(|j| full[(i, j)] * y[j]).sum();
+                        assert!((b - entry(i, 3)).abs() < TOLERANCE * size as f64);
                     }
 
                     let (mut gains, mut upper) = (h.clone(), vec![0.0; (m + SLACK) * m]);

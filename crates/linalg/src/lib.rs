@@ -33,7 +33,7 @@ mod vectors;
 pub use cholesky::Cholesky;
 pub use copy::{copy_lower, copy_matrix, copy_symmetric, transpose, transpose_negated};
 pub use elimination_tree::ColumnTree;
-pub use factor::{eliminate, solve_right, solve_transposed};
+pub use factor::{backward_solve, eliminate, forward_solve, solve_right, solve_transposed};
 pub use ltdl::Ltdl;
 pub use outer::{OuterProducts, SparseRows, block, mask};
 pub use product::{
@@ -42,7 +42,7 @@ pub use product::{
 };
 pub use registers::{Vector, Vectorized, at_level};
 pub use tile::{SLACK, View};
-pub use vectors::{add_scaled_product, copy, copy_scaled, dot, max_abs};
+pub use vectors::{add_product_vector, add_scaled_product, copy, copy_scaled, dot, max_abs, transposed_product_vector};
 
 /// Panics unless an argument has as many numbers as it must have.
 #[doc(hidden)]

@@ -2,7 +2,7 @@
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
-use crate::tile::View;
+use crate::tile::{SLACK, View};
 
 compiled! {
     /// y += α A x.
@@ -13,6 +13,77 @@ compiled! {
                 *y += a * factor;
             }
         }
+    }
+}
+
+compiled! {
+    /// y += A x for an A of `rows` rows; a y of them and of slack.
+    pub fn add_product_vector<V, COLUMNS>(y: &mut [f64], rows: usize, a: View<'_>, x: &[f64]) {
+        let mut i = 0;
+        while i < rows {
+            // Four registers of rows at a time, of which the last ones may be slack beyond one register.
+            if rows - i > 3 * V::N {
+                strip::<V, 4>(&mut y[i..], a, i, x);
+            } else if rows - i > 2 * V::N {
+                strip::<V, 3>(&mut y[i..], a, i, x);
+            } else if rows - i > V::N {
+                strip::<V, 2>(&mut y[i..], a, i, x);
+            } else {
+                strip::<V, 1>(&mut y[i..], a, i, x);
+            }
+            i += 4 * V::N;
+        }
+    }
+
+    /// y = Aᵀ x for an A of `rows` rows, where rows of A and numbers of x beyond them, up to a whole register, multiply to
+    /// zero; A has as many columns as y has numbers, and columns of slack.
+    pub fn transposed_product_vector<V, COLUMNS>(y: &mut [f64], rows: usize, a: View<'_>, x: &[f64]) {
+        let mut k = 0;
+        while k < y.len() {
+            let mut sums = [V::splat(0.0); SLACK];
+            let mut i = 0;
+            while i < rows {
+                let x = V::load(&x[i..]);
+                for kk in 0..V::N {
+                    sums[kk] = V::load(&a.data[(k + kk) * a.stride + i..]).mul_add(x, sums[kk]);
+                }
+                i += V::N;
+            }
+            V::transpose(&mut sums[..V::N]);
+            let mut sum = sums[0];
+            for kk in 1..V::N {
+                sum = sum.add(sums[kk]);
+            }
+            if k + V::N <= y.len() {
+                sum.store(&mut y[k..]);
+            } else {
+                let mut numbers = [0.0; SLACK];
+                sum.store(&mut numbers);
+                for (y, number) in y[k..].iter_mut().zip(numbers) {
+                    *y = number;
+                }
+            }
+            k += V::N;
+        }
+    }
+}
+
+/// y += A[i.., :] x on S registers of rows.
+#[inline(always)]
+fn strip<V: Vector, const S: usize>(y: &mut [f64], a: View<'_>, i: usize, x: &[f64]) {
+    let y = &mut y[..S * V::N];
+    let mut sums = [V::splat(0.0); S];
+    for s in 0..S {
+        sums[s] = V::load(&y[s * V::N..]);
+    }
+    for k in 0..x.len() {
+        let (factor, column) = (V::splat(x[k]), &a.data[k * a.stride + i..][..S * V::N]);
+        for s in 0..S {
+            sums[s] = V::load(&column[s * V::N..]).mul_add(factor, sums[s]);
+        }
+    }
+    for s in 0..S {
+        sums[s].store(&mut y[s * V::N..]);
     }
 }
 
@@ -73,4 +144,42 @@ pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
         i += V::N;
     }
     V::load(&x[last..]).mul(a).store(&mut to[last..]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registers::tests::at_each_level;
+
+    /// Entries of size one, sums of 20 of them: 1e-12 leaves room for rounding and nothing else.
+    const TOLERANCE: f64 = 1e-12;
+
+    #[test]
+    fn products_with_vectors_match_plain_loops() {
+        at_each_level(|| {
+            for (rows, columns) in (1..40).flat_map(|rows| [0, 1, 3, 8, 13].map(|columns| (rows, columns))) {
+                let ld = rows + SLACK;
+                let entry = |i: usize, j: usize| ((i * 31 + j * 17 + 5) % 23) as f64 / 23.0 - 0.4;
+                let mut a = vec![0.0; ld * (columns + SLACK)];
+                for (i, j) in (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j))) {
+                    a[j * ld + i] = entry(i, j);
+                }
+                let x: Vec<f64> = (0..columns).map(|j| entry(7, j)).collect();
+                let mut y = vec![1.0; rows + 4 * SLACK];
+                add_product_vector(&mut y, rows, View::new(&a, ld), &x);
+                for i in 0..rows {
+                    let expected = 1.0 + (0..columns).map(|j| entry(i, j) * x[j]).sum::<f64>();
+                    assert!((y[i] - expected).abs() < TOLERANCE);
+                }
+                let mut x = vec![0.0; rows + SLACK];
+                (0..rows).for_each(|i| x[i] = entry(i, 3));
+                let mut y = vec![f64::NAN; columns];
+                transposed_product_vector(&mut y, rows, View::new(&a, ld), &x);
+                for j in 0..columns {
+                    let expected: f64 = (0..rows).map(|i| entry(i, j) * x[i]).sum();
+                    assert!((y[j] - expected).abs() < TOLERANCE);
+                }
+            }
+        });
+    }
 }

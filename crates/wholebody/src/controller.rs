@@ -1,159 +1,337 @@
-//! The controller: fixes the program once, fills in its numbers at each tick, reads the answer.
+//! The controller: fixes memory once, fills in the numbers at each tick, solves, and looks at what it gives out.
 
+use crate::cone_program::Status as Stopped;
+use crate::contact::FrictionContact;
+use crate::contact_numbers::ContactNumbers;
 use crate::equations::Equations;
 use crate::error::{Error, Status, finite};
-use crate::program::ConeProgram;
+use crate::kinematics::Kinematics;
+use crate::levels::Levels;
+use crate::objective::{Objective, ResolvedTask};
+use crate::plan::{Plan, PlannedState};
+use crate::references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References};
+use crate::safety::Safety;
 use crate::settings::Settings;
-use crate::task::{FrictionContact, References, Tasks};
-use clarabel::solver::DefaultSettings;
-use condyle_dynamics::{Model, neutral};
-use condyle_spatial::Vec3;
+use crate::task::{Task, TaskKind};
+use condyle_dynamics::{Force, Model, Motion, Vec3, neutral};
 use std::fmt;
 
-/// What the robot should do now.
+/// A solution may violate its constraints by this part of 1 and the robot's weight (N, N m, m/s²); more is an error.
+const FEASIBLE: f64 = 1e-6;
+
+/// The weight with which joints that cannot be kept within their limits are pulled back.
+const PULL: f64 = 1e3;
+
+/// From where a command comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommandSource {
+    /// The program's solution; or, where the solver did not finish, an iterate that holds all constraints.
+    Solution,
+    /// The last solution, at most [`Settings::hold_ticks`] old.
+    LastSolution,
+    /// Gravity compensation with damping.
+    GravityCompensation,
+}
+
+/// What the robot should do now. Its numbers are finite, and `tau` is within the limits, whatever the status says.
 ///
 /// Constraints hold to the solver's tolerance: with the default, a force may leave its cone by some 1e-7 N.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command {
+    /// How the step ended.
+    pub status: Status,
+    /// From where the command comes.
+    pub source: CommandSource,
     /// τ, the efforts of the motors: nv numbers (N m, N), 0 at a free-flyer.
     pub tau: Vec<f64>,
-    /// q̈, the acceleration that follows if the contacts hold: nv numbers (rad/s², m/s²).
+    /// q̈, the acceleration that follows if the contacts hold: nv numbers (rad/s², m/s²). Of a safe command, the last one's.
     pub a: Vec<f64>,
-    /// f, what the environment then does to the robot at each contact, in the world's frame (N).
-    pub forces: Vec<Vec3<f64>>,
-    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²).
+    /// What the environment then does to the robot at each contact, about the frame's origin along the world's axes (N,
+    /// N m). Of a safe command, the last one's.
+    pub forces: Vec<Force<f64>>,
+    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²). Of a safe command, the last one's.
     pub com_acceleration: Vec3<f64>,
+    /// The violation of the worst constraint (N, N m, m/s²). Of a safe command, the last one's.
+    pub violation: f64,
     /// Iterations of the solver.
     pub iterations: u32,
-    /// Whether the solver fell short of [`Settings::tolerance`] and met only its reduced one (feasibility 1e-4).
+    /// Whether the solver fell short of [`Settings::tolerance`] and met only its reduced one.
     pub reduced_accuracy: bool,
+    /// Whether the limits of joints had to give way to dynamics, contacts and torques.
+    pub limits_relaxed: bool,
 }
 
-/// A whole-body controller: one cone program for each tick, stated in the [crate's documentation](crate).
+impl Command {
+    /// The command if it was solved, else why not.
+    ///
+    /// # Errors
+    /// The status, unless it is [`Status::Solved`].
+    pub fn solved(&self) -> Result<&Self, Status> {
+        if self.status == Status::Solved { Ok(self) } else { Err(self.status) }
+    }
+}
+
+/// A whole-body controller: one cone program for each tick and priority, stated in the [crate's documentation](crate).
 ///
 /// ```
 /// use condyle_dynamics::robots;
-/// use condyle_wholebody::{FrictionContact, Settings, Tasks, WholeBodyController};
+/// use condyle_wholebody::{FrictionContact, Settings, Task, WholeBodyController};
 /// let robot = robots::quadruped();
-/// let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|foot| FrictionContact::new(foot, 0.7));
-/// let mut controller = WholeBodyController::new(&robot, &feet, Tasks::default(), Settings::default())?;
+/// let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|foot| FrictionContact::point(foot, 0.7));
+/// let tasks = [Task::com(), Task::orientation("trunk"), Task::posture()];
+/// let mut controller = WholeBodyController::new(&robot, &feet, &tasks, Settings::default())?;
 /// // Knees inwards, feet on the ground.
 /// let mut q = vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0];
 /// q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
 /// let references = controller.hold(&q);
-/// let command = controller.step(&q, &[0.0; 18], &references)?;
-/// let lift: f64 = command.forces.iter().map(|f| f.z).sum();
+/// let command = controller.step(&q, &[0.0; 18], &references).solved()?;
+/// let lift: f64 = command.forces.iter().map(|f| f.linear.z).sum();
 /// assert!((lift - 9.81 * robot.total_mass()).abs() < 0.1); // the feet carry the weight
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct WholeBodyController {
+    settings: Settings,
     equations: Equations,
-    program: ConeProgram,
+    objective: Objective,
+    levels: Levels,
+    safety: Safety,
     command: Command,
+    /// Scratch: the state of a plan.
+    planned: PlannedState,
 }
 
 impl WholeBodyController {
-    /// Checks everything, fixes sparsity and memory.
+    /// Checks everything and fixes memory. Contacts may be none: a robot in free fall.
     ///
     /// # Errors
-    /// [`Error`] for an unknown frame, an empty list of contacts or one that names a frame twice, and for any number
-    /// outside of its range.
-    pub fn new(model: &Model, contacts: &[FrictionContact], tasks: Tasks, settings: Settings) -> Result<Self, Error> {
-        if contacts.is_empty() {
-            return Err(Error::NoContacts);
-        }
-        contacts.iter().try_for_each(FrictionContact::check)?;
-        tasks.check()?;
+    /// [`Error`] for an unknown frame, a contact that names a frame twice, and for any number outside of its range.
+    pub fn new(model: &Model, contacts: &[FrictionContact], tasks: &[Task], settings: Settings) -> Result<Self, Error> {
+        tasks.iter().try_for_each(|task| task.check(model.nv()))?;
         settings.check(model)?;
-        let names = contacts.iter().map(|c| &c.frame).chain(tasks.frames.iter().map(|t| &t.frame));
-        let frames = names.map(|name| model.frame(name)).collect::<Result<Vec<_>, _>>()?;
-        let (touching, _) = frames.split_at(contacts.len());
-        if let Some(k) = (1..touching.len()).find(|&k| touching[..k].contains(&touching[k])) {
-            return Err(Error::DuplicateContact { frame: contacts[k].frame.clone() });
+        // each frame once: those of contacts, of tasks, and of their axes
+        let mut frames: Vec<usize> = Vec::new();
+        let mut place = |name: &str| -> Result<usize, Error> {
+            let frame = model.frame(name)?;
+            Ok(frames.iter().position(|&f| f == frame).unwrap_or_else(|| {
+                frames.push(frame);
+                frames.len() - 1
+            }))
+        };
+        let mut touching: Vec<ContactNumbers> = Vec::new();
+        for contact in contacts {
+            let frame = place(&contact.frame)?;
+            if touching.iter().any(|c| c.frame == frame) {
+                return Err(Error::DuplicateContact { frame: contact.frame.clone() });
+            }
+            touching.push(ContactNumbers::new(contact, contact.check()?, frame, model.nv()));
+        }
+        let mut resolved: Vec<ResolvedTask> = Vec::new();
+        for task in tasks {
+            let frame = task.kind.frame().map(&mut place).transpose()?;
+            let axes = ResolvedTask::axes_name(task).map(&mut place).transpose()?;
+            let contact = match &task.kind {
+                TaskKind::ContactForce(name) => {
+                    let frame = place(name)?;
+                    let missing = || Error::NoSuchContact { frame: name.clone() };
+                    Some(touching.iter().position(|c| c.frame == frame).ok_or_else(missing)?)
+                }
+                _ => None,
+            };
+            let target = resolved.iter().filter(|task| task.frame.is_some()).count();
+            resolved.push(ResolvedTask { task: task.clone(), frame, target, axes, contact });
         }
 
-        let solver = DefaultSettings {
-            tol_feas: settings.tolerance,
-            tol_gap_abs: settings.tolerance,
-            tol_gap_rel: settings.tolerance,
-            max_iter: settings.max_iterations,
-            time_limit: settings.time_limit,
-            // Refined as far as asked for: clarabel's own 1e-13 costs a sixth of the time.
-            iterative_refinement_reltol: settings.tolerance,
-            iterative_refinement_abstol: settings.tolerance,
-            ..DefaultSettings::default()
+        let kinematics = Kinematics::new(model, &frames);
+        let unknowns = model.nv() + touching.iter().map(|c| c.geometry.unknowns()).sum::<usize>();
+        let objective = Objective::new(resolved, model.nv(), unknowns);
+        let rows: Vec<usize> = objective.levels.iter().map(|level| level.b.len()).collect();
+        let held = match rows.len() {
+            1 => 0,
+            priorities => rows.iter().sum::<usize>() + (priorities - 1) * model.nv(),
         };
-        let mut equations = Equations::new(model, contacts, tasks, settings, &frames);
-        let bodies: Vec<usize> = touching.iter().map(|&f| model.frames()[f].body).collect();
-        let (nv, in_A) = (model.nv(), equations.rows.pattern(model, &bodies));
-        let in_P = |i: usize, j: usize| i == j || (i < nv && j < nv);
-        // The solver takes the scales of rows and columns from here and keeps them.
-        let q = neutral(model);
-        let references = equations.hold(&q);
-        equations.update(&q, &references.posture.v, &references);
-        let cones = equations.rows.cones();
-        let program = ConeProgram::new(&equations.numbers, in_P, |i, j| in_A[i][j], &cones, solver);
         let command = Command {
-            tau: vec![0.0; nv],
-            a: vec![0.0; nv],
-            forces: vec![Vec3::zero(); contacts.len()],
+            status: Status::Solved,
+            source: CommandSource::GravityCompensation,
+            tau: vec![0.0; model.nv()],
+            a: vec![0.0; model.nv()],
+            forces: vec![Force::zero(); contacts.len()],
             com_acceleration: Vec3::zero(),
+            violation: 0.0,
             iterations: 0,
             reduced_accuracy: false,
+            limits_relaxed: false,
         };
-        Ok(Self { equations, program, command })
+        let Settings { damping, hold_ticks, .. } = settings;
+        let safety = Safety::new(&kinematics, &neutral(model), settings.effort(model), damping, hold_ticks);
+        let equations = Equations::new(kinematics, touching, &settings, held);
+        let levels = Levels::new(equations.program.capacity(), &rows, &settings);
+        let planned = PlannedState { q: neutral(model), v: vec![0.0; model.nv()], a: vec![0.0; model.nv()] };
+        Ok(Self { settings, equations, objective, levels, safety, command, planned })
     }
 
-    /// The references that keep the position q at rest: all tasks where they are, each contact held where it is, the
-    /// weight shared by the contacts in equal parts.
+    /// The references that keep the position q at rest: all tasks where they are, each contact held where it is and
+    /// touching, the weight shared by the contacts in equal parts.
     ///
     /// q: nq numbers.
     ///
     /// # Panics
     /// If `q` has not nq numbers.
     pub fn hold(&mut self, q: &[f64]) -> References {
-        check("q", q.len(), self.equations.model().nq());
-        self.equations.hold(q)
+        let k = &mut self.equations.kinematics;
+        check("q", q.len(), k.model.nq());
+        let rest = vec![0.0; k.model.nv()];
+        k.update(q, &rest);
+        let share = k.model.gravity().scale(-k.mass / self.equations.contacts.len() as f64);
+        let (zero, still) = (Vec3::zero(), Motion::zero());
+        let moved = self.objective.tasks.iter().filter_map(|task| task.frame);
+        let target = |frame: usize| FrameTarget { pose: k.frames[frame].pose, velocity: still, acceleration: still };
+        let contact = |c: &ContactNumbers| {
+            let force = Force::new(share, c.centre_arm(&k.frames[c.frame]).cross(share));
+            ContactTarget { activation: 1.0, pose: k.frames[c.frame].pose, force }
+        };
+        References {
+            com: ComTarget { position: k.com, velocity: zero, acceleration: zero },
+            frames: moved.map(target).collect(),
+            posture: PostureTarget { q: q.to_vec(), v: rest.clone(), a: rest },
+            momentum: MomentumTarget { momentum: zero, rate: zero },
+            contacts: self.equations.contacts.iter().map(contact).collect(),
+        }
     }
 
-    /// Efforts, acceleration and contact forces at the state (q, v), by one solve.
+    /// The references of a plan at a time: joints, and where they bring centre of mass, momentum and frames; contacts by
+    /// their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
     ///
-    /// q: nq numbers; v: nv. The command stays readable as [`command`](Self::command). Allocates once, inside clarabel.
+    /// # Panics
+    /// If the references or the plan were made for another controller.
+    pub fn track(&mut self, plan: &Plan, t: f64, references: &mut References) {
+        let Self { equations: Equations { kinematics: k, contacts, .. }, objective, planned, .. } = self;
+        check("references.contacts", references.contacts.len(), contacts.len());
+        plan.read(t, planned, &mut objective.error);
+        let PlannedState { q, v, a } = planned;
+        k.update(q, v);
+        references.posture.q.copy_from_slice(q);
+        references.posture.v.copy_from_slice(v);
+        references.posture.a.copy_from_slice(a);
+        let mut rate = k.momentum_drift.to_array();
+        for (A, &a) in k.Ag.as_slice().chunks_exact(6).zip(a.iter()) {
+            (0..6).for_each(|i| rate[i] += A[i] * a);
+        }
+        let [x, y, z, l, m, n] = rate;
+        let acceleration = Vec3::new(x, y, z).scale(1.0 / k.mass);
+        references.com = ComTarget { position: k.com, velocity: k.com_velocity, acceleration };
+        references.momentum = MomentumTarget { momentum: k.momentum.angular, rate: Vec3::new(l, m, n) };
+        let moved = objective.tasks.iter().filter_map(|task| task.frame);
+        for (target, frame) in references.frames.iter_mut().zip(moved) {
+            let frame = &k.frames[frame];
+            let mut acceleration = frame.drift.to_array();
+            for &j in &frame.support {
+                (0..6).for_each(|i| acceleration[i] += frame.J[(i, j)] * a[j]);
+            }
+            let [x, y, z, l, m, n] = acceleration;
+            let acceleration = Motion::new(Vec3::new(x, y, z), Vec3::new(l, m, n));
+            *target = FrameTarget { pose: frame.pose, velocity: frame.velocity, acceleration };
+        }
+        for (i, target) in references.contacts.iter_mut().enumerate() {
+            target.activation = plan.activation(i, t);
+        }
+        let sum: f64 = references.contacts.iter().map(|c| c.activation).sum();
+        let force = (acceleration - *k.model.gravity()).scale(k.mass / sum.max(1e-3));
+        for (target, contact) in references.contacts.iter_mut().zip(contacts) {
+            let (frame, share) = (&k.frames[contact.frame], force.scale(target.activation));
+            target.pose = frame.pose;
+            target.force = Force::new(share, contact.centre_arm(frame).cross(share));
+        }
+    }
+
+    /// Efforts, acceleration and contact forces at the state (q, v). There always is a command: without a solution it is a
+    /// safe one, and its status says why.
     ///
-    /// # Errors
-    /// [`Status`] if q, v or the references are not finite, or the program was not solved.
+    /// q: nq numbers; v: nv. The command stays readable as [`command`](Self::command). Allocates nothing with
+    /// [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of contacts.
     ///
     /// # Panics
     /// If `q`, `v` or a list of the references has the wrong length.
-    pub fn step(&mut self, q: &[f64], v: &[f64], references: &References) -> Result<&Command, Status> {
-        let Self { equations, program, command } = self;
-        let (nq, nv) = (equations.model().nq(), equations.model().nv());
+    pub fn step(&mut self, q: &[f64], v: &[f64], references: &References) -> &Command {
+        let (nq, nv) = (self.equations.model().nq(), self.equations.model().nv());
+        let moved = self.objective.tasks.iter().filter(|task| task.frame.is_some()).count();
         check("q", q.len(), nq);
         check("v", v.len(), nv);
         check("references.posture.q", references.posture.q.len(), nq);
         check("references.posture.v", references.posture.v.len(), nv);
         check("references.posture.a", references.posture.a.len(), nv);
-        check("references.contacts", references.contacts.len(), equations.rows.axes.len());
-        check("references.frames", references.frames.len(), equations.tasked_frames());
-        finite("q", q.iter().copied())?;
-        finite("v", v.iter().copied())?;
-        references.finite()?;
+        check("references.contacts", references.contacts.len(), self.equations.contacts.len());
+        check("references.frames", references.frames.len(), moved);
 
-        equations.update(q, v, references);
-        let outcome = program.solve(&equations.numbers);
-        match outcome.stopped {
-            None | Some(Status::IterationLimit | Status::TimeLimit) => {
-                command.iterations = outcome.iterations;
-                command.reduced_accuracy = outcome.reduced;
-                equations.read(outcome.x, command);
+        let state = finite("q", q.iter().copied()).and_then(|()| finite("v", v.iter().copied()));
+        self.safety.see(state.is_ok().then_some((q, v)));
+        let status = match state.and_then(|()| references.finite()) {
+            Ok(()) => self.solve(q, v, references),
+            Err(status) => {
+                self.command.iterations = 0;
+                Err(status)
             }
-            Some(_) => {}
+        };
+        match status {
+            Ok(status) => {
+                self.command.status = status;
+                self.command.source = CommandSource::Solution;
+                self.safety.keep(&self.command.tau);
+            }
+            Err(status) => {
+                self.command.status = status;
+                let Equations { kinematics, contacts, free, .. } = &mut self.equations;
+                let last = self.safety.command(kinematics, contacts, free, &mut self.command.tau);
+                self.command.source =
+                    if last { CommandSource::LastSolution } else { CommandSource::GravityCompensation };
+            }
         }
-        outcome.stopped.map_or(Ok(&self.command), Err)
+        &self.command
     }
 
-    /// The last command; after [`Status::IterationLimit`] and [`Status::TimeLimit`] the last iterate, which may violate
-    /// every constraint; zeros before the first step.
+    /// Fills in the command; `Err` if there is nothing that holds all constraints.
+    fn solve(&mut self, q: &[f64], v: &[f64], references: &References) -> Result<Status, Status> {
+        let Self { settings, equations, objective, levels, safety, command, .. } = self;
+        equations.update(q, v, references, settings);
+        let n = equations.program.size.unknowns;
+        let Equations { kinematics, contacts, actuated, .. } = &*equations;
+        objective.update(q, v, kinematics, contacts, references, settings, actuated, n);
+
+        let (mut outcome, mut done) = levels.solve(&mut equations.program, equations.limited.len(), &objective.levels);
+        let failed = matches!(outcome.stopped, Some(Stopped::Infeasible | Stopped::NumericalError)) && done == 0;
+        command.limits_relaxed = failed && !equations.bounds.bounds.is_empty();
+        if command.limits_relaxed {
+            equations.relax(&mut objective.levels[0], PULL);
+            let iterations = outcome.iterations;
+            (outcome, done) = levels.solve(&mut equations.program, equations.limited.len(), &objective.levels);
+            outcome.iterations += iterations;
+        }
+        command.iterations = outcome.iterations;
+        command.reduced_accuracy = outcome.reduced;
+        let status = outcome.stopped.map_or(Status::Solved, Status::from);
+        // An iterate that holds all constraints, or what a former priority found, is as good as any.
+        let may_serve = done > 0 || matches!(status, Status::IterationLimit | Status::TimeLimit);
+        let x = &levels.x[..n];
+        let violation = equations.violation(x);
+        let holds = violation <= FEASIBLE * (1.0 + equations.weight) && x.iter().all(|x| x.is_finite());
+        if !(may_serve && holds) {
+            return Err(if status == Status::Solved { Status::NumericalError } else { status });
+        }
+        command.violation = violation;
+        command.a.copy_from_slice(&x[..v.len()]);
+        for (force, contact) in command.forces.iter_mut().zip(&equations.contacts) {
+            *force = contact.read(x);
+        }
+        equations.effort(x, &mut command.tau); // τ = M q̈ + h − Jᵀ f
+        safety.clip(&mut command.tau);
+        let (k, mut rate) = (&equations.kinematics, [0.0; 3]);
+        for (A, a) in k.Ag.as_slice().chunks_exact(6).zip(x) {
+            (0..3).for_each(|i| rate[i] += A[i] * a);
+        }
+        command.com_acceleration = Vec3::from(rate).scale(1.0 / k.mass) + k.com_drift; // c̈ = J q̈ + J̇ v
+        Ok(status)
+    }
+
+    /// The last command; before the first step zeros.
     pub fn command(&self) -> &Command {
         &self.command
     }

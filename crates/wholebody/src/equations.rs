@@ -1,230 +1,172 @@
-//! The numbers of the cone program at one state: each block beside its equation.
+//! The program's constraints at one state: each block beside its equation. x = (q̈, the forces of the active contacts).
 
-use crate::controller::Command;
-use crate::kinematics::{FrameMotion, Kinematics};
-use crate::program::Numbers;
-use crate::rows::Rows;
-use crate::settings::Settings;
-use crate::task::{ComTarget, ContactTarget, FrameTarget, FrictionContact, Gains, PostureTarget, References, Tasks};
-use condyle_dynamics::{Data, Model, crba, difference, lie, nonlinear_effects};
-use condyle_spatial::{Mat3, Motion, Quaternion, Vec3};
+use crate::cone_program::{ConeProgram, Size};
+use crate::contact_numbers::ContactNumbers;
+use crate::kinematics::Kinematics;
+use crate::least_squares::LeastSquares;
+use crate::limits::AccelerationBounds;
+use crate::references::References;
+use crate::settings::{Friction, Settings};
+use condyle_dynamics::{Joint, Model};
 use nalgebra::DMatrix;
 
-/// All that the numbers are computed from, and in. x = (q̈, f₁ … f_k).
+/// Below this activation a contact is off: what it could carry would be lost in the solver's tolerance.
+const LEAST_ACTIVATION: f64 = 1e-6;
+
+/// All that the constraints are computed from, and in.
 pub(crate) struct Equations {
-    model: Model,
-    contacts: Vec<FrictionContact>,
-    tasks: Tasks,
-    settings: Settings,
-    pub rows: Rows,
-    data: Data<f64>,
-    /// Its frames: the contacts, then those of the tasks.
-    kinematics: Kinematics,
-    /// τ = E x + h with E = [M, −Jᵀ], nv × (nv + 3 k).
-    E: DMatrix<f64>,
-    h: Vec<f64>,
-    /// q_ref ⊖ q, nv numbers.
-    error: Vec<f64>,
-    pub numbers: Numbers,
+    pub kinematics: Kinematics,
+    pub contacts: Vec<ContactNumbers>,
+    /// Coordinates of free-flyers, on which no motor acts.
+    pub free: Vec<usize>,
+    /// The other coordinates.
+    pub actuated: Vec<usize>,
+    /// Coordinates with a limited motor, and the limit.
+    pub limited: Vec<(usize, f64)>,
+    pub bounds: AccelerationBounds,
+    /// Eᵀ of τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate.
+    pub Et: DMatrix<f64>,
+    /// Constraints of the whole program; P and c are the solver's affair.
+    pub program: ConeProgram,
+    /// ‖g‖ times the mass (N).
+    pub weight: f64,
 }
 
 impl Equations {
-    /// `frames`: the numbers of the contacts' frames, then of the tasks'.
-    pub(crate) fn new(
-        model: &Model,
-        contacts: &[FrictionContact],
-        tasks: Tasks,
-        settings: Settings,
-        frames: &[usize],
-    ) -> Self {
-        let rows = Rows::new(model, contacts, settings.effort(model));
-        let (nv, n) = (model.nv(), rows.force(contacts.len()));
-        let mut numbers = Numbers::zeros(rows.count(), n);
-        fill_constant_rows(&mut numbers, &rows, contacts);
-        Self {
-            model: model.clone(),
-            contacts: contacts.to_vec(),
-            tasks,
-            settings,
-            rows,
-            data: Data::new(model),
-            kinematics: Kinematics::new(model, frames.iter().copied()),
-            E: DMatrix::zeros(nv, n),
-            h: vec![0.0; nv],
-            error: vec![0.0; nv],
-            numbers,
-        }
+    /// With room for some more equalities.
+    pub(crate) fn new(kinematics: Kinematics, contacts: Vec<ContactNumbers>, settings: &Settings, held: usize) -> Self {
+        let model = &kinematics.model;
+        let nv = model.nv();
+        let free_flyers = model.bodies().iter().skip(1).filter(|b| b.joint == Joint::FreeFlyer);
+        let free: Vec<usize> = free_flyers.flat_map(|b| b.idx_v..b.idx_v + 6).collect();
+        let actuated: Vec<usize> = (0..nv).filter(|i| !free.contains(i)).collect();
+        let effort = settings.effort(model);
+        let limited: Vec<_> = actuated.iter().map(|&i| (i, effort[i])).filter(|l| l.1.is_finite()).collect();
+        let bounds = AccelerationBounds::new(model, settings.joint_limits.as_ref());
+        let unknowns = nv + contacts.iter().map(|c| c.geometry.unknowns()).sum::<usize>();
+        let of_forces: usize = contacts.iter().map(|c| c.max_rows(settings.friction)).sum();
+        let cones: usize = contacts.iter().map(|c| c.geometry.cones()).sum();
+        let capacity = Size {
+            unknowns,
+            equalities: free.len() + contacts.iter().map(|c| c.geometry.motion.len()).sum::<usize>() + held,
+            rows: limited.len() + bounds.bounds.len() + of_forces,
+            cone_rows: if settings.friction == Friction::Cone { 3 * cones } else { 0 },
+        };
+        let weight = kinematics.mass * model.gravity().norm_squared().sqrt();
+        let (Et, program) = (DMatrix::zeros(unknowns, nv), ConeProgram::new(capacity));
+        Self { free, actuated, limited, bounds, Et, program, weight, contacts, kinematics }
     }
 
     pub(crate) fn model(&self) -> &Model {
-        &self.model
+        &self.kinematics.model
     }
 
-    /// How many frames the tasks move.
-    pub(crate) fn tasked_frames(&self) -> usize {
-        self.tasks.frames.len()
-    }
-
-    /// Reads x = (q̈, f).
-    pub(crate) fn read(&self, x: &[f64], command: &mut Command) {
-        let Self { rows, E, h, kinematics: Kinematics { com, .. }, .. } = self;
-        command.a.copy_from_slice(&x[..h.len()]);
-        for (k, f) in command.forces.iter_mut().enumerate() {
-            let i = rows.force(k);
-            *f = Vec3::new(x[i], x[i + 1], x[i + 2]);
-        }
-        let row = |m: &DMatrix<f64>, i: usize| (0..m.ncols()).map(|j| m[(i, j)] * x[j]).sum::<f64>();
-        for &i in &rows.actuated {
-            command.tau[i] = row(E, i) + h[i]; // τ = M q̈ + h − Jᵀ f
-        }
-        let Jx = Vec3::new(row(&com.J, 0), row(&com.J, 1), row(&com.J, 2));
-        command.com_acceleration = Jx + com.bias; // c̈ = J q̈ + J̇ v
-    }
-
-    /// The references that keep the position q at rest, the weight shared by all contacts.
-    pub(crate) fn hold(&mut self, q: &[f64]) -> References {
-        let rest = vec![0.0; self.model.nv()];
-        self.kinematics.update(&self.model, &mut self.data, q, &rest);
-        let Kinematics { com, frames, mass, .. } = &self.kinematics;
-        let (contacts, frames) = frames.split_at(self.contacts.len());
-        let share = self.model.gravity().scale(-mass / contacts.len() as f64);
-        let zero = Motion::zero();
-        References {
-            com: ComTarget { position: com.position, velocity: Vec3::zero(), acceleration: Vec3::zero() },
-            frames: frames.iter().map(|f| FrameTarget { pose: f.pose, velocity: zero, acceleration: zero }).collect(),
-            posture: PostureTarget { q: q.to_vec(), v: rest.clone(), a: rest },
-            contacts: contacts.iter().map(|c| ContactTarget { position: c.pose.translation, force: share }).collect(),
-        }
-    }
-
-    /// Computes all numbers at (q, v).
-    pub(crate) fn update(&mut self, q: &[f64], v: &[f64], references: &References) {
-        let Self { model, data, kinematics, E, h, .. } = self;
-        kinematics.update(model, data, q, v);
-        let nv = model.nv();
-        E.columns_mut(0, nv).copy_from(crba(model, data, q));
-        for (k, contact) in kinematics.frames[..self.contacts.len()].iter().enumerate() {
-            let column = self.rows.force(k);
-            E.columns_mut(column, 3).tr_copy_from(&contact.J.rows(0, 3));
-            E.columns_mut(column, 3).neg_mut();
-        }
-        h.copy_from_slice(nonlinear_effects(model, data, q, v));
-        self.objective(q, v, references);
-        self.constraints(references);
-    }
-
-    /// ½ xᵀ P x + cᵀ x = Σ ½ w (J q̈ + J̇ v − a*)² + ½ w_a ‖q̈‖² + ½ w_f Σ ‖f − f_ref‖², up to a constant.
-    fn objective(&mut self, q: &[f64], v: &[f64], references: &References) {
-        let Self { tasks, settings, rows, kinematics, numbers, error, model, .. } = self;
-        let (nv, contacts) = (model.nv(), self.contacts.len());
-        numbers.P.fill(0.0);
-        numbers.c.fill(0.0);
-
-        let (com, target) = (&kinematics.com, &references.com);
-        let Gains { stiffness, damping } = tasks.com.gains;
-        let a = target.acceleration
-            + (target.position - com.position).scale(stiffness) // a* = a_ref + k (c_ref − c)
-            + (target.velocity - com.velocity).scale(damping); //           + d (ċ_ref − ċ)
-        let b = (a - com.bias).to_array(); // J q̈ = a* − J̇ v
-        for (r, w) in tasks.com.weight.to_array().into_iter().enumerate() {
-            add_task(numbers, w, &com.J, r, b[r]);
-        }
-
-        for ((task, frame), target) in tasks.frames.iter().zip(&kinematics.frames[contacts..]).zip(&references.frames) {
-            let Gains { stiffness, damping } = task.gains;
-            let a = target.acceleration
-                + pose_error(frame, target).scale(stiffness) // a* = a_ref + k (X_ref ⊖ X)
-                + (target.velocity - frame.velocity).scale(damping); //    + d (v_ref − v)
-            let b = (a - frame.bias).to_array();
-            for (r, w) in Motion::new(task.linear, task.angular).to_array().into_iter().enumerate() {
-                add_task(numbers, w, &frame.J, r, b[r]);
+    /// Computes all constraints at (q, v).
+    pub(crate) fn update(&mut self, q: &[f64], v: &[f64], references: &References, settings: &Settings) {
+        let Self { kinematics, contacts, bounds, Et, program, .. } = self;
+        kinematics.update(q, v);
+        let nv = v.len();
+        let mut unknowns = nv;
+        for (contact, target) in contacts.iter_mut().zip(&references.contacts) {
+            contact.active = target.activation > LEAST_ACTIVATION;
+            if contact.active {
+                contact.column = unknowns;
+                unknowns += contact.geometry.unknowns();
+                contact.update(&kinematics.frames[contact.frame], target, settings, self.weight);
             }
         }
-
-        let PostureTarget { q: q_ref, v: v_ref, a: a_ref } = &references.posture;
-        difference(model, q, q_ref, error); // q_ref ⊖ q
-        let Gains { stiffness, damping } = tasks.posture.gains;
-        for &i in &rows.actuated {
-            let a = a_ref[i] + stiffness * error[i] + damping * (v_ref[i] - v[i]);
-            numbers.P[(i, i)] += tasks.posture.weight; // ½ w (q̈_i − a*_i)²
-            numbers.c[i] -= tasks.posture.weight * a;
-        }
+        program.size = Size { unknowns, equalities: 0, rows: 0, cone_rows: 0 };
+        program.cones.clear();
 
         for i in 0..nv {
-            numbers.P[(i, i)] += settings.acceleration_weight; // ½ w_a q̈_i²
+            Et.column_mut(i).rows_mut(0, nv).copy_from(&kinematics.M.column(i));
+            Et.column_mut(i).rows_mut(nv, unknowns - nv).fill(0.0);
         }
-        for (k, target) in references.contacts.iter().enumerate() {
-            for (r, f) in target.force.to_array().into_iter().enumerate() {
-                let i = rows.force(k) + r;
-                numbers.P[(i, i)] += settings.force_weight; // ½ w_f (f_i − f_ref,i)²
-                numbers.c[i] -= settings.force_weight * f;
+        for contact in contacts.iter().filter(|contact| contact.active) {
+            contact.add_effort(&kinematics.frames[contact.frame].support, Et);
+        }
+
+        for &i in &self.free {
+            let e = program.size.equalities;
+            program.At.column_mut(e).rows_mut(0, unknowns).copy_from(&Et.column(i).rows(0, unknowns));
+            program.b[e] = -kinematics.h[i]; // M q̈ − Jᵀ f = −h: no motor acts on the base
+            program.size.equalities += 1;
+        }
+        for contact in contacts.iter().filter(|contact| contact.active) {
+            contact.add_equalities(program); // J q̈ = a* − J̇ v
+        }
+
+        for (row, &(i, limit)) in self.limited.iter().enumerate() {
+            program.Gt.column_mut(row).rows_mut(0, unknowns).copy_from(&Et.column(i).rows(0, unknowns));
+            let h = kinematics.h[i];
+            (program.lower[row], program.upper[row]) = (-limit - h, limit - h); // −τ̄ ≤ E x + h ≤ τ̄
+        }
+        bounds.update(q, v);
+        for (k, &(i, lower, upper)) in bounds.bounds.iter().enumerate() {
+            let row = self.limited.len() + k;
+            program.Gt.column_mut(row).rows_mut(0, unknowns).fill(0.0);
+            program.Gt[(i, row)] = 1.0; // position and velocity, as bounds on q̈
+            (program.lower[row], program.upper[row]) = (lower, upper);
+        }
+        program.size.rows = self.limited.len() + bounds.bounds.len();
+        for contact in contacts.iter().filter(|contact| contact.active) {
+            contact.add_force_rows(program, settings.friction);
+        }
+    }
+
+    /// τ = E x + h of the actuated coordinates.
+    pub(crate) fn effort(&self, x: &[f64], tau: &mut [f64]) {
+        for &i in &self.actuated {
+            tau[i] = self.kinematics.h[i] + dot(self.Et.column(i).as_slice(), x);
+        }
+    }
+
+    /// Takes the joints' limits out of the rows; joints that should be led back become tasks of such a weight.
+    pub(crate) fn relax(&mut self, objective: &mut LeastSquares, weight: f64) {
+        for (k, &(i, lower, upper)) in self.bounds.bounds.iter().enumerate() {
+            let row = self.limited.len() + k;
+            (self.program.lower[row], self.program.upper[row]) = (f64::NEG_INFINITY, f64::INFINITY);
+            if lower > 0.0 || upper < 0.0 {
+                objective.add_single(i, weight, if lower > 0.0 { lower } else { upper });
             }
         }
     }
 
-    /// The rows of A x + s = b that depend on the state.
-    fn constraints(&mut self, references: &References) {
-        let Self { rows, kinematics, E, h, numbers: Numbers { A, b, .. }, settings, model, .. } = self;
-        for (r, &i) in rows.free.iter().enumerate() {
-            A.row_mut(r).copy_from(&E.row(i)); // M q̈ − Jᵀ f = −h: no motor acts on the base
-            b[r] = -h[i];
+    /// By how much x violates the worst of its rows and cones, and of the equalities, in their units.
+    pub(crate) fn violation(&self, x: &[f64]) -> f64 {
+        let p = &self.program;
+        let stride = p.At.nrows();
+        let product = |matrix: &DMatrix<f64>, column: usize| -> f64 { dot(&matrix.as_slice()[column * stride..], x) };
+        let unit = self.limited.len()..self.limited.len() + self.bounds.bounds.len();
+        let larger = |worst: f64, x: f64| if x > worst || x.is_nan() { x } else { worst };
+        let mut worst = 0.0;
+        for e in 0..p.size.equalities {
+            worst = larger(worst, (product(&p.At, e) - p.b[e]).abs());
         }
-        let Gains { stiffness, damping } = settings.contact_gains;
-        for (k, (contact, target)) in kinematics.frames.iter().zip(&references.contacts).enumerate() {
-            let r = rows.held(k);
-            A.view_mut((r, 0), (3, model.nv())).copy_from(&contact.J.rows(0, 3));
-            let a = (target.position - contact.pose.translation).scale(stiffness) // J q̈ + J̇ v = k (p_ref − p) − d ṗ
-                - contact.velocity.linear.scale(damping);
-            b[r..r + 3].copy_from_slice(&(a - contact.bias.linear).to_array());
+        for r in 0..p.size.rows {
+            let y = if unit.contains(&r) { x[self.bounds.bounds[r - unit.start].0] } else { product(&p.Gt, r) };
+            worst = larger(larger(worst, y - p.upper[r]), p.lower[r] - y);
         }
-        for (l, &(i, limit)) in rows.limited.iter().enumerate() {
-            let r = rows.limit(l);
-            A.row_mut(r).copy_from(&E.row(i)); // τ = E x + h ≤ τ̄
-            b[r] = limit - h[i];
-            A.row_mut(r + 1).copy_from(&E.row(i)); // −τ ≤ τ̄
-            A.row_mut(r + 1).neg_mut();
-            b[r + 1] = limit + h[i];
+        let mut first = 0;
+        for &dimension in &p.cones {
+            let s = |i: usize| p.h[first + i] + product(&p.Ft, first + i);
+            let tail = (1..dimension).map(|i| s(i) * s(i)).sum::<f64>().sqrt();
+            worst = larger(worst, tail - s(0));
+            first += dimension;
         }
+        worst
     }
 }
 
-/// The rows that are the same in every state: those of the forces.
-fn fill_constant_rows(numbers: &mut Numbers, rows: &Rows, contacts: &[FrictionContact]) {
-    let Numbers { A, b, .. } = numbers;
-    let mut fill = |row: usize, k: usize, direction: Vec3<f64>| {
-        for (r, x) in direction.to_array().into_iter().enumerate() {
-            A[(row, rows.force(k) + r)] = x;
+/// xᵀ y for the numbers of the shorter y, in eight sums side by side.
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let x = &x[..y.len()];
+    let ((xs, x), (ys, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (x, y) in xs.iter().zip(ys) {
+        for i in 0..8 {
+            sums[i] += x[i] * y[i];
         }
-    };
-    for (i, bound) in rows.force_bounds.iter().enumerate() {
-        fill(rows.force_bound(i), bound.contact, rows.axes[bound.contact][2].scale(bound.sign)); // ±nᵀ f ≤ ±bound
-        b[rows.force_bound(i)] = bound.sign * bound.bound;
     }
-    for (k, &[t1, t2, n]) in rows.axes.iter().enumerate() {
-        let r = rows.cone(k);
-        fill(r, k, n.scale(-contacts[k].friction)); // s = (μ nᵀ f, t₁ᵀ f, t₂ᵀ f): ‖(s₂, s₃)‖ ≤ s₁
-        fill(r + 1, k, -t1);
-        fill(r + 2, k, -t2);
-    }
-}
-
-/// Adds ½ w (J_r q̈ − b)²: w J_rᵀ J_r to the upper triangle of P, −w b J_rᵀ to c.
-fn add_task(numbers: &mut Numbers, w: f64, J: &DMatrix<f64>, r: usize, b: f64) {
-    if w == 0.0 {
-        return;
-    }
-    for j in 0..J.ncols() {
-        let wJ = w * J[(r, j)];
-        for i in 0..=j {
-            numbers.P[(i, j)] += J[(r, i)] * wJ;
-        }
-        numbers.c[j] -= wJ * b;
-    }
-}
-
-/// X_ref ⊖ X along the world's axes: (p_ref − p, log(R_ref Rᵀ)).
-fn pose_error(frame: &FrameMotion, target: &FrameTarget) -> Motion<f64> {
-    let rotation: Mat3<f64> = target.pose.rotation * frame.pose.rotation.transpose();
-    let angular = lie::log3(Quaternion::from_rotation(rotation));
-    Motion::new(target.pose.translation - frame.pose.translation, angular)
+    sums.iter().sum::<f64>() + x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
 }

@@ -1,12 +1,14 @@
 //! What can be wrong with a controller's description, and how a step can fail.
 
+use crate::cone_program;
+
 /// What is wrong with the description of a controller, found when it is built.
 ///
 /// ```
-/// use condyle_wholebody::{FrictionContact, Settings, Tasks, WholeBodyController};
+/// use condyle_wholebody::{FrictionContact, Settings, Task, WholeBodyController};
 /// let robot = condyle_dynamics::robots::quadruped();
-/// let contacts = [FrictionContact::new("LF_fot", 0.7)];
-/// let error = WholeBodyController::new(&robot, &contacts, Tasks::default(), Settings::default()).unwrap_err();
+/// let contacts = [FrictionContact::point("LF_fot", 0.7)];
+/// let error = WholeBodyController::new(&robot, &contacts, &[Task::com()], Settings::default()).unwrap_err();
 /// assert_eq!(error.to_string(), "unknown frame `LF_fot`; nearest is `LF_foot`");
 /// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -15,12 +17,15 @@ pub enum Error {
     /// A name of the model is unknown; the message has the nearest one.
     #[error(transparent)]
     Model(#[from] condyle_dynamics::Error),
-    /// A controller of contact forces needs a contact.
-    #[error("the list of contacts is empty")]
-    NoContacts,
     /// The same frame is listed as a contact twice.
     #[error("contact `{frame}` is listed twice")]
     DuplicateContact {
+        /// The frame.
+        frame: String,
+    },
+    /// A task sets the force of a frame that is no contact.
+    #[error("task `{frame}`: there is no contact of this frame")]
+    NoSuchContact {
         /// The frame.
         frame: String,
     },
@@ -39,7 +44,7 @@ pub enum Error {
     /// A weight or gain of a task lies outside of its range.
     #[error("task `{task}`: {name} is {value}, but it must be {allowed}")]
     Task {
-        /// `com`, `posture`, or the frame.
+        /// `com`, `posture`, `angular momentum`, or the frame.
         task: String,
         /// The field of the task.
         name: &'static str,
@@ -70,25 +75,27 @@ pub enum Error {
     },
 }
 
-/// Why a step gave no command. A step that gave one never returns a `Status`.
+/// How a step ended.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Status {
+    /// The command is the program's solution.
+    #[error("solved")]
+    Solved,
     /// Dynamics, held contacts, friction cones, force bounds and torque limits exclude each other: the solver holds a
-    /// certificate of it. No iterate exists; the last command is unchanged.
+    /// certificate of it.
     #[error("dynamics, contacts, friction cones and limits exclude each other")]
     Infeasible,
-    /// [`Settings::max_iterations`](crate::Settings::max_iterations) were not enough. The last iterate is kept.
+    /// [`Settings::max_iterations`](crate::Settings::max_iterations) were not enough.
     #[error("not solved within the allowed iterations")]
     IterationLimit,
-    /// [`Settings::time_limit`](crate::Settings::time_limit) was not enough. The last iterate is kept.
+    /// [`Settings::time_limit`](crate::Settings::time_limit) was not enough.
     #[error("not solved within the allowed time")]
     TimeLimit,
-    /// A factorisation failed or the iterates made no more progress. The last command is unchanged.
+    /// A factorisation failed, the iterates made no more progress, or the solution does not hold what it should.
     #[error("the solver stopped for numerical reasons")]
     NumericalError,
-    /// A number of the state or of the references is infinite or NaN. Nothing was solved; the last command is
-    /// unchanged.
+    /// A number of the state or of the references is infinite or NaN. Nothing was solved.
     #[error("`{name}[{index}]` is {value}, which is not finite")]
     NotFinite {
         /// `q`, `v`, or the field of [`References`](crate::References).
@@ -98,6 +105,20 @@ pub enum Status {
         /// The number.
         value: f64,
     },
+}
+
+impl From<cone_program::Status> for Status {
+    fn from(status: cone_program::Status) -> Self {
+        match status {
+            cone_program::Status::Infeasible => Self::Infeasible,
+            cone_program::Status::IterationLimit => Self::IterationLimit,
+            cone_program::Status::TimeLimit => Self::TimeLimit,
+            // The objective is bounded below, and what goes into the numbers was checked: both are numerical failures.
+            cone_program::Status::Unbounded
+            | cone_program::Status::NotFinite { .. }
+            | cone_program::Status::NumericalError => Self::NumericalError,
+        }
+    }
 }
 
 /// `Ok` if every number of an argument is finite.

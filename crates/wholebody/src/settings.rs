@@ -4,6 +4,71 @@ use crate::error::Error;
 use crate::task::Gains;
 use condyle_dynamics::Model;
 
+/// How the friction cone is described.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Friction {
+    /// ‖f_t‖ ≤ μ f_n, a second-order cone.
+    Cone,
+    /// A pyramid, for comparison.
+    Pyramid {
+        /// How many faces; at least 3.
+        sides: usize,
+        /// Whether it lies within the cone (and touches it with its edges), or around it (with its faces).
+        inscribed: bool,
+    },
+}
+
+/// Which solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Backend {
+    /// clarabel, the reference.
+    Clarabel,
+    /// Our own dense interior point method, warm-started from the last tick.
+    InteriorPoint,
+}
+
+/// In which unknowns the program is solved; the solution is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// The rows of the base and of the contacts are eliminated first.
+    Condensed,
+    /// All of (q̈, f), with equalities.
+    Full,
+}
+
+/// How joints are kept within their limits.
+///
+/// ```text
+/// (v_min − v) / T ≤ q̈ ≤ (v_max − v) / T                        velocity
+/// (q_min − q) / T² − 2 v / T ≤ q̈ ≤ (q_max − q) / T² − 2 v / T    position: the distance d obeys d̈ ≥ −(2 / T) ḋ − d / T²
+/// ```
+///
+/// each bound no further than a_max from 0 on the other's side: a joint that is beyond its limit, or too fast towards it,
+/// is led back with at most a_max. Where they exclude each other, the position's bound holds. A limit is approached no
+/// faster than a critically damped spring of time constant T would, and not passed (an exponential control barrier
+/// function: Nguyen and Sreenath, 2016). Where dynamics, contacts and torques leave no acceleration within these bounds,
+/// they become tasks of great weight at that tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointLimits {
+    /// T (s), the time to look ahead; some ticks at least.
+    pub look_ahead: f64,
+    /// a_max (rad/s², m/s²).
+    pub max_acceleration: f64,
+    /// Least position, nq numbers; `None` for the model's.
+    pub lower: Option<Vec<f64>>,
+    /// Greatest position, nq numbers; `None` for the model's.
+    pub upper: Option<Vec<f64>>,
+    /// Greatest speed, nv numbers; `None` for the model's.
+    pub velocity: Option<Vec<f64>>,
+}
+
+impl Default for JointLimits {
+    fn default() -> Self {
+        Self { look_ahead: 0.05, max_acceleration: 200.0, lower: None, upper: None, velocity: None }
+    }
+}
+
 /// The settings of [`WholeBodyController`](crate::WholeBodyController).
 ///
 /// ```
@@ -15,14 +80,30 @@ use condyle_dynamics::Model;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Weight of ½ ‖q̈‖², which decides what the tasks leave open.
+    /// Weight of ½ ‖q̈‖², which decides what the tasks leave open; above 0.
     pub acceleration_weight: f64,
-    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces.
+    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces; above 0.
     pub force_weight: f64,
-    /// Baumgarte's: a contact's acceleration is k (p_ref − p) − d ṗ instead of 0.
+    /// Baumgarte's: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0.
     pub contact_gains: Gains,
+    /// The greatest such acceleration (m/s², rad/s²): a foot that lands fast is stopped over some ticks.
+    pub max_correction: f64,
+    /// Cones or pyramids.
+    pub friction: Friction,
     /// Greatest effort of each coordinate, nv numbers (N m, N), infinite where there is none; `None` for the model's.
     pub effort: Option<Vec<f64>>,
+    /// Limits of the joints' position and velocity; `None` for none.
+    pub joint_limits: Option<JointLimits>,
+    /// For how many ticks after the last solution its torques serve as the safe command.
+    pub hold_ticks: u32,
+    /// Damping of the safe command that follows: −D v, D in this part of the greatest effort for 1 rad/s (s/rad).
+    pub damping: f64,
+    /// Which solver.
+    pub backend: Backend,
+    /// In which unknowns.
+    pub form: Form,
+    /// Whether the solver begins at the last tick's solution, if it can.
+    pub warm_start: bool,
     /// Tolerance of the solver, absolute and relative, on feasibility and duality gap.
     pub tolerance: f64,
     /// Iterations after which a step fails.
@@ -37,7 +118,15 @@ impl Default for Settings {
             acceleration_weight: 1e-6,
             force_weight: 1e-5,
             contact_gains: Gains { stiffness: 0.0, damping: 0.0 },
+            max_correction: 50.0,
+            friction: Friction::Cone,
             effort: None,
+            joint_limits: Some(JointLimits::default()),
+            hold_ticks: 5,
+            damping: 0.02,
+            backend: Backend::InteriorPoint,
+            form: Form::Condensed,
+            warm_start: true,
             tolerance: 1e-9,
             max_iterations: 50,
             time_limit: f64::INFINITY,
@@ -48,12 +137,22 @@ impl Default for Settings {
 impl Settings {
     pub(crate) fn check(&self, model: &Model) -> Result<(), Error> {
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();
+        let above_zero = |x: f64| x > 0.0 && x.is_finite();
         let Gains { stiffness, damping } = self.contact_gains;
+        let default = JointLimits::default();
+        let limits = self.joint_limits.as_ref().unwrap_or(&default);
+        let sides = if let Friction::Pyramid { sides, .. } = self.friction { sides } else { 3 };
+        let (T, a) = (limits.look_ahead, limits.max_acceleration);
         for (name, value, good, allowed) in [
-            ("acceleration_weight", self.acceleration_weight, from_zero(self.acceleration_weight), "at least 0"),
-            ("force_weight", self.force_weight, from_zero(self.force_weight), "at least 0"),
+            ("acceleration_weight", self.acceleration_weight, above_zero(self.acceleration_weight), "above 0"),
+            ("force_weight", self.force_weight, above_zero(self.force_weight), "above 0"),
             ("contact_gains.stiffness", stiffness, from_zero(stiffness), "at least 0"),
             ("contact_gains.damping", damping, from_zero(damping), "at least 0"),
+            ("max_correction", self.max_correction, above_zero(self.max_correction), "above 0"),
+            ("friction.sides", sides as f64, sides >= 3, "at least 3"),
+            ("joint_limits.look_ahead", T, above_zero(T), "above 0"),
+            ("joint_limits.max_acceleration", a, above_zero(a), "above 0"),
+            ("damping", self.damping, from_zero(self.damping), "at least 0"),
             ("tolerance", self.tolerance, self.tolerance > 0.0 && self.tolerance < 1.0, "between 0 and 1"),
             ("max_iterations", f64::from(self.max_iterations), self.max_iterations > 0, "at least 1"),
             ("time_limit", self.time_limit, self.time_limit > 0.0, "above 0"),
@@ -62,14 +161,22 @@ impl Settings {
                 return Err(Error::Setting { name, value, allowed });
             }
         }
-        let effort = self.effort(model);
-        if effort.len() != model.nv() {
-            return Err(Error::Length { name: "effort", expected: model.nv(), found: effort.len() });
+        let (nq, nv) = (model.nq(), model.nv());
+        for (name, numbers, expected, least) in [
+            ("effort", &self.effort, nv, 0.0),
+            ("joint_limits.lower", &limits.lower, nq, f64::NEG_INFINITY),
+            ("joint_limits.upper", &limits.upper, nq, f64::NEG_INFINITY),
+            ("joint_limits.velocity", &limits.velocity, nv, 0.0),
+        ] {
+            let Some(numbers) = numbers else { continue };
+            if numbers.len() != expected {
+                return Err(Error::Length { name, expected, found: numbers.len() });
+            }
+            if let Some(&value) = numbers.iter().find(|&&x| x.is_nan() || x < least) {
+                return Err(Error::Setting { name, value, allowed: "at least 0, or any number for a position" });
+            }
         }
-        match effort.iter().find(|x| x.is_nan() || **x < 0.0) {
-            Some(&value) => Err(Error::Setting { name: "effort", value, allowed: "at least 0" }),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     /// Greatest effort of each coordinate.

@@ -5,7 +5,7 @@ mod common;
 
 use common::*;
 use condyle_dynamics::{Data, ReferenceFrame, Vec3, forward_kinematics, neutral, rnea, robots};
-use condyle_wholebody::{ComTask, FrictionContact, Gains, PostureTask, Settings, Status, Tasks, WholeBodyController};
+use condyle_wholebody::{FrictionContact, Gains, Normal, Settings, Status, Task, WholeBodyController};
 use nalgebra::{DMatrix, DVector};
 
 #[test]
@@ -14,8 +14,8 @@ fn standing_still() {
     let contacts = feet(0.7);
     let mut controller = controller(&model, &contacts);
     let references = controller.hold(&q);
-    let command = controller.step(&q, &v, &references).unwrap();
-    check(&model, &contacts, &q, &v, command);
+    let command = controller.step(&q, &v, &references).solved().unwrap();
+    check(&model, &contacts, &q, &v, &references, command);
     // All tasks agree with rest; only the equal shares of the weight do not, with a weight of 1e-5.
     assert!(max_abs(command.a.iter().copied()) < 1e-2, "{:?}", command.a);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
@@ -32,8 +32,8 @@ fn moving_anyhow() {
     let references = controller.hold(&stance());
     for seed in 0..100 {
         let (q, v) = state(&model, seed, 0.1, 0.3);
-        let command = controller.step(&q, &v, &references).unwrap_or_else(|status| panic!("{seed}: {status}"));
-        check(&model, &contacts, &q, &v, command);
+        let command = controller.step(&q, &v, &references).solved().unwrap_or_else(|status| panic!("{seed}: {status}"));
+        check(&model, &contacts, &q, &v, &references, command);
         for (tau, limit) in command.tau[6..].iter().zip(&model.limits().effort[6..]) {
             assert!(tau.abs() < limit + EQUALITY);
         }
@@ -43,13 +43,14 @@ fn moving_anyhow() {
 #[test]
 fn a_humanoid_on_two_points() {
     let model = robots::humanoid();
-    let contacts = [FrictionContact::new("left_sole", 0.7), FrictionContact::new("right_sole", 0.7)];
-    let mut controller = WholeBodyController::new(&model, &contacts, Tasks::default(), Settings::default()).unwrap();
+    let contacts = [FrictionContact::point("left_sole", 0.7), FrictionContact::point("right_sole", 0.7)];
+    let mut controller =
+        WholeBodyController::new(&model, &contacts, &[Task::com(), Task::posture()], Settings::default()).unwrap();
     for seed in 0..20 {
         let (q, v) = near(&model, &neutral(&model), seed, 0.2, 0.1);
         let references = controller.hold(&q);
-        let command = controller.step(&q, &v, &references).unwrap_or_else(|status| panic!("{seed}: {status}"));
-        check(&model, &contacts, &q, &v, command);
+        let command = controller.step(&q, &v, &references).solved().unwrap_or_else(|status| panic!("{seed}: {status}"));
+        check(&model, &contacts, &q, &v, &references, command);
     }
 }
 
@@ -58,12 +59,11 @@ fn a_humanoid_on_two_points() {
 fn a_feasible_task_is_met() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let settings = Settings { force_weight: 1e-9, acceleration_weight: 1e-9, ..Settings::default() };
-    let none = PostureTask { weight: 0.0, gains: Gains::critical(0.0) };
-    let tasks = Tasks { posture: none, ..tasks() };
-    let mut controller = WholeBodyController::new(&model, &feet(0.7), tasks, settings).unwrap();
+    let tasks = [Task::com(), Task::orientation("trunk")];
+    let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks, settings).unwrap();
     let mut references = controller.hold(&q);
     references.com.acceleration = Vec3::new(0.5, -0.4, 0.3);
-    let c = controller.step(&q, &v, &references).unwrap().com_acceleration;
+    let c = controller.step(&q, &v, &references).solved().unwrap().com_acceleration;
     assert!(norm(c - references.com.acceleration) < 1e-5, "{c:?}");
 }
 
@@ -75,11 +75,11 @@ fn little_friction_tilts_forces_to_the_cone() {
     let mut controller = controller(&model, &contacts);
     let mut references = controller.hold(&q);
     references.com.acceleration.x = 3.0; // of which 0.1 · 9.81 can be had
-    let command = controller.step(&q, &v, &references).unwrap();
-    check(&model, &contacts, &q, &v, command);
+    let command = controller.step(&q, &v, &references).solved().unwrap();
+    check(&model, &contacts, &q, &v, &references, command);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
-        assert!(margin(contact, f) < 1e-4 * f.z, "{f:?} is inside of its cone");
-        assert!(f.x > 0.0);
+        assert!(margin(contact, f) < 1e-4 * f.linear.z, "{f:?} is inside of its cone");
+        assert!(f.linear.x > 0.0);
     }
     // ẍ = Σ f_x / m = μ Σ f_z / m, all forces pointing forward
     let c = command.com_acceleration;
@@ -96,8 +96,8 @@ fn friction_has_no_preferred_direction() {
         let angle = f64::from(k) * std::f64::consts::TAU / 8.0;
         let mut references = controller.hold(&q);
         references.com.acceleration = Vec3::new(3.0 * angle.cos(), 3.0 * angle.sin(), 0.0);
-        let command = controller.step(&q, &v, &references).unwrap();
-        let sum = command.forces.iter().fold(Vec3::zero(), |sum, &f| sum + f);
+        let command = controller.step(&q, &v, &references).solved().unwrap();
+        let sum = command.forces.iter().fold(Vec3::zero(), |sum, &f| sum + f.linear);
         assert!((sum.x.hypot(sum.y) / (0.1 * sum.z) - 1.0).abs() < 0.02, "{angle}: {sum:?}");
     }
 }
@@ -106,14 +106,14 @@ fn friction_has_no_preferred_direction() {
 fn torque_limits_bind() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts = feet(0.7);
-    let free = controller(&model, &contacts).step(&q, &v, &{ controller(&model, &contacts).hold(&q) }).unwrap().clone();
+    let free = controller(&model, &contacts).step(&q, &v, &{ controller(&model, &contacts).hold(&q) }).clone();
     let strongest = max_abs(free.tau.iter().copied());
     let limit = 0.5 * strongest; // more than internal forces can make up for
     let settings = Settings { effort: Some(vec![limit; 18]), ..Settings::default() };
-    let mut controller = WholeBodyController::new(&model, &contacts, tasks(), settings).unwrap();
+    let mut controller = WholeBodyController::new(&model, &contacts, &tasks(), settings).unwrap();
     let references = controller.hold(&q);
-    let command = controller.step(&q, &v, &references).unwrap();
-    check(&model, &contacts, &q, &v, command);
+    let command = controller.step(&q, &v, &references).solved().unwrap();
+    check(&model, &contacts, &q, &v, &references, command);
     let used = max_abs(command.tau.iter().copied());
     assert!((used - limit).abs() < 1e-4 * limit, "{used} of {limit}");
     assert!(command.tau.iter().all(|t| t.abs() < limit + EQUALITY));
@@ -128,9 +128,9 @@ fn force_bounds_bind() {
     contacts[3].min_force = 95.0;
     let mut controller = controller(&model, &contacts);
     let references = controller.hold(&q);
-    let command = controller.step(&q, &v, &references).unwrap();
-    check(&model, &contacts, &q, &v, command);
-    assert!(command.forces[0].z < 50.0 + EQUALITY && command.forces[3].z > 95.0 - EQUALITY);
+    let command = controller.step(&q, &v, &references).solved().unwrap();
+    check(&model, &contacts, &q, &v, &references, command);
+    assert!(command.forces[0].linear.z < 50.0 + EQUALITY && command.forces[3].linear.z > 95.0 - EQUALITY);
 }
 
 /// The same robot on tilted ground, and the same robot in a tilted world: one answer.
@@ -144,20 +144,21 @@ fn a_slope_is_a_tilted_world() {
     let contacts = feet(0.5);
     let mut level = controller(&leaning, &contacts);
     let references = level.hold(&q);
-    let expected = level.step(&q, &v, &references).unwrap().clone();
+    let expected = level.step(&q, &v, &references).solved().unwrap().clone();
     // Gravity is straight; base and normals are turned by −slope about y.
     let mut turned = q.clone();
     let (s, c) = (-slope / 2.0).sin_cos();
     let (x, z) = (q[0], q[2]);
     turned[..7].copy_from_slice(&[x * cos - z * sin, q[1], x * sin + z * cos, 0.0, s, 0.0, c]);
-    let normal = Vec3::new(-2.0 * sin, 0.0, 2.0 * cos); // of any length
+    let normal = Normal::World(Vec3::new(-2.0 * sin, 0.0, 2.0 * cos)); // of any length
     let contacts: Vec<_> = contacts.into_iter().map(|c| FrictionContact { normal, ..c }).collect();
     let mut tilted = controller(&model, &contacts);
     let references = tilted.hold(&turned);
-    let found = tilted.step(&turned, &v, &references).unwrap();
+    let found = tilted.step(&turned, &v, &references).solved().unwrap();
     for (f, e) in found.forces.iter().zip(&expected.forces) {
+        let e = e.linear;
         let rotated = Vec3::new(e.x * cos - e.z * sin, e.y, e.x * sin + e.z * cos);
-        assert!(norm(*f - rotated) < 1e-3, "{f:?} for {rotated:?}");
+        assert!(norm(f.linear - rotated) < 1e-3, "{f:?} for {rotated:?}");
     }
     assert!(max_abs(found.tau.iter().zip(&expected.tau).map(|(a, b)| a - b)) < 1e-3);
 }
@@ -167,10 +168,10 @@ fn contacts_are_pulled_back() {
     let (model, contacts) = (robots::quadruped(), feet(0.7));
     let gains = Gains { stiffness: 400.0, damping: 40.0 };
     let settings = Settings { contact_gains: gains, ..Settings::default() };
-    let mut controller = WholeBodyController::new(&model, &contacts, tasks(), settings).unwrap();
+    let mut controller = WholeBodyController::new(&model, &contacts, &tasks(), settings).unwrap();
     let (q, mut references) = (stance(), controller.hold(&stance()));
-    references.contacts[1].position.x += 1e-3;
-    let command = controller.step(&q, &[0.0; 18], &references).unwrap();
+    references.contacts[1].pose.translation.x += 1e-3;
+    let command = controller.step(&q, &[0.0; 18], &references).solved().unwrap();
     let (feet, _) = accelerations(&model, &contacts, &q, &[0.0; 18], &command.a);
     assert!(norm(feet[1] - Vec3::new(0.4, 0.0, 0.0)) < EQUALITY, "k · 1 mm, found {:?}", feet[1]);
     assert!(norm(feet[0]) < EQUALITY);
@@ -180,13 +181,11 @@ fn contacts_are_pulled_back() {
 fn a_fixed_base_arm_leans_on_its_tool() {
     let model = robots::arm7();
     let q = [0.3, 0.6, 0.0, 1.2, 0.0, 0.5, 0.0];
-    let contact = FrictionContact { min_force: 20.0, ..FrictionContact::new("tool", 0.5) };
-    let com = ComTask { weight: Vec3::zero(), gains: Gains::critical(0.0) };
-    let tasks = Tasks { com, ..Tasks::default() };
-    let mut controller = WholeBodyController::new(&model, &[contact], tasks, Settings::default()).unwrap();
+    let contact = FrictionContact { min_force: 20.0, ..FrictionContact::point("tool", 0.5) };
+    let mut controller = WholeBodyController::new(&model, &[contact], &[Task::posture()], Settings::default()).unwrap();
     let references = controller.hold(&q);
-    let command = controller.step(&q, &[0.0; 7], &references).unwrap();
-    assert!(command.forces[0].z > 20.0 - EQUALITY);
+    let command = controller.step(&q, &[0.0; 7], &references).solved().unwrap();
+    assert!(command.forces[0].linear.z > 20.0 - EQUALITY);
     assert!(command.tau.iter().all(|&tau| tau != 0.0));
 }
 
@@ -196,8 +195,7 @@ fn what_cannot_be_is_infeasible() {
     let contacts: Vec<_> = feet(0.7).into_iter().map(|c| FrictionContact { min_force: 1000.0, ..c }).collect();
     let mut controller = controller(&model, &contacts);
     let references = controller.hold(&q);
-    assert_eq!(controller.step(&q, &v, &references), Err(Status::Infeasible)); // knees of 80 N m
-    assert_eq!(controller.command().tau, [0.0; 18], "the last command stands");
+    assert_eq!(controller.step(&q, &v, &references).status, Status::Infeasible); // knees of 80 N m
 }
 
 /// With no inequality active the command solves a linear system, built here from other parts: columns of M and of
@@ -209,7 +207,7 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     let mut controller = controller(&model, &contacts);
     let mut references = controller.hold(&q);
     references.com.acceleration = Vec3::new(0.3, -0.2, 0.4);
-    let command = controller.step(&q, &v, &references).unwrap();
+    let command = controller.step(&q, &v, &references).solved().unwrap();
     for (contact, &f) in contacts.iter().zip(&command.forces) {
         assert!(margin(contact, f) > 1.0, "the state is chosen inside of all cones: {f:?}");
     }
@@ -264,7 +262,7 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     K.view_mut((0, n), (n, rows)).copy_from(&A.transpose());
     let right = DVector::from_iterator(n + rows, c.iter().map(|c| -c).chain(b.iter().copied()));
     let x = K.lu().solve(&right).unwrap();
-    let found = command.a.iter().copied().chain(command.forces.iter().flat_map(|f| f.to_array()));
+    let found = command.a.iter().copied().chain(command.forces.iter().flat_map(|f| f.linear.to_array()));
     // A duality gap of 1e-9 bounds what only w_f = 1e-5 decides by √(1e-9 / 1e-5) = 1e-2 N; the last Newton step of an
     // interior-point method squares that.
     let error = max_abs(found.zip(&x).map(|(found, x)| found - x));

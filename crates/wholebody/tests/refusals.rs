@@ -4,99 +4,78 @@ mod common;
 
 use common::*;
 use condyle_dynamics::{Vec3, robots};
-use condyle_wholebody::{Error, FrameTask, FrictionContact, Gains, Settings, Status, Tasks, WholeBodyController};
+use condyle_wholebody::{Axes, Error, Friction, FrictionContact, Normal, Settings, Task, WholeBodyController};
 
-fn refusal(contacts: &[FrictionContact], tasks: Tasks, settings: Settings) -> Error {
-    WholeBodyController::new(&robots::quadruped(), contacts, tasks, settings).unwrap_err()
+fn refusal(contacts: &[FrictionContact], tasks: &[Task], settings: Settings) -> String {
+    WholeBodyController::new(&robots::quadruped(), contacts, tasks, settings).unwrap_err().to_string()
 }
 
 #[test]
 fn descriptions() {
     let plain = Settings::default;
-    assert_eq!(refusal(&[], tasks(), plain()), Error::NoContacts);
-    let unknown = refusal(&[FrictionContact::new("LF_fot", 0.7)], tasks(), plain());
-    assert_eq!(unknown.to_string(), "unknown frame `LF_fot`; nearest is `LF_foot`");
-    let twice = [
-        FrictionContact::new("LF_foot", 0.7),
-        FrictionContact::new("RF_foot", 0.7),
-        FrictionContact::new("LF_foot", 0.5),
-    ];
-    assert_eq!(refusal(&twice, tasks(), plain()), Error::DuplicateContact { frame: "LF_foot".to_owned() });
+    let unknown = refusal(&[FrictionContact::point("LF_fot", 0.7)], &tasks(), plain());
+    assert_eq!(unknown, "unknown frame `LF_fot`; nearest is `LF_foot`");
+    let twice = ["LF_foot", "RF_foot", "LF_foot"].map(|foot| FrictionContact::point(foot, 0.7));
+    let model = robots::quadruped();
+    let error = WholeBodyController::new(&model, &twice, &tasks(), plain()).unwrap_err();
+    assert_eq!(error, Error::DuplicateContact { frame: "LF_foot".to_owned() });
 
-    let gains = Gains::critical(100.0);
-    let missing =
-        FrameTask { frame: "trunc".to_owned(), linear: Vec3::zero(), angular: Vec3::new(1.0, 1.0, 1.0), gains };
-    let error = refusal(&feet(0.7), Tasks { frames: vec![missing], ..Tasks::default() }, plain());
-    assert_eq!(error.to_string(), "unknown frame `trunc`; nearest is `trunk`");
-
-    let foot = || FrictionContact::new("LF_foot", 0.7);
-    for (contact, expected) in [
-        (FrictionContact { friction: 0.0, ..foot() }, "contact `LF_foot`: friction is 0, but it must be above 0"),
-        (
-            FrictionContact { friction: f64::NAN, ..foot() },
-            "contact `LF_foot`: friction is NaN, but it must be above 0",
-        ),
-        (
-            FrictionContact { normal: Vec3::zero(), ..foot() },
-            "contact `LF_foot`: normal (its length) is 0, but it must be above 0",
-        ),
-        (
-            FrictionContact { min_force: -1.0, ..foot() },
-            "contact `LF_foot`: min_force is -1, but it must be at least 0",
-        ),
-        (
-            FrictionContact { min_force: 5.0, max_force: 4.0, ..foot() },
-            "contact `LF_foot`: max_force is 4, but it must be at least min_force",
-        ),
+    for (task, expected) in [
+        (Task::orientation("trunc"), "unknown frame `trunc`; nearest is `trunk`"),
+        (Task { axes: Axes::Frame("trunc".to_owned()), ..Task::com() }, "unknown frame `trunc`; nearest is `trunk`"),
+        (Task::contact_force("trunk"), "task `trunk`: there is no contact of this frame"),
+        (Task { weight: -1.0, ..Task::com() }, "task `com`: weight is -1, but it must be at least 0"),
+        (Task { weight: f64::NAN, ..Task::posture() }, "task `posture`: weight is NaN, but it must be at least 0"),
+        (Task { priority: 3, ..Task::com() }, "task `com`: priority is 3, but it must be 0, 1 or 2"),
+        (Task { joints: vec![1.0; 3], ..Task::posture() }, "`joints`: expected 18 numbers, found 3"),
     ] {
-        assert_eq!(refusal(&[contact], tasks(), plain()).to_string(), expected);
+        assert_eq!(refusal(&feet(0.7), &[task], plain()), expected);
     }
 
-    let mut heavy = tasks();
-    heavy.com.weight.y = -1.0;
-    assert_eq!(refusal(&feet(0.7), heavy, plain()).to_string(), "task `com`: weight is -1, but it must be at least 0");
+    let foot = || FrictionContact::point("LF_foot", 0.7);
+    let corners = |corners: &[[f64; 3]]| {
+        FrictionContact::surface("LF_foot", 0.7, &corners.iter().map(|&c| Vec3::from(c)).collect::<Vec<_>>())
+    };
+    for (contact, expected) in [
+        (FrictionContact { friction: 0.0, ..foot() }, "friction is 0, but it must be above 0"),
+        (FrictionContact { friction: f64::NAN, ..foot() }, "friction is NaN, but it must be above 0"),
+        (
+            FrictionContact { normal: Normal::Frame(Vec3::zero()), ..foot() },
+            "normal (its length) is 0, but it must be above 0",
+        ),
+        (FrictionContact { min_force: -1.0, ..foot() }, "min_force is -1, but it must be at least 0"),
+        (
+            FrictionContact { min_force: 5.0, max_force: 4.0, ..foot() },
+            "max_force is 4, but it must be at least min_force, above 0",
+        ),
+        (corners(&[[0.0; 3]]), "corners is 1, but it must be at least 2, and finite"),
+        (corners(&[[0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]), "corners is 2, but it must be apart from each other"),
+        (
+            corners(&[[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [-0.1, 0.0, 0.05]]),
+            "corners is 3, but it must be in one plane across the normal",
+        ),
+        (
+            corners(&[[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, -0.1, 0.0]]),
+            "corners is 4, but it must be in their order around a convex polygon",
+        ),
+        (
+            FrictionContact { normal: Normal::World(Vec3::new(0.0, 0.0, 1.0)), ..corners(&[[0.1; 3], [0.2; 3]]) },
+            "corners is 2, but it must be those of a point where the normal is the world's",
+        ),
+    ] {
+        assert_eq!(refusal(&[contact], &tasks(), plain()), format!("contact `LF_foot`: {expected}"));
+    }
 
-    let settings = Settings { effort: Some(vec![80.0; 12]), ..plain() };
-    assert_eq!(refusal(&feet(0.7), tasks(), settings), Error::Length { name: "effort", expected: 18, found: 12 });
-    let settings = Settings { tolerance: 0.0, ..plain() };
-    assert_eq!(
-        refusal(&feet(0.7), tasks(), settings).to_string(),
-        "setting `tolerance` is 0, but it must be between 0 and 1"
-    );
-}
-
-#[test]
-fn numbers_that_are_not_finite() {
-    let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
-    let mut controller = controller(&model, &feet(0.7));
-    let references = controller.hold(&q);
-    let good = controller.step(&q, &v, &references).unwrap().clone();
-
-    let mut bad = q.clone();
-    bad[8] = f64::NAN;
-    let status = controller.step(&bad, &v, &references).unwrap_err();
-    assert_eq!(status.to_string(), "`q[8]` is NaN, which is not finite");
-    let mut bad = v.clone();
-    bad[3] = f64::INFINITY;
-    let status = controller.step(&q, &bad, &references).unwrap_err();
-    assert_eq!(status, Status::NotFinite { name: "v", index: 3, value: f64::INFINITY });
-    let mut bad = references.clone();
-    bad.contacts[1].force.z = f64::NAN;
-    let status = controller.step(&q, &v, &bad).unwrap_err();
-    assert_eq!(status.to_string(), "`contacts[11]` is NaN, which is not finite");
-
-    assert_eq!(controller.command(), &good, "the last command stands");
-    assert_eq!(controller.step(&q, &v, &references).unwrap(), &good, "and nothing of the bad steps stays behind");
-}
-
-#[test]
-fn iterations_run_out() {
-    let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
-    let settings = Settings { max_iterations: 2, ..Settings::default() };
-    let mut controller = WholeBodyController::new(&model, &feet(0.7), tasks(), settings).unwrap();
-    let references = controller.hold(&q);
-    assert_eq!(controller.step(&q, &v, &references), Err(Status::IterationLimit));
-    assert_eq!(controller.command().iterations, 2);
+    for (settings, expected) in [
+        (Settings { effort: Some(vec![80.0; 12]), ..plain() }, "`effort`: expected 18 numbers, found 12"),
+        (Settings { tolerance: 0.0, ..plain() }, "setting `tolerance` is 0, but it must be between 0 and 1"),
+        (
+            Settings { friction: Friction::Pyramid { sides: 2, inscribed: true }, ..plain() },
+            "setting `friction.sides` is 2, but it must be at least 3",
+        ),
+    ] {
+        assert_eq!(refusal(&feet(0.7), &tasks(), settings), expected);
+    }
 }
 
 #[test]

@@ -110,6 +110,7 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
         kinematics,
         M: &data.all_terms.M,
         h: &data.all_terms.h,
+        a: &data.all_terms.a,
         centroidal: shift_rate(model, &mut data.centroidal),
         kinetic_energy: (data.all_terms.twice + kinematics.rotors()) * S::splat(0.5),
         potential_energy: Single::<S, R>::new(model).minus_gravity().dot(moment),

@@ -5,13 +5,13 @@
 
 use crate::passes::centroidal::{self, CentroidalMapRate};
 use crate::passes::coriolis::Coriolis;
-use crate::passes::frames::Velocities;
+use crate::passes::frames::{ReferenceFrame, Velocities, classical};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
 /// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
@@ -110,6 +110,34 @@ pub struct AllTerms<'d, S, R = f64> {
     pub kinetic_energy: S,
     /// V = −m gᵀ c (J).
     pub potential_energy: S,
+    /// Accelerations of the bodies for q̈ = 0, with gravity as the world's.
+    pub(crate) a: &'d [Motion<S>],
+}
+
+impl<S: Scalar, R: Constant<S>> AllTerms<'_, S, R> {
+    /// J̇ v of a frame along the world's axes: p̈ of its origin and ω̇ where q̈ = 0 (m/s², rad/s²), in O(1). With J of
+    /// [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's classical acceleration.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, compute_all_terms, forward_accelerations, robots};
+    /// let arm = robots::arm7();
+    /// let (tool, mut data, q, v) = (arm.frame("tool")?, Data::new(&arm), [0.3; 7], [0.5; 7]);
+    /// let drift = compute_all_terms(&arm, &mut data, &q, &v).frame_drift(tool);
+    /// let motion = forward_accelerations(&arm, &mut data, &q, &v, &[0.0; 7]);
+    /// let expected = motion.frame_classical_acceleration(tool, LocalWorldAligned);
+    /// assert!((drift - expected).to_array().iter().all(|x: &f64| x.abs() < 1e-13));
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn frame_drift(&self, frame: usize) -> Motion<S> {
+        let reference = ReferenceFrame::LocalWorldAligned;
+        let origin = reference.pose(self.kinematics.frame(frame));
+        let body = self.kinematics.placements.model.frames()[frame].body;
+        let v = self.kinematics.frame_velocity(frame, reference);
+        classical(origin.act_inv(self.a[body] - self.a[0]), v)
+    }
 }
 
 kernel! {

@@ -223,7 +223,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
 
 /// The classical acceleration of the point at a frame's origin: v̇ + ω × v, of its spatial acceleration and velocity.
 #[inline(always)]
-fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
+pub(crate) fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
     Motion::new(a.linear + v.angular.cross(v.linear), a.angular)
 }
 

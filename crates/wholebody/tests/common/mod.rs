@@ -2,7 +2,9 @@
 #![allow(dead_code, non_snake_case, unreachable_pub)] // each test file uses its part
 
 use condyle_dynamics::{Act, Data, Force, Model, Se3, Vec3, forward_kinematics, integrate, rnea};
-use condyle_wholebody::{Command, FrameTask, FrictionContact, Gains, Settings, Tasks, WholeBodyController};
+use condyle_wholebody::{
+    Command, FrictionContact, Normal, References, Settings, Shape, Status, Task, WholeBodyController,
+};
 use num_dual::Dual2_64;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
@@ -19,17 +21,37 @@ pub fn stance() -> Vec<f64> {
 }
 
 pub fn feet(friction: f64) -> Vec<FrictionContact> {
-    FEET.iter().map(|foot| FrictionContact::new(foot, friction)).collect()
+    FEET.iter().map(|foot| FrictionContact::point(foot, friction)).collect()
 }
 
-pub fn tasks() -> Tasks {
-    let (linear, angular) = (Vec3::zero(), Vec3::new(10.0, 10.0, 10.0));
-    let trunk = FrameTask { frame: "trunk".to_owned(), linear, angular, gains: Gains::critical(100.0) };
-    Tasks { frames: vec![trunk], ..Tasks::default() }
+pub fn tasks() -> Vec<Task> {
+    vec![Task::com(), Task::orientation("trunk"), Task::posture()]
 }
 
 pub fn controller(model: &Model, contacts: &[FrictionContact]) -> WholeBodyController {
-    WholeBodyController::new(model, contacts, tasks(), Settings::default()).unwrap()
+    WholeBodyController::new(model, contacts, &tasks(), Settings::default()).unwrap()
+}
+
+/// Knees bent, soles level under the hips.
+pub fn squat(model: &Model) -> Vec<f64> {
+    let mut q = condyle_dynamics::neutral(model);
+    for side in ["left", "right"] {
+        for (joint, angle) in [("hip_pitch", -0.4), ("knee", 0.8), ("ankle_pitch", -0.4)] {
+            let name = format!("{side}_{joint}");
+            let body = model.bodies().iter().find(|body| body.joint_name == name).unwrap();
+            q[body.idx_q] = angle;
+        }
+    }
+    q
+}
+
+/// Rectangles of 20 by 10 cm.
+pub fn soles(friction: f64) -> Vec<FrictionContact> {
+    ["left_sole", "right_sole"].map(|sole| FrictionContact::sole(sole, friction, [0.2, 0.1])).to_vec()
+}
+
+pub fn humanoid_tasks() -> Vec<Task> {
+    vec![Task::com(), Task::orientation("pelvis"), Task::angular_momentum(), Task::posture()]
 }
 
 /// A position near the stance and a velocity.
@@ -87,15 +109,15 @@ pub fn inverse_dynamics(
         let frame = model.frame(&contact.frame).unwrap();
         let body = model.frames()[frame].body;
         let point = placements.frame(frame).translation;
-        let about_origin = Force::new(f, point.cross(f)); // the world's origin
+        let about_origin = Force::new(f.linear, f.angular + point.cross(f.linear)); // the world's origin
         f_ext[body] += placements.body(body).act_inv(about_origin);
     }
     rnea(model, &mut data, q, v, &command.a, &f_ext).to_vec()
 }
 
-/// μ f_n − ‖f_t‖ of a contact on level ground.
-pub fn margin(contact: &FrictionContact, f: Vec3<f64>) -> f64 {
-    contact.friction * f.z - f.x.hypot(f.y)
+/// μ f_n − ‖f_t‖ of a contact whose normal is that of level ground.
+pub fn margin(contact: &FrictionContact, f: Force<f64>) -> f64 {
+    contact.friction * f.linear.z - f.linear.x.hypot(f.linear.y)
 }
 
 pub fn norm(x: Vec3<f64>) -> f64 {
@@ -106,24 +128,69 @@ pub fn max_abs(x: impl IntoIterator<Item = f64>) -> f64 {
     x.into_iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Dynamics, held contacts, momentum: what holds of every command, to [`EQUALITY`]; and no force outside its cone.
-pub fn check(model: &Model, contacts: &[FrictionContact], q: &[f64], v: &[f64], command: &Command) {
+/// Dynamics, held contacts, momentum, cones, centre of pressure: what holds of every command, to [`EQUALITY`].
+pub fn check(
+    model: &Model,
+    contacts: &[FrictionContact],
+    q: &[f64],
+    v: &[f64],
+    references: &References,
+    command: &Command,
+) {
+    assert_eq!(command.status, Status::Solved);
     let tau = inverse_dynamics(model, contacts, q, v, command);
     let residual = max_abs(tau.iter().zip(&command.tau).map(|(a, b)| a - b));
     assert!(residual < EQUALITY, "M q̈ + h − Jᵀ f − τ = {residual:.1e}");
     assert_eq!(command.tau[..6], [0.0; 6]);
 
     let (feet, com) = accelerations(model, contacts, q, v, &command.a);
-    for (contact, a) in contacts.iter().zip(feet) {
-        assert!(norm(a) < EQUALITY, "{} accelerates with {:.1e} m/s²", contact.frame, norm(a));
+    for ((contact, a), target) in contacts.iter().zip(feet).zip(&references.contacts) {
+        if target.activation > 0.0 {
+            assert!(norm(a) < EQUALITY, "{} accelerates with {:.1e} m/s²", contact.frame, norm(a));
+        }
     }
     assert!(norm(com - command.com_acceleration) < 1e-9 * (1.0 + norm(com)));
 
-    let sum = command.forces.iter().fold(Vec3::zero(), |sum, &f| sum + f);
+    let sum = command.forces.iter().fold(Vec3::zero(), |sum, &f| sum + f.linear);
     let needed = (com - *model.gravity()).scale(model.total_mass());
     assert!(norm(sum - needed) < EQUALITY, "Σ f − m (c̈ − g) = {:.1e}", norm(sum - needed));
 
-    for (contact, &f) in contacts.iter().zip(&command.forces) {
-        assert!(margin(contact, f) > -EQUALITY, "{}: {f:?} leaves the cone", contact.frame);
+    let mut data = Data::new(model);
+    let placements = forward_kinematics(model, &mut data, q);
+    for ((contact, &f), target) in contacts.iter().zip(&command.forces).zip(&references.contacts) {
+        if target.activation == 0.0 {
+            assert_eq!(f, Force::zero());
+            continue;
+        }
+        let R = placements.frame(model.frame(&contact.frame).unwrap()).rotation;
+        let n = match contact.normal {
+            Normal::World(n) => n,
+            Normal::Frame(n) => R * n,
+        };
+        let n = n.scale(1.0 / norm(n));
+        let f_n = f.linear.dot(n);
+        let slip = norm(f.linear - n.scale(f_n)) - contact.friction * f_n;
+        assert!(slip < EQUALITY, "{}: {f:?} leaves the cone by {slip:.1e}", contact.frame);
+        if let Shape::Surface { corners, .. } = &contact.shape {
+            // each edge of the polygon: the moment about it cannot tip the sole over it
+            let count = corners.len();
+            for k in 0..count {
+                let (a, b) = (R * corners[k], R * corners[(k + 1) % count]);
+                if count > 2 {
+                    let sign = (b - a).cross(R * corners[(k + 2) % count] - b).dot(n).signum();
+                    let moment = f.angular - a.cross(f.linear);
+                    let tip = sign * moment.dot((b - a).scale(1.0 / norm(b - a)));
+                    assert!(tip > -EQUALITY, "{}: the centre of pressure is outside by {tip:.1e}", contact.frame);
+                }
+            }
+        }
     }
+}
+
+pub fn orientation(model: &Model, q: &[f64], frame: &str) -> condyle_dynamics::Mat3<f64> {
+    forward_kinematics(model, &mut Data::new(model), q).frame(model.frame(frame).unwrap()).rotation
+}
+
+pub fn position(model: &Model, q: &[f64], frame: &str) -> Vec3<f64> {
+    forward_kinematics(model, &mut Data::new(model), q).frame(model.frame(frame).unwrap()).translation
 }

@@ -1,0 +1,130 @@
+//! One side of the rows: s = ±(G x − bound) ≥ 0 with its multiplier z ≥ 0, element by element in whole vectors.
+
+use condyle_linalg::{Vector, Vectorized};
+
+/// The lower or the upper bounds. Where a row has none, s = z = 1 and all changes are 0.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Side {
+    /// 1 for lower bounds, −1 for upper ones.
+    pub sign: f64,
+    pub s: Vec<f64>,
+    pub z: Vec<f64>,
+    /// 1 / s and 1 / z.
+    pub inverse_s: Vec<f64>,
+    pub inverse_z: Vec<f64>,
+    /// z / s.
+    pub d: Vec<f64>,
+    /// ±(G x − bound) − s.
+    pub r: Vec<f64>,
+    pub ds: Vec<f64>,
+    pub dz: Vec<f64>,
+}
+
+impl Side {
+    pub(super) fn new(rows: usize, sign: f64) -> Self {
+        let vector = || vec![0.0; rows];
+        let (s, z, inverse_s, inverse_z) = (vector(), vector(), vector(), vector());
+        Self { sign, s, z, inverse_s, inverse_z, d: vector(), r: vector(), ds: vector(), dz: vector() }
+    }
+}
+
+/// r = ±(G x − bound) − s, d = z / s; adds ±z to `multipliers`, sᵀ z to `gap`, ±bᵀ z to `support`.
+pub(super) struct Residuals<'a> {
+    pub side: &'a mut Side,
+    pub has: &'a [f64],
+    pub bound: &'a [f64],
+    pub Gx: &'a [f64],
+    pub multipliers: &'a mut [f64],
+    /// max |r| / max(1, s), sᵀ z, ± boundᵀ z.
+    pub sums: &'a mut [f64; 3],
+}
+
+impl Vectorized for Residuals<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { side, has, bound, Gx, multipliers, sums } = self;
+        let (m, sign) = (has.len(), side.sign);
+        let (s, z, r, d) = (&side.s[..m], &side.z[..m], &mut side.r[..m], &mut side.d[..m]);
+        let (bound, Gx, multipliers) = (&bound[..m], &Gx[..m], &mut multipliers[..m]);
+        let mut partial = [[0.0_f64; 8]; 3];
+        let (inverse_s, inverse_z) = (&mut side.inverse_s[..m], &mut side.inverse_z[..m]);
+        for i in 0..m {
+            r[i] = has[i] * (sign * (Gx[i] - bound[i]) - s[i]);
+            (inverse_s[i], inverse_z[i]) = (1.0 / s[i], 1.0 / z[i]);
+            d[i] = has[i] * (z[i] * inverse_s[i]);
+            multipliers[i] += sign * has[i] * z[i];
+        }
+        for (k, block) in r.chunks(8).enumerate() {
+            for j in 0..block.len() {
+                let i = 8 * k + j;
+                let share = if inverse_s[i] < 1.0 { inverse_s[i] } else { 1.0 };
+                let excess = share * r[i].abs();
+                partial[0][j] = if excess > partial[0][j] { excess } else { partial[0][j] };
+                partial[1][j] += has[i] * s[i] * z[i];
+                partial[2][j] += has[i] * bound[i] * z[i];
+            }
+        }
+        sums[0] = partial[0].iter().fold(sums[0], |a, b| a.max(*b));
+        sums[1] += partial[1].iter().sum::<f64>();
+        sums[2] += sign * partial[2].iter().sum::<f64>();
+    }
+}
+
+/// Adds ±t to `target`, t = ξ / s − d r, with ξ = σμ − s z − ds dz, of which the last part only if `second_order`.
+pub(super) struct Target<'a> {
+    pub side: &'a Side,
+    pub has: &'a [f64],
+    pub centre: f64,
+    pub second_order: bool,
+    pub target: &'a mut [f64],
+}
+
+impl Vectorized for Target<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { side, has, centre, second_order, target } = self;
+        let (m, sign, b) = (has.len(), side.sign, if second_order { 1.0 } else { 0.0 });
+        let inverse_s = &side.inverse_s[..m];
+        let (z, r, d) = (&side.z[..m], &side.r[..m], &side.d[..m]);
+        let (ds, dz, target) = (&side.ds[..m], &side.dz[..m], &mut target[..m]);
+        for i in 0..m {
+            target[i] += sign * has[i] * ((centre - b * ds[i] * dz[i]) * inverse_s[i] - z[i] - d[i] * r[i]);
+        }
+    }
+}
+
+/// ds = ±G dx + r, dz = (ξ − z ds) / s with ξ as in [`Target`]; the greatest of −ds/s and −dz/z.
+pub(super) struct Direction<'a> {
+    pub side: &'a mut Side,
+    pub has: &'a [f64],
+    pub centre: f64,
+    pub second_order: bool,
+    pub Gdx: &'a [f64],
+    pub inverse_step: &'a mut f64,
+}
+
+impl Vectorized for Direction<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { side, has, centre, second_order, Gdx, inverse_step } = self;
+        let (m, sign, b) = (has.len(), side.sign, if second_order { 1.0 } else { 0.0 });
+        let (inverse_s, inverse_z) = (&side.inverse_s[..m], &side.inverse_z[..m]);
+        let (z, r, d) = (&side.z[..m], &side.r[..m], &side.d[..m]);
+        let (ds, dz, Gdx) = (&mut side.ds[..m], &mut side.dz[..m], &Gdx[..m]);
+        for i in 0..m {
+            let step = has[i] * (sign * Gdx[i] + r[i]);
+            dz[i] = has[i] * ((centre - b * ds[i] * dz[i]) * inverse_s[i] - z[i] - d[i] * step);
+            ds[i] = step;
+        }
+        let mut most = [0.0_f64; 8];
+        for (k, block) in inverse_s.chunks(8).enumerate() {
+            for j in 0..block.len() {
+                let i = 8 * k + j;
+                let (a, b) = (-ds[i] * inverse_s[i], -dz[i] * inverse_z[i]);
+                let a = if a > b { a } else { b };
+                most[j] = if a > most[j] { a } else { most[j] };
+            }
+        }
+        *inverse_step = most.iter().fold(*inverse_step, |a, b| a.max(*b));
+    }
+}

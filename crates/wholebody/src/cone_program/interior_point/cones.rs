@@ -1,0 +1,197 @@
+//! The cones of a program together: slacks, multipliers, their scalings and directions, row after row.
+
+use super::cone::{apply_inverse, divide, inverse_step, product, scaling};
+use super::scaled::{Cone, Scaled};
+
+/// The expression with `dim` a constant where it is that of a friction cone, so that its loops have no end to ask for.
+macro_rules! by_dimension {
+    ($value:expr, $dim:ident => $expression:expr) => {
+        match $value {
+            3 => {
+                let $dim = 3;
+                $expression
+            }
+            $dim => $expression,
+        }
+    };
+}
+
+/// s = h + F x in the product of cones, and z. Vectors with a tilde are scaled: d̃s = W⁻¹ ds, d̃z = W dz.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Cones {
+    pub s: Vec<f64>,
+    pub z: Vec<f64>,
+    /// h + F x − s.
+    pub r: Vec<f64>,
+    pub ds: Vec<f64>,
+    pub dz: Vec<f64>,
+    /// W's w and η of each cone, and λ.
+    w: Vec<f64>,
+    eta: Vec<f64>,
+    lambda: Vec<f64>,
+    /// λ \ ξ.
+    p: Vec<f64>,
+    ds_tilde: Vec<f64>,
+    dz_tilde: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Cones {
+    pub(super) fn new(rows: usize) -> Self {
+        let vector = || vec![0.0; rows];
+        Self {
+            s: vector(),
+            z: vector(),
+            r: vector(),
+            ds: vector(),
+            dz: vector(),
+            w: vector(),
+            eta: vector(),
+            lambda: vector(),
+            p: vector(),
+            ds_tilde: vector(),
+            dz_tilde: vector(),
+            scratch: vector(),
+        }
+    }
+
+    /// r, the multipliers; adds to [‖r‖∞, sᵀ z, −hᵀ z].
+    pub(super) fn residuals(&mut self, h: &[f64], Fx: &[f64], multipliers: &mut [f64], sums: &mut [f64; 3]) {
+        for i in 0..h.len() {
+            self.r[i] = h[i] + Fx[i] - self.s[i];
+            multipliers[i] = self.z[i];
+            sums[0] = sums[0].max(self.r[i].abs());
+            sums[1] += self.s[i] * self.z[i];
+            sums[2] -= h[i] * self.z[i];
+        }
+    }
+
+    /// W and λ of each cone; false if a pair is not in the interior.
+    pub(super) fn scale(&mut self, cones: &[Cone]) -> bool {
+        cones.iter().enumerate().all(|(k, cone)| by_dimension!(cone.dim, dim => self.scale_one(k, cone.at, dim)))
+    }
+
+    #[inline(always)]
+    fn scale_one(&mut self, k: usize, at: usize, dim: usize) -> bool {
+        let at = at..at + dim;
+        let (w, lambda) = (&mut self.w[at.clone()], &mut self.lambda[at.clone()]);
+        match scaling(&self.s[at.clone()], &self.z[at], w, lambda) {
+            Some(eta) => self.eta[k] = eta,
+            None => return false,
+        }
+        true
+    }
+
+    /// B = (W⁻¹ F)ᵀ, where F is not zero.
+    #[inline(always)]
+    pub(super) fn scale_rows(&self, data: &Scaled, B: &mut [f64]) {
+        let (ld, m) = (data.ld, data.rows());
+        for (k, cone) in data.cones.iter().enumerate() {
+            let rows = data.range(m + cone.at);
+            let (w, r, n) = (&self.w[cone.at..][..cone.dim], self.eta[k].recip(), rows.len());
+            let F = &data.K[(m + cone.at) * ld + rows.start..];
+            let (head, tail) = B[cone.at * ld + rows.start..].split_at_mut(ld);
+            let (f0, head) = (&F[..n], &mut head[..n]);
+            // w₁ᵀ F₁, in the head's place for now.
+            head.fill(0.0);
+            for i in 1..cone.dim {
+                let f = &F[i * ld..][..n];
+                for j in 0..n {
+                    head[j] += w[i] * f[j];
+                }
+            }
+            let a = r / (1.0 + w[0]);
+            for i in 1..cone.dim {
+                let (to, f) = (&mut tail[(i - 1) * ld..][..n], &F[i * ld..][..n]);
+                for j in 0..n {
+                    to[j] = r * f[j] + w[i] * (a * head[j] - r * f0[j]);
+                }
+            }
+            for j in 0..n {
+                head[j] = r * (w[0] * f0[j] - head[j]);
+            }
+        }
+    }
+
+    /// x ← W⁻² x.
+    pub(super) fn weigh(&mut self, cones: &[Cone], x: &mut [f64]) {
+        for (k, cone) in cones.iter().enumerate() {
+            let at = cone.at..cone.at + cone.dim;
+            let (w, y) = (&self.w[at.clone()], &mut self.scratch[at.clone()]);
+            apply_inverse(self.eta[k], w, &x[at.clone()], y);
+            apply_inverse(self.eta[k], w, y, &mut x[at]);
+        }
+    }
+
+    /// p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z, of which the last part only if `second_order`, and the target
+    /// W⁻¹ (p − W⁻¹ r).
+    pub(super) fn target(&mut self, cones: &[Cone], centre: f64, second_order: bool, target: &mut [f64]) {
+        for (k, cone) in cones.iter().enumerate() {
+            by_dimension!(cone.dim, dim => self.target_one(k, cone.at, dim, centre, second_order, target));
+        }
+    }
+
+    #[inline(always)]
+    fn target_one(&mut self, k: usize, at: usize, dim: usize, centre: f64, second_order: bool, target: &mut [f64]) {
+        let at = at..at + dim;
+        let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
+        let (p, y) = (&mut self.p[at.clone()], &mut self.scratch[at.clone()]);
+        if second_order {
+            product(&self.ds_tilde[at.clone()], &self.dz_tilde[at.clone()], y);
+            y[0] -= centre;
+            divide(lambda, y, p);
+        } else if centre > 0.0 {
+            y.fill(0.0);
+            y[0] = -centre;
+            divide(lambda, y, p);
+        } else {
+            p.fill(0.0);
+        }
+        for i in 0..dim {
+            p[i] = -lambda[i] - p[i];
+        }
+        apply_inverse(eta, w, &self.r[at.clone()], y);
+        for i in 0..dim {
+            y[i] = p[i] - y[i];
+        }
+        apply_inverse(eta, w, y, &mut target[at]);
+    }
+
+    /// ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds); the inverse of the greatest step, if it is greater.
+    pub(super) fn direction(&mut self, cones: &[Cone], Fdx: &[f64], inverse: &mut f64) {
+        for (k, cone) in cones.iter().enumerate() {
+            by_dimension!(cone.dim, dim => self.direction_one(k, cone.at, dim, Fdx, inverse));
+        }
+    }
+
+    #[inline(always)]
+    fn direction_one(&mut self, k: usize, at: usize, dim: usize, Fdx: &[f64], inverse: &mut f64) {
+        let at = at..at + dim;
+        let (Fdx, r, p) = (&Fdx[at.clone()], &self.r[at.clone()], &self.p[at.clone()]);
+        let (eta, w, lambda) = (self.eta[k], &self.w[at.clone()], &self.lambda[at.clone()]);
+        let (ds, dz) = (&mut self.ds[at.clone()], &mut self.dz[at.clone()]);
+        let (ds_tilde, dz_tilde) = (&mut self.ds_tilde[at.clone()], &mut self.dz_tilde[at.clone()]);
+        for i in 0..dim {
+            ds[i] = Fdx[i] + r[i];
+        }
+        apply_inverse(eta, w, ds, ds_tilde);
+        for i in 0..dim {
+            dz_tilde[i] = p[i] - ds_tilde[i];
+        }
+        apply_inverse(eta, w, dz_tilde, dz);
+        *inverse = inverse.max(inverse_step(lambda, ds_tilde)).max(inverse_step(lambda, dz_tilde));
+    }
+
+    /// s += α ds, z += α dz.
+    pub(super) fn advance(&mut self, rows: usize, step: f64) {
+        for i in 0..rows {
+            self.s[i] += step * self.ds[i];
+            self.z[i] += step * self.dz[i];
+        }
+    }
+
+    /// (s + α ds)ᵀ (z + α dz).
+    pub(super) fn gap_after(&self, rows: usize, step: f64) -> f64 {
+        (0..rows).map(|i| (self.s[i] + step * self.ds[i]) * (self.z[i] + step * self.dz[i])).sum()
+    }
+}

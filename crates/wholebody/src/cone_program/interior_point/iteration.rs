@@ -1,0 +1,93 @@
+//! The iteration: how far each step goes, and when it ends.
+
+use super::certificate::REDUCED_TOLERANCE;
+use super::workspace::Workspace;
+use crate::cone_program::Status;
+use std::time::Instant;
+
+/// The share of the way to the boundary that a step goes: 1 − a tenth of what the predictor could not go, within these bounds.
+/// The upper one is what keeps slacks from becoming smaller than the rounding errors of what they are differences of.
+const TO_BOUNDARY: [f64; 2] = [0.99, 0.9999];
+const SHORTFALL: f64 = 0.1;
+/// The last steps aim at this share of the gap that is allowed.
+const AIM: f64 = 0.1;
+/// So many iterations that come closer neither to a solution nor to a proof that there is none are the last ones.
+const PATIENCE: u32 = 5;
+/// Steps shorter than this are none.
+const SHORT_STEP: f64 = 1e-7;
+/// A solution whose errors are this many times the tolerance is a reduced one.
+const REDUCED: f64 = 1e4;
+/// A dual residual this many times what a step should have left asks for refinement of later solves, at most so often.
+const INEXACT: f64 = 2.0;
+const REFINEMENTS: usize = 2;
+
+/// What ends an iteration.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    pub tolerance: f64,
+    /// A count, together with what was counted before.
+    pub iterations: u32,
+    /// When it began, and the seconds from then on.
+    pub clock: Option<(Instant, f64)>,
+}
+
+impl Workspace {
+    /// Iterates from where x, y, s and z stand; the error of the last iterate.
+    ///
+    /// # Errors
+    /// [`Status`] if that error is above [`REDUCED`] times the tolerance.
+    pub(super) fn iterate(&mut self, iterations: &mut u32, limits: Limits) -> Result<f64, Status> {
+        let Limits { tolerance, .. } = limits;
+        let (mut least, mut idle, mut refinements) = ([f64::INFINITY; 2], 0, 0);
+        let mut measure = self.measure();
+        loop {
+            let error = measure.error;
+            let stop = |status| match status {
+                _ if error <= REDUCED * tolerance => Ok(error),
+                Status::NumericalError if measure.exclusion <= REDUCED_TOLERANCE => Err(Status::Infeasible),
+                status => Err(status),
+            };
+            if error.is_nan() {
+                return Err(Status::NumericalError);
+            }
+            if error <= tolerance {
+                return Ok(error);
+            }
+            if let Some(status) = measure.certificate {
+                return Err(status);
+            }
+            if *iterations >= limits.iterations {
+                return stop(Status::IterationLimit);
+            }
+            if limits.clock.is_some_and(|(start, seconds)| start.elapsed().as_secs_f64() > seconds) {
+                return stop(Status::TimeLimit);
+            }
+            idle = if error < least[0] || measure.exclusion < least[1] { 0 } else { idle + 1 };
+            least = [least[0].min(error), least[1].min(measure.exclusion)];
+            if idle > PATIENCE || !self.scale() || !self.system.factorize(&self.data) {
+                return stop(Status::NumericalError);
+            }
+            *iterations += 1;
+
+            // Predictor: towards s ∘ z = 0.
+            let inverse = self.direction(0.0, false, refinements);
+            let shortfall = if inverse > 1.0 { 1.0 - inverse.recip() } else { 0.0 };
+            // Corrector: towards s ∘ z = σ μ e with Mehrotra's σ = (1 − α)³, and no further than needed.
+            let sigma = shortfall * shortfall * shortfall;
+            let centre = (sigma * measure.mu).max(AIM * tolerance * measure.scale);
+            let inverse = self.direction(centre, true, refinements);
+            let to_boundary = (1.0 - SHORTFALL * shortfall).clamp(TO_BOUNDARY[0], TO_BOUNDARY[1]);
+            let step = if inverse > to_boundary { to_boundary / inverse } else { 1.0 };
+            if step.is_nan() || step < SHORT_STEP {
+                return stop(Status::NumericalError);
+            }
+            self.advance(step);
+
+            let expected = (1.0 - step) * measure.dual;
+            measure = self.measure();
+            if measure.dual > tolerance && measure.dual > INEXACT * expected && refinements < REFINEMENTS {
+                refinements += 1;
+            }
+        }
+    }
+}

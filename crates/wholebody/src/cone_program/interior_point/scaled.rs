@@ -1,0 +1,332 @@
+//! The program as the method sees it: padded, without what constrains nothing, and in units in which all is of size one.
+//!
+//! With x = D x̂, Dⱼ = C / √Pⱼⱼ and C = max |cⱼ| / √Pⱼⱼ, the cost divided by C² has a P̂ with a diagonal of ones and a ĉ of at
+//! most one. So weights that differ by many orders of magnitude, as those of tasks and of forces do, meet one tolerance.
+//! Rows of Ĝ = G D, and the longest row of each cone, have length one.
+
+use crate::cone_program::{ConeProgram, Size, Status};
+use condyle_linalg::{SLACK, View, add_product_vector, block, dot, mask, transposed_product_vector};
+use std::ops::Range;
+
+/// A diagonal entry of P below this share of the greatest counts as zero when units are chosen.
+const NO_CURVATURE: f64 = 1e-14;
+/// By this much, relative to its size, a bound of a row without coefficients may be exceeded.
+const NO_ROW_TOLERANCE: f64 = 1e-9;
+
+/// Where a constraint came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    /// A row of A.
+    Equality(usize),
+    /// A row of G.
+    Row(usize),
+    /// A row of F, of a cone of one dimension.
+    Cone(usize),
+}
+
+/// A cone: its first row among the cones' rows here, its first row in F, its dimension.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cone {
+    pub at: usize,
+    pub source: usize,
+    pub dim: usize,
+    /// What its rows of F were multiplied with.
+    pub scale: f64,
+}
+
+/// Columns of K that are not zero between the same rows.
+#[derive(Clone, Debug)]
+struct Run {
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+/// The rows that a mask's blocks lie between.
+fn range(mask: u64, n: usize, ld: usize) -> Range<usize> {
+    let (block, first) = (block(ld), mask.trailing_zeros() as usize);
+    let end = 64 - mask.leading_zeros() as usize;
+    if mask == 0 { 0..0 } else { block * first..n.min(block * end) }
+}
+
+/// minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q; the columns of K are rows of G and of F.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scaled {
+    /// Numbers of x.
+    pub n: usize,
+    /// From one column of a matrix to the next.
+    pub ld: usize,
+    /// Both triangles.
+    pub P: Vec<f64>,
+    pub c: Vec<f64>,
+    /// D, the unit of each unknown.
+    pub units: Vec<f64>,
+    /// P and c were multiplied with this.
+    pub cost: f64,
+    /// Eᵀ: equalities, and rows of G with l = u.
+    pub E: Vec<f64>,
+    pub e: Vec<f64>,
+    pub equality_sources: Vec<Source>,
+    pub equality_scales: Vec<f64>,
+    /// [Gᵀ Fᵀ].
+    pub K: Vec<f64>,
+    /// The blocks of each column that are not zero, in any of a cone's columns for those of a cone.
+    pub masks: Vec<u64>,
+    runs: Vec<Run>,
+    /// l and u, 0 where there is none.
+    pub lower: Vec<f64>,
+    pub upper: Vec<f64>,
+    /// Whether there is one: 1 or 0.
+    pub has_lower: Vec<f64>,
+    pub has_upper: Vec<f64>,
+    pub sources: Vec<Source>,
+    pub scales: Vec<f64>,
+    pub h: Vec<f64>,
+    pub cones: Vec<Cone>,
+    /// The number of bounds and cones: what sᵀ z is divided by.
+    pub degree: f64,
+}
+
+impl Scaled {
+    pub(super) fn new(capacity: Size) -> Self {
+        let Size { unknowns: n, equalities, rows, cone_rows } = capacity;
+        let (ld, m, me) = (n + SLACK, rows + cone_rows, equalities + rows);
+        let vector = Vec::with_capacity;
+        Self {
+            n,
+            ld,
+            P: vec![0.0; ld * n],
+            c: vec![0.0; ld],
+            units: vec![1.0; n],
+            cost: 1.0,
+            E: vec![0.0; ld * (me + SLACK)],
+            e: vector(me),
+            equality_sources: Vec::with_capacity(me),
+            equality_scales: vector(me),
+            K: vec![0.0; ld * (m + SLACK)],
+            masks: Vec::with_capacity(m),
+            runs: Vec::with_capacity(m),
+            lower: vector(m),
+            upper: vector(m),
+            has_lower: vector(m),
+            has_upper: vector(m),
+            sources: Vec::with_capacity(m),
+            scales: vector(m),
+            h: vector(m),
+            cones: Vec::with_capacity(cone_rows),
+            degree: 0.0,
+        }
+    }
+
+    /// Rows of G in use.
+    pub(super) fn rows(&self) -> usize {
+        self.lower.len()
+    }
+
+    pub(super) fn equalities(&self) -> usize {
+        self.e.len()
+    }
+
+    /// The rows of a column between which it is not zero, in whole blocks but for the last.
+    pub(super) fn range(&self, column: usize) -> Range<usize> {
+        range(self.masks[column], self.n, self.ld)
+    }
+
+    /// y = Kᵀ x: G x and F x. The slack of x is zero.
+    pub(super) fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        for Run { columns, rows } in &self.runs {
+            let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
+            transposed_product_vector(&mut y[columns.clone()], rows.len(), K, &x[rows.start..]);
+        }
+    }
+
+    /// y += K x.
+    pub(super) fn add_transposed(&self, x: &[f64], y: &mut [f64]) {
+        for Run { columns, rows } in &self.runs {
+            let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
+            add_product_vector(&mut y[rows.start..], rows.len(), K, &x[columns.clone()]);
+        }
+    }
+
+    /// The columns of K, rows of G and of F.
+    pub(super) fn columns(&self) -> usize {
+        self.rows() + self.h.len()
+    }
+
+    /// Takes the numbers of a program.
+    ///
+    /// # Errors
+    /// [`Status::Infeasible`] where bounds exclude each other, or a row without coefficients is outside of its bounds.
+    pub(super) fn load(&mut self, program: &ConeProgram) -> Result<(), Status> {
+        let (Size { unknowns: n, equalities, rows, .. }, ld) = (program.size, self.ld);
+        let most = program.capacity().unknowns;
+        if n != self.n {
+            self.n = n;
+            self.P.fill(0.0);
+            self.c.fill(0.0);
+            self.E.fill(0.0);
+            self.K.fill(0.0);
+        }
+        self.choose_units(&program.c[..n], program.P.as_slice(), most);
+        let (P, D) = (program.P.as_slice(), &self.units[..n]);
+        for j in 0..n {
+            let unit = self.cost * D[j];
+            for i in j..n {
+                let x = unit * D[i] * P[j * most + i];
+                self.P[j * ld + i] = x;
+                self.P[i * ld + j] = x;
+            }
+            self.c[j] = unit * program.c[j];
+        }
+
+        for list in [&mut self.e, &mut self.equality_scales, &mut self.lower, &mut self.upper, &mut self.h] {
+            list.clear();
+        }
+        for list in [&mut self.has_lower, &mut self.has_upper, &mut self.scales] {
+            list.clear();
+        }
+        self.equality_sources.clear();
+        self.sources.clear();
+        self.cones.clear();
+        let (A, G, F) = (program.At.as_slice(), program.Gt.as_slice(), program.Ft.as_slice());
+        for i in 0..equalities {
+            self.add_row(&A[i * most..][..n], [program.b[i]; 2], Source::Equality(i))?;
+        }
+        for i in 0..rows {
+            self.add_row(&G[i * most..][..n], [program.lower[i], program.upper[i]], Source::Row(i))?;
+        }
+        let mut first = 0;
+        for &dim in &program.cones {
+            if dim == 1 {
+                let bounds = [-program.h[first], f64::INFINITY];
+                self.add_row(&F[first * most..][..n], bounds, Source::Cone(first))?;
+            }
+            first += dim;
+        }
+        first = 0;
+        for &dim in &program.cones {
+            if dim > 1 {
+                self.add_cone(&F[first * most..], most, &program.h[first..][..dim], first)?;
+            }
+            first += dim;
+        }
+        self.note_zeros();
+        let bounds: f64 = self.has_lower.iter().zip(&self.has_upper).map(|(l, u)| l + u).sum();
+        self.degree = bounds + self.cones.len() as f64;
+        Ok(())
+    }
+
+    /// The masks and runs of K's columns.
+    fn note_zeros(&mut self) {
+        let (m, columns, ld) = (self.rows(), self.columns(), self.ld);
+        self.masks.clear();
+        self.masks.extend(self.K.chunks_exact(ld).take(columns).map(mask));
+        for cone in &self.cones {
+            let masks = &mut self.masks[m + cone.at..][..cone.dim];
+            let all = masks.iter().fold(0, |all, mask| all | mask);
+            masks.fill(all);
+        }
+        self.runs.clear();
+        for k in 0..columns {
+            let rows = self.range(k);
+            match self.runs.last_mut() {
+                Some(run) if run.rows == rows => run.columns.end = k + 1,
+                _ => self.runs.push(Run { columns: k..k + 1, rows }),
+            }
+        }
+    }
+
+    /// D and the cost's factor 1 / C².
+    fn choose_units(&mut self, c: &[f64], P: &[f64], stride: usize) {
+        let most = (0..c.len()).map(|j| P[j * stride + j]).fold(0.0, f64::max);
+        let mut size = 0.0_f64;
+        for (j, unit) in self.units[..c.len()].iter_mut().enumerate() {
+            let curvature = P[j * stride + j];
+            // Without curvature there is no size of its own: that of the others.
+            let curvature = if curvature > NO_CURVATURE * most {
+                curvature
+            } else if most > 0.0 {
+                most
+            } else {
+                1.0
+            };
+            *unit = curvature.sqrt().recip();
+            size = size.max(*unit * c[j].abs());
+        }
+        if size == 0.0 {
+            size = 1.0;
+        }
+        // Without any curvature only the cost has a size.
+        let length = if most > 0.0 { size } else { 1.0 };
+        self.cost = 1.0 / (size * length);
+        self.units[..c.len()].iter_mut().for_each(|unit| *unit *= length);
+    }
+
+    fn add_row(&mut self, row: &[f64], [lower, upper]: [f64; 2], source: Source) -> Result<(), Status> {
+        if lower > upper {
+            return Err(Status::Infeasible);
+        }
+        let free = lower == f64::NEG_INFINITY && upper == f64::INFINITY;
+        let D = &self.units[..self.n];
+        let norm = length(row, D);
+        if free || norm == 0.0 {
+            let outside = (lower > NO_ROW_TOLERANCE) || (upper < -NO_ROW_TOLERANCE);
+            return if outside { Err(Status::Infeasible) } else { Ok(()) };
+        }
+        let scale = norm.recip();
+        let to = if lower == upper {
+            let to = self.e.len() * self.ld;
+            self.e.push(scale * lower);
+            self.equality_sources.push(source);
+            self.equality_scales.push(scale);
+            &mut self.E[to..]
+        } else {
+            let to = self.lower.len() * self.ld;
+            let bound = |x: f64| if x.is_finite() { [scale * x, 1.0] } else { [0.0; 2] };
+            let ([lower, has_lower], [upper, has_upper]) = (bound(lower), bound(upper));
+            self.lower.push(lower);
+            self.upper.push(upper);
+            self.has_lower.push(has_lower);
+            self.has_upper.push(has_upper);
+            self.sources.push(source);
+            self.scales.push(scale);
+            &mut self.K[to..]
+        };
+        for j in 0..row.len() {
+            to[j] = scale * D[j] * row[j];
+        }
+        Ok(())
+    }
+
+    fn add_cone(&mut self, F: &[f64], stride: usize, h: &[f64], source: usize) -> Result<(), Status> {
+        let (n, dim, at) = (self.n, h.len(), self.h.len());
+        let row = |i: usize| &F[i * stride..][..n];
+        let D = &self.units[..n];
+        let norm = (0..dim).map(|i| length(row(i), D)).fold(0.0, f64::max);
+        if norm == 0.0 {
+            let radius = dot(&h[1..], &h[1..]).sqrt();
+            return if radius > h[0] + NO_ROW_TOLERANCE { Err(Status::Infeasible) } else { Ok(()) };
+        }
+        let (scale, first) = (norm.recip(), self.rows() + at);
+        for i in 0..dim {
+            let (to, row) = (&mut self.K[(first + i) * self.ld..][..n], row(i));
+            for j in 0..n {
+                to[j] = scale * D[j] * row[j];
+            }
+            self.h.push(scale * h[i]);
+        }
+        self.cones.push(Cone { at, source, dim, scale });
+        Ok(())
+    }
+}
+
+/// √Σ (xᵢ Dᵢ)², in eight sums, which do not wait for each other.
+fn length(x: &[f64], D: &[f64]) -> f64 {
+    let (eights, units) = (x.chunks(8), D.chunks(8));
+    let mut sums = [0.0; 8];
+    for (x, D) in eights.zip(units) {
+        for i in 0..x.len() {
+            sums[i] += (x[i] * D[i]) * (x[i] * D[i]);
+        }
+    }
+    sums.iter().sum::<f64>().sqrt()
+}

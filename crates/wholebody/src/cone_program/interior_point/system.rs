@@ -1,0 +1,186 @@
+//! The linear system of each iteration: positive definite in x, with the equalities as a Schur complement.
+//!
+//! ```text
+//! [ H   −Eᵀ ] [dx]   [r₁]        H = P + Gᵀ D G + Fᵀ W⁻² F
+//! [ E    0  ] [dy] = [r₂]
+//! ```
+//!
+//! With H = L Lᵀ and X = E L⁻ᵀ: X Xᵀ dy = r₂ − X L⁻¹ r₁, Lᵀ dx = L⁻¹ r₁ + Xᵀ dy. Where there are equalities, Eᵀ E is added to
+//! H and Eᵀ r₂ to r₁, which changes no solution and makes an H regular that is singular but for E.
+
+use super::scaled::Scaled;
+use condyle_linalg::{
+    OuterProducts, SLACK, View, add_product_vector, add_scaled_product, backward_solve, eliminate, forward_solve, mask,
+    transposed_product_vector,
+};
+
+/// What is added to a diagonal of H, which costs of size one have entries of size one in; refinement takes it out again.
+const REGULARISATION: f64 = 1e-13;
+/// The same relative to the diagonal entry, some roundings of a factor.
+const RELATIVE_REGULARISATION: f64 = 1e-15;
+/// What is added to a diagonal of X Xᵀ, whose entries are of size one for costs of size one.
+const DUAL_REGULARISATION: f64 = 1e-13;
+/// Each attempt after a pivot that was not positive regularises so many times more.
+const GROWTH: f64 = 1e3;
+const ATTEMPTS: usize = 4;
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct System {
+    /// The lower triangle of [H; E], then of its factor.
+    H: Vec<f64>,
+    ldh: usize,
+    /// The inverse of the factor's diagonal.
+    inverse: Vec<f64>,
+    /// Columns of K, scaled: √D G and W⁻¹ F, then those of E; only their blocks that are not zero are written and multiplied.
+    pub B: OuterProducts,
+    n: usize,
+    me: usize,
+    r: Vec<f64>,
+    /// r₂ of the refinement.
+    re: Vec<f64>,
+    more: Vec<f64>,
+    more_y: Vec<f64>,
+}
+
+impl System {
+    pub(super) fn new(n: usize, me: usize, columns: usize) -> Self {
+        Self {
+            H: vec![0.0; (n + me + SLACK) * (n + me + SLACK)],
+            inverse: vec![0.0; n + me],
+            B: OuterProducts::with_capacity((n + SLACK) * (columns + me + SLACK), columns + me),
+            r: vec![0.0; n + 4 * SLACK],
+            re: vec![0.0; me + SLACK],
+            more: vec![0.0; n + 4 * SLACK],
+            more_y: vec![0.0; me + SLACK],
+            ..Self::default()
+        }
+    }
+
+    /// Takes the sizes of a program and which blocks of its columns are not zero; writes E, and zeros where K has them.
+    pub(super) fn prepare(&mut self, data: &Scaled) {
+        let (n, me, columns, ld) = (data.n, data.equalities(), data.columns(), data.ld);
+        (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
+        let B = &mut self.B;
+        B.clear(n, ld);
+        B.rows[..(columns + me) * ld].fill(0.0);
+        B.add_rows(columns + me);
+        B.rows[columns * ld..][..me * ld].copy_from_slice(&data.E[..me * ld]);
+        for k in 0..columns + me {
+            let row = &if k < columns { &data.K[k * ld..] } else { &data.E[(k - columns) * ld..] }[..ld];
+            // What W⁻¹ makes of a cone's rows has the blocks of all of them.
+            let mask = if k < columns { data.masks[k] } else { mask(row) };
+            B.multiply([k, k], [mask, mask]);
+        }
+    }
+
+    /// Factorises P + B Bᵀ, where `B` has been written; false if even with the greatest regularisation it has no factor.
+    pub(super) fn factorize(&mut self, data: &Scaled) -> bool {
+        let Self { H, ldh, B, n, me, inverse, .. } = self;
+        let (n, me, ldh, ld) = (*n, *me, *ldh, data.ld);
+        let mut regularisation = 1.0;
+        for _ in 0..ATTEMPTS {
+            for j in 0..n {
+                let column = &mut H[j * ldh..][..ldh];
+                column[..n].copy_from_slice(&data.P[j * ld..][..n]);
+                for i in 0..me {
+                    column[n + i] = data.E[i * ld + j];
+                }
+                column[n + me..].fill(0.0);
+            }
+            H[n * ldh..][..me * ldh].fill(0.0);
+            B.add_to(H, ldh);
+            for j in 0..n {
+                let x = &mut H[j * ldh + j];
+                *x += regularisation * (REGULARISATION + RELATIVE_REGULARISATION * *x);
+            }
+            if eliminate(H, ldh, [n + me, n + me, n]).is_ok()
+                && factorize_schur(&mut H[n * ldh + n..], ldh, me, regularisation)
+            {
+                for j in 0..n + me {
+                    inverse[j] = H[j * ldh + j].recip();
+                }
+                return true;
+            }
+            regularisation *= GROWTH;
+        }
+        false
+    }
+
+    /// dx in place of r₁, dy in place of r₂, by the factor.
+    fn solve_once(&mut self, data: &Scaled, x: &mut [f64], y: &mut [f64]) {
+        let (n, me, ldh) = (self.n, self.me, self.ldh);
+        let (L, (inverse, inverse_S)) = (View::new(&self.H, ldh), self.inverse[..n + me].split_at(n));
+        if me > 0 {
+            add_product_vector(x, n, View::new(&data.E, data.ld), &y[..me]);
+        }
+        forward_solve(L, inverse, x);
+        if me > 0 {
+            add_scaled_product(&mut y[..me], -1.0, View::new(&self.H[n..], ldh), &x[..n]);
+            let S = L.at(n, n);
+            forward_solve(S, inverse_S, y);
+            backward_solve(S, inverse_S, y);
+            for j in 0..n {
+                let X = &self.H[j * ldh + n..][..me];
+                x[j] += X.iter().zip(&*y).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+        backward_solve(L, inverse, x);
+    }
+
+    /// dx in place of r₁ and dy in place of r₂; writes K dx. `weigh` makes [D G dx; W⁻² F dx] of it, for `refinements`.
+    pub(super) fn solve(
+        &mut self,
+        data: &Scaled,
+        [x, y]: [&mut [f64]; 2],
+        Kdx: &mut [f64],
+        refinements: usize,
+        mut weigh: impl FnMut(&mut [f64]),
+    ) {
+        let (n, me, ld) = (self.n, self.me, data.ld);
+        let (mut r, mut re) = (std::mem::take(&mut self.r), std::mem::take(&mut self.re));
+        let (mut more, mut more_y) = (std::mem::take(&mut self.more), std::mem::take(&mut self.more_y));
+        r[..n].copy_from_slice(&x[..n]);
+        re[..me].copy_from_slice(&y[..me]);
+        self.solve_once(data, x, y);
+        for _ in 0..refinements {
+            // r₁ − H dx + Eᵀ dy, r₂ − E dx
+            data.multiply(x, Kdx);
+            weigh(Kdx);
+            for i in 0..n {
+                more[i] = 0.0;
+            }
+            data.add_transposed(Kdx, &mut more);
+            add_product_vector(&mut more, n, View::new(&data.P, ld), &x[..n]);
+            for i in 0..n {
+                more[i] = r[i] - more[i];
+            }
+            if me > 0 {
+                add_product_vector(&mut more, n, View::new(&data.E, ld), &y[..me]);
+                transposed_product_vector(&mut more_y[..me], n, View::new(&data.E, ld), x);
+                for i in 0..me {
+                    more_y[i] = re[i] - more_y[i];
+                }
+            }
+            self.solve_once(data, &mut more, &mut more_y);
+            for i in 0..n {
+                x[i] += more[i];
+            }
+            for i in 0..me {
+                y[i] += more_y[i];
+            }
+        }
+        data.multiply(x, Kdx);
+        (self.r, self.re, self.more, self.more_y) = (r, re, more, more_y);
+    }
+}
+
+/// The factor of −S in place of S, which is not positive; true if there is one.
+fn factorize_schur(S: &mut [f64], stride: usize, me: usize, regularisation: f64) -> bool {
+    for j in 0..me {
+        for x in &mut S[j * stride + j..][..me - j] {
+            *x = -*x;
+        }
+        S[j * stride + j] += regularisation * DUAL_REGULARISATION;
+    }
+    me == 0 || eliminate(S, stride, [me, me, me]).is_ok()
+}

@@ -1,0 +1,133 @@
+//! The numbers of a program.
+
+use super::Status;
+use nalgebra::DMatrix;
+
+/// How many unknowns and constraints there are, or may be at most.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Size {
+    /// Numbers of x.
+    pub unknowns: usize,
+    /// Rows of A.
+    pub equalities: usize,
+    /// Rows of G.
+    pub rows: usize,
+    /// Rows of F, of all cones together.
+    pub cone_rows: usize,
+}
+
+/// The numbers of a program. Matrices and vectors have the sizes of the capacity; a solver reads their leading parts of the
+/// size in use.
+#[derive(Clone, Debug)]
+pub(crate) struct ConeProgram {
+    /// The size in use, at most the capacity in each number.
+    pub size: Size,
+    /// P: n × n, positive semidefinite, of which the lower triangle is read.
+    pub P: DMatrix<f64>,
+    /// c: n.
+    pub c: Vec<f64>,
+    /// Aᵀ: a column for each equality.
+    pub At: DMatrix<f64>,
+    /// b.
+    pub b: Vec<f64>,
+    /// Gᵀ: a column for each row of G.
+    pub Gt: DMatrix<f64>,
+    /// l; −∞ where there is none.
+    pub lower: Vec<f64>,
+    /// u; ∞ where there is none.
+    pub upper: Vec<f64>,
+    /// Fᵀ: a column for each row of F, cone after cone.
+    pub Ft: DMatrix<f64>,
+    /// h.
+    pub h: Vec<f64>,
+    /// The dimension of each cone in use, at least 2 (or 1, which is s₁ ≥ 0); their sum is `size.cone_rows`.
+    pub cones: Vec<usize>,
+}
+
+impl ConeProgram {
+    /// A program of zeros and infinite bounds with the size of its capacity, but without cones; there may be as many as
+    /// `cone_rows`.
+    pub(crate) fn new(capacity: Size) -> Self {
+        let Size { unknowns, equalities, rows, cone_rows } = capacity;
+        Self {
+            size: Size { cone_rows: 0, ..capacity },
+            P: DMatrix::zeros(unknowns, unknowns),
+            c: vec![0.0; unknowns],
+            At: DMatrix::zeros(unknowns, equalities),
+            b: vec![0.0; equalities],
+            Gt: DMatrix::zeros(unknowns, rows),
+            lower: vec![f64::NEG_INFINITY; rows],
+            upper: vec![f64::INFINITY; rows],
+            Ft: DMatrix::zeros(unknowns, cone_rows),
+            h: vec![0.0; cone_rows],
+            cones: Vec::with_capacity(cone_rows),
+        }
+    }
+
+    /// The greatest size that fits.
+    pub(crate) fn capacity(&self) -> Size {
+        Size { unknowns: self.c.len(), equalities: self.b.len(), rows: self.lower.len(), cone_rows: self.h.len() }
+    }
+
+    /// That what a solver would read is finite but for bounds, and that the size in use fits.
+    ///
+    /// # Errors
+    /// [`Status::NotFinite`].
+    ///
+    /// # Panics
+    /// If the size in use exceeds the capacity, or the cones have not `size.cone_rows` rows.
+    pub(crate) fn check(&self) -> Result<(), Status> {
+        let (Size { unknowns: n, equalities, rows, cone_rows }, most) = (self.size, self.capacity());
+        assert!(n <= most.unknowns && equalities <= most.equalities, "size: more than the capacity");
+        assert!(rows <= most.rows && cone_rows <= most.cone_rows, "size: more than the capacity");
+        assert_eq!(self.cones.iter().sum::<usize>(), cone_rows, "cones: the sum of the dimensions");
+        for (name, matrix, columns) in
+            [("P", &self.P, n), ("At", &self.At, equalities), ("Gt", &self.Gt, rows), ("Ft", &self.Ft, cone_rows)]
+        {
+            for j in 0..columns {
+                let from = if name == "P" { j } else { 0 };
+                finite(name, &matrix.as_slice()[j * most.unknowns..][..n], from, j * most.unknowns)?;
+            }
+        }
+        finite("c", &self.c[..n], 0, 0)?;
+        finite("b", &self.b[..equalities], 0, 0)?;
+        finite("h", &self.h[..cone_rows], 0, 0)?;
+        let wrong = |name, index| Err(Status::NotFinite { name, index });
+        for i in 0..rows {
+            if self.lower[i].is_nan() || self.lower[i] == f64::INFINITY {
+                return wrong("lower", i);
+            }
+            if self.upper[i].is_nan() || self.upper[i] == f64::NEG_INFINITY {
+                return wrong("upper", i);
+            }
+        }
+        Ok(())
+    }
+
+    /// ½ xᵀ P x + cᵀ x.
+    pub(crate) fn objective(&self, x: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for j in 0..self.size.unknowns {
+            let below: f64 = (j + 1..self.size.unknowns).map(|i| self.P[(i, j)] * x[i]).sum();
+            sum += x[j] * (0.5 * self.P[(j, j)] * x[j] + below + self.c[j]);
+        }
+        sum
+    }
+}
+
+/// That the numbers of a column are finite, from one on; `first` is the position of the column.
+fn finite(name: &'static str, column: &[f64], from: usize, first: usize) -> Result<(), Status> {
+    // 0 · x is 0 for each finite x, and NaN for all others; in eight sums, which do not wait for each other.
+    let (eights, rest) = column[from..].as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for x in eights {
+        for i in 0..8 {
+            sums[i] += 0.0 * x[i];
+        }
+    }
+    if sums.iter().chain(rest).map(|x| 0.0 * x).sum::<f64>() == 0.0 {
+        return Ok(());
+    }
+    let index = (from..column.len()).find(|&i| !column[i].is_finite()).expect("the sum is NaN");
+    Err(Status::NotFinite { name, index: first + index })
+}

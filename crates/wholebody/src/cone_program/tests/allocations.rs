@@ -1,0 +1,59 @@
+//! A solve allocates nothing, whatever the sizes in use.
+#![allow(unsafe_code)] // a counting allocator cannot be written without
+
+use super::random::{Draw, Kind};
+use super::walk::Walk;
+use crate::cone_program::{InteriorPoint, Settings, Solver, Start};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
+// and allocates nothing itself.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.set(COUNT.get() + 1);
+        // SAFETY: the caller's promise about `layout` is the one that is asked for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_solve_allocates_nothing() {
+    let walk = Walk::humanoid(2);
+    let mut program = walk.program();
+    let mut solver = InteriorPoint::new(program.capacity(), Settings::default());
+    for tick in 0..10 {
+        walk.write(tick, &mut program);
+        // contacts come and go, rows become equalities, bounds vanish
+        program.cones.truncate(8 - tick % 3);
+        program.size.cone_rows = 3 * program.cones.len();
+        program.size.rows = 96 - tick;
+        program.lower[5] = program.upper[5];
+        program.upper[7] = f64::INFINITY;
+        let before = COUNT.get();
+        let outcome = solver.solve(&program, if tick % 4 == 0 { Start::Cold } else { Start::Warm });
+        assert_eq!(COUNT.get() - before, 0);
+        assert_eq!(outcome.stopped, None);
+    }
+    for kind in Kind::ALL {
+        let program = Draw::new(1).program(kind, 18, [3, 40, 6]);
+        let mut solver = InteriorPoint::new(program.capacity(), Settings::default());
+        let before = COUNT.get();
+        solver.solve(&program, Start::Cold);
+        assert_eq!(COUNT.get() - before, 0);
+    }
+}

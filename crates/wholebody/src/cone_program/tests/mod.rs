@@ -1,0 +1,11 @@
+//! Both back ends on the same programs.
+
+mod allocations;
+mod closed_forms;
+mod kkt;
+mod properties;
+mod random;
+mod refusals;
+mod speed;
+mod walk;
+mod warm;

@@ -1,0 +1,257 @@
+//! Where a robot may touch its environment, and which forces act there.
+
+use crate::error::Error;
+use condyle_spatial::{Mat3, Vec3};
+
+/// The direction in which the environment pushes; of any length but 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Normal {
+    /// Along the world's axes: the ground stays as it is when the foot turns. For points.
+    World(Vec3<f64>),
+    /// Along the frame's axes: it turns with the frame.
+    Frame(Vec3<f64>),
+}
+
+/// By which unknowns the force on a surface is described.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SurfaceForces {
+    /// A force with a friction cone at each corner.
+    Corners,
+    /// A force with one friction cone, a centre of pressure within the polygon, and a bounded moment about the normal.
+    Wrench,
+}
+
+/// What touches.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// The frame's origin: it is held, the frame may turn about it.
+    Point,
+    /// An edge (two corners: the frame may turn about it) or a convex polygon (three or more: the frame is held).
+    Surface {
+        /// In the frame, in their order around the polygon, in one plane across the normal (m).
+        corners: Vec<Vec3<f64>>,
+        /// By which unknowns.
+        forces: SurfaceForces,
+    },
+}
+
+/// A contact with friction: what touches is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+///
+/// Whether it touches at a tick, and how strongly, is said by [`ContactTarget::activation`](crate::ContactTarget).
+///
+/// ```
+/// use condyle_wholebody::{FrictionContact, Normal};
+/// let icy = FrictionContact { friction: 0.05, ..FrictionContact::point("LF_foot", 0.7) };
+/// let sole = FrictionContact::sole("left_sole", 0.7, [0.2, 0.1]);
+/// assert_eq!((icy.min_force, sole.max_force), (0.0, f64::INFINITY));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrictionContact {
+    /// The name of a frame.
+    pub frame: String,
+    /// What touches.
+    pub shape: Shape,
+    /// The direction in which the environment pushes.
+    pub normal: Normal,
+    /// μ, Coulomb's coefficient; above 0.
+    pub friction: f64,
+    /// γ (m): the moment about the normal of a [wrench](SurfaceForces::Wrench) is at most γ f_n. `None` for ⅔ μ r, what a
+    /// disc of radius r turns with under an even pressure, r being that of the greatest disc about the corners' mean within
+    /// the polygon; for ½ μ l on an edge of length 2 l.
+    pub yaw_friction: Option<f64>,
+    /// Least normal force of the whole contact (N); at least 0.
+    pub min_force: f64,
+    /// Greatest normal force of the whole contact (N); may be infinite.
+    pub max_force: f64,
+}
+
+impl FrictionContact {
+    /// A point on level ground.
+    pub fn point(frame: &str, friction: f64) -> Self {
+        let normal = Normal::World(Vec3::new(0.0, 0.0, 1.0));
+        let (frame, shape) = (frame.to_owned(), Shape::Point);
+        Self { frame, shape, normal, friction, yaw_friction: None, min_force: 0.0, max_force: f64::INFINITY }
+    }
+
+    /// A convex polygon (or an edge) of corners in the frame, whose normal is the frame's z, by its wrench.
+    pub fn surface(frame: &str, friction: f64, corners: &[Vec3<f64>]) -> Self {
+        let shape = Shape::Surface { corners: corners.to_vec(), forces: SurfaceForces::Wrench };
+        Self { shape, normal: Normal::Frame(Vec3::new(0.0, 0.0, 1.0)), ..Self::point(frame, friction) }
+    }
+
+    /// A rectangle about the frame's origin with sides along the frame's x and y (m).
+    pub fn sole(frame: &str, friction: f64, [length, width]: [f64; 2]) -> Self {
+        let (x, y) = (0.5 * length, 0.5 * width);
+        let corners = [[x, y], [-x, y], [-x, -y], [x, -y]].map(|[x, y]| Vec3::new(x, y, 0.0));
+        Self::surface(frame, friction, &corners)
+    }
+
+    /// The same contact with a force at each corner.
+    #[must_use]
+    pub fn by_corners(mut self) -> Self {
+        if let Shape::Surface { forces, .. } = &mut self.shape {
+            *forces = SurfaceForces::Corners;
+        }
+        self
+    }
+
+    fn wrong(&self, name: &'static str, value: f64, allowed: &'static str) -> Error {
+        Error::Contact { frame: self.frame.clone(), name, value, allowed }
+    }
+
+    pub(crate) fn check(&self) -> Result<Geometry, Error> {
+        let (Normal::World(n) | Normal::Frame(n)) = self.normal;
+        let length = norm(n);
+        let yaw = self.yaw_friction.unwrap_or(0.0);
+        for (name, value, good, allowed) in [
+            ("friction", self.friction, self.friction > 0.0 && self.friction.is_finite(), "above 0"),
+            ("yaw_friction", yaw, yaw >= 0.0 && yaw.is_finite(), "at least 0"),
+            ("normal (its length)", length, length > 0.0 && length.is_finite(), "above 0"),
+            ("min_force", self.min_force, self.min_force >= 0.0 && self.min_force.is_finite(), "at least 0"),
+            (
+                "max_force",
+                self.max_force,
+                self.max_force >= self.min_force && self.max_force > 0.0,
+                "at least min_force, above 0",
+            ),
+        ] {
+            if !good {
+                return Err(self.wrong(name, value, allowed));
+            }
+        }
+        let n = n.scale(1.0 / length);
+        match &self.shape {
+            Shape::Point => {
+                let (centre, axes) = (Vec3::zero(), axes(n));
+                Ok(Geometry { centre, axes, corners: Vec::new(), by_corners: false, motion: &[0, 1, 2], yaw: 0.0 })
+            }
+            Shape::Surface { corners, forces } => self.surface_geometry(n, corners, *forces),
+        }
+    }
+
+    fn surface_geometry(&self, n: Vec3<f64>, corners: &[Vec3<f64>], forces: SurfaceForces) -> Result<Geometry, Error> {
+        let count = corners.len() as f64;
+        if matches!(self.normal, Normal::World(_)) {
+            return Err(self.wrong("corners", count, "those of a point where the normal is the world's"));
+        }
+        let sum = corners.iter().fold(Vec3::zero(), |sum, &c| sum + c);
+        let centre = sum.scale(1.0 / count);
+        if corners.len() < 2 || !norm(centre).is_finite() {
+            return Err(self.wrong("corners", count, "at least 2, and finite"));
+        }
+        let size = corners.iter().map(|&c| norm(c - centre)).fold(0.0, f64::max);
+        if corners.iter().any(|&c| (c - centre).dot(n).abs() > 1e-6 * size) {
+            return Err(self.wrong("corners", count, "in one plane across the normal"));
+        }
+        let axes = match corners {
+            [a, b] if norm(*b - *a) > 0.0 => {
+                let t = (*b - *a).scale(1.0 / norm(*b - *a));
+                Mat3 { x: t, y: n.cross(t), z: n }
+            }
+            _ => axes(n),
+        };
+        let mut flat: Vec<[f64; 2]> =
+            corners.iter().map(|&c| [axes.x.dot(c - centre), axes.y.dot(c - centre)]).collect();
+        let turn = |k: usize| {
+            let [a, b, c] = [0, 1, 2].map(|i| flat[(k + i) % flat.len()]);
+            (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+        };
+        let turns: Vec<f64> = (0..flat.len()).map(turn).collect();
+        let edge = flat.len() == 2;
+        // Each turn to the left; all together one round, which a star's would exceed: the centre lies left of each edge.
+        let left = turns.iter().all(|&t| t > 0.0);
+        if !edge && !left {
+            if !turns.iter().all(|&t| t < 0.0) {
+                return Err(self.wrong("corners", count, "in their order around a convex polygon"));
+            }
+            flat.reverse();
+        }
+        if edge && size <= 0.0 {
+            return Err(self.wrong("corners", count, "apart from each other"));
+        }
+        let radius =
+            (0..flat.len()).map(|k| inside(flat[k], flat[(k + 1) % flat.len()])[2]).fold(f64::INFINITY, f64::min);
+        if !edge && radius <= 0.0 {
+            return Err(self.wrong("corners", count, "in their order around a convex polygon"));
+        }
+        let even = if edge { 0.5 * size } else { 2.0 / 3.0 * radius };
+        let yaw = self.yaw_friction.unwrap_or(self.friction * even);
+        // An edge does not hold the rotation about itself (t₁).
+        let motion: &[usize] = if edge { &[0, 1, 2, 4, 5] } else { &[0, 1, 2, 3, 4, 5] };
+        Ok(Geometry { centre, axes, corners: flat, by_corners: forces == SurfaceForces::Corners, motion, yaw })
+    }
+}
+
+/// What is fixed of a contact.
+#[derive(Clone, Debug)]
+pub(crate) struct Geometry {
+    /// The corners' mean, in the frame.
+    pub centre: Vec3<f64>,
+    /// (t₁, t₂, n), right-handed; in the frame, or in the world if the normal is.
+    pub axes: Mat3<f64>,
+    /// Corners along t₁ and t₂ from the centre, counterclockwise about n; none for a point.
+    pub corners: Vec<[f64; 2]>,
+    pub by_corners: bool,
+    /// Which of the motion's six numbers are held; the wrench has the same.
+    pub motion: &'static [usize],
+    /// γ.
+    pub yaw: f64,
+}
+
+impl Geometry {
+    /// How many unknowns the force has.
+    pub(crate) fn unknowns(&self) -> usize {
+        if self.by_corners { 3 * self.corners.len() } else { self.motion.len() }
+    }
+
+    /// How many friction cones there are; that of number k is on unknowns 3 k to 3 k + 2: t₁, t₂, n.
+    pub(crate) fn cones(&self) -> usize {
+        if self.by_corners { self.corners.len() } else { 1 }
+    }
+
+    /// The half-planes (a, b, c) with a x + b y + c ≥ 0 in which the centre of pressure of a wrench lies.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        let count = if self.by_corners { 0 } else { self.corners.len() };
+        (0..count).map(move |k| {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % count]);
+            if count == 2 { [b[0].signum(), 0.0, b[0].abs()] } else { inside(a, b) }
+        })
+    }
+
+    /// Row r of the wrench that unknown j makes, in the contact's axes at the centre.
+    pub(crate) fn wrench(&self, r: usize, j: usize) -> f64 {
+        if !self.by_corners {
+            return f64::from(u8::from(self.motion[j] == r));
+        }
+        let ([x, y], axis) = (self.corners[j / 3], j % 3);
+        match (r, axis) {
+            (0, 0) | (1, 1) | (2, 2) => 1.0,
+            (3, 2) => y, // (x, y, 0) × f = (y f_n, −x f_n, x f₂ − y f₁)
+            (4, 2) => -x,
+            (5, 0) => -y,
+            (5, 1) => x,
+            _ => 0.0,
+        }
+    }
+}
+
+/// (a, b, c): a x + b y + c is the distance of (x, y) from the line through two corners, above 0 on its left.
+fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
+    let (x, y) = (to[0] - from[0], to[1] - from[1]);
+    let length = x.hypot(y);
+    let (a, b) = (-y / length, x / length);
+    [a, b, -(a * from[0] + b * from[1])]
+}
+
+/// Unit vectors (t₁, t₂, n), right-handed, for a unit vector n.
+fn axes(n: Vec3<f64>) -> Mat3<f64> {
+    // across n and the axis that lies farthest from it
+    let (x, y) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0));
+    let t = if n.x.abs() < n.y.abs() { n.cross(x) } else { y.cross(n) };
+    let t1 = t.scale(1.0 / norm(t));
+    Mat3 { x: t1, y: n.cross(t1), z: n }
+}
+
+pub(crate) fn norm(x: Vec3<f64>) -> f64 {
+    x.norm_squared().sqrt()
+}

@@ -1,0 +1,239 @@
+//! The numbers of a contact at one state: Jacobian, held acceleration, and the rows and cones of its force.
+
+use crate::cone_program::ConeProgram;
+use crate::contact::{FrictionContact, Geometry, Normal, norm};
+use crate::kinematics::FrameMotion;
+use crate::references::ContactTarget;
+use crate::settings::{Friction, Settings};
+use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
+use nalgebra::DMatrix;
+
+/// A contact, all of whose rows are along its axes (t₁, t₂, n) at its centre.
+pub(crate) struct ContactNumbers {
+    pub description: FrictionContact,
+    pub geometry: Geometry,
+    /// Which of the kinematics' frames it is.
+    pub frame: usize,
+    /// Whether it touches.
+    pub active: bool,
+    /// The place of its force's first unknown in x, if it is active.
+    pub column: usize,
+    /// The axes in the world.
+    axes: Mat3<f64>,
+    /// From the frame's origin to the centre, in the world.
+    arm: Vec3<f64>,
+    /// Jᵀ, nv × the number of rows held.
+    pub Jt: DMatrix<f64>,
+    /// J q̈ = this: a* − J̇ v.
+    pub held: [f64; 6],
+    /// The reference of the force's unknowns.
+    pub reference: Vec<f64>,
+    /// The reference of the wrench.
+    pub wrench: [f64; 6],
+    /// Least and greatest normal force.
+    bounds: [f64; 2],
+}
+
+impl ContactNumbers {
+    pub(crate) fn new(description: &FrictionContact, geometry: Geometry, frame: usize, nv: usize) -> Self {
+        Self {
+            description: description.clone(),
+            frame,
+            active: false,
+            column: 0,
+            axes: Mat3::identity(),
+            arm: Vec3::zero(),
+            Jt: DMatrix::zeros(nv, geometry.motion.len()),
+            held: [0.0; 6],
+            reference: vec![0.0; geometry.unknowns()],
+            wrench: [0.0; 6],
+            bounds: [0.0, f64::INFINITY],
+            geometry,
+        }
+    }
+
+    /// How many rows of G the force may have.
+    pub(crate) fn max_rows(&self, friction: Friction) -> usize {
+        let edges = self.geometry.edges().count();
+        let sides = if let Friction::Pyramid { sides, .. } = friction { sides } else { 0 };
+        1 + edges + 2 * usize::from(edges > 0) + sides * self.geometry.cones()
+    }
+
+    /// From the frame's origin to the centre, in the world.
+    pub(crate) fn centre_arm(&self, frame: &FrameMotion) -> Vec3<f64> {
+        frame.pose.rotation * self.geometry.centre
+    }
+
+    /// All numbers of an active contact, whose frame is at `frame`.
+    pub(crate) fn update(&mut self, frame: &FrameMotion, target: &ContactTarget, settings: &Settings, weight: f64) {
+        let R = frame.pose.rotation;
+        let (centre, axes, motion) = (self.geometry.centre, self.geometry.axes, self.geometry.motion);
+        self.arm = R * centre;
+        self.axes = match self.description.normal {
+            Normal::World(_) => axes,
+            Normal::Frame(_) => R * axes,
+        };
+        let [t1, t2, n] = self.axes.columns();
+        for &j in &frame.support {
+            let s = &frame.J.as_slice()[6 * j..6 * j + 6];
+            let (linear, angular) = (Vec3::new(s[0], s[1], s[2]), Vec3::new(s[3], s[4], s[5]));
+            let at = linear + angular.cross(self.arm); // of the centre
+            let along = [t1.dot(at), t2.dot(at), n.dot(at), t1.dot(angular), t2.dot(angular), n.dot(angular)];
+            for (r, &row) in motion.iter().enumerate() {
+                self.Jt[(j, r)] = along[row];
+            }
+        }
+        // a* = k (X_ref ⊖ X) − d v of the centre, no longer than the greatest correction
+        let gains = settings.contact_gains;
+        let (v, w) = (frame.velocity.linear, frame.velocity.angular);
+        let turn: Mat3<f64> = target.pose.rotation * R.transpose();
+        let error = Motion::new(
+            target.pose.translation + target.pose.rotation * centre - (frame.pose.translation + self.arm),
+            lie::log3(Quaternion::from_rotation(turn)),
+        );
+        let error = if self.geometry.corners.is_empty() {
+            Motion::new(target.pose.translation - frame.pose.translation, Vec3::zero())
+        } else {
+            error
+        };
+        let wanted = |error: Vec3<f64>, velocity: Vec3<f64>| {
+            let a = error.scale(gains.stiffness) - velocity.scale(gains.damping);
+            a.scale((settings.max_correction / norm(a)).min(1.0)) // NaN.min(1) is 1
+        };
+        let drift = frame.drift.linear + frame.drift.angular.cross(self.arm) + w.cross(w.cross(self.arm));
+        let linear = wanted(error.linear, v + w.cross(self.arm)) - drift;
+        let angular = wanted(error.angular, w) - frame.drift.angular;
+        let along = self.along(linear, angular);
+        for (held, &row) in self.held.iter_mut().zip(motion) {
+            *held = along[row];
+        }
+        // references of the force, whose wrench is about the frame's origin
+        let Force { linear, angular } = target.force;
+        self.wrench = self.along(linear, angular - self.arm.cross(linear));
+        let (wrench, share) = (self.wrench, 1.0 / self.geometry.cones() as f64);
+        for (j, reference) in self.reference.iter_mut().enumerate() {
+            *reference = if self.geometry.by_corners { share * wrench[j % 3] } else { wrench[motion[j]] };
+        }
+        let FrictionContact { min_force, max_force, .. } = self.description;
+        self.bounds = [min_force, max_force];
+        if target.activation < 1.0 {
+            // f_n ≤ α times the greatest force there is, or the robot's weight
+            let most = if max_force.is_finite() { max_force } else { weight };
+            self.bounds = [min_force, most].map(|bound| bound * target.activation);
+        }
+    }
+
+    fn along(&self, linear: Vec3<f64>, angular: Vec3<f64>) -> [f64; 6] {
+        let (a, b) = (self.axes.transpose_mul(linear), self.axes.transpose_mul(angular));
+        [a.x, a.y, a.z, b.x, b.y, b.z]
+    }
+
+    /// −Jᵀ f: subtracts what the force adds to the effort of each coordinate, from the columns of Eᵀ.
+    pub(crate) fn add_effort(&self, support: &[usize], Et: &mut DMatrix<f64>) {
+        let rows = self.geometry.motion;
+        for &i in support {
+            for j in 0..self.geometry.unknowns() {
+                Et[(self.column + j, i)] = if self.geometry.by_corners {
+                    -(rows
+                        .iter()
+                        .enumerate()
+                        .map(|(r, &row)| self.Jt[(i, r)] * self.geometry.wrench(row, j))
+                        .sum::<f64>())
+                } else {
+                    -self.Jt[(i, j)]
+                };
+            }
+        }
+    }
+
+    /// J q̈ = a* − J̇ v.
+    pub(crate) fn add_equalities(&self, program: &mut ConeProgram) {
+        let (n, nv) = (program.size.unknowns, self.Jt.nrows());
+        for r in 0..self.geometry.motion.len() {
+            let e = program.size.equalities;
+            let column = &mut program.At.column_mut(e);
+            column.rows_mut(0, nv).copy_from(&self.Jt.column(r));
+            column.rows_mut(nv, n - nv).fill(0.0);
+            program.b[e] = self.held[r];
+            program.size.equalities += 1;
+        }
+    }
+
+    /// Bounds of the force, its friction cones or pyramids, the centre of pressure, the moment about the normal.
+    pub(crate) fn add_force_rows(&self, program: &mut ConeProgram, friction: Friction) {
+        let Geometry { by_corners, yaw, motion, .. } = self.geometry;
+        let mu = self.description.friction;
+        let cones = self.geometry.cones();
+        let [least, most] = self.bounds;
+        if least > 0.0 || most < f64::INFINITY {
+            let lower = if least > 0.0 { least } else { f64::NEG_INFINITY }; // the cones say f_n ≥ 0
+            let row = add_row(program, lower, most);
+            for k in 0..cones {
+                program.Gt[(self.column + 3 * k + 2, row)] = 1.0;
+            }
+        }
+        if !by_corners && motion.len() > 3 {
+            let (f_n, moments) = (self.column + 2, self.column + motion.len() - 2);
+            for [a, b, c] in self.geometry.edges() {
+                let row = add_row(program, 0.0, f64::INFINITY); // f_n p = (−τ₂, τ₁): −a τ₂ + b τ₁ + c f_n ≥ 0
+                program.Gt[(moments, row)] = -a;
+                if b != 0.0 {
+                    program.Gt[(moments - 1, row)] = b;
+                }
+                program.Gt[(f_n, row)] = c;
+            }
+            for sign in [1.0, -1.0] {
+                let row = add_row(program, 0.0, f64::INFINITY); // γ f_n ± τ_n ≥ 0
+                program.Gt[(f_n, row)] = yaw;
+                program.Gt[(moments + 1, row)] = sign;
+            }
+        }
+        for k in 0..cones {
+            let f = self.column + 3 * k;
+            match friction {
+                Friction::Cone => {
+                    let first = program.size.cone_rows;
+                    program.size.cone_rows += 3;
+                    program.cones.push(3);
+                    let n = program.size.unknowns;
+                    for (i, (column, x)) in [(f + 2, mu), (f, 1.0), (f + 1, 1.0)].into_iter().enumerate() {
+                        program.Ft.column_mut(first + i).rows_mut(0, n).fill(0.0);
+                        program.Ft[(column, first + i)] = x; // s = (μ f_n, f₁, f₂)
+                        program.h[first + i] = 0.0;
+                    }
+                }
+                Friction::Pyramid { sides, inscribed } => {
+                    let step = core::f64::consts::TAU / sides as f64;
+                    let slope = if inscribed { mu * (0.5 * step).cos() } else { mu };
+                    for side in 0..sides {
+                        let (sin, cos) = (step * side as f64).sin_cos();
+                        let row = add_row(program, 0.0, f64::INFINITY); // μ f_n − dᵀ f_t ≥ 0
+                        program.Gt[(f + 2, row)] = slope;
+                        program.Gt[(f, row)] = -cos;
+                        program.Gt[(f + 1, row)] = -sin;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The wrench of the force in x about the frame's origin, along the world's axes.
+    pub(crate) fn read(&self, x: &[f64]) -> Force<f64> {
+        if !self.active {
+            return Force::zero();
+        }
+        let f = &x[self.column..self.column + self.geometry.unknowns()];
+        let row = |r: usize| f.iter().enumerate().map(|(j, f)| self.geometry.wrench(r, j) * f).sum::<f64>();
+        let linear = self.axes * Vec3::new(row(0), row(1), row(2));
+        Force::new(linear, self.axes * Vec3::new(row(3), row(4), row(5)) + self.arm.cross(linear))
+    }
+}
+
+/// A row of zeros more.
+fn add_row(program: &mut ConeProgram, lower: f64, upper: f64) -> usize {
+    let (row, n) = (program.size.rows, program.size.unknowns);
+    program.Gt.column_mut(row).rows_mut(0, n).fill(0.0);
+    (program.lower[row], program.upper[row]) = (lower, upper);
+    program.size.rows += 1;
+    row
+}

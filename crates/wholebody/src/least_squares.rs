@@ -1,0 +1,85 @@
+//! An objective as a sum of squares: ½ ‖R x − b‖² + ½ Σ dᵢ xᵢ² + cᵀ x.
+
+use crate::cone_program::ConeProgram;
+use nalgebra::DMatrix;
+
+/// The rows of one priority. It has room for all tasks and unknowns.
+#[derive(Clone, Debug)]
+pub(crate) struct LeastSquares {
+    /// Rᵀ: a column for each row, √w times the task's.
+    pub Rt: DMatrix<f64>,
+    /// b, √w times the task's.
+    pub b: Vec<f64>,
+    /// How many rows there are.
+    pub count: usize,
+    /// d.
+    pub diagonal: Vec<f64>,
+    /// c.
+    pub linear: Vec<f64>,
+    /// Unknowns of which d is a task, not regularisation only.
+    pub single: Vec<usize>,
+    /// How many unknowns there are.
+    unknowns: usize,
+}
+
+impl LeastSquares {
+    pub(crate) fn new(unknowns: usize, rows: usize) -> Self {
+        Self {
+            Rt: DMatrix::zeros(unknowns, rows),
+            b: vec![0.0; rows],
+            count: 0,
+            diagonal: vec![0.0; unknowns],
+            linear: vec![0.0; unknowns],
+            single: Vec::with_capacity(unknowns),
+            unknowns,
+        }
+    }
+
+    /// No rows, for so many unknowns.
+    pub(crate) fn clear(&mut self, unknowns: usize) {
+        self.count = 0;
+        self.unknowns = unknowns;
+        self.diagonal[..unknowns].fill(0.0);
+        self.linear[..unknowns].fill(0.0);
+        self.single.clear();
+    }
+
+    /// ½ w (r x − b)² more: the row r of zeros, to be filled.
+    pub(crate) fn add_row(&mut self, weight: f64, b: f64, fill: impl FnOnce(&mut [f64])) {
+        let root = weight.sqrt();
+        let stride = self.Rt.nrows();
+        let row = &mut self.Rt.as_mut_slice()[self.count * stride..][..self.unknowns];
+        row.fill(0.0);
+        fill(row);
+        for x in row {
+            *x *= root;
+        }
+        self.b[self.count] = root * b;
+        self.count += 1;
+    }
+
+    /// ½ w (x_i − a)² more.
+    pub(crate) fn add_single(&mut self, i: usize, weight: f64, a: f64) {
+        self.diagonal[i] += weight;
+        self.linear[i] -= weight * a;
+    }
+
+    /// P and c of a program in the same unknowns.
+    pub(crate) fn write(&self, program: &mut ConeProgram) {
+        let n = self.unknowns;
+        for j in 0..n {
+            program.P.column_mut(j).rows_mut(j, n - j).fill(0.0);
+            program.P[(j, j)] = self.diagonal[j];
+        }
+        program.c[..n].copy_from_slice(&self.linear[..n]);
+        for (row, &b) in self.Rt.column_iter().zip(&self.b).take(self.count) {
+            for j in 0..n {
+                if row[j] == 0.0 {
+                    continue;
+                }
+                program.P.column_mut(j).rows_mut(j, n - j).axpy(row[j], &row.rows(j, n - j), 1.0);
+                program.c[j] -= row[j] * b;
+            }
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The tasks at one state: J q̈ = a* − J̇ v, row by row.
+
+use crate::contact_numbers::ContactNumbers;
+use crate::kinematics::{FrameMotion, Kinematics};
+use crate::least_squares::LeastSquares;
+use crate::references::{FrameTarget, PostureTarget, References};
+use crate::settings::Settings;
+use crate::task::{Axes, Gains, Task, TaskKind};
+use condyle_dynamics::{Mat3, Quaternion, Vec3, difference, lie};
+
+/// A task whose names are found.
+pub(crate) struct ResolvedTask {
+    pub task: Task,
+    /// Which of the kinematics' frames it moves.
+    pub frame: Option<usize>,
+    /// Which of the references' frames it aims at.
+    pub target: usize,
+    /// Which of the kinematics' frames has its axes.
+    pub axes: Option<usize>,
+    /// Which contact's force it sets.
+    pub contact: Option<usize>,
+}
+
+impl ResolvedTask {
+    /// How many rows it may have.
+    pub(crate) fn max_rows(&self) -> usize {
+        match self.task.kind {
+            TaskKind::Posture => 0,
+            TaskKind::Com | TaskKind::Position(_) | TaskKind::Orientation(_) | TaskKind::AngularMomentum => 3,
+            TaskKind::Pose(_) | TaskKind::Velocity(_) | TaskKind::ContactForce(_) => 6,
+        }
+    }
+
+    /// Adds its rows, one for each axis that the mask lets through.
+    fn add(&self, k: &Kinematics, contacts: &[ContactNumbers], references: &References, out: &mut LeastSquares) {
+        let Gains { stiffness, damping } = self.task.gains;
+        let axes = self.axes.map_or(Mat3::identity(), |frame| k.frames[frame].pose.rotation);
+        let frame = || (&k.frames[self.frame.expect("resolved")], &references.frames[self.target]);
+        match self.task.kind {
+            TaskKind::Com => {
+                let target = &references.com;
+                let a = target.acceleration
+                    + (target.position - k.com).scale(stiffness) // a* = a_ref + k (c_ref − c)
+                    + (target.velocity - k.com_velocity).scale(damping); //     + d (ċ_ref − ċ)
+                self.add_map(k, axes, 0, 1.0 / k.mass, a - k.com_drift, out);
+            }
+            TaskKind::AngularMomentum => {
+                let target = &references.momentum;
+                let rate = target.rate + (target.momentum - k.momentum.angular).scale(damping);
+                self.add_map(k, axes, 3, 1.0, rate - k.momentum_drift.angular, out);
+            }
+            TaskKind::Position(_) => {
+                let (frame, target) = frame();
+                self.add_linear(frame, target, axes, 0, stiffness, out);
+            }
+            TaskKind::Orientation(_) => {
+                let (frame, target) = frame();
+                self.add_angular(frame, target, axes, 0, stiffness, out);
+            }
+            TaskKind::Pose(_) | TaskKind::Velocity(_) => {
+                let (frame, target) = frame();
+                let stiffness = if matches!(self.task.kind, TaskKind::Pose(_)) { stiffness } else { 0.0 };
+                self.add_linear(frame, target, axes, 0, stiffness, out);
+                self.add_angular(frame, target, axes, 3, stiffness, out);
+            }
+            TaskKind::ContactForce(_) => {
+                let contact = &contacts[self.contact.expect("resolved")];
+                if !contact.active {
+                    return;
+                }
+                let unknowns = contact.geometry.unknowns();
+                for &r in contact.geometry.motion {
+                    if self.task.mask[r] {
+                        out.add_row(self.task.weight, contact.wrench[r], |row| {
+                            for j in 0..unknowns {
+                                row[contact.column + j] = contact.geometry.wrench(r, j);
+                            }
+                        });
+                    }
+                }
+            }
+            TaskKind::Posture => {}
+        }
+    }
+
+    /// Rows of the centroidal momentum matrix, from one on, along some axes.
+    fn add_map(&self, k: &Kinematics, axes: Mat3<f64>, from: usize, scale: f64, b: Vec3<f64>, out: &mut LeastSquares) {
+        for (e, _) in axes.columns().into_iter().zip(self.task.mask).filter(|(_, counts)| *counts) {
+            let s = e.scale(scale);
+            out.add_row(self.task.weight, e.dot(b), |row| {
+                for (x, A) in row.iter_mut().zip(k.Ag.as_slice().chunks_exact(6)) {
+                    *x = s.x * A[from] + s.y * A[from + 1] + s.z * A[from + 2];
+                }
+            });
+        }
+    }
+
+    fn add_linear(
+        &self,
+        frame: &FrameMotion,
+        target: &FrameTarget,
+        axes: Mat3<f64>,
+        mask: usize,
+        stiffness: f64,
+        out: &mut LeastSquares,
+    ) {
+        let a = target.acceleration.linear
+            + (target.pose.translation - frame.pose.translation).scale(stiffness) // a* = a_ref + k (p_ref − p)
+            + (target.velocity.linear - frame.velocity.linear).scale(self.task.gains.damping); // + d (ṗ_ref − ṗ)
+        self.add_jacobian(frame, axes, mask, 0, a - frame.drift.linear, out);
+    }
+
+    fn add_angular(
+        &self,
+        frame: &FrameMotion,
+        target: &FrameTarget,
+        axes: Mat3<f64>,
+        mask: usize,
+        stiffness: f64,
+        out: &mut LeastSquares,
+    ) {
+        let turn: Mat3<f64> = target.pose.rotation * frame.pose.rotation.transpose();
+        let error = lie::log3(Quaternion::from_rotation(turn));
+        let a = target.acceleration.angular
+            + error.scale(stiffness) // a* = ω̇_ref + k log(R_ref Rᵀ)
+            + (target.velocity.angular - frame.velocity.angular).scale(self.task.gains.damping); // + d (ω_ref − ω)
+        self.add_jacobian(frame, axes, mask, 3, a - frame.drift.angular, out);
+    }
+
+    /// Rows of a frame's Jacobian, from one on, along some axes.
+    fn add_jacobian(
+        &self,
+        frame: &FrameMotion,
+        axes: Mat3<f64>,
+        mask: usize,
+        from: usize,
+        b: Vec3<f64>,
+        out: &mut LeastSquares,
+    ) {
+        for (axis, e) in axes.columns().into_iter().enumerate() {
+            if self.task.mask[mask + axis] {
+                out.add_row(self.task.weight, e.dot(b), |row| {
+                    for &j in &frame.support {
+                        let J = &frame.J.as_slice()[6 * j + from..6 * j + from + 3];
+                        row[j] = e.x * J[0] + e.y * J[1] + e.z * J[2];
+                    }
+                });
+            }
+        }
+    }
+}
+
+/// All tasks, by their priorities.
+pub(crate) struct Objective {
+    pub tasks: Vec<ResolvedTask>,
+    /// q_ref ⊖ q, nv numbers.
+    pub error: Vec<f64>,
+    /// One for each priority.
+    pub levels: Vec<LeastSquares>,
+}
+
+impl Objective {
+    pub(crate) fn new(tasks: Vec<ResolvedTask>, nv: usize, unknowns: usize) -> Self {
+        let count = tasks.iter().map(|t| t.task.priority + 1).max().unwrap_or(1);
+        let rows = |p| tasks.iter().filter(|t| t.task.priority == p).map(ResolvedTask::max_rows).sum();
+        let levels = (0..count).map(|p| LeastSquares::new(unknowns, rows(p))).collect();
+        Self { levels, error: vec![0.0; nv], tasks }
+    }
+
+    /// Computes the rows at (q, v).
+    ///
+    /// Each priority is regularised with ½ w_a ‖q̈‖² + ½ w_f Σ ‖f − f_ref‖².
+    pub(crate) fn update(
+        &mut self,
+        q: &[f64],
+        v: &[f64],
+        k: &Kinematics,
+        contacts: &[ContactNumbers],
+        references: &References,
+        settings: &Settings,
+        actuated: &[usize],
+        unknowns: usize,
+    ) {
+        let Self { tasks, error, levels } = self;
+        let PostureTarget { q: q_ref, v: v_ref, a: a_ref } = &references.posture;
+        if tasks.iter().any(|task| task.task.kind == TaskKind::Posture) {
+            difference(&k.model, q, q_ref, error); // q_ref ⊖ q
+        }
+        for level in levels.iter_mut() {
+            level.clear(unknowns);
+        }
+        for resolved in tasks.iter() {
+            let Task { weight, joints, gains: Gains { stiffness, damping }, priority, .. } = &resolved.task;
+            let level = &mut levels[*priority];
+            if *weight == 0.0 {
+                continue;
+            }
+            resolved.add(k, contacts, references, level);
+            if resolved.task.kind == TaskKind::Posture {
+                for &i in actuated {
+                    let a = a_ref[i] + stiffness * error[i] + damping * (v_ref[i] - v[i]);
+                    let factor = joints.get(i).copied().unwrap_or(1.0);
+                    if factor > 0.0 {
+                        level.add_single(i, weight * factor, a); // ½ w (q̈ᵢ − a*ᵢ)²
+                        level.single.push(i);
+                    }
+                }
+            }
+        }
+        for level in levels {
+            for i in 0..v.len() {
+                level.add_single(i, settings.acceleration_weight, 0.0); // ½ w_a q̈ᵢ²
+            }
+            for contact in contacts.iter().filter(|contact| contact.active) {
+                for (j, &f) in contact.reference.iter().enumerate() {
+                    level.add_single(contact.column + j, settings.force_weight, f); // ½ w_f (f − f_ref)²
+                }
+            }
+        }
+    }
+}
+
+impl ResolvedTask {
+    /// Which frame's axes a task wants: its own, or another one.
+    pub(crate) fn axes_name(task: &Task) -> Option<&str> {
+        match &task.axes {
+            Axes::World => None,
+            Axes::Local => task.kind.frame(),
+            Axes::Frame(name) => Some(name),
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The command where there is no solution: the last one for some ticks, then gravity compensation with damping.
+
+use crate::contact_numbers::ContactNumbers;
+use crate::kinematics::Kinematics;
+use condyle_dynamics::{Data, gravity};
+use nalgebra::{Matrix6, Vector6};
+
+/// What the safe command is made of.
+pub(crate) struct Safety {
+    data: Data<f64>,
+    /// The torques of the last solution; 0 before the first.
+    tau: Vec<f64>,
+    /// How many ticks ago it was, if there was one.
+    age: Option<u32>,
+    /// The last state that was finite.
+    q: Vec<f64>,
+    v: Vec<f64>,
+    /// Whether that is the current one.
+    current: bool,
+    /// Greatest effort of each coordinate.
+    effort: Vec<f64>,
+    damping: f64,
+    hold_ticks: u32,
+}
+
+impl Safety {
+    pub(crate) fn new(kinematics: &Kinematics, q: &[f64], effort: &[f64], damping: f64, hold_ticks: u32) -> Self {
+        let nv = kinematics.model.nv();
+        Self {
+            data: Data::new(&kinematics.model),
+            tau: vec![0.0; nv],
+            age: None,
+            q: q.to_vec(),
+            v: vec![0.0; nv],
+            current: false,
+            effort: effort.to_vec(),
+            damping,
+            hold_ticks,
+        }
+    }
+
+    /// The state of a tick, if it is finite.
+    pub(crate) fn see(&mut self, state: Option<(&[f64], &[f64])>) {
+        self.current = state.is_some();
+        if let Some((q, v)) = state {
+            self.q.copy_from_slice(q);
+            self.v.copy_from_slice(v);
+        }
+    }
+
+    /// The torques of a tick that was solved.
+    pub(crate) fn keep(&mut self, tau: &[f64]) {
+        self.tau.copy_from_slice(tau);
+        self.age = Some(0);
+    }
+
+    /// The greatest effort of each coordinate is not exceeded.
+    pub(crate) fn clip(&self, tau: &mut [f64]) {
+        for (tau, &limit) in tau.iter_mut().zip(&self.effort) {
+            *tau = tau.clamp(-limit, limit);
+        }
+    }
+
+    /// Writes the torques of a tick that was not solved. Whether they are the last solution's.
+    pub(crate) fn command(
+        &mut self,
+        kinematics: &mut Kinematics,
+        contacts: &[ContactNumbers],
+        free: &[usize],
+        tau: &mut [f64],
+    ) -> bool {
+        if let Some(age) = self.age.filter(|age| *age < self.hold_ticks) {
+            self.age = Some(age + 1);
+            tau.copy_from_slice(&self.tau);
+            return true;
+        }
+        self.gravity_compensation(kinematics, contacts, free, tau);
+        if self.current {
+            for (i, tau) in tau.iter_mut().enumerate() {
+                let scale = if self.effort[i].is_finite() { self.effort[i] } else { 1.0 };
+                *tau -= self.damping * scale * self.v[i]; // −D v
+            }
+        }
+        free.iter().for_each(|&i| tau[i] = 0.0);
+        self.clip(tau);
+        false
+    }
+
+    /// τ = g − Jᵀ f, with the smallest forces of the active contacts that carry the base: S (g − Jᵀ f) = 0.
+    fn gravity_compensation(
+        &mut self,
+        kinematics: &mut Kinematics,
+        contacts: &[ContactNumbers],
+        free: &[usize],
+        tau: &mut [f64],
+    ) {
+        let Self { data, q, v, .. } = self;
+        tau.copy_from_slice(gravity(&kinematics.model, data, q));
+        let Ok(base) = <[usize; 6]>::try_from(free) else { return };
+        kinematics.update(q, v);
+        let frames = &kinematics.frames;
+        let rows = |c: &ContactNumbers| if c.geometry.motion.len() == 3 { 3 } else { 6 };
+        let active = || contacts.iter().filter(|c| c.active);
+        // f = J_b λ with (Σ J_bᵀ J_b) λ = g_b
+        let mut gram = Matrix6::identity() * 1e-9;
+        for c in active() {
+            for r in 0..rows(c) {
+                let J = Vector6::from_fn(|i, _| frames[c.frame].J[(r, base[i])]);
+                gram += J * J.transpose();
+            }
+        }
+        let Some(factor) = gram.cholesky() else { return };
+        let lambda = factor.solve(&Vector6::from_fn(|i, _| tau[base[i]]));
+        for c in active() {
+            let frame = &frames[c.frame];
+            for r in 0..rows(c) {
+                let f: f64 = (0..6).map(|i| frame.J[(r, base[i])] * lambda[i]).sum();
+                for &i in &frame.support {
+                    tau[i] -= frame.J[(r, i)] * f;
+                }
+            }
+        }
+    }
+}

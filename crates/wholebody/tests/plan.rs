@@ -1,0 +1,92 @@
+//! Plans: what a controller reads from plain arrays.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::*;
+use condyle_dynamics::{Model, integrate, robots};
+use condyle_wholebody::{Plan, PlanData, Settings, Task, WholeBodyController};
+
+/// Five knots 0.1 s apart: the trunk accelerates upwards with 0.4 m/s² from rest; the first foot is off in the third step.
+fn data(model: &Model) -> PlanData {
+    let mut states = Vec::new();
+    for k in 0..5 {
+        let t = 0.1 * f64::from(k);
+        let (mut q, mut v) = (stance(), vec![0.0; 18]);
+        (q[2], v[2]) = (q[2] + 0.2 * t * t, 0.4 * t);
+        states.extend(q.into_iter().chain(v));
+    }
+    let mut touches = vec![true; 16];
+    touches[8] = false;
+    assert_eq!(model.nv(), 18);
+    let controls = (0..48).map(f64::from).collect();
+    let mut gains = vec![0.0; 4 * 12 * 36];
+    gains[2] = 100.0; // of the first joint, on the height, in the first step
+    PlanData { times: (0..5).map(|k| 0.1 * f64::from(k)).collect(), states, controls, gains, touches, fade: 0.05 }
+}
+
+#[test]
+fn references_follow_the_plan() {
+    let model = robots::quadruped();
+    let plan = Plan::new(&model, 4, data(&model)).unwrap();
+    assert_eq!(plan.span(), [0.0, 0.4]);
+    let tasks = [tasks(), vec![Task::position("LF_foot")]].concat();
+    let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks, Settings::default()).unwrap();
+    let mut references = controller.hold(&stance());
+    let height = references.com.position.z;
+    controller.track(&plan, 0.1, &mut references);
+    assert!((references.com.position.z - height - 0.002).abs() < 1e-12);
+    assert!((references.com.velocity.z - 0.04).abs() < 1e-12);
+    assert!((references.com.acceleration.z - 0.4).abs() < 1e-9);
+    assert!((references.frames[1].acceleration.linear.z - 0.4).abs() < 1e-9, "the foot is lifted with the trunk");
+    let lift: f64 = references.contacts.iter().map(|c| c.force.linear.z).sum();
+    assert!((lift - model.total_mass() * (9.81 + 0.4)).abs() < 1e-9);
+    // outside of its span it is at rest
+    controller.track(&plan, 1.0, &mut references);
+    assert_eq!((references.com.velocity.z, references.com.acceleration.z), (0.0, 0.0));
+    assert!((references.com.position.z - height - 0.032).abs() < 1e-12);
+}
+
+#[test]
+fn contacts_are_ramped() {
+    let model = robots::quadruped();
+    let plan = Plan::new(&model, 4, data(&model)).unwrap();
+    for (t, expected) in
+        [(-1.0, 1.0), (0.1, 1.0), (0.175, 0.5), (0.2, 0.0), (0.25, 0.0), (0.325, 0.5), (0.36, 1.0), (9.0, 1.0)]
+    {
+        let found = plan.activation(0, t);
+        assert!((found - expected).abs() < 1e-9, "at {t} s: {found}");
+        assert_eq!(plan.activation(1, t), 1.0);
+    }
+}
+
+#[test]
+fn feedback_is_the_plans() {
+    let model = robots::quadruped();
+    let plan = Plan::new(&model, 4, data(&model)).unwrap();
+    let (mut q, mut tau) = (stance(), vec![f64::NAN; 18]);
+    let mut up = vec![0.0; 18];
+    up[2] = 0.01;
+    integrate(&model, &stance(), &up, &mut q);
+    plan.feedback(0.0, &q, &[0.0; 18], &mut tau);
+    assert_eq!(tau[..6], [0.0; 6]);
+    assert!((tau[6] - 1.0).abs() < 1e-12, "0 + 100 · 0.01 m");
+    assert_eq!(tau[7..], (1..12).map(f64::from).collect::<Vec<_>>());
+}
+
+#[test]
+fn wrong_arrays_are_named() {
+    let model = robots::quadruped();
+    let refusal = |change: &dyn Fn(&mut PlanData)| {
+        let mut data = data(&model);
+        change(&mut data);
+        Plan::new(&model, 4, data).unwrap_err().to_string()
+    };
+    assert_eq!(refusal(&|d| d.touches.truncate(3)), "`touches`: expected 16 numbers, found 3");
+    assert_eq!(refusal(&|d| d.states.truncate(3)), "`states`: expected 185 numbers, found 3");
+    assert_eq!(refusal(&|d| d.times[2] = 0.0), "setting `times` is 0, but it must be finite, and times in their order");
+    assert_eq!(
+        refusal(&|d| d.gains[7] = f64::NAN),
+        "setting `gains` is NaN, but it must be finite, and times in their order"
+    );
+}

@@ -1,0 +1,175 @@
+//! Whatever happens there is a command: finite, within the torque limits, its status said.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::*;
+use condyle_dynamics::{Data, gravity, integrate, robots};
+use condyle_wholebody::{
+    Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
+};
+
+/// Finite, and within the limits to the last bit.
+fn is_safe(command: &Command, effort: &[f64]) {
+    let numbers = command.tau.iter().chain(&command.a).copied();
+    let forces = command.forces.iter().flat_map(|f| f.to_array());
+    assert!(numbers.chain(forces).chain(command.com_acceleration.to_array()).all(f64::is_finite));
+    for (tau, limit) in command.tau.iter().zip(effort).skip(6) {
+        assert!(tau.abs() <= *limit, "{tau} of {limit}");
+    }
+    assert_eq!(command.tau[..6], [0.0; 6]);
+}
+
+#[test]
+fn the_last_solution_then_gravity_compensation() {
+    let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
+    let effort = model.limits().effort.clone();
+    let mut controller = controller(&model, &feet(0.7));
+    let references = controller.hold(&q);
+    let good = controller.step(&q, &v, &references).solved().unwrap().clone();
+    let mut bad = references.clone();
+    bad.com.position.x = f64::NAN;
+    for tick in 0..20 {
+        let command = controller.step(&q, &v, &bad);
+        is_safe(command, &effort);
+        assert_eq!(command.status.to_string(), "`com[0]` is NaN, which is not finite");
+        if tick < Settings::default().hold_ticks {
+            assert_eq!((command.source, &command.tau), (CommandSource::LastSolution, &good.tau));
+        } else {
+            assert_eq!(command.source, CommandSource::GravityCompensation);
+            // On four feet it stands: the same torques, but for what the solver spreads otherwise.
+            let apart = max_abs(command.tau.iter().zip(&good.tau).map(|(a, b)| a - b));
+            assert!(apart < 2.0, "{apart} N m");
+        }
+    }
+    let again = controller.step(&q, &v, &references).solved().unwrap();
+    assert!(max_abs(again.tau.iter().zip(&good.tau).map(|(a, b)| a - b)) < 1e-2, "nothing of it stays behind");
+}
+
+#[test]
+fn a_state_that_is_not_finite() {
+    let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
+    let effort = model.limits().effort.clone();
+    let mut controller = controller(&model, &feet(0.7));
+    let references = controller.hold(&q);
+    let (mut no_q, mut no_v) = (q.clone(), v.clone());
+    (no_q[8], no_v[3]) = (f64::NAN, f64::INFINITY);
+    for tick in 0..20 {
+        // before any solution, and after one
+        let command = controller.step(&no_q, &v, &references);
+        is_safe(command, &effort);
+        assert_eq!(command.status.to_string(), "`q[8]` is NaN, which is not finite");
+        let command = controller.step(&q, &no_v, &references);
+        is_safe(command, &effort);
+        assert_eq!(command.status, Status::NotFinite { name: "v", index: 3, value: f64::INFINITY });
+        if tick == 10 {
+            controller.step(&q, &v, &references).solved().unwrap();
+        }
+    }
+}
+
+/// What no torque can do, and solvers that stop early: for any state whatever.
+#[test]
+fn nothing_breaks_the_limits() {
+    let model = robots::humanoid();
+    let effort = model.limits().effort.clone();
+    let heavy: Vec<_> = soles(0.7).into_iter().map(|c| FrictionContact { min_force: 5000.0, ..c }).collect();
+    for (contacts, max_iterations) in [(heavy, 50), (soles(0.7), 2), (soles(0.7), 6), (soles(0.05), 50)] {
+        let settings = Settings { max_iterations, hold_ticks: 1, ..Settings::default() };
+        let mut controller = WholeBodyController::new(&model, &contacts, &humanoid_tasks(), settings).unwrap();
+        let references = controller.hold(&squat(&model));
+        for seed in 0..30 {
+            let (q, v) = near(&model, &squat(&model), seed, 0.3, 5.0);
+            let command = controller.step(&q, &v, &references);
+            is_safe(command, &effort);
+            assert!(command.status != Status::Solved || command.source == CommandSource::Solution);
+            assert!(contacts[0].min_force == 0.0 || command.status != Status::Solved, "5000 N on each foot");
+            assert!(max_iterations > 2 || command.status == Status::IterationLimit, "{:?}", command.status);
+        }
+    }
+}
+
+/// In the air the compensation is gravity's torques.
+#[test]
+fn compensation_without_contacts() {
+    let model = robots::quadruped();
+    let mut controller = controller(&model, &[]);
+    let references = controller.hold(&stance());
+    let mut bad = references.clone();
+    bad.momentum.rate.y = f64::INFINITY;
+    let command = controller.step(&stance(), &[0.0; 18], &bad);
+    let (mut data, zero) = (Data::new(&model), [0.0; 6]);
+    let g = gravity(&model, &mut data, &stance());
+    assert_eq!((&command.tau[..6], &command.tau[6..]), (&zero[..], &g[6..]));
+}
+
+/// States beyond the limits are led back, others kept within them: simulated in free fall, thrown about by the posture.
+#[test]
+fn joints_stay_within_their_limits() {
+    let model = robots::quadruped();
+    let limits = JointLimits::default();
+    let mut lower = vec![f64::NEG_INFINITY; 19];
+    let mut upper = vec![f64::INFINITY; 19];
+    let velocity = vec![5.0; 18];
+    for i in 7..19 {
+        (lower[i], upper[i]) = (stance()[i] - 0.3, stance()[i] + 0.3);
+    }
+    let limits =
+        JointLimits { lower: Some(lower.clone()), upper: Some(upper.clone()), velocity: Some(velocity), ..limits };
+    let settings = Settings { joint_limits: Some(limits), effort: Some(vec![500.0; 18]), ..Settings::default() };
+    let tasks = [Task { weight: 1.0, ..Task::posture() }];
+    for beyond in [false, true] {
+        let mut controller = WholeBodyController::new(&model, &[], &tasks, settings.clone()).unwrap();
+        let (mut q, mut v) = (stance(), vec![0.0; 18]);
+        let mut references = controller.hold(&q);
+        for i in 7..19 {
+            references.posture.q[i] += if i % 2 == 0 { 1.0 } else { -1.0 }; // far outside
+            if beyond {
+                q[i] += if i % 2 == 0 { 0.35 } else { -0.35 };
+                v[i - 1] = if i % 2 == 0 { 4.0 } else { -4.0 };
+            }
+        }
+        for tick in 0..1000 {
+            let command = controller.step(&q, &v, &references).solved().unwrap_or_else(|s| panic!("{tick}: {s}"));
+            assert!(!command.limits_relaxed);
+            assert!(command.a[6..].iter().all(|a| a.abs() < 201.0 || !beyond), "led back at a bounded acceleration");
+            let step: Vec<f64> = v.iter().zip(&command.a).map(|(v, a)| 1e-3 * (v + 0.5e-3 * a)).collect();
+            v.iter_mut().zip(&command.a).for_each(|(v, a)| *v += 1e-3 * a);
+            let mut next = q.clone();
+            integrate(&model, &q, &step, &mut next);
+            q = next;
+            assert!(beyond || v[6..].iter().all(|v| v.abs() < 5.0 + 1e-6));
+            // a fifth of the distance after the first 0.5 s, and never outside if it was inside
+            for i in 7..19 {
+                let out = (q[i] - upper[i]).max(lower[i] - q[i]);
+                assert!(
+                    out < if !beyond {
+                        1e-4
+                    } else if tick > 500 {
+                        0.01
+                    } else {
+                        0.2
+                    },
+                    "{tick}: {i} is out by {out}"
+                );
+            }
+        }
+        let near = (7..19).all(|i| (q[i] - upper[i]).max(lower[i] - q[i]) > -0.01);
+        assert!(near, "and it does go to the limit: {q:?}");
+    }
+}
+
+/// A stance in which a limit asks for what the held feet do not allow.
+#[test]
+fn limits_give_way_to_contacts() {
+    let (model, q) = (robots::quadruped(), stance());
+    let mut upper = model.limits().upper.clone();
+    (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are beyond: no motion of the trunk brings them all back
+    let limits = JointLimits { upper: Some(upper), ..JointLimits::default() };
+    let settings = Settings { joint_limits: Some(limits), ..Settings::default() };
+    let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();
+    let references = controller.hold(&q);
+    let command = controller.step(&q, &[0.0; 18], &references);
+    check(&model, &feet(0.7), &q, &[0.0; 18], &references, command);
+    assert!(command.limits_relaxed);
+}

@@ -1,0 +1,173 @@
+//! Soles, edges and pyramids; the two forms of the program give one command.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::*;
+use condyle_dynamics::{Model, Vec3, robots};
+use condyle_wholebody::{
+    Backend, Command, Form, Friction, FrictionContact, Normal, References, Settings, Shape, Status, Task,
+    WholeBodyController,
+};
+
+/// Of q̈, relative to 1 and its largest number: what two solvers of tolerance 1e-10 agree to.
+const AGREEMENT: f64 = 1e-6;
+
+fn solve(
+    model: &Model,
+    contacts: &[FrictionContact],
+    tasks: &[Task],
+    settings: Settings,
+    q: &[f64],
+    v: &[f64],
+    change: impl Fn(&mut References),
+) -> (References, Command) {
+    let mut controller = WholeBodyController::new(model, contacts, tasks, settings).unwrap();
+    let mut references = controller.hold(q);
+    change(&mut references);
+    let command = controller.step(q, v, &references).solved().unwrap().clone();
+    (references, command)
+}
+
+#[test]
+fn a_humanoid_stands_on_soles() {
+    let model = robots::humanoid();
+    for contacts in [soles(0.7), soles(0.7).into_iter().map(FrictionContact::by_corners).collect()] {
+        let mut controller =
+            WholeBodyController::new(&model, &contacts, &humanoid_tasks(), Settings::default()).unwrap();
+        let references = controller.hold(&squat(&model));
+        for seed in 0..20 {
+            let (q, v) = near(&model, &squat(&model), seed, 0.02, 0.05);
+            let command = controller.step(&q, &v, &references);
+            check(&model, &contacts, &q, &v, &references, command);
+            assert!(!command.limits_relaxed);
+        }
+    }
+}
+
+/// Pushed so hard to the side that the centre of pressure stands at the edge of a sole, or friction at its cone.
+#[test]
+fn the_centre_of_pressure_stays_within() {
+    let model = robots::humanoid();
+    let (q, v) = (squat(&model), vec![0.0; 38]);
+    for (push, mu) in [(Vec3::new(2.0, 0.0, 0.0), 0.7), (Vec3::new(0.5, 4.0, 0.0), 0.2)] {
+        for contacts in [soles(mu), soles(mu).into_iter().map(FrictionContact::by_corners).collect()] {
+            let (references, command) =
+                solve(&model, &contacts, &humanoid_tasks(), Settings::default(), &q, &v, |r| r.com.acceleration = push);
+            check(&model, &contacts, &q, &v, &references, &command);
+            assert!(norm(command.com_acceleration - push) > 0.1, "so much cannot be had");
+        }
+    }
+}
+
+/// Condensed or not, by clarabel or by our solver.
+#[test]
+fn all_ways_agree() {
+    let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
+    let corners: Vec<_> = soles(0.4).into_iter().map(FrictionContact::by_corners).collect();
+    for (model, contacts, tasks, centre) in [
+        (&quadruped, feet(0.4), tasks(), stance()),
+        (&humanoid, soles(0.4), humanoid_tasks(), squat(&humanoid)),
+        (&humanoid, corners, humanoid_tasks(), squat(&humanoid)),
+    ] {
+        for seed in 0..5 {
+            let (q, v) = near(model, &centre, seed, 0.02, 0.1);
+            let command = |backend, form| {
+                let tolerance = if backend == Backend::Clarabel { 1e-11 } else { 1e-10 };
+                let settings = Settings { form, backend, tolerance, ..Settings::default() };
+                let (references, command) =
+                    solve(model, &contacts, &tasks, settings, &q, &v, |r| r.com.acceleration.x = 2.0);
+                check(model, &contacts, &q, &v, &references, &command);
+                command
+            };
+            let reference = command(Backend::Clarabel, Form::Full);
+            for (backend, form) in [
+                (Backend::Clarabel, Form::Condensed),
+                (Backend::InteriorPoint, Form::Condensed),
+                (Backend::InteriorPoint, Form::Full),
+            ] {
+                let apart = max_abs(command(backend, form).a.iter().zip(&reference.a).map(|(a, b)| a - b));
+                let bound = AGREEMENT * (1.0 + max_abs(reference.a.iter().copied()));
+                assert!(apart < bound, "q̈ of seed {seed} by {backend:?}, {form:?}: {apart:.1e}");
+            }
+        }
+    }
+}
+
+/// The objective of a task, which a larger set of forces can only lower: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+#[test]
+fn the_cone_lies_between_the_pyramids() {
+    let model = robots::quadruped();
+    let (q, v, push) = (stance(), vec![0.0; 18], Vec3::new(3.0, 1.0, 0.0));
+    let missed = |friction| {
+        let settings = Settings { friction, ..Settings::default() };
+        let tasks = [Task::com(), Task::orientation("trunk")];
+        let command = solve(&model, &feet(0.2), &tasks, settings, &q, &v, |r| r.com.acceleration = push).1;
+        // what the objective consists of, but for the regularisation
+        (command.com_acceleration - push).norm_squared()
+    };
+    let cone = missed(Friction::Cone);
+    for sides in [3, 4, 8, 16] {
+        let inner = missed(Friction::Pyramid { sides, inscribed: true });
+        let outer = missed(Friction::Pyramid { sides, inscribed: false });
+        assert!(outer < cone && cone < inner, "{sides} sides: {outer} {cone} {inner}");
+        if sides == 16 {
+            assert!(inner - outer < 0.1 * cone, "many sides come near the cone");
+        }
+    }
+}
+
+/// A foot that rolls over its toe's edge, and hands against a wall that turns with them.
+#[test]
+fn edges_and_walls() {
+    let model = robots::humanoid();
+    let (q, v) = (squat(&model), vec![0.0; 38]);
+    let toe = [Vec3::new(0.1, 0.05, 0.0), Vec3::new(0.1, -0.05, 0.0)];
+    let edge = FrictionContact::surface("left_sole", 0.7, &toe);
+    let wall = FrictionContact {
+        normal: Normal::Frame(Vec3::new(-1.0, 0.0, 0.0)),
+        shape: Shape::Point,
+        max_force: 30.0,
+        ..FrictionContact::point("left_hand", 0.4)
+    };
+    for edge in [edge.clone(), edge.by_corners()] {
+        let contacts = [edge, FrictionContact::sole("right_sole", 0.7, [0.2, 0.1]), wall.clone()];
+        let (_, command) = solve(&model, &contacts, &humanoid_tasks(), Settings::default(), &q, &v, |_| ());
+        assert_eq!(command.status, Status::Solved);
+        let tau = inverse_dynamics(&model, &contacts, &q, &v, &command);
+        assert!(max_abs(tau.iter().zip(&command.tau).map(|(a, b)| a - b)) < EQUALITY);
+        // No moment about the edge.
+        let (f, p) = (command.forces[0], toe[0]);
+        let R = orientation(&model, &q, "left_sole");
+        let about = f.angular - (R * p).cross(f.linear);
+        assert!(about.dot(R * Vec3::new(0.0, 1.0, 0.0)).abs() < EQUALITY);
+        // The wall only pushes, along a normal that turns with the hand, and not too hard.
+        let R = orientation(&model, &q, "left_hand");
+        let f_n = command.forces[2].linear.dot(R * Vec3::new(-1.0, 0.0, 0.0));
+        assert!((-EQUALITY..30.0 + EQUALITY).contains(&f_n), "{f_n}");
+    }
+}
+
+/// Four points on one foot: twelve rows of which six are independent.
+#[test]
+fn redundant_contacts_are_no_obstacle() {
+    let mut builder = condyle_dynamics::ModelBuilder::new("hopper");
+    let inertia = condyle_dynamics::Inertia::from_com(5.0, Vec3::zero(), condyle_dynamics::Sym3::diagonal(0.2));
+    let place = |z| condyle_dynamics::Se3::new(condyle_dynamics::Mat3::identity(), Vec3::new(0.0, 0.0, z));
+    let joint = condyle_dynamics::Joint::Revolute { axis: Vec3::new(1.0, 0.0, 0.0) };
+    let trunk = builder.body("trunk", condyle_dynamics::WORLD, condyle_dynamics::Joint::FreeFlyer, place(0.0), inertia);
+    let foot = builder.body("foot", trunk, joint, place(-0.3), inertia);
+    for (k, [x, y]) in [[0.1, 0.1], [0.1, -0.1], [-0.1, 0.1], [-0.1, -0.1]].into_iter().enumerate() {
+        let at = condyle_dynamics::Se3::new(condyle_dynamics::Mat3::identity(), Vec3::new(x, y, -0.1));
+        builder.frame(&format!("corner{k}"), foot, at);
+    }
+    let model = builder.build().unwrap();
+    let contacts: Vec<_> = (0..4).map(|k| FrictionContact::point(&format!("corner{k}"), 0.7)).collect();
+    let (q, v) = (condyle_dynamics::neutral(&model), vec![0.0; 7]);
+    let settings = Settings { backend: Backend::Clarabel, ..Settings::default() };
+    let (references, command) = solve(&model, &contacts, &[Task::posture()], settings, &q, &v, |_| ());
+    check(&model, &contacts, &q, &v, &references, &command);
+    for f in &command.forces {
+        assert!((f.linear.z - 10.0 * 9.81 / 4.0).abs() < 1e-3, "{f:?}");
+    }
+}
