@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (f, _) in forces.iter().zip(&references.contacts).filter(|(f, c)| c.activation == 1.0 && f.z > 0.0) {
             (loaded, slips) = (loaded + 1, slips + usize::from(f.x.hypot(f.y) > FRICTION * f.z));
         }
-        if (t / DT).round() as usize % 100 == 0 {
+        if ((t / DT).round() as usize).is_multiple_of(100) {
             let away = (0..3).map(|i| (world.q[i] - references.posture.q[i]).powi(2)).sum::<f64>().sqrt();
             let loads: Vec<String> = forces.iter().map(|f| format!("{:4.0}", f.z)).collect();
             println!(
