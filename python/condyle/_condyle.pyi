@@ -693,7 +693,7 @@ class ConstraintSet:
     10000.
 
     Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
-    'world', a gain is negative or not finite, or two constraints are the same.
+    'world', a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> trot = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
@@ -721,6 +721,8 @@ class ConstraintSet:
     ) -> None:
         """Changes the target of constraint k: where its frame should be and how it should move there. What is not given
         stays as it is.
+
+        Raises `ModelError` for numbers that are not finite and a placement that is none; the old target then stays.
         """
 
     def jacobian(self, out: _Array | None = None) -> _Array:
@@ -1947,13 +1949,22 @@ class Model:
         """
 
     def with_gravity(self, gravity: ArrayLike) -> Model:
-        """The same robot under another gravity (m/s², 3 numbers, in the world's frame)."""
+        """The same robot under another gravity (m/s², 3 numbers, in the world's frame).
+
+        Raises `ModelError` if it is not finite.
+        """
 
     def with_armature(self, armature: ArrayLike) -> Model:
-        """The same robot with another armature, nv numbers (kg m², kg)."""
+        """The same robot with another armature, nv numbers (kg m², kg).
+
+        Raises `ModelError` if one is negative or not finite.
+        """
 
     def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
-        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first.
+        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
+        them is in its `warnings` and `singular_joints`.
+
+        Raises `ModelError` if a mass is negative or a number is not finite.
 
         >>> arm = condyle.robots.arm7()
         >>> twice = [I._replace(mass=2.0 * I.mass, rotational=2.0 * I.rotational) for I in arm.inertias]
@@ -1974,7 +1985,7 @@ class Model:
         >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
 
-        Raises `ModelError`.
+        Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
         """
 
     def __copy__(self) -> Model:
@@ -2326,6 +2337,8 @@ class FrictionCone:
     surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
     default 0 and infinite.
 
+    Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
+
     >>> condyle.optimal.FrictionCone(0.5).rows()[0]
     array([ 1. ,  0. , -0.5])
     """
@@ -2450,7 +2463,9 @@ class Problem:
     stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
     terminal: the model of the end, without controls.
 
-    Raises `ProblemError` if they do not fit together.
+    Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
+    1e-3), and for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot, or 2²⁸ in the matrices [A B] of
+    all knots.
     """
 
     def __new__(cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int], terminal: _Action) -> Problem: ...
@@ -2462,7 +2477,8 @@ class Problem:
     def from_json(text: str) -> Problem:
         """A problem of a robot from the text that `to_json` gave.
 
-        Raises `ProblemError` for a text that is none, and for what does not fit together in it.
+        Raises `ProblemError` for a text that is none, for what does not fit together in it, and for sizes beyond the limits
+        that `Problem` has.
         """
 
     def to_json(self) -> str:
@@ -2476,13 +2492,13 @@ class Problem:
     def set_x0(self, x0: ArrayLike) -> None:
         """Sets the initial state, nx numbers, as an MPC does before each solve.
 
-        Raises `ProblemError` for a number that is not finite.
+        Raises `ProblemError` for a number that is not finite, and for a rotation whose length is not 1 (up to 1e-3).
         """
 
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
 
-        Raises `KeyError` if there is no such term.
+        Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
@@ -2504,7 +2520,9 @@ class Problem:
 class Residual:
     """A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 
-    A frame is given by its name or number, a contact by the name that it has in `ContactDynamics` or `ImpulseDynamics`.
+    A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics` or
+    `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it looks at the frame of that
+    name, or is refused.
     A target that is not given is zero, a rotation the identity.
 
     >>> from condyle.optimal import Residual
@@ -2596,6 +2614,8 @@ class WrenchCone:
     w ≤ upper.
 
     friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
+
+    Raises `ProblemError` if a side is negative or not finite.
 
     >>> from condyle.optimal import FrictionCone, WrenchCone
     >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape

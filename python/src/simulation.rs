@@ -6,7 +6,7 @@ use crate::functions::{Argument, Forces, Position, Tangent, positive_speed, regu
 use crate::model::Model;
 use crate::signals::{self, Signals};
 use condyle::simulation as rust;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::{Integrator, Settings, Status};
@@ -31,13 +31,13 @@ self_cell::self_cell!(
 /// integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
 ///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
 ///     is conserved to rounding.
-/// dt: h, the length of a step (s).
+/// dt: h, the length of a step (s); a negative one goes back in time.
 /// passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
 ///     none of either.
 /// tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
 /// max_iterations: it gives up after so many iterations.
 ///
-/// Raises `ModelError` if M is singular.
+/// Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
 ///
 /// >>> from condyle.simulation import Simulation
 /// >>> quadruped = condyle.robots.quadruped()
@@ -83,6 +83,14 @@ impl Simulation {
             }
         };
         let passive = passive.map(|smoothing| positive_speed("passive", smoothing)).transpose()?;
+        if dt == 0.0 || !dt.is_finite() {
+            return Err(PyValueError::new_err(format!("dt: expected a finite number other than 0, found {dt}")));
+        }
+        if !(tolerance >= 0.0 && tolerance.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "tolerance: expected a finite number of at least 0, found {tolerance}"
+            )));
+        }
         regular(&model.get().inner)?;
         let settings = Settings { integrator, dt, passive, tolerance, max_iterations };
         let owned = Owned::new(model.clone().unbind(), |model| rust::Simulation::new(&model.get().inner, settings));

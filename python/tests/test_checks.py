@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import condyle
+import condyle.simulation
 from condyle import ModelError
 from condyle.optimal import (
     Action,
@@ -69,7 +70,9 @@ def test_other_inertias_are_judged_as_a_build_judges_them() -> None:
 def test_numbers_of_joints_and_gravity_are_checked() -> None:
     with pytest.raises(ModelError, match=r"^gravity: \(0, NaN, 0\) m/s² is not finite$"):
         ARM.with_gravity([0.0, np.nan, 0.0])
-    with pytest.raises(ModelError, match=r"^joint `joint3`: armature is -0\.1, expected a finite number"):
+    with pytest.raises(
+        ModelError, match=r"^joint `joint3`: armature is -0\.1, expected a finite number of at least 0$"
+    ):
         ARM.with_armature([0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 0.0])
     for name in ("damping", "friction", "armature"):
         robot = condyle.ModelBuilder("r")
@@ -130,7 +133,7 @@ def test_plans_know_the_robot_that_they_were_made_for() -> None:
 
     one, other, zero = robot(1.0), robot(2.0), np.full(3, 0.1)
     contacts = condyle.ConstraintSet(one, [condyle.ContactConstraint("end", "point")])
-    divided = condyle.DivideConquer(one)
+    divided = condyle.DivideConquer(one, 1)
     message = r"made for another model \('arm'\), not for this 'arm', whose joints or frames are elsewhere$"
     with pytest.raises(ValueError, match=f"^constraints: {message}"):
         condyle.constrained_dynamics(other, condyle.Data(other), contacts, zero, zero, zero)
@@ -166,7 +169,9 @@ def test_targets_that_are_none_are_refused() -> None:
             FreeDynamics(ARM, 0.1, [cost])
     mirrored = np.r_[q, zero]
     mirrored[6] = 3.0
-    with pytest.raises(ProblemError, match="^cost `rest`: its reference: joint `root_joint`: its rotation, q.3..7."):
+    with pytest.raises(
+        ProblemError, match="^cost `rest`: its reference: joint `root_joint`: its rotation, q.3..7., has the"
+    ):
         FreeDynamics(quadruped, 0.1, [Cost("rest", 1.0, Residual.state(mirrored))])
 
 
@@ -181,7 +186,9 @@ def test_weights_cones_and_settings_are_checked() -> None:
         problem.set_weight("rest of it", 1.0)
     for weights in ([-1.0] * 7, [np.nan] * 7):
         cost = Cost("effort", 1.0, Residual.control(np.zeros(7)), Activation.weighted(weights))
-        with pytest.raises(ProblemError, match="^cost `effort`: its weight 0 is .*, expected a finite number"):
+        with pytest.raises(
+            ProblemError, match="^cost `effort`: its weight 0 is .*, expected a finite number of at least 0$"
+        ):
             problem.set_costs(0, [cost])
     for mu in (-0.1, np.nan):
         with pytest.raises(ProblemError, match="^cone: its friction is .*, but it must be at least 0$"):
@@ -201,6 +208,14 @@ def test_weights_cones_and_settings_are_checked() -> None:
     for dt in (0.0, -0.1, np.nan, np.inf):
         with pytest.raises(ProblemError, match="its duration must be above 0"):
             FreeDynamics(ARM, dt, [])
+
+
+def test_steps_of_a_simulation_are_numbers() -> None:
+    for dt in (0.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="^dt: expected a finite number other than 0, found"):
+            condyle.simulation.Simulation(ARM, dt=dt)
+    with pytest.raises(ValueError, match="^tolerance: expected a finite number of at least 0, found NaN$"):
+        condyle.simulation.Simulation(ARM, tolerance=np.nan)
 
 
 def test_states_are_states() -> None:

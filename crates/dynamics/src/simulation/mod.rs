@@ -211,11 +211,13 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If an argument has the wrong length, or the smoothing of passive torques is not positive.
+    /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is 0 or not
+    /// finite.
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
         check("tau", tau.len(), self.model.nv());
         check_forces(f_ext.len(), self.model.nodes().len());
         let Settings { integrator, dt, passive, .. } = self.settings;
+        assert!(dt != 0.0 && dt.is_finite(), "settings.dt: expected a finite number other than 0, found {dt}");
         let input = Input { h: S::splat(dt), tau, f_ext, passive };
         let (model, data, state) = (self.model, &mut self.data, (&self.q[..], &self.v[..]));
         let (q, v) = (&mut self.q_next, &mut self.v_next);

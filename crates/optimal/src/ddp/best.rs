@@ -1,6 +1,8 @@
-//! The best iterate of a solve, to go back to when a later one is worse.
+//! The best iterate of a solve, to go back to at the end when the last one is worse.
+#![allow(non_snake_case)] // K beside k, the names of the literature
 
-use super::solution::Solution;
+use super::fddp::{Fddp, Progress};
+use super::solution::{Solution, Status};
 use crate::problem::Problem;
 
 /// Gaps that differ by less are the same: they are differences of states, which are rounded.
@@ -94,5 +96,42 @@ impl Best {
         std::mem::swap(&mut self.xs, &mut solution.xs);
         std::mem::swap(&mut self.us, &mut solution.us);
         std::mem::swap(&mut self.next, next);
+    }
+}
+
+impl Fddp {
+    /// Fills what the iterations leave open in the solution, of the last iterate or of a better one.
+    pub(super) fn finish(&mut self, problem: &mut Problem, now: &mut Progress, status: Status) {
+        let infinite_if_nan = |x: f64| if x.is_nan() { f64::INFINITY } else { x };
+        self.solution.gap = infinite_if_nan(self.update_gaps(problem));
+        self.solution.cost = infinite_if_nan(self.solution.cost);
+        let Solution { gap, cost, .. } = self.solution;
+        let last = Value { gap, cost, feasible: now.feasible, regularisation: now.regularisation };
+        let regularisation = now.regularisation;
+        let goes_back = match status {
+            Status::Converged => false,
+            Status::NotFinite => true, // there is no direction at the last one
+            _ => self.best.is_better_than(&last),
+        };
+        if goes_back && let Some(best) = self.best.restore(&mut self.solution, &mut self.next) {
+            (self.solution.gap, self.solution.cost, now.feasible) = (best.gap, best.cost, best.feasible);
+            self.update_gaps(problem);
+            if !now.swept_best {
+                self.calc_diff(problem, best.feasible);
+                self.sweep.keep_values(false);
+                now.swept = self.sweep(problem, best.regularisation).is_ok();
+            }
+        }
+        let solution = &mut self.solution;
+        solution.feasible = now.feasible;
+        solution.regularisation = regularisation;
+        solution.status = status;
+        if !now.swept {
+            return; // the gains of the solve before, shifted or not
+        }
+        for ((K, k), knot) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.knots()) {
+            K.copy_from(&knot.K);
+            k.copy_from(&knot.k);
+        }
     }
 }

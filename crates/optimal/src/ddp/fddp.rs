@@ -10,7 +10,7 @@ use super::settings::{DdpMethod, Settings};
 use super::solution::{Iteration, Solution, Status, Timings};
 use crate::error::Error;
 use crate::lq::{LqNode, Sweep, SweepError};
-use crate::problem::{Problem, Shape};
+use crate::problem::Problem;
 use condyle_linalg::max_abs;
 use std::time::Instant;
 
@@ -52,7 +52,7 @@ use std::time::Instant;
 /// #         next[0] = x[0] + u;
 /// #         0.5 * (x[0] * x[0] + u * u)
 /// #     }
-/// #     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+/// #     pub(super) fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
 /// #         (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[0]);
 /// #         node.B.fill(1.0);
 /// #         node.S.fill(0.0);
@@ -96,16 +96,16 @@ pub struct Fddp {
 const FORESEEN: usize = 10_000;
 
 /// The state that goes from one iteration to the next.
-struct Progress {
-    regularisation: f64,
-    feasible: bool,
+pub(super) struct Progress {
+    pub(super) regularisation: f64,
+    pub(super) feasible: bool,
     /// Whether the iterate before the last accepted step was feasible.
-    was_feasible: bool,
-    tolerance: f64,
+    pub(super) was_feasible: bool,
+    pub(super) tolerance: f64,
     /// Whether there are gains of this solve.
-    swept: bool,
+    pub(super) swept: bool,
     /// Whether they are those of the best iterate, which the last step left.
-    swept_best: bool,
+    pub(super) swept_best: bool,
 }
 
 impl Fddp {
@@ -178,7 +178,7 @@ impl Fddp {
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
         if let Some([xs, us]) = warm_start {
-            check_shape(self.solution.shape(), problem.shape())?;
+            self.solution.shape().check(problem.shape())?;
             Error::check("xs", xs, self.solution.xs.len())?;
             Error::check("us", us, self.solution.us.len())?;
             for (knot, x) in xs.chunks_exact(problem.nx()).enumerate() {
@@ -188,7 +188,7 @@ impl Fddp {
             self.solution.us.copy_from_slice(us);
         }
         self.settings.check()?;
-        check_shape(self.solution.shape(), problem.shape())?;
+        self.solution.shape().check(problem.shape())?;
         let bounded = problem.check_bounds()?;
         self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
         let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
@@ -317,7 +317,7 @@ impl Fddp {
     }
 
     /// f₀ = x̂₀ ⊖ x₀,  fₜ₊₁ = φₜ(xₜ, uₜ) ⊖ xₜ₊₁; returns ‖f‖∞.
-    fn update_gaps(&mut self, problem: &Problem) -> f64 {
+    pub(super) fn update_gaps(&mut self, problem: &Problem) -> f64 {
         let (shape, xs) = (self.solution.shape(), &self.solution.xs);
         for t in 0..=shape.horizon() {
             let predicted = if t == 0 { problem.x0() } else { &self.next[shape.x(t - 1)] };
@@ -333,7 +333,7 @@ impl Fddp {
 
     /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on.
     #[inline(never)] // `benches/instructions.py` counts it by its name
-    fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
+    pub(super) fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
         let clock = Instant::now();
         for node in &mut self.nodes {
             node.inverse_dynamics.wanted = self.inverse_dynamics;
@@ -362,7 +362,7 @@ impl Fddp {
     }
 
     #[inline(never)] // `benches/instructions.py` counts it by its name
-    fn sweep(&mut self, problem: &mut Problem, regularisation: f64) -> Result<(), SweepError> {
+    pub(super) fn sweep(&mut self, problem: &mut Problem, regularisation: f64) -> Result<(), SweepError> {
         let clock = Instant::now();
         let result = if self.settings.second_order {
             let Solution { xs, us, .. } = &self.solution;
@@ -385,56 +385,4 @@ impl Fddp {
     fn decreased(&self, regularisation: f64) -> f64 {
         (regularisation / self.settings.regularisation_factor).max(self.settings.regularisation_min)
     }
-
-    /// Fills what the iterations leave open in the solution, of the last iterate or of a better one.
-    fn finish(&mut self, problem: &mut Problem, now: &mut Progress, status: Status) {
-        let infinite_if_nan = |x: f64| if x.is_nan() { f64::INFINITY } else { x };
-        self.solution.gap = infinite_if_nan(self.update_gaps(problem));
-        self.solution.cost = infinite_if_nan(self.solution.cost);
-        let Solution { gap, cost, .. } = self.solution;
-        let last = Value { gap, cost, feasible: now.feasible, regularisation: now.regularisation };
-        let regularisation = now.regularisation;
-        let goes_back = match status {
-            Status::Converged => false,
-            Status::NotFinite => true, // there is no direction at the last one
-            _ => self.best.is_better_than(&last),
-        };
-        if goes_back && let Some(best) = self.best.restore(&mut self.solution, &mut self.next) {
-            (self.solution.gap, self.solution.cost, now.feasible) = (best.gap, best.cost, best.feasible);
-            self.update_gaps(problem);
-            if !now.swept_best {
-                self.calc_diff(problem, best.feasible);
-                self.sweep.keep_values(false);
-                now.swept = self.sweep(problem, best.regularisation).is_ok();
-            }
-        }
-        let solution = &mut self.solution;
-        solution.feasible = now.feasible;
-        solution.regularisation = regularisation;
-        solution.status = status;
-        if !now.swept {
-            return; // the gains of the solve before, shifted or not
-        }
-        for ((K, k), knot) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.knots()) {
-            K.copy_from(&knot.K);
-            k.copy_from(&knot.k);
-        }
-    }
-}
-
-/// `Ok` if a problem has the dimensions for which a solver was made.
-fn check_shape(expected: &Shape, found: &Shape) -> Result<(), Error> {
-    if expected.horizon() != found.horizon() {
-        return Err(Error::Length { name: "stages", expected: expected.horizon(), found: found.horizon() });
-    }
-    for t in 0..=expected.horizon() {
-        for (name, expected, found) in
-            [("nx", expected.nx, found.nx), ("ndx", expected.ndx, found.ndx), ("nu", expected.nu(t), found.nu(t))]
-        {
-            if expected != found {
-                return Err(Error::Dimension { node: t, name, expected, found });
-            }
-        }
-    }
-    Ok(())
 }

@@ -1,5 +1,6 @@
 //! The dimensions of a horizon.
 
+use crate::error::Error;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
@@ -46,5 +47,22 @@ impl Shape {
     /// The place of uₜ in flat controls; empty at the terminal knot.
     pub(crate) fn u(&self, t: usize) -> Range<usize> {
         self.offsets[t]..self.offsets[t] + self.nu(t)
+    }
+
+    /// `Ok` if a problem has the dimensions for which a solver was made.
+    pub(crate) fn check(&self, found: &Self) -> Result<(), Error> {
+        if self.horizon() != found.horizon() {
+            return Err(Error::Length { name: "stages", expected: self.horizon(), found: found.horizon() });
+        }
+        for t in 0..=self.horizon() {
+            for (name, expected, found) in
+                [("nx", self.nx, found.nx), ("ndx", self.ndx, found.ndx), ("nu", self.nu(t), found.nu(t))]
+            {
+                if expected != found {
+                    return Err(Error::Dimension { node: t, name, expected, found });
+                }
+            }
+        }
+        Ok(())
     }
 }
