@@ -21,6 +21,12 @@ pub(super) struct Side {
 }
 
 impl Side {
+    /// Forgets the last direction, which may not be finite.
+    pub(super) fn clear(&mut self) {
+        self.ds.fill(0.0);
+        self.dz.fill(0.0);
+    }
+
     pub(super) fn new(rows: usize, sign: f64) -> Self {
         let vector = || vec![0.0; rows];
         let (s, z, inverse_s, inverse_z) = (vector(), vector(), vector(), vector());

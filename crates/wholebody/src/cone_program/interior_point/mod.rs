@@ -20,6 +20,7 @@ mod system;
 mod workspace;
 
 use super::{ConeProgram, Multipliers, Outcome, Settings, Size, Solver, Start, Status};
+use bounds::Side;
 use iteration::Limits;
 use solution::Solution;
 use std::time::Instant;
@@ -76,6 +77,7 @@ impl Solver for InteriorPoint {
             return Outcome { iterations: 0, warm: false, reduced: false, stopped: Some(status) };
         }
         self.work.system.prepare(&self.work.data);
+        self.work.sides.iter_mut().for_each(Side::clear);
         let mut iterations = 0;
         let (warm, found) = self.minimise(start, &mut iterations);
         if self.work.is_finite() {

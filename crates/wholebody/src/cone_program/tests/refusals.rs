@@ -129,5 +129,7 @@ fn wild_numbers_never_become_nan() {
             let numbers = [solver.x(), multipliers.equalities, multipliers.rows, multipliers.cones];
             assert!(numbers.into_iter().flatten().all(|x| x.is_finite()), "{seed}: {outcome:?}");
         }
+        let tame = Draw::new(seed).program(Kind::Plain, 6, [1, 10, 2]);
+        assert_eq!(solver.solve(&tame, Start::Cold).stopped, None, "after {seed}");
     }
 }

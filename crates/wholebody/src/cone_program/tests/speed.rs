@@ -1,4 +1,5 @@
-//! What a tick costs; not a test. `cargo test --release -p condyle-wholebody --lib speed -- --ignored --nocapture`
+//! What a tick costs; not a test.
+//! `cargo test --release -p condyle-wholebody --lib speed -- --ignored --nocapture --test-threads 1`
 //!
 //! Under `valgrind --tool=callgrind --toggle-collect='*one_tick*'` with TICKS=20 it counts instructions.
 
@@ -31,41 +32,71 @@ fn print(name: &str, mut times: Vec<f64>, iterations: &[u32]) {
     );
 }
 
+fn number_of_ticks() -> Option<usize> {
+    std::env::var("TICKS").ok().map(|x| x.parse().expect("TICKS: a number"))
+}
+
+fn measure(name: &str, walk: Walk, start: Start) {
+    let walk = walk.disturbed([0.05, 0.3]);
+    let mut program = walk.program();
+    let mut solver = InteriorPoint::new(program.capacity(), Settings::default());
+    let (mut times, mut iterations) = (Vec::new(), Vec::new());
+    // Counted ticks are run once.
+    let replays = if number_of_ticks().is_some() { 1 } else { REPLAYS };
+    for tick in 0..number_of_ticks().unwrap_or(TICKS) {
+        walk.write(tick, &mut program);
+        let mut least = f64::INFINITY;
+        for _ in 1..replays {
+            least = least.min(one_tick(&mut solver.clone(), &program, start).0);
+        }
+        let (time, outcome) = one_tick(&mut solver, &program, start);
+        if tick > 0 {
+            times.push(least.min(time));
+            iterations.push(outcome.iterations);
+        }
+    }
+    print(&format!("{name}, interior point, {start:?}"), times, &iterations);
+}
+
 #[test]
 #[ignore = "a measurement"]
-fn ticks() {
-    let counted = std::env::var("TICKS").ok();
-    let ticks = counted.as_ref().map_or(TICKS, |x| x.parse().expect("TICKS: a number"));
+fn humanoid_cold() {
+    measure("humanoid", Walk::humanoid(1), Start::Cold);
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn humanoid_warm() {
+    measure("humanoid", Walk::humanoid(1), Start::Warm);
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn quadruped_cold() {
+    measure("quadruped", Walk::quadruped(1), Start::Cold);
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn quadruped_warm() {
+    measure("quadruped", Walk::quadruped(1), Start::Warm);
+}
+
+/// The pattern is dense: where the robot's is sparse, clarabel is faster than this.
+#[test]
+#[ignore = "a measurement"]
+fn clarabel() {
     for (name, walk) in [("humanoid", Walk::humanoid(1)), ("quadruped", Walk::quadruped(1))] {
         let walk = walk.disturbed([0.05, 0.3]);
         let mut program = walk.program();
-        for start in [Start::Cold, Start::Warm] {
-            let mut solver = InteriorPoint::new(program.capacity(), Settings::default());
-            let (mut times, mut iterations) = (Vec::new(), Vec::new());
-            for tick in 0..ticks {
-                walk.write(tick, &mut program);
-                let mut least = f64::INFINITY;
-                for _ in 1..if counted.is_some() { 1 } else { REPLAYS } {
-                    least = least.min(one_tick(&mut solver.clone(), &program, start).0);
-                }
-                let (time, outcome) = one_tick(&mut solver, &program, start);
-                if tick > 0 {
-                    times.push(least.min(time));
-                    iterations.push(outcome.iterations);
-                }
-            }
-            print(&format!("{name}, interior point, {start:?}"), times, &iterations);
+        let mut solver = Clarabel::new(program.capacity(), Dense, Settings::default());
+        let (mut times, mut iterations) = (Vec::new(), Vec::new());
+        for tick in 0..number_of_ticks().unwrap_or(TICKS / 10) {
+            walk.write(tick, &mut program);
+            let (time, outcome) = one_tick(&mut solver, &program, Start::Cold);
+            times.push(time);
+            iterations.push(outcome.iterations);
         }
-        if counted.is_none() {
-            let mut solver = Clarabel::new(program.capacity(), Dense, Settings::default());
-            let (times, iterations): (Vec<_>, Vec<_>) = (0..200)
-                .map(|tick| {
-                    walk.write(tick, &mut program);
-                    let (time, outcome) = one_tick(&mut solver, &program, Start::Cold);
-                    (time, outcome.iterations)
-                })
-                .unzip();
-            print(&format!("{name}, clarabel with dense patterns"), times, &iterations);
-        }
+        print(&format!("{name}, clarabel"), times, &iterations);
     }
 }
