@@ -51,7 +51,7 @@ ARGUMENTS = {
     "Model": "model",
     "Data": "data",
     "ConstraintSet": "constraints",
-    "Sequence[ContactConstraint]": "ConstraintSet.constraints casadi_hold.constraints",
+    "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "str": "contact function joint_name name prefix text",
     "str | int": "body frame",
     "int": "facets grain iterations k knot last max_iterations n nu nx seed size steps threads",
@@ -127,7 +127,7 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Problem.to_json casadi_hold",
+    "str": "Model.name Problem.to_json _casadi_hold",
     "None": """
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic

@@ -48,11 +48,11 @@ __all__ = [
 
 
 def _function(model: Model, function: str, **options: Any) -> "_casadi.Function":
-    name = _condyle.casadi_hold(model, function, **options)
+    name = _condyle._casadi_hold(model, function, **options)
     try:
         return _casadi.external(name, _condyle.__file__)
     finally:
-        _condyle.casadi_release(name)  # CasADi holds it now
+        _condyle._casadi_release(name)  # CasADi holds it now
 
 
 def rnea(model: Model) -> "_casadi.Function":

@@ -1,5 +1,6 @@
 """`condyle.casadi`: values, derivatives of both orders, zeros, threads, lifetimes."""
 
+import doctest
 import gc
 import subprocess
 import sys
@@ -240,6 +241,12 @@ def test_what_cannot_be() -> None:
         condyle.casadi.forward_kinematics(arm, "tol")
     with pytest.raises(ValueError, match="reference"):
         condyle.casadi.frame_velocity(arm, "tool", "sideways")
+
+
+def test_examples() -> None:
+    results = doctest.testmod(condyle.casadi)
+    assert results.attempted > 5
+    assert results.failed == 0
 
 
 def test_swing_up_by_ipopt() -> None:

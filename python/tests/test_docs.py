@@ -61,4 +61,4 @@ def test_version_and_names() -> None:
     assert condyle.__version__ == _condyle.__version__
     modules = [getattr(condyle, name) for name in condyle.__all__ if inspect.ismodule(getattr(condyle, name))]
     public = {name for module in (condyle, *modules) for name in module.__all__}
-    assert {name for name in _condyle.__all__ if name != "_model_from_bytes"} <= public
+    assert {name for name in _condyle.__all__ if not name.startswith("_")} <= public

@@ -15,12 +15,12 @@ use function::Kind;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// A slot of CasADi's interface that computes a function of a robot, held for the caller until `casadi_release`.
+/// A slot of CasADi's interface that computes a function of a robot, held for the caller until `_casadi_release`.
 ///
 /// function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
 /// 'constrained_dynamics'. Returns the name of its symbols.
 #[pyfunction]
-#[pyo3(signature = (model, function, *, frame=None, reference=None, constraints=None))]
+#[pyo3(name = "_casadi_hold", signature = (model, function, *, frame=None, reference=None, constraints=None))]
 pub(crate) fn casadi_hold(
     model: &Bound<'_, Model>,
     function: &str,
@@ -62,6 +62,7 @@ pub(crate) fn casadi_hold(
 
 /// The end of a hold: the slot lives on as long as CasADi has functions of it.
 #[pyfunction]
+#[pyo3(name = "_casadi_release")]
 pub(crate) fn casadi_release(name: &str) {
     interface::release(name);
 }
