@@ -129,7 +129,7 @@ RESULTS = {
         HyperDual.__lt__ HyperDual.__ne__""",
     "str": "Model.name Problem.to_json _casadi_hold",
     "None": """
-        AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
+        _casadi_release AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
         Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state check""",
     "slice": "ConstraintSet.range",

@@ -75,6 +75,8 @@ __all__ = [
     "Simulation",
     "WrenchCone",
     "__version__",
+    "_casadi_hold",
+    "_casadi_release",
     "_model_from_bytes",
     "aba",
     "aba_derivatives",
@@ -473,6 +475,23 @@ class ModelBuilder:
 
         Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
         """
+
+def _casadi_hold(
+    model: Model,
+    function: str,
+    *,
+    frame: str | int | None = None,
+    reference: _Reference | None = None,
+    constraints: Sequence[ContactConstraint] | None = None,
+) -> str:
+    """A slot of CasADi's interface that computes a function of a robot, held for the caller until `_casadi_release`.
+
+    function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
+    'constrained_dynamics'. Returns the name of its symbols.
+    """
+
+def _casadi_release(name: str) -> None:
+    """The end of a hold: the slot lives on as long as CasADi has functions of it."""
 
 def centroidal_map(
     model: Model, data: Data, q: ArrayLike, out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None
@@ -2005,7 +2024,8 @@ class Action:
     """An action written in Python.
 
     nx, nu: the numbers of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the next state and the cost; None for the next state of a terminal knot.
+    calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
+        state may be None.
     calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
         q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
     lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
@@ -2711,13 +2731,13 @@ class Simulation:
     integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
         is conserved to rounding.
-    dt: h, the length of a step (s).
+    dt: h, the length of a step (s); a negative one goes back in time.
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
     max_iterations: it gives up after so many iterations.
 
-    Raises `ModelError` if M is singular.
+    Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()

@@ -244,7 +244,7 @@ def test_what_cannot_be() -> None:
 
 
 def test_examples() -> None:
-    results = doctest.testmod(condyle.casadi)
+    results = doctest.testmod(condyle.casadi, extraglobs={"condyle": condyle})
     assert results.attempted > 5
     assert results.failed == 0
 
