@@ -32,8 +32,8 @@ from ._types import ContactConstraint
 
 try:
     import casadi as _casadi
-except ImportError as error:
-    raise ImportError("condyle.casadi needs CasADi: pip install condyle[casadi]") from error
+except ImportError:
+    raise ImportError("condyle.casadi needs CasADi: pip install condyle[casadi]") from None
 
 __all__ = [
     "aba",
