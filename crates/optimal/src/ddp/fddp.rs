@@ -52,7 +52,7 @@ use std::time::Instant;
 /// #         next[0] = x[0] + u;
 /// #         0.5 * (x[0] * x[0] + u * u)
 /// #     }
-/// #     pub(super) fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+/// #     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
 /// #         (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[0]);
 /// #         node.B.fill(1.0);
 /// #         node.S.fill(0.0);
