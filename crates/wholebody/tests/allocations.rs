@@ -1,37 +1,13 @@
 //! A step allocates nothing but what clarabel does.
-#![allow(unsafe_code)] // a counting allocator cannot be written without
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
 use common::*;
 use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Settings, Task, WholeBodyController};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
-// and allocates nothing itself.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.set(COUNT.get() + 1);
-        // SAFETY: the caller's promise about `layout` is the one that is asked for.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use counting::COUNT;
 
 /// Assembly and our solver allocate nothing, whatever touches; clarabel once in a solve, and more for a new set of contacts.
 #[test]

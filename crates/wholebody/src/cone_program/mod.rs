@@ -9,7 +9,6 @@
 //!
 //! Multipliers stand with the constraints' gradients: P x + c = Aᵀ y + Gᵀ z + Fᵀ w, where z is positive at a lower bound and
 //! negative at an upper one, and wₖ ∈ Qₖ.
-#![allow(dead_code)]
 
 mod clarabel;
 mod interior_point;
@@ -17,9 +16,7 @@ mod program;
 #[cfg(test)]
 mod tests;
 
-#[allow(unused_imports)]
-pub(crate) use self::clarabel::{Clarabel, Dense, Pattern};
-#[allow(unused_imports)]
+pub(crate) use self::clarabel::{Clarabel, Dense};
 pub(crate) use interior_point::InteriorPoint;
 pub(crate) use program::{ConeProgram, Size};
 
@@ -92,6 +89,7 @@ pub(crate) struct Outcome {
 
 /// The multipliers of the last solve, with the signs of the [module](self).
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(test), expect(dead_code, reason = "the tests check the conditions of optimality by them"))]
 pub(crate) struct Multipliers<'s> {
     /// y, of A x = b.
     pub equalities: &'s [f64],
@@ -113,5 +111,6 @@ pub(crate) trait Solver {
     fn x(&self) -> &[f64];
 
     /// The multipliers of the last solve.
+    #[cfg_attr(not(test), expect(dead_code, reason = "as of `Multipliers`"))]
     fn multipliers(&self) -> Multipliers<'_>;
 }

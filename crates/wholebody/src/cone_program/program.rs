@@ -105,6 +105,7 @@ impl ConeProgram {
     }
 
     /// ½ xᵀ P x + cᵀ x.
+    #[cfg(test)]
     pub(crate) fn objective(&self, x: &[f64]) -> f64 {
         let mut sum = 0.0;
         for j in 0..self.size.unknowns {

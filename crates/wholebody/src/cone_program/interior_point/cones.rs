@@ -189,9 +189,4 @@ impl Cones {
             self.z[i] += step * self.dz[i];
         }
     }
-
-    /// (s + α ds)ᵀ (z + α dz).
-    pub(super) fn gap_after(&self, rows: usize, step: f64) -> f64 {
-        (0..rows).map(|i| (self.s[i] + step * self.ds[i]) * (self.z[i] + step * self.dz[i])).sum()
-    }
 }

@@ -1,35 +1,12 @@
 //! A solve allocates nothing, whatever the sizes in use.
-#![allow(unsafe_code)] // a counting allocator cannot be written without
+
+#[path = "../../../tests/common/counting.rs"]
+mod counting;
 
 use super::random::{Draw, Kind};
 use super::walk::Walk;
 use crate::cone_program::{InteriorPoint, Settings, Solver, Start};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
-// and allocates nothing itself.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.set(COUNT.get() + 1);
-        // SAFETY: the caller's promise about `layout` is the one that is asked for.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use counting::COUNT;
 
 #[test]
 fn a_solve_allocates_nothing() {

@@ -6,6 +6,5 @@ mod kkt;
 mod properties;
 mod random;
 mod refusals;
-mod speed;
 mod walk;
 mod warm;

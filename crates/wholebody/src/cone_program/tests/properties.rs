@@ -10,8 +10,6 @@ const KKT_TOLERANCE: f64 = 1e-8;
 const OBJECTIVE_TOLERANCE: f64 = 1e-6;
 /// Of entries of x of size one, from solutions with [`SHARP`] where P has no eigenvalue below 0.1.
 const X_TOLERANCE: f64 = 1e-6;
-/// From a gap of 1e-9: λ / 2 ‖Δx‖² ≤ 1e-9 (1 + |objective|).
-const BLUNT_X_TOLERANCE: f64 = 1e-3;
 const SHARP: Settings = Settings { tolerance: 1e-12, max_iterations: 50, time_limit: f64::INFINITY };
 
 /// Sizes: unknowns, and equalities, rows, cones.
