@@ -133,7 +133,8 @@ impl Fddp {
     ///
     /// # Errors
     /// [`Error`] if the dimensions of `problem` are not those given to [`new`](Self::new), the warm start has a wrong
-    /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see [`Solution::status`].
+    /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see
+    /// [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.run(problem, Some([xs, us]), &mut Unobserved)
     }
