@@ -62,6 +62,8 @@ pub use configuration::{
     DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
     interpolate, neutral, normalize, random_configuration, transport,
 };
+#[doc(hidden)]
+pub use configuration::integrate_jacobian_groups;
 pub use error::{Error, Warning};
 pub use io::mjcf::MjcfOptions;
 pub use io::sdf::SdfOptions;
