@@ -6,6 +6,6 @@ pub(super) mod free;
 pub(super) mod impulse;
 pub(super) mod inverse;
 pub(super) mod kkt_elimination;
-mod limb_elimination;
 pub(super) mod knots;
+mod limb_elimination;
 mod robot;
