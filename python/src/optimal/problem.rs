@@ -16,7 +16,7 @@ use rust::Observer;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The value behind a lock; an error if another call holds it.
-pub(super) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
+pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
     value.try_lock().map_err(|_| PyRuntimeError::new_err(format!("{name}: in use by another call")))
 }
 
