@@ -49,6 +49,7 @@ pub mod layout;
 pub mod limbs;
 mod magnitude;
 mod model;
+mod real;
 pub mod robots;
 #[doc(hidden)]
 pub mod tree;

@@ -271,7 +271,7 @@ impl RobotDynamics {
     }
 }
 
-/// How the outputs of a knot change, by the derivatives in its data.
+/// The derivatives of the outputs of a knot, from those in its data.
 pub(crate) struct DynamicsSensitivities<'a> {
     /// The output that is S u.
     pub given: Output,
