@@ -226,7 +226,7 @@ impl Vectorized for Run<'_> {
         }
         // what the rows were solved for goes out of the joints' rows, several at once
         e.late.iter_mut().for_each(|(r, blocks)| *blocks = mask(&T[*r * stride..][..stride]));
-        for other in motion.chunks_exact_mut(stride) {
+        for other in motion.chunks_exact_mut(stride).take(if e.late.is_empty() { 0 } else { nv }) {
             let (mut x, mut a, mut blocks, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0, 0);
             for &(r, mask) in &e.late {
                 let factor = other[e.pivots[r]];
