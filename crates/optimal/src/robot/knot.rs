@@ -24,6 +24,8 @@ pub(crate) struct KnotData {
     pub dtau: [DMatrix<f64>; 3],
     /// The equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
+    /// Whether the limbs in contact are solved in it.
+    pub limbs_solved: bool,
     pub residuals: ResidualData,
 }
 
@@ -45,6 +47,7 @@ impl KnotData {
             dlambda: [wide(), wide(), wide()],
             dtau: [(); 3].map(|()| DMatrix::zeros(n, n)),
             equations: Vec::new(),
+            limbs_solved: false,
             residuals: ResidualData::default(),
         }
     }

@@ -5,9 +5,8 @@
 //!
 //! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
 //!   instructions that the scalar is made of; whoever uses the library calls that code;
-//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same 64
-//! bits
-//!   under another name;
+//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same
+//!   64 bits under another name;
 //! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
 //!
 //! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one
@@ -51,8 +50,7 @@ pub unsafe fn renamed<A, B>(a: A) -> B {
     unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
-/// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants;
-/// see
+/// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
 /// [`gate`](crate::simd::gate). It returns nothing: what it computes is in its arguments.
 #[macro_export]
 #[doc(hidden)]
