@@ -224,6 +224,9 @@ def aba(
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 
+    Raises `ModelError` if M is singular wherever the robot is. At a position at which it happens to be, a point of mass on
+    the axis about which it turns, the numbers are not finite, or as large as rounding has it.
+
     >>> quadruped = condyle.robots.quadruped()
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
     >>> a = condyle.aba(quadruped, condyle.Data(quadruped), q, zero, zero)
@@ -1165,7 +1168,8 @@ class Cholesky:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1268,7 +1272,8 @@ class Ltdl:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -2250,6 +2255,7 @@ class Cost:
     """A term of a cost: weight times an activation of a residual.
 
     name: what `Problem.set_weight` and errors call it.
+    weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
     activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
         for other residuals.
@@ -2363,9 +2369,9 @@ class FreeDynamics:
 class FrictionCone:
     """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
-    surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
-    default 0 and infinite.
+    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
+    rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
+    (N), by default 0 and infinite.
 
     Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
 
@@ -2528,7 +2534,7 @@ class Problem:
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
 
-        Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
+        Raises `KeyError` if there is no such term, `ProblemError` if the weight is negative or not finite.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
@@ -2544,6 +2550,8 @@ class Problem:
         """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
         us: (N, nu), or a list of N arrays where knots differ in nu.
+
+        Other threads run meanwhile; what a handler of a signal raises, as KeyboardInterrupt, ends it between knots.
         """
 
 @final
@@ -2741,13 +2749,13 @@ class Simulation:
     integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
         is conserved to rounding.
-    dt: h, the length of a step (s); a negative one goes back in time.
+    dt: h, the length of a step (s), above 0.
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
     max_iterations: it gives up after so many iterations.
 
-    Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
+    Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -2782,7 +2790,11 @@ class Simulation:
         """The velocity, nv numbers."""
 
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
-        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0."""
+        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
+
+        Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+        `ValueError` if one of v is not finite.
+        """
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
         """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the

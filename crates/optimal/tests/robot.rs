@@ -2,8 +2,8 @@
 #![allow(non_snake_case)] // the names of the literature
 
 use condyle_dynamics::{
-    Act, Data, FrameKind, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, forward_kinematics, integrate,
-    neutral, robots,
+    Act, Data, FrameKind, Model, ModelBuilder, Se3, UrdfOptions, Vec3, WORLD, forward_kinematics, integrate, neutral,
+    robots,
 };
 use condyle_optimal::robot::{Activation, Cost, Dynamics, FrameName, FreeDynamics, Knot, Limit, Residual};
 use condyle_optimal::{ActionModel, Error, LqNode, NumDiff, Sweep};
@@ -205,18 +205,14 @@ fn frames_travel_by_name() {
         unknown(read.build(&quadruped).map(|_| ()).unwrap_err());
     }
     // of two frames with one name the one of the wanted kind, else a link's
-    let mut builder = ModelBuilder::new("twice");
-    let body = builder.body("tip", WORLD, Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) }, Se3::identity(), rod());
-    builder.frame("tip", body, Se3 { translation: Vec3::new(0.0, 0.0, 2.0), ..Se3::identity() });
-    let twice = builder.build().unwrap();
+    let text = r#"<robot name="twice"><link name="base"/><link name="tip"/><joint name="tip" type="continuous">
+        <parent link="base"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>"#;
+    let twice = Model::from_urdf_str(text, &UrdfOptions::default()).unwrap();
     let named = |kind| FrameName { name: "tip".to_owned(), kind }.number(&twice).unwrap();
-    assert_eq!(twice.frames()[named(Some(FrameKind::User))].kind, FrameKind::User);
+    assert_eq!(twice.frames()[named(Some(FrameKind::Joint))].kind, FrameKind::Joint);
     assert_eq!(named(None), twice.frame("tip").unwrap());
-    assert_ne!(named(None), named(Some(FrameKind::User)));
-}
-
-fn rod() -> Inertia<f64> {
-    Inertia::from_com(1.0, Vec3::new(0.0, 0.0, 0.5), Sym3::diagonal(0.1))
+    assert_ne!(named(None), named(Some(FrameKind::Joint)));
+    assert_eq!(named(Some(FrameKind::User)), named(None)); // for want of one
 }
 
 #[test]
