@@ -19,6 +19,10 @@ const WIDENED: f64 = 1e-7;
 /// A row whose coefficients all have become smaller than this part of what they were is decided by what is held.
 const DECIDED: f64 = 1e-9;
 
+/// Up to so many limited torques, about as many unknowns as an elimination leaves, a sparse solver takes less time for the
+/// condensed program: ANYmal's 12 took 0.23 ms instead of 0.31 ms, Talos's 32 1.9 ms instead of 0.9 ms.
+const FEW: usize = 20;
+
 /// What the solver of a priority gets.
 enum Given {
     /// A program without equalities.
@@ -46,6 +50,7 @@ impl Levels {
             // What former priorities hold may depend on contacts and base: only an elimination sees that.
             _ if level > 0 => Given::condensed(capacity, objective),
             (Form::Condensed, _) | (Form::Automatic, Backend::InteriorPoint) => Given::condensed(capacity, objective),
+            (Form::Automatic, Backend::Clarabel) if dense <= FEW => Given::condensed(capacity, objective),
             (Form::Automatic | Form::Full, Backend::Clarabel) => Given::Lifted(Lifted::new(capacity, dense, objective)),
             (Form::Full, Backend::InteriorPoint) => Given::Full(ConeProgram::new(capacity)),
         };
@@ -137,7 +142,10 @@ impl Levels {
 
 impl Given {
     fn condensed(capacity: Size, objective: usize) -> Self {
-        Given::Condensed(Box::new(Condenser::new(capacity, objective)), ConeProgram::new(Size { equalities: 0, ..capacity }))
+        Given::Condensed(
+            Box::new(Condenser::new(capacity, objective)),
+            ConeProgram::new(Size { equalities: 0, ..capacity }),
+        )
     }
 
     fn program(&self) -> &ConeProgram {

@@ -31,7 +31,8 @@ pub enum Backend {
 /// In which unknowns the program is solved; the solution is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// What is fastest: condensed for our own solver, whose matrices are dense; in full for clarabel, which keeps zeros.
+    /// What is fastest: condensed for our own solver, whose matrices are dense, and for robots of few joints; in full for
+    /// clarabel, which keeps zeros, on others.
     Automatic,
     /// The rows of the base and of the contacts are eliminated first.
     Condensed,
