@@ -46,7 +46,7 @@ ALIASES = {
 ARGUMENTS = {
     "ArrayLike": """
         A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
-        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference""",
+        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort""",
     "ArrayLike | None": "ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
@@ -60,7 +60,7 @@ ARGUMENTS = {
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity""",
     "float | None": "FreeDynamics.dt",
-    "bool": "mimic strict weightless_meshes FrictionCone.inner",
+    "bool": "frames mimic strict weightless_meshes FrictionCone.inner",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -127,7 +127,7 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Problem.to_json _casadi_hold",
+    "str": "Model.name Model.tree Problem.to_json _casadi_hold",
     "None": """
         _casadi_release AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
@@ -140,7 +140,7 @@ RESULTS = {
     "HyperDual": "HyperDual",
     "Model": """
         Model.__copy__ Model.__deepcopy__ Model.lock Model.with_armature Model.with_gravity
-        Model.with_inertias ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
+        Model.with_inertias Model.with_limits ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",
