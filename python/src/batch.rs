@@ -4,7 +4,7 @@
 //! milliseconds, with the interpreter's lock released, and each part is written to the arrays that the caller gets;
 //! everything else is called state after state. Between parts and states signals are looked at.
 
-use crate::arrays::{Array, Expected, Input, check_shape, matrix, members, named, place, writable};
+use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
 use crate::signals::{self, Signals};
 use condyle::{Batch, BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices, Scalar};
@@ -178,9 +178,7 @@ impl Results for &[f64] {
 
 impl Results for Matrices<'_, f64> {
     fn write(&self, to: &mut [&mut [f64]]) {
-        for (matrix, to) in self.iter().zip(to[0].chunks_exact_mut(self.at(0).len().max(1))) {
-            matrix.write(to);
-        }
+        self.write_rows(to[0]);
     }
 }
 

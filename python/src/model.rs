@@ -75,8 +75,8 @@ impl From<condyle::Model> for Model {
 
 /// The number of a frame that is given by name or by number.
 pub(crate) fn frame_index(model: &condyle::Model, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
-    if let Ok(name) = frame.extract::<&str>() {
-        return model.frame(name).map_err(exception);
+    if let Ok(name) = frame.cast::<PyString>() {
+        return model.frame(name.to_str()?).map_err(exception);
     }
     numbered("frame: expected a name", frame, 0, model.frames().len())
 }
@@ -88,8 +88,8 @@ pub(crate) fn body_index(
     body: &Bound<'_, PyAny>,
     least: usize,
 ) -> PyResult<usize> {
-    if let Ok(name) = body.extract::<&str>() {
-        return model.joint(name).map_err(exception);
+    if let Ok(name) = body.cast::<PyString>() {
+        return model.joint(name.to_str()?).map_err(exception);
     }
     numbered(expected, body, least, model.bodies().len())
 }
@@ -112,18 +112,16 @@ pub(crate) fn members_of<'py>(
 
 /// An index from `least` to below `count`.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
-    let wanted = match count {
-        _ if least < count => format!("{expected} or {least} to {}", count - 1),
-        _ => expected.to_owned(),
+    let wrong = |found: String| match count {
+        _ if least < count => format!("{expected} or {least} to {}, found {found}", count - 1),
+        _ => format!("{expected}, found {found}: the model has none"),
     };
-    let none = if least < count { "" } else { ": the model has none" };
     let index: isize = given.extract().map_err(|_| {
         let found = if given.is_none() { "None".to_owned() } else { format!("a {}", type_name(given)) };
-        PyTypeError::new_err(format!("{wanted}, found {found}{none}"))
+        PyTypeError::new_err(wrong(found))
     })?;
-    let wrong = || format!("{wanted}, found {index}{none}");
     let inside = usize::try_from(index).ok().filter(|i| (least..count).contains(i));
-    inside.ok_or_else(|| PyIndexError::new_err(wrong()))
+    inside.ok_or_else(|| PyIndexError::new_err(wrong(index.to_string())))
 }
 
 impl Model {

@@ -79,6 +79,10 @@ pub(crate) trait Array {
     fn shape(&self) -> impl AsRef<[usize]>;
     /// Writes its numbers in C order.
     fn write(&self, x: &mut [Self::Number]);
+    /// Its numbers as they lie, if it is a vector.
+    fn vector(&self) -> Option<&[Self::Number]> {
+        None
+    }
 }
 
 impl<S: Number> Array for [S] {
@@ -88,6 +92,9 @@ impl<S: Number> Array for [S] {
     }
     fn write(&self, x: &mut [S]) {
         x.copy_from_slice(self);
+    }
+    fn vector(&self) -> Option<&[S]> {
+        Some(self)
     }
 }
 
@@ -253,6 +260,11 @@ pub(crate) trait Give {
 
 impl<T: Array + ?Sized> Give for T {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        if let (None, Some(numbers)) = (out, self.vector())
+            && let Some(array) = T::Number::new_vector(py, numbers)
+        {
+            return Ok(array);
+        }
         T::Number::output(py, out, self.shape().as_ref(), |x| self.write(x))
     }
 }

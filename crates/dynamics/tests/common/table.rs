@@ -198,7 +198,7 @@ pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
 
 /// Name and call of each function. A call allocates only if the function does.
 pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
-    let others: [(&'static str, Function<S>); 38] = [
+    let others: [(&'static str, Function<S>); 39] = [
         ("rnea_derivatives by all other inputs", |m, d, i, o| {
             let r = rnea_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
             other_inputs(m).into_iter().zip(&mut o.by_inputs).for_each(|(input, out)| r.with_respect_to(input, out));
