@@ -71,10 +71,10 @@ Contacts, loops, impacts: `ContactConstraint`, `ConstraintSet`, `constrained_dyn
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
-Modules: `optimal` (FDDP, DDP and their problems), `simulation`, `casadi` (imported by itself)
+Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `casadi` (imported by itself)
 """
 
-from . import inertial_parameters, optimal, robots, simulation
+from . import inertial_parameters, optimal, robots, simulation, wholebody
 from ._condyle import (
     WORLD,
     BodyId,
@@ -303,4 +303,5 @@ __all__ = [
     "static_torque",
     "static_torque_derivative",
     "transport",
+    "wholebody",
 ]

@@ -3,7 +3,7 @@
 use condyle::{Mat3, Se3, Vec3};
 use nalgebra::DMatrix;
 use numpy::ndarray::Dimension;
-use numpy::{Element, Ix1, Ix2, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{Element, Ix1, Ix2, Ix3, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use std::fmt::{self, Display};
@@ -54,6 +54,11 @@ pub(crate) fn vector<'py>(argument: &str, value: &Bound<'py, PyAny>, length: usi
 
 /// A matrix argument.
 pub(crate) fn matrix<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 2]) -> PyResult<Input<'py, Ix2>> {
+    input(argument, value, &shape)
+}
+
+/// An argument with three indices.
+pub(crate) fn tensor<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 3]) -> PyResult<Input<'py, Ix3>> {
     input(argument, value, &shape)
 }
 

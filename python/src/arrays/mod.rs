@@ -10,7 +10,7 @@ mod output;
 mod read_only;
 
 pub(crate) use input::{
-    Expected, Input, array, bounds, check_shape, matrix, numbers, pose, rotation, three, type_name, vector,
+    Expected, Input, array, bounds, check_shape, matrix, numbers, pose, rotation, tensor, three, type_name, vector,
 };
 pub(crate) use output::{Array, Give, class, give_named, members, named, named_tuples, output, place, writable};
 pub(crate) use read_only::read_only;

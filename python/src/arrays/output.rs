@@ -284,11 +284,14 @@ impl<S: Number> Give for (DMatrix<S>, DMatrix<S>) {
     }
 }
 
-/// A class of `condyle._types`, looked up once.
+/// A class of `condyle._types`, or of another module, looked up once.
 macro_rules! class {
-    ($py:expr, $name:expr) => {{
+    ($py:expr, $name:expr) => {
+        $crate::arrays::class!($py, "condyle._types", $name)
+    };
+    ($py:expr, $module:expr, $name:expr) => {{
         static CLASS: pyo3::sync::PyOnceLock<Py<pyo3::types::PyType>> = pyo3::sync::PyOnceLock::new();
-        CLASS.import($py, "condyle._types", $name)
+        CLASS.import($py, $module, $name)
     }};
 }
 pub(crate) use class;
