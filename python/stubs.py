@@ -47,7 +47,7 @@ ALIASES = {
 ARGUMENTS = {
     "ArrayLike": """
         A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
-        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference
+        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
         controls corners normal states times touches FrictionContact.size Plan.gains Task.joints""",
     "ArrayLike | None": "ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
@@ -63,7 +63,7 @@ ARGUMENTS = {
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "FreeDynamics.dt",
-    "bool": "mimic strict weightless_meshes FrictionCone.inner",
+    "bool": "frames mimic strict weightless_meshes FrictionCone.inner",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -144,7 +144,7 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Problem.to_json _casadi_hold FrictionContact.frame Task.kind",
+    "str": "Model.name Model.tree Problem.to_json _casadi_hold FrictionContact.frame Task.kind",
     "str | None": "Task.frame",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"] | None': "FrictionContact.forces",
@@ -166,7 +166,7 @@ RESULTS = {
     "HyperDual": "HyperDual",
     "Model": """
         Model.__copy__ Model.__deepcopy__ Model.lock Model.with_armature Model.with_gravity
-        Model.with_inertias ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
+        Model.with_inertias Model.with_limits ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",

@@ -1994,6 +1994,23 @@ class Model:
         Raises `ModelError` if one is negative or not finite.
         """
 
+    def with_limits(
+        self,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+    ) -> Model:
+        """The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
+        are, and infinite numbers are none.
+
+        Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity or effort is negative.
+
+        >>> arm = condyle.robots.arm7()
+        >>> arm.with_limits(effort=0.5 * arm.limits.effort).limits.effort[0].item()
+        43.5
+        """
+
     def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
         """The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
         them is in its `warnings` and `singular_joints`.
@@ -2020,6 +2037,15 @@ class Model:
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
 
         Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
+        """
+
+    def tree(self, frames: bool = False) -> str:
+        """The tree of bodies as text: each joint with its kind and where its coordinates stand in q and v, and the body that it
+        carries; frames: whether the names of other frames stand with the bodies.
+
+        >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
+        universe
+        └─ root_joint: free_flyer, q[0:7], v[0:6] → trunk, 30.000 kg
         """
 
     def __copy__(self) -> Model:

@@ -97,6 +97,12 @@ impl Simulation {
         Ok(Self(owned))
     }
 
+    /// The robot's name and the time.
+    fn __repr__(&self) -> String {
+        let (name, time) = (self.0.borrow_owner().get().inner.name(), self.0.borrow_dependent().time());
+        format!("<condyle.simulation.Simulation of '{name}' at {time} s>")
+    }
+
     /// The position, nq numbers.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
