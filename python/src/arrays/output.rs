@@ -25,17 +25,13 @@ pub(crate) fn output<'py>(
             Ok(out.clone())
         }
         None => {
-            fill(new_numbers(&array));
+            // SAFETY: nobody else has the array yet.
+            #[allow(unsafe_code)]
+            let numbers = unsafe { array.as_slice_mut() };
+            fill(numbers.expect("was made contiguous"));
             Ok(array.into_any())
         }
     }
-}
-
-/// The numbers of an array that was just made.
-#[allow(unsafe_code)]
-fn new_numbers<'a>(array: &'a Bound<'_, PyArrayDyn<f64>>) -> &'a mut [f64] {
-    // SAFETY: nobody else has the array yet.
-    unsafe { array.as_slice_mut() }.expect("was made contiguous")
 }
 
 /// So many numbers and more are asked of NumPy in a way that can fail.
