@@ -70,8 +70,9 @@ class Settings(NamedTuple):
 
     acceleration_weight: float = 1e-6
     """The weight of ½ ‖q̈‖², which decides what the tasks leave open; above 0."""
-    force_weight: float = 1e-5
-    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces; above 0."""
+    force_weight: float = 1e-7
+    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces; above 0. A moment of a sole's wrench counts as
+    the forces at the corners that make it, so that pressure stays away from the edges."""
     contact_gains: Gains = Gains(0.0, 0.0)
     """Baumgarte's: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0."""
     max_correction: float = 50.0

@@ -68,15 +68,19 @@ class Gait:
         self._phase(feet, knots, lambda k: self._costs(feet, [], self.com))
 
     def step(self, swinging, length, height, knots):
-        """Swings the feet with these numbers ahead by `length` in an arc of some height, and sets them down."""
+        """Swings the feet with these numbers ahead by `length` in an arc of some height, and sets them down.
+
+        They leave the ground and meet it nearly at rest: a robot can follow that.
+        """
         support = [k for k in range(len(self.feet)) if k not in swinging]
         com, places, ahead = self.com.copy(), self.places.copy(), np.array([length, 0.0, 0.0])
         share = len(swinging) / len(self.feet)
 
         def costs(k):
             s = (k + 1) / knots
-            lift = np.array([0.0, 0.0, height * np.sin(np.pi * s)])
-            moving = [(foot, places[foot] + s * ahead + lift) for foot in swinging]
+            lift = np.array([0.0, 0.0, height * np.sin(np.pi * s) ** 2])
+            forward = s - np.sin(2.0 * np.pi * s) / (2.0 * np.pi)
+            moving = [(foot, places[foot] + forward * ahead + lift) for foot in swinging]
             return self._costs(support, moving, com + share * s * ahead)
 
         self._phase(support, knots, costs)

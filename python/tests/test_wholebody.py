@@ -226,7 +226,7 @@ def test_references_are_views() -> None:
     assert references != other and other.contacts[1].activation == 1.0
     v = np.zeros(HUMANOID.nv)
     one, again = controller.step(upright(), v, references), controller.step(upright(), v, references)
-    np.testing.assert_allclose(one.a, again.a, rtol=1e-4, atol=1e-4)
+    assert np.abs(one.a - again.a).max() < 1e-4 * np.abs(one.a).max()
     assert np.abs(one.a - controller.step(upright(), v, other).a).max() > 0.1
     with pytest.raises(ValueError, match=r"^com.position: expected shape \(3,\), found \(2,\)$"):
         references.com.position = [0.0, 1.0]

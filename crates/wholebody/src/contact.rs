@@ -209,6 +209,20 @@ impl Geometry {
         if self.by_corners { self.corners.len() } else { 1 }
     }
 
+    /// What the square of unknown j is weighted by beside that of a force: a moment counts as the forces at the corners that
+    /// make it, 1 / r² with the root mean square r of the corners' distances from its axis.
+    pub(crate) fn weight(&self, j: usize) -> f64 {
+        let (row, count) = (self.motion[j % self.motion.len()], self.corners.len() as f64);
+        let mean = |square: &dyn Fn(&[f64; 2]) -> f64| self.corners.iter().map(square).sum::<f64>() / count;
+        match row {
+            _ if self.by_corners => 1.0,
+            3 => 1.0 / mean(&|[_, y]| y * y),
+            4 => 1.0 / mean(&|[x, _]| x * x),
+            5 => 1.0 / mean(&|[x, y]| x * x + y * y),
+            _ => 1.0,
+        }
+    }
+
     /// The half-planes (a, b, c) with a x + b y + c ≥ 0 in which the centre of pressure of a wrench lies.
     pub(crate) fn edges(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let count = if self.by_corners { 0 } else { self.corners.len() };

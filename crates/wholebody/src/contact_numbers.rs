@@ -28,6 +28,8 @@ pub(crate) struct ContactNumbers {
     pub held: [f64; 6],
     /// The reference of the force's unknowns.
     pub reference: Vec<f64>,
+    /// The weights of the force's unknowns, in parts of the settings' force weight.
+    pub weights: Vec<f64>,
     /// The reference of the wrench.
     pub wrench: [f64; 6],
     /// Least and greatest normal force.
@@ -46,6 +48,7 @@ impl ContactNumbers {
             Jt: DMatrix::zeros(nv, geometry.motion.len()),
             held: [0.0; 6],
             reference: vec![0.0; geometry.unknowns()],
+            weights: (0..geometry.unknowns()).map(|j| geometry.weight(j)).collect(),
             wrench: [0.0; 6],
             bounds: [0.0, f64::INFINITY],
             geometry,

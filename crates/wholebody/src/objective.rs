@@ -212,8 +212,8 @@ impl Objective {
                 level.add_single(i, settings.acceleration_weight, 0.0); // ½ w_a q̈ᵢ²
             }
             for contact in contacts.iter().filter(|contact| contact.active) {
-                for (j, &f) in contact.reference.iter().enumerate() {
-                    level.add_single(contact.column + j, settings.force_weight, f); // ½ w_f (f − f_ref)²
+                for (j, (&f, weight)) in contact.reference.iter().zip(&contact.weights).enumerate() {
+                    level.add_single(contact.column + j, weight * settings.force_weight, f); // ½ w_f (f − f_ref)²
                 }
             }
         }

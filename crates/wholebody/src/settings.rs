@@ -86,7 +86,8 @@ impl Default for JointLimits {
 pub struct Settings {
     /// Weight of ½ ‖q̈‖², which decides what the tasks leave open; above 0.
     pub acceleration_weight: f64,
-    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces; above 0.
+    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces; above 0. A moment of a sole's wrench counts as the forces
+    /// at the corners that make it, so that pressure stays away from the edges.
     pub force_weight: f64,
     /// Baumgarte's: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0.
     pub contact_gains: Gains,
@@ -120,7 +121,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             acceleration_weight: 1e-6,
-            force_weight: 1e-5,
+            force_weight: 1e-7,
             contact_gains: Gains { stiffness: 0.0, damping: 0.0 },
             max_correction: 50.0,
             friction: Friction::Cone,

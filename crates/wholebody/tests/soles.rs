@@ -60,7 +60,31 @@ fn the_centre_of_pressure_stays_within() {
     }
 }
 
-/// Condensed or not, by clarabel or by our solver.
+/// Forces are spread alike whether a wrench or the corners' forces describe them: of four corners, a quarter of the force
+/// each costs a quarter of the whole. Half of the way aside, pressure has left both soles' middles but is far from edges.
+#[test]
+fn pressure_keeps_away_from_the_edges() {
+    let model = robots::humanoid();
+    let (q, v) = (squat(&model), vec![0.0; 38]);
+    let tasks = [Task { weight: 1e4, ..Task::com() }, Task { weight: 1e4, ..Task::posture() }];
+    let corners: Vec<_> = soles(0.7).into_iter().map(FrictionContact::by_corners).collect();
+    let [wrench, corners] = [(soles(0.7), 0.25), (corners, 1.0)].map(|(contacts, part)| {
+        let settings = Settings { force_weight: 1e-2 * part, ..Settings::default() };
+        let (references, command) = solve(&model, &contacts, &tasks, settings, &q, &v, |r| r.com.acceleration.y = 0.6);
+        check(&model, &contacts, &q, &v, &references, &command);
+        command
+    });
+    let weight = 9.81 * model.total_mass();
+    for (one, other) in wrench.forces.iter().zip(&corners.forces) {
+        assert!(max_abs((*one - *other).to_array()) < 1e-5 * weight, "{one:?} and {other:?}");
+        let aside = one.angular.x / one.linear.z; // y of the centre of pressure, of a sole 10 cm wide
+        assert!(aside.abs() > 1e-3 && aside.abs() < 0.025, "{aside}");
+    }
+    let [left, right] = [0, 1].map(|k| wrench.forces[k].linear.z);
+    assert!((left - right).abs() > 0.05 * weight, "{left} and {right}");
+}
+
+/// Condensed or not, by clarabel or by our solver; with a weight of forces that decides them within the tolerance.
 #[test]
 fn all_ways_agree() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
@@ -74,7 +98,7 @@ fn all_ways_agree() {
             let (q, v) = near(model, &centre, seed, 0.02, 0.1);
             let command = |backend, form| {
                 let tolerance = if backend == Backend::Clarabel { 1e-11 } else { 1e-10 };
-                let settings = Settings { form, backend, tolerance, ..Settings::default() };
+                let settings = Settings { form, backend, tolerance, force_weight: 1e-5, ..Settings::default() };
                 let (references, command) =
                     solve(model, &contacts, &tasks, settings, &q, &v, |r| r.com.acceleration.x = 2.0);
                 check(model, &contacts, &q, &v, &references, &command);

@@ -1,0 +1,133 @@
+#!/usr/bin/env python3
+"""Whole-body control in MuJoCo, all cases: what stands, the largest pushes that are survived, the trot of 20 s.
+
+    .venv/pinocchio/bin/python tests/peers/mujoco/closed_loop.py [--write]    with --write into docs/wholebody.md
+
+It takes some minutes with a release build.
+"""
+
+import re
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scenes import FEET, FRICTION, PUSH_TIME, Disturbance, Humanoid, Quadruped, Record, anymal, urdf
+
+from condyle.wholebody import Pyramid
+
+DOCUMENT = Path(__file__).parents[3] / "docs" / "wholebody.md"
+
+DISTURBANCES = {
+    "as the model": Disturbance(),
+    "1 % noise on v": Disturbance(noise=0.01),
+    "one tick late": Disturbance(delay=1),
+    "μ taken for 20 % more": Disturbance(friction=1.2),
+    "μ taken for 20 % less": Disturbance(friction=0.8),
+    "these three: 1 %, late, more": Disturbance(0.01, 1, 1.2),
+    "10 %, five ticks late, more": Disturbance(0.1, 5, 1.2),
+}
+DIRECTIONS = {"forwards": (1.0, 0.0, 0.0), "backwards": (-1.0, 0.0, 0.0), "to the left": (0.0, 1.0, 0.0)}
+STIFFNESSES = (10.0, 20.0, 40.0)
+"""Of the PD hold, of which the best counts: parts of a joint's greatest effort for 1 rad."""
+PUSH = 20.0
+"""N s, in the table of disturbances."""
+STEP = 1.0
+"""To which the largest pushes are found (N s)."""
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(str(cell) for cell in line)} |" for line in lines)
+
+
+def deviation(record: Record) -> float:
+    """The largest horizontal distance of the centre of mass from where it should be (mm)."""
+    return 1e3 * float(np.linalg.norm((record.com - record.wanted)[:, :2], axis=1).max())
+
+
+def cell(record: Record, unsolved: int) -> str:
+    """A run in some words."""
+    if not record.stands:
+        return f"falls after {record.t[-1]:.1f} s"
+    failed = f", {unsolved} ticks unsolved" if unsolved else ""
+    return f"{deviation(record):.1f} mm{failed}"
+
+
+def humanoid_cases() -> dict[str, Callable[[Humanoid], Record]]:
+    """What TALOS does."""
+    return {
+        "stands, 5 s": lambda h: h.run(h.control(), 5.0),
+        "shifts its weight by ± 6 cm, 8 s": lambda h: h.run(h.control(h.shift), 8.0),
+        "lifts a foot by 10 cm, 7 s": lambda h: h.run(h.control(h.lift), 7.0),
+        f"is pushed forwards, {PUSH:.0f} N s": lambda h: h.run(h.control(), 4.0, (PUSH, 0.0, 0.0)),
+    }
+
+
+def disturbances() -> str:
+    """What still stands."""
+    rows = []
+    for name, case in humanoid_cases().items():
+        cells = []
+        for disturbance in DISTURBANCES.values():
+            humanoid = Humanoid(disturbance)
+            cells.append(cell(case(humanoid), humanoid.unsolved))
+        rows.append([f"TALOS {name}", *cells])
+    cells = []
+    for disturbance in DISTURBANCES.values():
+        quadruped = Quadruped(urdf("anymal"), FEET, anymal(), disturbance)
+        cells.append(cell(quadruped.run(20.0), quadruped.unsolved))
+    rows.append(["ANYmal trots, 20 s", *cells])
+    return table(["", *DISTURBANCES], rows)
+
+
+def largest(survives: Callable[[float], bool]) -> float:
+    """The largest push (N s) below which all of a bisection's are survived."""
+    low, high = 0.0, 10.0
+    while survives(high):
+        low, high = high, 2.0 * high
+    while high - low > STEP:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if survives(middle) else (low, middle)
+    return low
+
+
+def pushed(direction: Sequence[float], friction: float, cone: Any = "cone", stiffness: float | None = None) -> float:
+    """The largest push that TALOS survives: 4 s later it stands."""
+
+    def survives(push: float) -> bool:
+        humanoid = Humanoid(friction=friction, cone=cone)
+        law = humanoid.control() if stiffness is None else humanoid.hold(stiffness)
+        return humanoid.run(law, 4.0, push * np.array(direction)).stands
+
+    return largest(survives)
+
+
+def pushes() -> str:
+    """The largest ones."""
+    rows = []
+    for friction in (FRICTION, 0.3):
+        for name, direction in DIRECTIONS.items():
+            cones, pyramid = (pushed(direction, friction, cone) for cone in ("cone", Pyramid(4, True)))
+            hold = max(pushed(direction, friction, stiffness=stiffness) for stiffness in STIFFNESSES)
+            rows.append([f"μ = {friction}, {name}", *(f"{push:.0f} N s" for push in (cones, pyramid, hold))])
+    return table([f"TALOS is pushed for {PUSH_TIME} s", "cones", "pyramids of 4 sides", "PD hold"], rows)
+
+
+def main() -> None:
+    """Prints the tables, and writes them if told to."""
+    text = DOCUMENT.read_text(encoding="utf-8") if DOCUMENT.exists() else ""
+    for name, make in {"disturbances": disturbances, "pushes": pushes}.items():
+        made = make()
+        print(made, flush=True)
+        text = re.sub(
+            rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", lambda m, made=made: m[1] + made + m[2], text, flags=re.S
+        )
+    if sys.argv[1:] == ["--write"]:
+        DOCUMENT.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

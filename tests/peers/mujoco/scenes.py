@@ -1,0 +1,267 @@
+"""The robots, their controllers, and what they are to do in MuJoCo."""
+
+import sys
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from example_robot_data.robots_loader import ROBOTS, getModelPath
+from world import Array, World
+
+import condyle
+from condyle.wholebody import (
+    FrictionContact,
+    Gains,
+    Plan,
+    Pyramid,
+    References,
+    Settings,
+    Task,
+    WholeBodyController,
+    plan_of,
+)
+
+sys.path.append(str(Path(__file__).parents[3] / "python" / "examples"))
+from gait import Gait
+
+Law = Callable[[float, Array, Array], Array]
+"""Efforts from time, position and velocity."""
+
+SOLES = ["left_sole_link", "right_sole_link"]
+SOLE = (0.2, 0.12)
+"""Sides of TALOS's soles (m)."""
+TRUSTED = (0.19, 0.11)
+"""What the controller takes for them: at the very edges a sole tips."""
+FEET = ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"]
+BALL = 0.03
+"""Radius of ANYmal's feet (m)."""
+FRICTION = 0.7
+PUSH_TIME = 0.1
+"""For which a push lasts (s)."""
+FALLEN = 0.75
+"""A robot has fallen when its trunk is below this part of its first height, or leans by this angle (rad)."""
+
+
+def urdf(name: str) -> str:
+    """The text of a robot of example-robot-data."""
+    loader = ROBOTS[name]
+    path = Path(loader.path) / loader.urdf_subpath / loader.urdf_filename
+    return (Path(getModelPath(str(path))) / path).read_text()
+
+
+class Disturbance(NamedTuple):
+    """What the controller does not know."""
+
+    noise: float = 0.0
+    """Of each velocity, in parts of itself, normally distributed."""
+    delay: int = 0
+    """Ticks after which a state is seen."""
+    friction: float = 1.0
+    """What the controller takes for μ, in parts of it."""
+
+
+NONE = Disturbance()
+
+
+class Record(NamedTuple):
+    """A run, every so many ticks."""
+
+    stands: bool
+    """Whether the robot has not fallen."""
+    t: Array
+    """Times (s)."""
+    q: Array
+    """Positions."""
+    com: Array
+    """The centre of mass (m)."""
+    loads: Array
+    """The vertical force on each foot (N)."""
+    wanted: Array
+    """The centre of mass that is asked for (m)."""
+
+
+def run(
+    world: World,
+    law: Law,
+    seconds: float,
+    push: Callable[[float], Sequence[float]] | None = None,
+    disturbance: Disturbance = NONE,
+    wanted: Callable[[], Array] | None = None,
+    every: int = 10,
+) -> Record:
+    """Lets a law control a robot that is in its first state."""
+    rng, data = np.random.default_rng(0), condyle.Data(world.model)
+    seen: deque[tuple[Array, Array]] = deque(maxlen=1 + disturbance.delay)
+    height, rows = world.state()[0][2] - world.ground, []
+    stands = True
+    for tick in range(round(seconds / world.dt)):
+        t = tick * world.dt
+        q, v = world.state()
+        seen.append((q, v * (1.0 + disturbance.noise * rng.standard_normal(len(v)))))
+        world.step(law(t, *seen[0]), push(t) if push else (0.0, 0.0, 0.0))
+        if tick % every == 0:
+            c = condyle.com(world.model, data, q)
+            rows.append((t, q, c, world.loads()[:, 2], wanted() if wanted else c))
+        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z of the trunk's z
+        if not (q[2] - world.ground > FALLEN * height and upright > np.cos(FALLEN)):
+            stands = False
+            break
+    return Record(stands, *(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def ramp(t: float, begin: float, end: float) -> Array:
+    """From 0 at one time to 1 at another one, smoothly: value, rate, and rate of the rate."""
+    s, w = np.clip((t - begin) / (end - begin), 0.0, 1.0), 1.0 / (end - begin)
+    value = s**3 * (10.0 + s * (6.0 * s - 15.0))
+    return np.array([value, 30.0 * w * (s * (1.0 - s)) ** 2, 60.0 * w**2 * s * (1.0 - s) * (1.0 - 2.0 * s)])
+
+
+class Humanoid:
+    """TALOS on two soles."""
+
+    def __init__(
+        self,
+        disturbance: Disturbance = NONE,
+        friction: float = FRICTION,
+        cone: Literal["cone"] | Pyramid = "cone",
+    ) -> None:
+        self.world, self.disturbance = World(urdf("talos"), SOLES, SOLE, friction), disturbance
+        model = self.world.model
+        contacts = [FrictionContact.sole(sole, friction * disturbance.friction, TRUSTED) for sole in SOLES]
+        tasks = [
+            Task.com(weight=100.0, gains=Gains.critical(30.0)),
+            Task.orientation("base_link", weight=20.0, gains=Gains.critical(50.0)),
+            Task.pose(SOLES[1], weight=1000.0, gains=Gains.critical(400.0)),
+            Task.posture(gains=Gains.critical(30.0)),
+        ]
+        settings = Settings(contact_gains=Gains(0.0, 10.0), friction=cone)
+        self.controller = WholeBodyController(model, contacts, tasks, settings)
+        q = condyle.neutral(model)
+        posture = {"leg_*_3": -0.41, "leg_*_4": 0.86, "leg_*_5": -0.45, "arm_*_4": -0.53, "arm_*_7": 0.1}
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            for name, angle in (posture | {"arm_*_1": sign * 0.26, "arm_*_2": sign * 0.17}).items():
+                q[model.idx_qs[model.joint(name.replace("*", side) + "_joint")]] = angle
+        q[2] -= self.controller.hold(q).contacts[0].pose[2, 3]  # it stands at height 0
+        self.q, self.start = q, self.controller.hold(q)
+        self.references = self.start.copy()
+        self.unsolved = 0
+        self.world.set_state(q, np.zeros(model.nv))
+
+    def control(self, aim: Callable[[float, References], None] | None = None) -> Law:
+        """The whole-body controller, with references that a function changes as time goes by."""
+
+        def law(t: float, q: Array, v: Array) -> Array:
+            if aim:
+                aim(t, self.references)
+            command = self.controller.step(q, v, self.references)
+            self.unsolved += command.status != "solved"
+            return command.tau
+
+        return law
+
+    def hold(self, stiffness: float) -> Law:
+        """PD control of the joints about the posture, with the efforts that carry it: no whole-body control.
+
+        stiffness: in parts of the joint's greatest effort for 1 rad; the damping is a tenth of it for 1 rad/s, without
+        delay or limit, as in a motor's own loop: MuJoCo has it in its implicit step.
+        """
+        most = np.where(np.isfinite(limit := self.world.model.limits.effort), limit, 0.0)
+        tau0 = self.controller.step(self.q, np.zeros(len(most)), self.start).solved().tau
+        self.world.mj.dof_damping += self.world.generalized(0.1 * stiffness * most)
+
+        def law(t: float, q: Array, v: Array) -> Array:
+            error = condyle.difference(self.world.model, q, self.q)
+            return np.clip(tau0 + stiffness * most * error, -most, most)
+
+        return law
+
+    def run(self, law: Law, seconds: float, push: Sequence[float] | None = None, begin: float = 0.5) -> Record:
+        """push: N s, given evenly over PUSH_TIME."""
+
+        def force(t: float) -> Sequence[float]:
+            pushed = push is not None and begin <= t < begin + PUSH_TIME
+            return np.array(push) / PUSH_TIME if pushed else (0.0, 0.0, 0.0)
+
+        def wanted() -> Array:
+            return self.references.com.position.copy()
+
+        return run(self.world, law, seconds, force, self.disturbance, wanted)
+
+    def shift(self, t: float, references: References) -> None:
+        """The weight goes to the left and to the right sole, in 8 s, each time by 6 cm."""
+        w, (b, db, ddb) = 0.5 * np.pi, ramp(t, 0.0, 1.0)
+        s, ds, dds = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+        y, v, a = 0.06 * np.array([b * s, db * s + b * ds, ddb * s + 2.0 * db * ds + b * dds])
+        references.com.position[1] = self.start.com.position[1] + y
+        references.com.velocity[1], references.com.acceleration[1] = v, a
+
+    def lift(self, t: float, references: References) -> None:
+        """The weight goes to the left sole, the right foot is lifted by 10 cm, and all comes back, in 7 s."""
+        start = self.start
+        to, back = ramp(t, 0.2, 1.4), ramp(t, 5.2, 6.4)
+        aside = start.contacts[0].pose[:2, 3] - start.com.position[:2]
+        references.com.position[:2] = start.com.position[:2] + aside * (to - back)[0]
+        references.com.velocity[:2], references.com.acceleration[:2] = np.outer((to - back)[1:], aside)
+        up = 0.1 * (ramp(t, 1.9, 2.9) - ramp(t, 3.4, 4.4))
+        references.frames[1].pose[2, 3] = start.frames[1].pose[2, 3] + up[0]
+        references.frames[1].velocity[2], references.frames[1].acceleration[2] = up[1:]
+        references.contacts[1].activation = 1.0 - ramp(t, 1.6, 1.9)[0] + ramp(t, 4.5, 4.8)[0]
+
+
+class Quadruped:
+    """A quadruped that trots what FDDP has planned."""
+
+    def __init__(
+        self,
+        urdf: str,
+        feet: Sequence[str],
+        plan: Plan,
+        disturbance: Disturbance = NONE,
+        friction: float = FRICTION,
+    ) -> None:
+        self.world, self.plan, self.disturbance = World(urdf, feet, BALL, friction), plan, disturbance
+        self.feet = list(feet)
+        contacts = [FrictionContact.point(foot, friction * disturbance.friction) for foot in feet]
+        swing = [Task.position(foot, weight=100.0, gains=Gains.critical(900.0)) for foot in feet]
+        tasks = [Task.com(weight=100.0), Task.orientation(self.world.model.body_names[1]), Task.posture(), *swing]
+        settings = Settings(contact_gains=Gains(0.0, 40.0))
+        self.controller = WholeBodyController(self.world.model, contacts, tasks, settings)
+        self.references = self.controller.hold(condyle.neutral(self.world.model))
+        self.controller.track(plan, plan.span[0], self.references)
+        self.unsolved = 0
+        self.world.set_state(self.references.posture.q.copy(), np.zeros(self.world.model.nv))
+
+    def law(self, t: float, q: Array, v: Array) -> Array:
+        """Tracks the plan."""
+        self.controller.track(self.plan, t, self.references)
+        command = self.controller.step(q, v, self.references)
+        self.unsolved += command.status != "solved"
+        return command.tau
+
+    def run(self, seconds: float) -> Record:
+        """The first seconds of the plan."""
+        return run(self.world, self.law, seconds, None, self.disturbance, lambda: self.references.com.position.copy())
+
+
+def trot(urdf: str, feet: Sequence[str], knees: Sequence[float], seconds: float) -> Plan:
+    """A trot by FDDP: diagonal pairs step 16 cm ahead by turns, four times a second, with 50 ms on all feet between."""
+    model = condyle.Model.from_urdf_str(urdf, root_joint="free_flyer")
+    q = condyle.neutral(model)
+    q[7:] = knees
+    gait, turn = Gait(model, q, feet, 0.01), 0
+    gait.stand(30)
+    while gait.times[-1] < seconds - 0.55:
+        gait.step([[1, 2], [0, 3]][turn % 2], 0.16 if turn else 0.08, 0.06, 20)
+        gait.stand(5)
+        turn += 1
+    gait.stand(30)
+    return plan_of(model, gait.solve(), gait.times, gait.touches, fade=0.02)
+
+
+@cache
+def anymal() -> Plan:
+    """ANYmal's trot of 20 s."""
+    return trot(urdf("anymal"), FEET, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2, 20.0)

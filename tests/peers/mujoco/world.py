@@ -1,0 +1,137 @@
+"""A robot in MuJoCo and in Condyle, made from one URDF, and what leads from the state of one to that of the other.
+
+MuJoCo's free joint has the quaternion's w first; its linear velocity is along the world's axes, its angular one along
+the body's. Condyle (as Pinocchio) has w last, and both velocities along the body's axes.
+"""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+import condyle
+
+Array = NDArray[np.float64]
+
+STIFFNESS = (0.005, 1.0)
+"""Time constant (s) and damping ratio of MuJoCo's contacts: some tenths of a millimetre under a humanoid."""
+THICKNESS = 0.02
+"""Of the box that is a sole (m)."""
+
+
+def bare(urdf: str) -> ET.Element:
+    """The links and joints of a URDF without shapes, moving freely."""
+    robot = ET.fromstring(urdf)
+    for link in robot.iter("link"):
+        for shape in link.findall("visual") + link.findall("collision"):
+            link.remove(shape)
+    for other in [child for child in robot if child.tag not in ("link", "joint")]:
+        robot.remove(other)
+    moved = {joint.find("child").attrib["link"] for joint in robot.iter("joint")}
+    root = next(link.attrib["name"] for link in robot.iter("link") if link.attrib["name"] not in moved)
+    for inertia in robot.iter("inertia"):
+        if float(inertia.attrib["ixx"]) <= abs(float(inertia.attrib["ixy"])):  # ANYmal's base has what no body has
+            inertia.attrib.update(dict.fromkeys(["ixy", "ixz", "iyz"], "0"))
+    ET.SubElement(robot, "link", name="world")
+    joint = ET.SubElement(robot, "joint", name="root_joint", type="floating")
+    ET.SubElement(joint, "parent", link="world")
+    ET.SubElement(joint, "child", link=root)
+    ET.SubElement(ET.SubElement(robot, "mujoco"), "compiler", fusestatic="true")
+    return robot
+
+
+class World:
+    """A robot on level ground in MuJoCo: soles are boxes below their frames, other feet are balls around them."""
+
+    def __init__(
+        self,
+        urdf: str,
+        feet: Sequence[str],
+        size: tuple[float, float] | float,
+        friction: float = 0.7,
+        dt: float = 1e-3,
+    ) -> None:
+        """size: of soles, their sides along x and y (m); of balls, their radius. friction: Coulomb's, in MuJoCo."""
+        self.model = condyle.Model.from_urdf_str(urdf, root_joint="free_flyer")
+        self.feet, self.ground = list(feet), 0.0
+        spec = mujoco.MjSpec.from_string(ET.tostring(bare(urdf)).decode())
+        spec.option.timestep = dt
+        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        spec.option.impratio = 10.0
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        contact = {"friction": [friction, 0.005, 1e-4], "solref": STIFFNESS, "condim": 3}
+        for foot in feet:
+            frame = self.model.frames[self.model.frame(foot)]
+            shape = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": [size, 0.0, 0.0], "pos": frame.placement[:3, 3]}
+            if not isinstance(size, float):
+                half, quat = [0.5 * size[0], 0.5 * size[1], 0.5 * THICKNESS], np.zeros(4)
+                mujoco.mju_mat2Quat(quat, frame.placement[:3, :3].ravel())
+                middle = frame.placement @ [0.0, 0.0, 0.5 * THICKNESS, 1.0]
+                shape = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": half, "pos": middle[:3], "quat": quat}
+            body = spec.body(self.model.body_names[frame.body])
+            body.add_geom(name=foot, contype=1, conaffinity=0, mass=0.0, **shape, **contact)
+        if isinstance(size, float):
+            self.ground = -size  # the plan's feet, at height 0, are the middles of balls
+        plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "pos": [0.0, 0.0, self.ground]}
+        spec.worldbody.add_geom(name="ground", contype=0, conaffinity=1, **plane, **contact)
+        self.mj = spec.compile()
+        self.data = mujoco.MjData(self.mj)
+        named = zip(self.model.names[1:], self.model.idx_qs[1:], self.model.idx_vs[1:], self.model.nqs[1:], strict=True)
+        joints = [(self.mj.joint(name), q, v, nq) for name, q, v, nq in named]
+        if [nq for *_, nq in joints] != [7] + [1] * (len(joints) - 1):
+            raise ValueError("expected a free-flyer, and joints with one number each")
+        self._ours = np.array([[q, v] for _, q, v, _ in joints[1:]]).T
+        self._theirs = np.array([[joint.qposadr[0], joint.dofadr[0]] for joint, *_ in joints[1:]]).T
+        self.trunk = int(self.mj.jnt_bodyid[0])
+
+    @property
+    def dt(self) -> float:
+        """The time of a step (s)."""
+        return float(self.mj.opt.timestep)
+
+    def state(self) -> tuple[Array, Array]:
+        """(q, v), as Condyle has them."""
+        qpos, qvel, R = self.data.qpos, self.data.qvel, np.zeros(9)
+        mujoco.mju_quat2Mat(R, qpos[3:7])
+        q, v = np.zeros(self.model.nq), np.zeros(self.model.nv)
+        q[:3], q[3:6], q[6] = qpos[:3], qpos[4:7], qpos[3]
+        v[:3], v[3:6] = R.reshape(3, 3).T @ qvel[:3], qvel[3:6]
+        q[self._ours[0]], v[self._ours[1]] = qpos[self._theirs[0]], qvel[self._theirs[1]]
+        return q, v
+
+    def set_state(self, q: Array, v: Array) -> None:
+        """Puts the robot into a state that Condyle has."""
+        mujoco.mj_resetData(self.mj, self.data)
+        qpos, qvel, R = self.data.qpos, self.data.qvel, np.zeros(9)
+        qpos[:3], qpos[4:7], qpos[3] = q[:3], q[3:6], q[6]
+        mujoco.mju_quat2Mat(R, qpos[3:7])
+        qvel[:3], qvel[3:6] = R.reshape(3, 3) @ v[:3], v[3:6]
+        qpos[self._theirs[0]], qvel[self._theirs[1]] = q[self._ours[0]], v[self._ours[1]]
+        mujoco.mj_forward(self.mj, self.data)
+
+    def generalized(self, tau: Array) -> Array:
+        """Efforts of the joints in MuJoCo's order."""
+        out = np.zeros(self.mj.nv)
+        out[self._theirs[1]] = tau[self._ours[1]]
+        return out
+
+    def step(self, tau: Array, push: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        """One step under efforts of the joints, and a force on the trunk, at its centre of mass in the world (N)."""
+        self.data.qfrc_applied[:] = self.generalized(tau)
+        self.data.xfrc_applied[self.trunk, :3] = push
+        mujoco.mj_step(self.mj, self.data)
+
+    def loads(self) -> Array:
+        """The force of the ground on each foot in the world, as the last step had it, (feet, 3)."""
+        out, force = np.zeros((len(self.feet), 3)), np.zeros(6)
+        for k in range(self.data.ncon):
+            contact = self.data.contact[k]
+            mujoco.mj_contactForce(self.mj, self.data, k, force)
+            names = [self.mj.geom(geom).name for geom in contact.geom]
+            sign = 1.0 if names[0] == "ground" else -1.0  # the force is on the second of the two
+            out[self.feet.index(next(name for name in names if name != "ground"))] += (
+                sign * contact.frame.reshape(3, 3).T @ force[:3]
+            )
+        return out
