@@ -1,5 +1,6 @@
 //! `condyle plan`: a reaching motion for an arm, by FDDP on forward dynamics and its derivatives.
 
+use crate::error::{Error, positive};
 use crate::{page, posture, report};
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{Fddp, Problem, Solution, Status};
@@ -56,23 +57,6 @@ fn numbers(text: &str) -> Result<Numbers, String> {
     text.split(',').map(number).collect::<Result<_, _>>().map(Numbers)
 }
 
-/// Why there is no plan, or not the one asked for.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum Error {
-    #[error(transparent)]
-    Model(#[from] condyle::Error),
-    #[error(transparent)]
-    Problem(#[from] condyle::optimal::Error),
-    #[error("--{option}: {what}")]
-    Option { option: &'static str, what: String },
-    #[error("the robot has no joint that moves")]
-    Rigid,
-    #[error("`{frame}` ends {miss:.4} m from the target, more than --tolerance {tolerance} m: {hint}")]
-    Missed { frame: String, miss: f64, tolerance: f64, hint: &'static str },
-    #[error("{file}: {source}")]
-    Write { file: String, source: std::io::Error },
-}
-
 /// What was asked for, and what came out.
 pub(crate) struct Plan {
     pub model: Arc<Model>,
@@ -99,9 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let option = |option, what: String| Err(Error::Option { option, what });
     for (name, value) in [("dt", arguments.dt), ("budget-ms", arguments.budget_ms), ("tolerance", arguments.tolerance)]
     {
-        if !(value > 0.0 && value.is_finite()) {
-            return option(name, format!("must be above 0, not {value}"));
-        }
+        positive(name, value)?;
     }
     let (model, urdf) = match &arguments.robot {
         None => (robots::arm7(), robots::ARM7.to_owned()),
@@ -176,7 +158,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
             _ => "the solver did not converge; more --knots, more --max-iterations or another --q0 may help",
         };
         let frame = plan.model.frames()[frame].name.clone();
-        return Err(Error::Missed { frame, miss: plan.miss, tolerance: plan.tolerance, hint });
+        return Err(Error::No(format!(
+            "`{frame}` ends {:.4} m from the target, more than --tolerance {} m: {hint}",
+            plan.miss, plan.tolerance
+        )));
     }
     Ok(())
 }
@@ -195,7 +180,7 @@ fn last_frame(model: &Model) -> usize {
 }
 
 /// Neutral, but mid-range for the coordinates whose limits exclude it.
-fn start(model: &Model) -> Vec<f64> {
+pub(crate) fn start(model: &Model) -> Vec<f64> {
     let limits = model.limits();
     let inside = |(k, q): (usize, f64)| {
         let (lower, upper) = (limits.lower[k], limits.upper[k]);
