@@ -7,7 +7,8 @@ pub(crate) const STATUSES: &str = "\
 Exit status:
   0    done, and the answer is yes
   1    done, and the answer is no: over budget, a check failed, the target is missed, a limit is not held
-  2    a file, flag, number or name is wrong: one line says which, and nothing is written";
+  2    a file, flag, number or name is wrong: one line says which, and nothing is written
+  130  stopped by Ctrl-C; the best found so far is written";
 
 /// Why the program does not end with 0.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +28,9 @@ pub(crate) enum Error {
     /// A file that is no robot's.
     #[error("{file}: {what}")]
     File { file: String, what: String },
+    /// A line of a task.
+    #[error("{file}:{line}: {what}")]
+    Task { file: String, line: usize, what: String },
     /// A robot without joints.
     #[error("the robot has no joint that moves")]
     Rigid,
@@ -36,6 +40,9 @@ pub(crate) enum Error {
     /// A question that was answered with no.
     #[error("{0}")]
     No(String),
+    /// Ctrl-C.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl Error {
@@ -43,6 +50,7 @@ impl Error {
     pub(crate) fn status(&self) -> ExitCode {
         match self {
             Self::No(_) => ExitCode::from(1),
+            Self::Interrupted => ExitCode::from(130),
             _ => ExitCode::from(2),
         }
     }

@@ -6,16 +6,23 @@ mod budget;
 mod check;
 mod error;
 mod findings;
+mod gait;
 mod inspect;
+mod limits;
 mod lines;
+mod motion;
 mod page;
 mod plan;
 mod posture;
+mod reach;
+mod record;
 mod report;
 mod robot;
 mod scene;
 mod states;
+mod task;
 mod terminal;
+mod watch;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -34,7 +41,7 @@ enum Command {
     Inspect(inspect::Arguments),
     Budget(budget::Arguments),
     Check(check::Arguments),
-    Plan(plan::Arguments),
+    Plan(Box<plan::Arguments>),
     /// Write a shell's completions to standard output
     #[command(after_help = "Example:\n  condyle completions bash > ~/.local/share/bash-completion/completions/condyle")]
     Completions {

@@ -123,12 +123,7 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
         "arm7" => (robots::ARM7, false),
         "quadruped" => (robots::QUADRUPED, true),
         "humanoid" => (robots::HUMANOID, true),
-        _ => {
-            return Err(Error::Robot {
-                name: name.to_owned(),
-                nearest: nearest(name, names(name).iter().map(|n| &**n)),
-            });
-        }
+        _ => return Err(unknown(name)),
     };
     let root_joint = match options.root {
         Some(root) => root.joint(),
@@ -139,8 +134,8 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned() })
 }
 
-/// What a name could have meant: the robots that come along, and the files in the folder that it names.
-fn names(name: &str) -> Vec<String> {
+/// An error for a name that is neither a file's nor that of a robot that comes along; with what it could have meant.
+fn unknown(name: &str) -> Error {
     let folder = Path::new(name).parent().map_or("", |parent| parent.to_str().unwrap_or_default());
     let look_in = if folder.is_empty() { "." } else { folder };
     let files = std::fs::read_dir(look_in).into_iter().flatten().flatten().filter_map(|entry| {
@@ -149,7 +144,12 @@ fn names(name: &str) -> Vec<String> {
         let path = Path::new(folder).join(&file).to_str()?.to_owned();
         matches!(&*kind, "urdf" | "xml" | "mjcf" | "sdf").then_some(path)
     });
-    EMBEDDED.into_iter().map(str::to_owned).chain(files.take(1000)).collect()
+    let files: Vec<String> = files.take(1000).collect();
+    let files = files.iter().map(|file| &**file);
+    if name.contains(['.', '/', '\\']) {
+        return Error::File { file: name.to_owned(), what: format!("No such file{}", nearest(name, files)) };
+    }
+    Error::Robot { name: name.to_owned(), nearest: nearest(name, EMBEDDED.into_iter().chain(files)) }
 }
 
 /// The most that is read of a file that is looked at beside the library's reader, which has the same limit (bytes).

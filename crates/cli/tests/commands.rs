@@ -239,7 +239,7 @@ fn what_is_wrong_is_named_in_one_line() {
 
 #[test]
 fn help_and_completions() {
-    for command in ["inspect", "budget", "check"] {
+    for command in ["inspect", "budget", "check", "plan"] {
         let help = said(&[command, "--help"], 0);
         assert!(help.contains(&format!("Examples:\n  condyle {command}")), "{help}");
     }

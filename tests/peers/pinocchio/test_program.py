@@ -31,6 +31,82 @@ PROGRAM = find_program()
 pytestmark = pytest.mark.skipif(PROGRAM is None, reason="the program is not built: cargo build -p condyle-cli")
 
 
+QUADRUPEDS = {
+    "anymal": ("FOOT", ["LF", "RF", "LH", "RH"], "{}_HFE", "{}_KFE", (0.7, -1.0), True),
+    "solo12": ("FOOT", ["FL", "FR", "HL", "HR"], "{}_HFE", "{}_KFE", (0.7, -1.4), True),
+    "a1": ("foot", ["FL", "FR", "RL", "RR"], "{}_thigh_joint", "{}_calf_joint", (0.8, -1.6), False),
+    "go1": ("foot", ["FL", "FR", "RL", "RR"], "{}_thigh_joint", "{}_calf_joint", (0.8, -1.6), False),
+    "hyq": ("foot", ["lf", "rf", "lh", "rh"], "{}_hfe_joint", "{}_kfe_joint", (0.7, -1.4), True),
+}
+"""Ends of the feet's names, legs, joints of thigh and shank, their angles, and whether the hind knees bend forwards."""
+
+
+def phase(kind: str, knots: int, **numbers: object) -> str:
+    lines = [f"{key} = {json.dumps(value)}" for key, value in {"kind": kind, "knots": knots, **numbers}.items()]
+    return "\n".join(["[[phase]]", *lines, ""])
+
+
+def gait(name: str, feet: str, posture: dict[str, float], phases: list[str], dt: float) -> str:
+    joints = "\n".join(f"{json.dumps(joint)} = {angle}" for joint, angle in posture.items())
+    head = f"robot = {json.dumps(urdf_path(name))}\nroot = 'free'\ndt = {dt}\n[feet]\n{feet}\n[posture]\n{joints}\n"
+    return head + "".join(phases)
+
+
+def plan(task: str, folder: Path) -> dict:
+    (folder / "task.toml").write_text(task)
+    files = ["--out", str(folder / "plan.html"), "--record", str(folder / "motion.npz")]
+    line = [str(PROGRAM), "plan", str(folder / "task.toml"), *files, "--json"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return dict(np.load(folder / "motion.npz"))
+
+
+def check_motion(name: str, motion: dict, ahead: float) -> None:
+    """It goes where it should, within Pinocchio's limits, and its states are q ⊕ v Δt."""
+    model = pin.buildModelFromUrdf(urdf_path(name), pin.JointModelFreeFlyer())
+    q, v, tau = motion["q"], motion["v"], motion["tau"]
+    assert abs(q[-1, 0] - q[0, 0] - ahead) < 0.03
+    room = 1e-4
+    assert (q[:, 7:] >= model.lowerPositionLimit[7:] - room).all()
+    assert (q[:, 7:] <= model.upperPositionLimit[7:] + room).all()
+    assert (np.abs(v[:, 6:]) <= model.velocityLimit[6:] + room).all()
+    assert (np.abs(tau[:, 6:]) <= model.effortLimit[6:] + room).all()
+    for k, dt in enumerate(np.diff(motion["times"])):
+        assert np.abs(pin.difference(model, q[k], q[k + 1]) - dt * v[k + 1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", list(QUADRUPEDS))
+@pytest.mark.parametrize("kind", ["trot", "jump"])
+def test_gaits(name: str, kind: str, tmp_path: Path) -> None:
+    end, legs, thigh, shank, angles, forwards = QUADRUPEDS[name]
+    feet = [f"{leg}_{end}" for leg in legs]
+    posture = {}
+    for number, leg in enumerate(legs):
+        sign = -1 if forwards and number >= 2 else 1
+        posture |= {thigh.format(leg): sign * angles[0], shank.format(leg): sign * angles[1]}
+    ahead = 0.06
+    if kind == "trot":
+        one, other = [feet[1], feet[2]], [feet[0], feet[3]]
+        step = {"length": ahead / 2, "height": 0.04}
+        phases = [phase("stand", 10), phase("step", 25, feet=one, **step), phase("stand", 5)]
+        phases += [phase("step", 25, feet=other, length=ahead, height=0.04), phase("stand", 5)]
+        phases += [phase("step", 25, feet=one, **step), phase("stand", 15)]
+    else:
+        phases = [phase("stand", 30), phase("jump", 26, length=ahead, height=0.08), phase("stand", 40)]
+    check_motion(name, plan(gait(name, f"points = {json.dumps(feet)}", posture, phases, 0.01), tmp_path), ahead)
+
+
+def test_walk(tmp_path: Path) -> None:
+    feet = ["left_sole_link", "right_sole_link"]
+    angles = {3: -0.4, 4: 0.8, 5: -0.4}
+    posture = {f"leg_{side}_{k}_joint": angle for side in ("left", "right") for k, angle in angles.items()}
+    phases = [phase("stand", 10)]
+    for foot, length in ((feet[1], 0.15), (feet[0], 0.3), (feet[1], 0.15)):
+        phases += [phase("step", 20, feet=[foot], length=length, height=0.06), phase("stand", 9)]
+    soles = f"soles = {json.dumps(feet)}\nsize = [0.2, 0.1]"
+    check_motion("talos", plan(gait("talos", soles, posture, phases, 0.03), tmp_path), 0.3)
+
+
 def run(command: str, name: str, *flags: str) -> dict:
     path = cassie_path() if name in NO_URDF else urdf_path(name)
     root = ["--root", "free"] if root_joint(name) else []

@@ -7,13 +7,14 @@ mod solver;
 mod text;
 
 use crate::error::{Error, positive};
-use crate::plan;
+use crate::limits;
 use crate::robot::{self, RobotArguments};
 use crate::terminal::{say, say_json};
 use clock::Effort;
 use condyle::optimal::robot::Contact;
 use condyle::{ContactConstraint, level};
 use serde::Serialize;
+pub(crate) use solver::held;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -131,7 +132,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let horizons = knots.iter().map(|&n| bench.horizon(n)).collect();
     let algorithms = bench.algorithms(nearest(&knots, 100));
     let model = Arc::new(model.clone());
-    let iterate = solver::Bench { q: plan::start(&model), model: model.clone(), contacts, pool: &pool, effort };
+    let iterate = solver::Bench { q: limits::start(&model), model: model.clone(), contacts, pool: &pool, effort };
     let mut iterations = Vec::new();
     // A line needs two points: half of the horizon as well, where there is only one.
     let half = (knots.len() == 1 && most > 1).then_some(most / 2);

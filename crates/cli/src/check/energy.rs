@@ -1,7 +1,7 @@
 //! What the integrators make of the energy of a robot that nothing drives and nothing brakes.
 
 use super::ledger::Row;
-use crate::plan;
+use crate::limits;
 use crate::states::{normal, source};
 use condyle::simulation::{Integrator, Settings, Simulation};
 use condyle::{Data, Model, forward_velocities};
@@ -24,7 +24,7 @@ const RULES: [(&str, Integrator, f64, f64); 3] = [
 
 /// A row for each integrator.
 pub(super) fn check(model: &Model) -> Vec<Row> {
-    let q = plan::start(model);
+    let q = limits::start(model);
     let v: Vec<f64> = normal(&mut source(3), model.nv()).into_iter().map(|x| SPEED * x).collect();
     let row = |(name, integrator, bound, order)| {
         let mut row = Row::new(name, "E(t) = E(0) in free motion");
