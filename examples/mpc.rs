@@ -2,12 +2,12 @@
 //!
 //! `cargo run --release --example mpc`
 //!
-//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, move the horizon on by a knot, and improve the plan by
-//! one iteration within 5 ms. Prints how well the tool follows, and how punctual the loop was.
+//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, move the horizon on by a knot, and improve the plan
+//! by one iteration within 5 ms. Prints how well the tool follows, and how punctual the loop was.
 
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem, Status};
-use condyle::{Data, Model, Vec3, forward_kinematics, robots};
+use condyle::{Data, Vec3, forward_kinematics, robots};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -23,9 +23,8 @@ fn target(time: f64) -> Vec3<f64> {
 }
 
 /// What leads the tool to where it should be after some steps, with so many controls.
-fn costs(arm: &Model, rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
-    let frame = arm.frame("tool").expect("the arm has a tool");
-    let follow = Residual::FrameTranslation { frame, target: target(step as f64 * DT) };
+fn costs(rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
+    let follow = Residual::FrameTranslation { frame: "tool".into(), target: target(step as f64 * DT) };
     let effort = Residual::Control { reference: vec![0.0; controls] };
     vec![
         Cost::new("follow", 1e3, follow, Activation::Quadratic),
@@ -40,11 +39,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // One model for all knots, each with a target of its own, which it keeps while it moves to the front.
     let mut knot = FreeDynamics::running(arm.clone(), DT, vec![])?;
     for t in 0..HORIZON {
-        knot.set_costs(t, costs(&arm, &rest, t, 7))?;
+        knot.set_costs(t, costs(&rest, t, 7))?;
     }
     let mut plant = knot.clone();
     let hold = plant.quasi_static(&rest);
-    let end = FreeDynamics::terminal(arm.clone(), costs(&arm, &rest, HORIZON, 0))?;
+    let end = FreeDynamics::terminal(arm.clone(), costs(&rest, HORIZON, 0))?;
     let mut problem = Problem::new(rest.clone(), vec![Box::new(knot)], vec![0; HORIZON], Box::new(end))?;
 
     let mut solver = Fddp::new(&problem);
@@ -77,9 +76,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         // the horizon moves on: its last knot and its end have new targets
         problem.shift(0)?;
         let knots: &mut FreeDynamics = problem.model_mut(0).expect("it serves all knots");
-        knots.set_costs(HORIZON - 1, costs(&arm, &rest, step + HORIZON, 7))?;
+        knots.set_costs(HORIZON - 1, costs(&rest, step + HORIZON, 7))?;
         let end: &mut FreeDynamics = problem.terminal_mut().expect("it is a robot's");
-        end.set_costs(HORIZON, costs(&arm, &rest, step + 1 + HORIZON, 0))?;
+        end.set_costs(HORIZON, costs(&rest, step + 1 + HORIZON, 0))?;
         solver.shift(&mut problem)?;
         problem.set_x0(&x)?;
         let plan = solver.resume(&mut problem)?;

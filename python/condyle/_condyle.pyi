@@ -36,6 +36,7 @@ from ._types import (
     RneaSecondDerivatives,
     Solution,
 )
+from ._wholebody import Command, Gains, References, Settings
 
 __all__ = [
     "ARM7",
@@ -50,6 +51,7 @@ __all__ = [
     "ConstrainedAction",
     "ConstraintSet",
     "ContactDynamics",
+    "ControllerError",
     "Cost",
     "Data",
     "DivideConquer",
@@ -57,6 +59,7 @@ __all__ = [
     "Fddp",
     "FreeDynamics",
     "FrictionCone",
+    "FrictionContact",
     "HyperDual",
     "ImpulseDynamics",
     "InverseDynamics",
@@ -69,10 +72,13 @@ __all__ = [
     "ModelError",
     "NotPhysicalError",
     "ParseError",
+    "Plan",
     "Problem",
     "ProblemError",
     "Residual",
     "Simulation",
+    "Task",
+    "WholeBodyController",
     "WrenchCone",
     "__version__",
     "_casadi_hold",
@@ -176,6 +182,7 @@ _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
 _Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
 _Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
+_Axes: TypeAlias = Literal["world", "local"] | tuple[Literal["frame"], str]
 _Action: TypeAlias = (
     FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction
 )
@@ -185,6 +192,9 @@ WORLD: BodyId
 ARM7: str
 QUADRUPED: str
 HUMANOID: str
+
+class ControllerError(Error):
+    """An error in the description of a whole-body controller or of a plan, or a step that was not solved."""
 
 class Error(Exception):
     """An error of this package: the base of all others."""
@@ -213,6 +223,9 @@ def aba(
     """Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
+
+    Raises `ModelError` if M is singular wherever the robot is. At a position at which it happens to be, a point of mass on
+    the axis about which it turns, the numbers are not finite, or as large as rounding has it.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -1155,7 +1168,8 @@ class Cholesky:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1258,7 +1272,8 @@ class Ltdl:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1979,6 +1994,23 @@ class Model:
         Raises `ModelError` if one is negative or not finite.
         """
 
+    def with_limits(
+        self,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+    ) -> Model:
+        """The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
+        are, and infinite numbers are none.
+
+        Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity or effort is negative.
+
+        >>> arm = condyle.robots.arm7()
+        >>> arm.with_limits(effort=0.5 * arm.limits.effort).limits.effort[0].item()
+        43.5
+        """
+
     def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
         """The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
         them is in its `warnings` and `singular_joints`.
@@ -2005,6 +2037,15 @@ class Model:
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
 
         Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
+        """
+
+    def tree(self, frames: bool = False) -> str:
+        """The tree of bodies as text: each joint with its kind and where its coordinates stand in q and v, and the body that it
+        carries; frames: whether the names of other frames stand with the bodies.
+
+        >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
+        universe
+        └─ root_joint: free_flyer, q[0:7], v[0:6] → trunk, 30.000 kg
         """
 
     def __copy__(self) -> Model:
@@ -2240,6 +2281,7 @@ class Cost:
     """A term of a cost: weight times an activation of a residual.
 
     name: what `Problem.set_weight` and errors call it.
+    weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
     activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
         for other residuals.
@@ -2353,9 +2395,9 @@ class FreeDynamics:
 class FrictionCone:
     """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
-    surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
-    default 0 and infinite.
+    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
+    rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
+    (N), by default 0 and infinite.
 
     Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
 
@@ -2518,7 +2560,7 @@ class Problem:
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
 
-        Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
+        Raises `KeyError` if there is no such term, `ProblemError` if the weight is negative or not finite.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
@@ -2534,6 +2576,8 @@ class Problem:
         """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
         us: (N, nu), or a list of N arrays where knots differ in nu.
+
+        Other threads run meanwhile; what a handler of a signal raises, as KeyboardInterrupt, ends it between knots.
         """
 
 @final
@@ -2731,13 +2775,13 @@ class Simulation:
     integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
         is conserved to rounding.
-    dt: h, the length of a step (s); a negative one goes back in time.
+    dt: h, the length of a step (s), above 0.
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
     max_iterations: it gives up after so many iterations.
 
-    Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
+    Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -2772,7 +2816,11 @@ class Simulation:
         """The velocity, nv numbers."""
 
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
-        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0."""
+        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
+
+        Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+        `ValueError` if one of v is not finite.
+        """
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
         """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
@@ -2789,4 +2837,371 @@ class Simulation:
             efforts, then other threads run meanwhile.
 
         What a handler of a signal raises, as KeyboardInterrupt, ends the run after a step, whose state is kept.
+        """
+
+@final
+class FrictionContact:
+    """A contact with friction: what touches is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+
+    Whether it touches at a tick, and how strongly, is said by `ContactTarget.activation`. Numbers are checked when a
+    `WholeBodyController` is made.
+
+    Common arguments:
+    frame: the name of a frame of the robot.
+    friction: μ, Coulomb's coefficient; above 0.
+    min_force, max_force: least and greatest normal force of the whole contact (N).
+
+    >>> from condyle.wholebody import FrictionContact
+    >>> FrictionContact.sole("left_sole", 0.7, [0.2, 0.1]).corners.shape
+    (4, 3)
+    """
+
+    @property
+    def axes(self) -> Literal["world", "frame"]:
+        """The axes along which the normal is given: 'world' or 'frame'."""
+
+    @property
+    def corners(self) -> _Array | None:
+        """The corners of a surface in the frame (m), (n, 3); None of a point."""
+
+    @property
+    def forces(self) -> Literal["wrench", "corners"] | None:
+        """What describes the force on a surface: 'wrench' or 'corners'; None of a point."""
+
+    @property
+    def frame(self) -> str:
+        """The name of its frame."""
+
+    @property
+    def friction(self) -> float:
+        """μ."""
+
+    @property
+    def max_force(self) -> float:
+        """The greatest normal force (N)."""
+
+    @property
+    def min_force(self) -> float:
+        """The least normal force (N)."""
+
+    @property
+    def normal(self) -> _Array:
+        """The direction in which the environment pushes, 3 numbers."""
+
+    @property
+    def yaw_friction(self) -> float | None:
+        """γ (m); None for the default."""
+
+    @staticmethod
+    def point(
+        frame: str,
+        friction: float,
+        normal: ArrayLike | None = None,
+        axes: Literal["world", "frame"] = "world",
+        min_force: float = 0.0,
+        max_force: float = ...,
+    ) -> FrictionContact:
+        """A point: the frame's origin is held, the frame may turn about it.
+
+        normal: the direction in which the environment pushes, 3 numbers of any length but 0; None is z, level ground.
+        axes: 'world', along which the normal is given and stays, or 'frame', with which it turns.
+        """
+
+    @staticmethod
+    def surface(
+        frame: str,
+        friction: float,
+        corners: ArrayLike,
+        forces: Literal["wrench", "corners"] = "wrench",
+        normal: ArrayLike | None = None,
+        yaw_friction: float | None = None,
+        min_force: float = 0.0,
+        max_force: float = ...,
+    ) -> FrictionContact:
+        """An edge (two corners: the frame may turn about it) or a convex polygon (three or more: the frame is held).
+
+        corners: in the frame, in their order around the polygon, in one plane across the normal (m), (n, 3).
+        forces: 'wrench', a force with one friction cone, a centre of pressure within the polygon and a bounded moment about
+            the normal; or 'corners', a force with a friction cone at each corner.
+        normal: the direction in which the environment pushes, along the frame's axes, 3 numbers of any length but 0; None
+            is z.
+        yaw_friction: γ (m): the moment about the normal of a wrench is at most γ f_n. None is ⅔ μ r, r being the radius of
+            the greatest disc about the corners' mean within the polygon; ½ μ l on an edge of length 2 l.
+        """
+
+    @staticmethod
+    def sole(
+        frame: str,
+        friction: float,
+        size: ArrayLike,
+        forces: Literal["wrench", "corners"] = "wrench",
+        yaw_friction: float | None = None,
+        min_force: float = 0.0,
+        max_force: float = ...,
+    ) -> FrictionContact:
+        """A rectangular sole about the frame's origin, whose normal is the frame's z.
+
+        size: its sides along the frame's x and y (m); forces, yaw_friction: as of `surface`.
+        """
+
+@final
+class Plan:
+    """A planned motion with N + 1 knots: states at some times, efforts and gains between them, and which contacts touch when.
+
+    `WholeBodyController.track` makes references of it. Between knots q runs along the joints' own groups, v and a = Δv / Δt
+    are interpolated. Knots may share a time: then the velocity jumps there (an impact).
+
+    model: the robot.
+    times: N + 1 times, none smaller than the one before (s).
+    states: (q, v) of the knots, (N + 1, nq + nv).
+    touches: whether each of the controller's contacts touches from each knot to the next, (N, contacts).
+    controls: efforts of the actuated coordinates (all but those of free-flyers) from each knot to the next, (N, nu); None
+        if there are none.
+    gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
+    fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
+
+    Raises `ControllerError` for numbers that are not finite and times that run backwards.
+
+    >>> from condyle.wholebody import Plan
+    >>> robot = condyle.robots.quadruped()
+    >>> x = np.r_[condyle.neutral(robot), np.zeros(18)]
+    >>> plan = Plan(robot, [0.0, 0.5], [x, x], touches=np.ones((1, 4)))  # half a second on all feet
+    >>> plan.span, plan.activation(0, 0.2)
+    ((0.0, 0.5), 1.0)
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        times: ArrayLike,
+        states: ArrayLike,
+        touches: ArrayLike,
+        controls: ArrayLike | None = None,
+        gains: ArrayLike | None = None,
+        fade: float = 0.0,
+    ) -> Plan: ...
+    @property
+    def span(self) -> tuple[float, float]:
+        """The times of the first knot and of the last (s)."""
+
+    def activation(self, contact: int, t: float) -> float:
+        """The activation of a contact, by its number, at a time: 0 where it does not touch, ramped where it begins and ends
+        to, else 1.
+        """
+
+    def feedback(self, t: float, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+        """The plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
+
+        t: the time (s); q: nq numbers; v: nv.
+
+        Raises `ValueError` if the plan has no controls.
+        """
+
+@final
+class Task:
+    """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
+
+    What it aims at is in the `References`. Tasks of priority 0 come first; those of priority 1 decide only what they leave
+    open, and so on. Within a priority the weights decide, and only their ratios matter. Numbers are checked when a
+    `WholeBodyController` is made.
+
+    Common arguments:
+    weight: w, at least 0; None is the default of the task.
+    gains: `Gains`, k (1/s²) and d (1/s); None is `Gains.critical(100.0)`.
+    mask: which of its numbers count, as many as it has; None is all.
+    axes: along whose axes these numbers are: 'world'; 'local', the frame's own (of tasks that move no frame, the world's);
+        or ('frame', name), those of another frame.
+    priority: 0 for the first; at most 2.
+
+    >>> from condyle.wholebody import Task
+    >>> Task.orientation("trunk", mask=[True, True, False])  # level, whatever its heading
+    <condyle.wholebody.Task orientation 'trunk', weight 10>
+    """
+
+    @property
+    def axes(self) -> _Axes:
+        """Along whose axes its numbers are: 'world', 'local' or ('frame', name)."""
+
+    @property
+    def frame(self) -> str | None:
+        """The name of its frame; None if it has none."""
+
+    @property
+    def gains(self) -> Gains:
+        """k and d, `Gains`."""
+
+    @property
+    def joints(self) -> _Array:
+        """Factors of the posture's weight, nv numbers; empty for all 1."""
+
+    @property
+    def kind(self) -> str:
+        """The quantity: the name of what made it."""
+
+    @property
+    def mask(self) -> list[bool]:
+        """Which of its numbers count."""
+
+    @property
+    def priority(self) -> int:
+        """Its priority: 0 for the first."""
+
+    @property
+    def weight(self) -> float:
+        """w."""
+
+    @staticmethod
+    def com(
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """The centre of mass, c̈: 3 numbers; weight 10."""
+
+    @staticmethod
+    def pose(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """A frame's origin and rotation, (p̈, ω̇): 6 numbers, linear first; weight 10."""
+
+    @staticmethod
+    def position(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """A frame's origin, p̈: 3 numbers; weight 10."""
+
+    @staticmethod
+    def orientation(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """A frame's rotation, ω̇: 3 numbers; weight 10."""
+
+    @staticmethod
+    def velocity(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """The velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6 numbers, linear first;
+        weight 10.
+        """
+
+    @staticmethod
+    def angular_momentum(
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """The rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers; weight 0.1."""
+
+    @staticmethod
+    def posture(
+        weight: float | None = None, gains: Gains | None = None, joints: ArrayLike | None = None, priority: int = 0
+    ) -> Task:
+        """The actuated joints, q̈; weight 0.1.
+
+        joints: factors of the weight, one for each coordinate, nv numbers; None is all 1.
+        """
+
+    @staticmethod
+    def contact_force(
+        frame: str, weight: float | None = None, mask: Sequence[bool] | None = None, priority: int = 0
+    ) -> Task:
+        """The force of the contact of this frame: 6 numbers, force and moment at the contact's centre along its axes (t₁, t₂,
+        n), of which a point has 3; weight 1e-3. It has no gains, and does not act while the contact is off.
+        """
+
+@final
+class WholeBodyController:
+    """A whole-body controller: at each tick a cone program gives the accelerations, contact forces and joint efforts that best
+    do what the tasks ask.
+
+        x = (q̈, f)
+        minimise     ½ Σ w ‖J q̈ + J̇ v − a*‖²  +  ½ w_a ‖q̈‖²  +  ½ w_f ‖f − f_ref‖²
+        subject to   Sᵤ (M q̈ + h − Jᵀ f) = 0            no motor acts on a free-flyer
+                     J_c q̈ + J̇_c v = k (X_ref ⊖ X) − d v   contacts are held (k = d = 0 unless set)
+                     ‖(f₁, f₂)‖ ≤ μ f_n                  friction, a second-order cone for each force
+                     f_n p ∈ f_n · polygon, |τ_n| ≤ γ f_n   centre of pressure and yaw moment of a sole's wrench
+                     f_min ≤ Σ f_n ≤ f_max               for each contact, ramped while it fades in or out
+                     −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
+                     bounds on q̈                         from limits of position and velocity: `JointLimits`
+
+    Positions, velocities and accelerations of tasks and contacts are along the world's axes, accelerations classical. Memory
+    is fixed here.
+
+    model: the robot.
+    contacts: a list of `FrictionContact`, each of another frame; empty for a robot in free fall.
+    tasks: a list of `Task`.
+    settings: `Settings`; None for the default ones.
+
+    Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
+    without its contact, and for any number outside of its range.
+
+    >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
+    >>> robot = condyle.robots.quadruped()
+    >>> feet = [FrictionContact.point(f"{leg}_foot", 0.7) for leg in ("LF", "LH", "RF", "RH")]
+    >>> controller = WholeBodyController(robot, feet, [Task.com(), Task.orientation("trunk"), Task.posture()])
+    >>> knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # inwards
+    >>> q = np.r_[0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0, knees]
+    >>> command = controller.step(q, np.zeros(18), controller.hold(q)).solved()
+    >>> lift = command.forces[:, 2].sum()
+    >>> bool(abs(lift - 9.81 * robot.total_mass) < 0.1)  # the feet carry the weight
+    True
+    """
+
+    def __new__(
+        cls, model: Model, contacts: Sequence[FrictionContact], tasks: Sequence[Task], settings: Settings | None = None
+    ) -> WholeBodyController: ...
+    @property
+    def command(self) -> Command:
+        """The last `Command`; before the first step zeros."""
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, all of them: `Settings`."""
+
+    def hold(self, q: ArrayLike) -> References:
+        """The `References` that keep a position at rest: all tasks where they are, each contact held where it is and touching,
+        the weight shared by the contacts in equal parts.
+
+        q: nq numbers.
+        """
+
+    def track(self, plan: Plan, t: float, references: References) -> None:
+        """Sets references to those of a plan at a time: joints, and where they bring centre of mass, momentum and frames;
+        contacts by their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
+
+        plan: a `Plan` of the same robot with as many contacts.
+        t: the time (s); before the first and after the last knot the plan rests in it.
+        references: `References` of this controller, which are changed.
+        """
+
+    def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
+        """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
+        Other threads run meanwhile.
+
+        q: nq numbers; v: nv.
+        references: `References` of this controller.
         """

@@ -1,11 +1,59 @@
 """The results of functions that are more than an array, and some arguments: named tuples."""
 
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _Array: TypeAlias = NDArray[np.float64]
+
+
+class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
+    """Numbers of a model, which never changes. Whoever writes to them is told how to make another model.
+
+    Results of arithmetic, and copies, are plain arrays.
+    """
+
+    _instead: str
+
+    @classmethod
+    def of(cls, numbers: _Array, instead: str) -> "ReadOnly":
+        """These numbers; `instead` is the method of `Model` that makes a model with others, if there is one."""
+        array = numbers.view(cls)
+        array._instead = instead
+        array.flags.writeable = False
+        return array
+
+    def __array_finalize__(self, other: Any) -> None:
+        self._instead = getattr(other, "_instead", "")
+
+    def _refuse(self) -> NoReturn:
+        other = f"model.{self._instead}(...) makes another one" if self._instead else "a ModelBuilder makes another one"
+        raise ValueError(f"read-only: a model never changes; {other}, and array.copy() is an array of your own")
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if not self.flags.writeable:
+            self._refuse()
+        super().__setitem__(key, value)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, out: Any = None, **options: Any) -> Any:
+        if out is not None:
+            for array in out:
+                if isinstance(array, ReadOnly) and not array.flags.writeable:
+                    array._refuse()
+            options["out"] = out
+        plain = (x.view(np.ndarray) if isinstance(x, ReadOnly) else x for x in inputs)
+        return getattr(ufunc, method)(*plain, **options)
+
+    def copy(self, order: Literal["K", "A", "C", "F"] | None = "C") -> _Array:  # type: ignore[override]
+        """A plain array with these numbers."""
+        return np.array(self, order=order)
+
+    def __reduce__(self) -> Any:
+        return self.view(np.ndarray).__reduce__()
+
+    def __repr__(self) -> str:
+        return repr(self.view(np.ndarray))
 
 
 class RneaDerivatives(NamedTuple):
@@ -476,6 +524,25 @@ class Control(NamedTuple):
     """The force on each body during the step, (nbodies, 6), at its origin and in its frame; likewise."""
 
 
+_NUMBERS = 12
+"""The number of numbers of a vector, and of things in a list, that a result shows; else it shows the shape."""
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        if value.ndim > 1 or value.size > _NUMBERS:
+            return f"<array {value.shape}>"
+        return np.array2string(value, separator=", ", max_line_width=1000)
+    if isinstance(value, list) and len(value) > _NUMBERS:
+        return f"<list of {len(value)}>"
+    return repr(value)
+
+
+def _repr(self: Any) -> str:
+    """The members in short."""
+    return f"{type(self).__name__}({', '.join(f'{k}={_shown(v)}' for k, v in self._asdict().items())})"
+
+
 # where users find them, and pickle too
 _MODULES = {
     "Iteration": "optimal",
@@ -485,4 +552,5 @@ _MODULES = {
     "Control": "simulation",
 }
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and issubclass(_item, tuple)]:
+    setattr(_class, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced
     _class.__module__ = f"condyle.{_MODULES[_class.__name__]}" if _class.__name__ in _MODULES else "condyle"

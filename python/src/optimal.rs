@@ -10,6 +10,6 @@ mod solvers;
 pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
 pub(crate) use costs::{Activation, Cost, Limit};
 pub(crate) use own::{Action, ConstrainedAction, Lqr};
-pub(crate) use problem::Problem;
+pub(crate) use problem::{Problem, lock};
 pub(crate) use residuals::{FrictionCone, Residual, WrenchCone};
 pub(crate) use solvers::{AugmentedLagrangian, Fddp};

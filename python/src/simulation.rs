@@ -1,7 +1,7 @@
 //! Robots that move by themselves, as Python sees them: the module `condyle.simulation`.
 
 use crate::arrays::{Give, class, output};
-use crate::exceptions::wrong_word;
+use crate::exceptions::{exception, wrong_word};
 use crate::functions::{Argument, Forces, Position, Tangent, positive_speed, regular};
 use crate::model::Model;
 use crate::signals::{self, Signals};
@@ -31,13 +31,13 @@ self_cell::self_cell!(
 /// integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
 ///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
 ///     is conserved to rounding.
-/// dt: h, the length of a step (s); a negative one goes back in time.
+/// dt: h, the length of a step (s), above 0.
 /// passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
 ///     none of either.
 /// tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
 /// max_iterations: it gives up after so many iterations.
 ///
-/// Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
+/// Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
 ///
 /// >>> from condyle.simulation import Simulation
 /// >>> quadruped = condyle.robots.quadruped()
@@ -83,8 +83,8 @@ impl Simulation {
             }
         };
         let passive = passive.map(|smoothing| positive_speed("passive", smoothing)).transpose()?;
-        if dt == 0.0 || !dt.is_finite() {
-            return Err(PyValueError::new_err(format!("dt: expected a finite number other than 0, found {dt}")));
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(PyValueError::new_err(format!("dt: expected a finite number above 0, found {dt}")));
         }
         if !(tolerance >= 0.0 && tolerance.is_finite()) {
             return Err(PyValueError::new_err(format!(
@@ -95,6 +95,12 @@ impl Simulation {
         let settings = Settings { integrator, dt, passive, tolerance, max_iterations };
         let owned = Owned::new(model.clone().unbind(), |model| rust::Simulation::new(&model.get().inner, settings));
         Ok(Self(owned))
+    }
+
+    /// The robot's name and the time.
+    fn __repr__(&self) -> String {
+        let (name, time) = (self.0.borrow_owner().get().inner.name(), self.0.borrow_dependent().time());
+        format!("<condyle.simulation.Simulation of '{name}' at {time} s>")
     }
 
     /// The position, nq numbers.
@@ -116,9 +122,16 @@ impl Simulation {
     }
 
     /// Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
+    ///
+    /// Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+    /// `ValueError` if one of v is not finite.
     fn set_state(&mut self, q: &Bound<'_, PyAny>, v: &Bound<'_, PyAny>) -> PyResult<()> {
         let model = &self.0.borrow_owner().get().inner;
         let (q, v) = (Position::read("q", q, model)?, Tangent::read("v", v, model)?);
+        model.check_position(&q).map_err(exception)?;
+        if let Some((k, found)) = v.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            return Err(PyValueError::new_err(format!("v: expected finite numbers, found {found} at {k}")));
+        }
         self.0.with_dependent_mut(|_, simulation| simulation.set_state(&q, &v));
         Ok(())
     }

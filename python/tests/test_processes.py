@@ -301,6 +301,74 @@ def test_signals_on_another_thread() -> None:
     )
 
 
+MEANWHILE = {
+    "rollout": """
+        arm, knots = condyle.robots.arm7(), 250_000
+        problem = Problem(np.zeros(14), [FreeDynamics(arm, 1e-6, [])], [0] * knots, FreeDynamics(arm, None, []))
+        us = np.zeros((knots, 7))
+        def call():
+            return problem.rollout(us)
+    """,
+    "factorize": """
+        factor, M = condyle.Cholesky(1536), np.diag(np.full(1536, 2.0))
+        def call():
+            factor.factorize(M)
+    """,
+    "inverse": """
+        factor = condyle.Cholesky(800)
+        factor.factorize(np.diag(np.full(800, 2.0)))
+        def call():
+            factor.inverse()
+    """,
+    "solve": """
+        factor = condyle.Cholesky(800)
+        factor.factorize(np.diag(np.full(800, 2.0)))
+        def call():
+            factor.solve_matrix(np.ones((800, 800)))
+    """,
+    "a factor with the zeros of a tree": """
+        chain, body = condyle.ModelBuilder("chain"), condyle.WORLD
+        ball = condyle.Inertia.from_com(1.0, np.zeros(3), np.eye(3))
+        for k in range(1500):
+            body = chain.body(f"b{k}", body, condyle.Joint.revolute([0, 0, 1]), inertia=ball)
+        chain = chain.build()
+        factor = condyle.Ltdl(chain)
+        factor.factorize(np.diag(np.full(1500, 2.0)))
+        def call():
+            factor.inverse()
+    """,
+}
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
+@pytest.mark.parametrize("call", MEANWHILE.values(), ids=MEANWHILE)
+def test_handlers_run_meanwhile(call: str) -> None:
+    """Handlers run again and again during a long call, not once when it has ended; and what they raise ends it."""
+    check(
+        call
+        + """
+        seen, ends = [], False
+        def handler(number, frame):
+            seen.append(number)
+            if ends:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+                raise TimeoutError
+        signal.signal(signal.SIGALRM, handler)
+        signal.setitimer(signal.ITIMER_REAL, 0.005, 0.005)
+        call()
+        assert len(seen) > 3, len(seen)
+        ends = True
+        try:
+            call()
+        except TimeoutError:
+            pass
+        else:
+            raise AssertionError("the call has ended by itself")
+        call()
+        """
+    )
+
+
 @pytest.mark.parametrize("value", ["", "avx3", "AVX2", "neon" if os.uname().machine == "x86_64" else "avx2"])
 def test_refused_level(value: str) -> None:
     """A level that cannot be used is an error of the import, which names those that can."""

@@ -55,8 +55,9 @@ for (const name of ["reach", "trot"]) {
 
   test(`${name}: play, pause and keys`, async () => {
     const { page, wrong } = await open(name);
+    await page.select("#speed", "0.1"); // so that it is not at its end before it is paused
     await page.click("#play");
-    await page.waitForFunction(() => Number(document.querySelector("#clock b").textContent) > 0.05);
+    await page.waitForFunction(() => Number(document.querySelector("#clock b").textContent) > 0.02);
     await page.click("#play");
     const paused = await clock(page);
     await settled(page);

@@ -43,13 +43,17 @@ pub use calls::forward_dynamics::{aba, forward_dynamics};
 pub use calls::impulse_dynamics::{Impulse, ImpulseDerivatives, impulse_dynamics, impulse_dynamics_derivatives};
 pub use calls::inertia::{crba, minv};
 pub use calls::inverse_dynamics::{coriolis_matrix, gravity, nonlinear_effects, rnea, static_torque};
-pub use calls::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
+pub use calls::kinematics::{
+    body_jacobian, forward_accelerations, forward_kinematics, forward_velocities, frame_jacobian,
+};
 pub use calls::parameter_derivatives::Input;
 pub use calls::regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
 pub use calls::second_derivatives::{
     AbaHessian, RneaHessian, RneaSecondDerivatives, aba_hessian, rnea_hessian, rnea_second_derivatives,
 };
 pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
+#[doc(hidden)]
+pub use condyle_model::integrate_jacobian_groups;
 pub use condyle_model::{
     Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, IntegrateArgument, Joint, JointOptions, Limits, Mimic,
     MjcfOptions, Model, ModelBuilder, SdfOptions, UrdfOptions, WORLD, Warning, difference, difference_jacobian,

@@ -144,8 +144,8 @@ fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult
     Ok((Some(matrix("actuation", map, [model.nv(), nu])?.to_matrix()), nu))
 }
 
-pub(super) fn terms(model: &condyle::Model, costs: &[PyRef<'_, Cost>]) -> PyResult<Vec<robot::Cost>> {
-    costs.iter().map(|cost| cost.of(model)).collect()
+pub(super) fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
+    costs.iter().map(|cost| cost.to_inner()).collect()
 }
 
 /// Costs, or limits, of single knots.
@@ -154,8 +154,8 @@ type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
 /// Limits of all knots, if there are any.
 type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
 
-fn limits(model: &condyle::Model, limits: Limits<'_>) -> PyResult<Vec<robot::Limit>> {
-    limits.into_iter().flatten().map(|limit| limit.of(model)).collect()
+fn limits(limits: Limits<'_>) -> Vec<robot::Limit> {
+    limits.into_iter().flatten().map(|limit| limit.to_inner()).collect()
 }
 
 /// Contacts with the names that residuals call them by.
@@ -168,18 +168,15 @@ fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Ve
 
 /// A knot as data.
 fn knot(
-    model: &condyle::Model,
     dynamics: Dynamics,
     (costs, costs_at): (&[PyRef<'_, Cost>], At<'_, Cost>),
     (all, limits_at): (Limits<'_>, At<'_, Limit>),
     bounds: Option<[Vec<f64>; 2]>,
-) -> PyResult<Knot> {
-    let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| Ok((t, terms(model, &costs)?)));
-    let limits_at = limits_at.into_iter().flatten().map(|(t, those)| Ok((t, limits(model, Some(those))?)));
-    let (costs_at, limits_at) = (costs_at.collect::<PyResult<_>>()?, limits_at.collect::<PyResult<_>>()?);
+) -> Knot {
+    let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(&costs))).collect();
+    let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(Some(those)))).collect();
     let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
-    let (costs, limits) = (terms(model, costs)?, limits(model, all)?);
-    Ok(Knot { dynamics, costs, costs_at, limits, limits_at, bounds })
+    Knot { dynamics, costs: terms(costs), costs_at, limits: limits(all), limits_at, bounds }
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.
@@ -221,16 +218,14 @@ impl FreeDynamics {
         limits_at: At<'_, Limit>,
     ) -> PyResult<Self> {
         let Some(dt) = dt else {
-            let end = |model: &_| {
-                Ok(Knot { limits: self::limits(model, limits)?, ..Knot::new(Dynamics::End, terms(model, &costs)?) })
-            };
-            return Ok(Self(RobotAction::new(model, end)?));
+            let end = Knot { limits: self::limits(limits), ..Knot::new(Dynamics::End, terms(&costs)) };
+            return Ok(Self(RobotAction::new(model, |_| Ok(end))?));
         };
         let integrator = self::integrator(integrator)?;
         Ok(Self(RobotAction::new(model, |model| {
             let (actuation, nu) = self::actuation(model, actuation)?;
             let dynamics = Dynamics::Free { actuation, integrator, dt };
-            knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?)
+            Ok(knot(dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
@@ -284,7 +279,7 @@ impl ContactDynamics {
         Ok(Self(RobotAction::new(model, |model| {
             let ((actuation, nu), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);
             let dynamics = Dynamics::Contact { contacts, damping, actuation, integrator, dt };
-            knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?)
+            Ok(knot(dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
@@ -324,7 +319,7 @@ impl ImpulseDynamics {
         Ok(Self(RobotAction::new(model, |model| {
             let contacts = self::contacts(model, contacts)?;
             let dynamics = Dynamics::Impulse { contacts, restitution, damping };
-            knot(model, dynamics, (&costs, None), (limits, None), None)
+            Ok(knot(dynamics, (&costs, None), (limits, None), None))
         })?))
     }
 }
@@ -356,7 +351,7 @@ impl InverseDynamics {
         let integrator = self::integrator(integrator)?;
         Ok(Self(RobotAction::new(model, |model| {
             let bounds = bounds(model.nv(), lower, upper)?;
-            knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds)
+            Ok(knot(Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds))
         })?))
     }
 }

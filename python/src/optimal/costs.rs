@@ -64,6 +64,7 @@ impl Activation {
 /// A term of a cost: weight times an activation of a residual.
 ///
 /// name: what `Problem.set_weight` and errors call it.
+/// weight: finite and at least 0; a term whose weight is 0 is not computed.
 /// residual: a `Residual`.
 /// activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
 ///     for other residuals.
@@ -80,10 +81,9 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// The term for a robot.
-    pub(super) fn of(&self, model: &condyle::Model) -> PyResult<robot::Cost> {
-        let residual = self.residual.resolved(&format!("cost `{}`", self.name), model)?;
-        Ok(robot::Cost::new(&self.name, self.weight, residual, self.activation.clone()))
+    /// The library's own term.
+    pub(super) fn to_inner(&self) -> robot::Cost {
+        robot::Cost::new(&self.name, self.weight, self.residual.inner.clone(), self.activation.clone())
     }
 }
 
@@ -132,10 +132,9 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
-    /// The limit for a robot.
-    pub(super) fn of(&self, model: &condyle::Model) -> PyResult<robot::Limit> {
-        let residual = self.residual.resolved(&format!("limit `{}`", self.name), model)?;
-        Ok(robot::Limit::new(&self.name, residual, self.lower.clone(), self.upper.clone()))
+    /// The library's own limit.
+    pub(super) fn to_inner(&self) -> robot::Limit {
+        robot::Limit::new(&self.name, self.residual.inner.clone(), self.lower.clone(), self.upper.clone())
     }
 }
 

@@ -1,11 +1,11 @@
 //! Residuals, and the cones that some of them look at.
 
 use crate::arrays::{Give, array, numbers, pose, rotation, three};
-use crate::exceptions::{ProblemError, problem_error, within};
+use crate::exceptions::{problem_error, within};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
-use condyle::{Force, FrameKind, Mat3, Motion};
+use condyle::{Force, Mat3, Motion};
 use pyo3::prelude::*;
 
 /// A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
@@ -21,22 +21,12 @@ use pyo3::prelude::*;
 #[pyclass(frozen, eq, module = "condyle.optimal")]
 #[derive(Clone, PartialEq)]
 pub(crate) struct Residual {
-    /// With the number that its frame has in the robot it was made with.
     pub(super) inner: robot::Residual,
-    /// The name and kind of its frame, if it looks at one: the number is found anew in each robot.
-    frame: Option<FrameName>,
-}
-
-/// A frame as other robots may have it too.
-#[derive(Clone, PartialEq)]
-struct FrameName {
-    name: String,
-    kind: FrameKind,
 }
 
 impl From<robot::Residual> for Residual {
     fn from(inner: robot::Residual) -> Self {
-        Self { inner, frame: None }
+        Self { inner }
     }
 }
 
@@ -94,8 +84,8 @@ impl Residual {
         frame: &Bound<'_, PyAny>,
         target: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let (frame, target) = (frame_index(&model.get().inner, frame)?, pose("target", target)?);
-        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FramePlacement { frame, target }))
+        let (frame, target) = (frame_name(model, frame)?, pose("target", target)?);
+        Ok(Self::from(robot::Residual::FramePlacement { frame, target }))
     }
 
     /// The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m).
@@ -105,15 +95,15 @@ impl Residual {
         frame: &Bound<'_, PyAny>,
         target: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let (frame, target) = (frame_index(&model.get().inner, frame)?, three("target", target)?);
-        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FrameTranslation { frame, target }))
+        let (frame, target) = (frame_name(model, frame)?, three("target", target)?);
+        Ok(Self::from(robot::Residual::FrameTranslation { frame, target }))
     }
 
     /// The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix.
     #[staticmethod]
     fn frame_rotation(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (frame, target) = (frame_index(&model.get().inner, frame)?, rotation("target", target)?);
-        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FrameRotation { frame, target }))
+        let (frame, target) = (frame_name(model, frame)?, rotation("target", target)?);
+        Ok(Self::from(robot::Residual::FrameRotation { frame, target }))
     }
 
     /// The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
@@ -126,10 +116,9 @@ impl Residual {
         target: Option<&Bound<'_, PyAny>>,
         reference: &str,
     ) -> PyResult<Self> {
-        let model = &model.get().inner;
-        let (frame, target) = (frame_index(model, frame)?, Motion::from(six(target)?));
-        let reference = Reference::read("reference", reference, model)?;
-        Ok(Self::of_frame(model, frame, robot::Residual::FrameVelocity { frame, target, reference }))
+        let (frame, target) = (frame_name(model, frame)?, Motion::from(six(target)?));
+        let reference = Reference::read("reference", reference, &model.get().inner)?;
+        Ok(Self::from(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
     /// The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
@@ -176,26 +165,6 @@ impl Residual {
 }
 
 impl Residual {
-    /// A residual that looks at a frame of a model.
-    fn of_frame(model: &condyle::Model, frame: usize, inner: robot::Residual) -> Self {
-        let frame = &model.frames()[frame];
-        Self { inner, frame: Some(FrameName { name: frame.name.clone(), kind: frame.kind }) }
-    }
-
-    /// The residual with the number that its frame has in a model, or an error of what it belongs to.
-    pub(super) fn resolved(&self, what: &str, model: &condyle::Model) -> PyResult<robot::Residual> {
-        let mut residual = self.inner.clone();
-        let (Some(number), Some(FrameName { name, kind })) = (frame_mut(&mut residual), &self.frame) else {
-            return Ok(residual);
-        };
-        let same = |f: &condyle::Frame| f.name == *name && f.kind == *kind;
-        *number = match model.frames().iter().position(same) {
-            Some(number) => number,
-            None => model.frame(name).map_err(|error| ProblemError::new_err(format!("{what}: {error}")))?,
-        };
-        Ok(residual)
-    }
-
     /// The bounds that a residual has of its own: those of a cone, or of a centre of pressure.
     pub(super) fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         match &self.inner {
@@ -207,22 +176,17 @@ impl Residual {
     }
 }
 
-/// The number of the frame that a residual looks at.
-fn frame_mut(residual: &mut robot::Residual) -> Option<&mut usize> {
-    match residual {
-        robot::Residual::FramePlacement { frame, .. }
-        | robot::Residual::FrameTranslation { frame, .. }
-        | robot::Residual::FrameRotation { frame, .. }
-        | robot::Residual::FrameVelocity { frame, .. } => Some(frame),
-        _ => None,
-    }
+/// A frame, given by its name or number in a model, as a residual keeps it.
+fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<robot::FrameName> {
+    let model = &model.get().inner;
+    Ok((&model.frames()[frame_index(model, frame)?]).into())
 }
 
 /// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 ///
-/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
-/// surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
-/// default 0 and infinite.
+/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
+/// rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
+/// (N), by default 0 and infinite.
 ///
 /// Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
 ///

@@ -1,4 +1,4 @@
-//! How a batch computes: groups of states, a lane for each, spread over threads.
+//! Passes of a batch: groups of states, a lane for each, spread over threads.
 
 use super::StateMatrix;
 use crate::calls::derivatives::{aba_derivatives, rnea_derivatives};
@@ -10,17 +10,17 @@ use crate::workspace::{filled, zero_matrix};
 use condyle_linalg::threads;
 use condyle_model::Model;
 use condyle_spatial::Force;
-use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter};
+use condyle_spatial::block::{Block, MOST, Real, Strided, flat, flat_mut, gather, lanes, scatter, scatter_matrix};
 use core::mem::swap;
 use nalgebra::{DMatrix, DMatrixView};
 
 #[derive(Debug)]
 pub(super) struct Group<S: Block> {
-    /// One for each thread.
+    /// The workers, one for each thread.
     workers: Vec<Worker<S>>,
-    /// How many groups of as many states as there are lanes there may be.
+    /// The most groups of as many states as there are lanes.
     groups: usize,
-    /// One for each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
+    /// The matrices of each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
     matrices: Vec<[DMatrix<S>; KINDS]>,
 }
 
@@ -35,7 +35,7 @@ pub(super) const DA: [usize; 2] = [5, 6];
 
 const KINDS: usize = 7;
 
-/// One thread's scratch.
+/// The scratch of a thread.
 #[derive(Debug)]
 pub(super) struct Worker<S: Block> {
     data: Data<S>,
@@ -92,14 +92,14 @@ pub(super) struct Arguments<'a, T> {
     pub f_ext: &'a [Force<T>],
 }
 
-/// Where the results of some states go.
+/// The places for the results of some states.
 struct Results<'a, S: Block> {
     /// Both are empty where a function has none.
     vectors: &'a mut [S::Number],
     matrices: &'a mut [[DMatrix<S>; KINDS]],
 }
 
-/// What is done with a group of states: with the arguments of a worker, to where its vectors and matrices go.
+/// The work on a group of states: with the arguments of a worker, to where its vectors and matrices go.
 pub(super) trait Pass<T: Real>: Copy + Sync {
     /// The kinds of matrices that it gives.
     const KINDS: &'static [usize];
@@ -272,5 +272,23 @@ impl<S: Block> Group<S> {
         let n = matrix.nrows();
         let lane = lanes(matrix.as_slice()).get(k % S::LANES..).unwrap_or_default();
         DMatrixView::from_slice_with_strides(lane, n, n, S::LANES, S::LANES * n)
+    }
+
+    /// The matrices of the first states, as many as there is room for, each by rows.
+    pub(super) fn write_rows(&self, kind: usize, to: &mut [S::Number]) {
+        let n = self.matrices.first().map_or(0, |matrices| matrices[kind].nrows());
+        if n == 0 {
+            return;
+        }
+        for (matrices, to) in self.matrices.iter().zip(to.chunks_mut(S::LANES * n * n)) {
+            let (vectors, mut each) = (matrices[kind].as_slice(), <[&mut [S::Number]; MOST]>::default());
+            let mut states = 0;
+            for to in to.chunks_exact_mut(n * n) {
+                each[states] = to;
+                states += 1;
+            }
+            let matrix = Strided { vectors, strides: [1, n], shape: [n, n], negative: false };
+            scatter_matrix(&matrix, &mut each[..states], n);
+        }
     }
 }

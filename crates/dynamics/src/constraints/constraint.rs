@@ -7,7 +7,7 @@ use condyle_spatial::{Constant, Motion, Scalar, Se3};
 use core::any::Any;
 use serde::{Deserialize, Serialize};
 
-/// What a constraint holds.
+/// The motion that a constraint holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ConstraintKind {
@@ -27,7 +27,7 @@ impl ConstraintKind {
     }
 }
 
-/// Where a constraint wants its frame to be and how it should move there.
+/// The target of a constraint: where its frame should be, and how it should move there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Target<S> {
@@ -143,7 +143,7 @@ impl ContactConstraint {
             return wrong(format!("frames `{}` and `{other}` do not move relative to each other", frame.name));
         }
         if self.reference == ReferenceFrame::World {
-            return wrong("its reference frame must be Local or LocalWorldAligned, found World".to_owned());
+            return wrong("its reference must be `local` or `local_world_aligned`, found `world`".to_owned());
         }
         for (name, gain) in [("kp", self.kp), ("kd", self.kd)] {
             if !(gain.is_finite() && gain >= 0.0) {

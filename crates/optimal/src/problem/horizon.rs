@@ -1,17 +1,13 @@
 //! The optimal control problem over a horizon of knots.
 
 use super::action::ActionModel;
-use super::shape::Shape;
+use super::shape::{MOST_ENTRIES, MOST_KNOTS, Shape};
 use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
 use std::any::Any;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
-/// The most knots of a horizon.
-pub(crate) const MOST_KNOTS: usize = 1 << 20;
-/// The most entries of a state, a change of state, or the controls of a knot: matrices of that size take 128 MiB each.
-pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
 /// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
 const MOST_NUMBERS: usize = 1 << 28;
 
@@ -75,9 +71,9 @@ impl Problem {
     /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls, x̂₀ has a
-    /// wrong length or an entry that is not finite or is no state, a state or the controls of a knot have more than 4096
-    /// entries, or there are more than 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
+    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has
+    /// controls, x̂₀ has a wrong length or an entry that is not finite or is no state, a state or the controls of a knot
+    /// have more than 4096 entries, or there are more than 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
@@ -229,10 +225,23 @@ impl Problem {
     /// # Errors
     /// [`Error`] if `us` has a wrong length or an entry that is not finite, or a state `xs` becomes infinite.
     pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
+        self.rollout_while(us, || ControlFlow::Continue(()))
+    }
+
+    /// As [`rollout`](Self::rollout), with a function that is asked at each knot whether to go on; the states of knots that
+    /// were not reached are zeros.
+    ///
+    /// # Errors
+    /// As of [`rollout`](Self::rollout).
+    #[doc(hidden)]
+    pub fn rollout_while(&mut self, us: &[f64], mut go_on: impl FnMut() -> ControlFlow<()>) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
         let mut xs = vec![0.0; (self.horizon() + 1) * self.nx()];
         xs[..self.shape.nx].copy_from_slice(&self.x0);
         for t in 0..self.horizon() {
+            if go_on().is_break() {
+                break;
+            }
             let (done, ahead) = xs.split_at_mut((t + 1) * self.shape.nx);
             let u = &us[self.shape.u(t)];
             self.models[self.stages[t]].calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);

@@ -1,6 +1,6 @@
-//! What an MJCF element says, with the defaults of its class, in SI units.
+//! Attributes of MJCF elements, with the defaults of their classes, in SI units.
 
-use crate::error::{Error, nearest};
+use crate::error::{Error, near, nearest};
 use crate::io::xml::{self, Element};
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 use std::collections::HashMap;
@@ -8,7 +8,7 @@ use std::collections::HashMap;
 /// Attributes of a class, for each kind of element.
 type Class<'a> = HashMap<&'a str, HashMap<&'a str, &'a str>>;
 
-/// How many attributes all classes may have together, what they inherit included.
+/// The most attributes that all classes may have together, what they inherit included.
 const MAX_INHERITED: usize = 1 << 20;
 
 /// The name of the class that elements have without being asked.
@@ -68,8 +68,8 @@ impl<'a> Defaults<'a> {
         }
         let mut names: Vec<&str> = self.classes.keys().copied().collect();
         names.sort_unstable();
-        let near = nearest(name, names.into_iter());
-        Err(element.wrong(format!("no default class is named `{name}`; nearest is `{near}`")))
+        let near = near(&nearest(name, names.into_iter()));
+        Err(element.wrong(format!("no default class is named `{name}`{near}")))
     }
 }
 

@@ -11,9 +11,11 @@
 //! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those that
 //! it may best do without. A contact's rows prefer joints that move no other contact; where these are close to singular
 //! (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are redundant is there
-//! no pivot, and the knot stays explicit.
+//! no pivot, and the knot stays explicit. What the limbs in contact do is mostly solved before, for several knots side by
+//! side: see [`limb_elimination`](super::limb_elimination).
 #![allow(non_snake_case)] // J, M, T, U, D
 
+use super::limb_elimination::LimbElimination;
 use crate::lq::InverseDynamicsForm;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
@@ -21,7 +23,7 @@ use crate::robot::residuals::rows::Row;
 use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, block, copy_scaled, mask, max_abs};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
-const PREFERENCE: f64 = 1e-2;
+pub(super) const PREFERENCE: f64 = 1e-2;
 /// A pivot that is so much smaller than the row's largest entry was at first counts as zero.
 const REDUNDANT: f64 = 1e-7;
 
@@ -54,8 +56,12 @@ pub(crate) struct KktElimination {
     passive: usize,
     /// The coordinates that each contact's row prefers.
     preferred: Vec<Vec<usize>>,
+    /// The rows that limbs were solved for, each with its column.
+    limbs: Vec<(usize, usize)>,
     /// The column that each row was solved for.
     pivots: Vec<usize>,
+    /// The rows that are solved here, and which of their blocks are not zero.
+    late: Vec<(usize, u64)>,
     /// The place of each column of δa and δf: its unknown, if it is one, or else the row that was solved for it.
     place: Vec<Place>,
     /// Runs of columns that are unknowns: the first column, the first unknown, how many.
@@ -73,7 +79,7 @@ enum Place {
 impl KktElimination {
     /// The elimination for contacts whose rows are moved by some coordinates each, of a robot whose first `passive`
     /// coordinates are not driven.
-    pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
+    pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>], limbs: &LimbElimination) -> Self {
         let rows = moved_by.len();
         let driven = |k: &usize| *k >= passive;
         let alone = |r: usize, k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
@@ -85,7 +91,9 @@ impl KktElimination {
             tableau: Tableau { nv, rows },
             passive,
             preferred: preferred.collect(),
+            limbs: limbs.solved().collect(),
             pivots: Vec::with_capacity(rows + passive),
+            late: Vec::with_capacity(rows + passive),
             place: vec![Place::Unknown(0); nv + rows],
             runs: Vec::with_capacity(nv + rows),
             forces: SparseRows::default(),
@@ -97,10 +105,11 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt; says whether there were pivots. Overwrites the tableau.
-    pub(crate) fn run(&mut self, tableau: &mut [f64], dt: f64, form: &mut InverseDynamicsForm) -> bool {
+    /// Writes U and D for steps of Δt, from a tableau of which the limbs are solved or are not; says whether there were
+    /// pivots. Overwrites the tableau.
+    pub(crate) fn run(&mut self, tableau: &mut [f64], limbs: bool, dt: f64, form: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
-        at_level(Run { elimination: self, T: tableau, dt, form, done: &mut done });
+        at_level(Run { elimination: self, T: tableau, limbs, dt, form, done: &mut done });
         done
     }
 
@@ -142,21 +151,29 @@ impl KktElimination {
 struct Run<'a> {
     elimination: &'a mut KktElimination,
     T: &'a mut [f64],
+    limbs: bool,
     dt: f64,
     form: &'a mut InverseDynamicsForm,
     done: &'a mut bool,
 }
 
-/// y −= a x on the blocks that are not zero in x, in whole registers.
+/// How many rows are subtracted at once.
+const TOGETHER: usize = 4;
+
+/// y −= Σ aᵢ xᵢ on the blocks that are not zero in all x, in whole registers.
 #[inline(always)]
-fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
-    let (a, wide) = (V::splat(-a), block(y.len()));
+fn subtract<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N], mut mask: u64) {
+    let (n, wide) = (y.len(), block(y.len()));
+    let (x, a) = (x.map(|x| &x[..n]), a.map(|a| V::splat(-a)));
     while mask != 0 {
         let mut i = mask.trailing_zeros() as usize * wide;
-        let end = y.len().min(i + wide);
+        let end = n.min(i + wide);
         while i + V::N <= end {
-            let place = &mut y[i..][..V::N];
-            V::load(&x[i..]).mul_add(a, V::load(place)).store(place);
+            let mut sum = V::load(&y[i..][..V::N]);
+            for k in 0..N {
+                sum = V::load(&x[k][i..][..V::N]).mul_add(a[k], sum);
+            }
+            sum.store(&mut y[i..][..V::N]);
             i += V::N;
         }
         mask &= mask - 1;
@@ -166,36 +183,66 @@ fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
 impl Vectorized for Run<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { elimination: e, T, dt, form, done } = self;
+        let Self { elimination: e, T, limbs, dt, form, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
-        let (solved, all) = (rows + e.passive, rows + nv);
+        let solved = rows + e.passive;
         let mut force_scale = 0.0_f64;
         for r in rows..solved {
             force_scale = force_scale.max(max_abs(&T[r * stride + nv..][..rows]));
         }
         e.place.fill(Place::Unknown(0));
         e.pivots.clear();
+        e.pivots.resize(solved, usize::MAX);
+        for &(r, k) in e.limbs.iter().filter(|_| limbs) {
+            (e.place[k], e.pivots[r]) = (Place::Row(r), k);
+        }
+        e.late.clear();
+        let (T, motion) = T.split_at_mut(solved * stride);
         for r in 0..solved {
+            if e.pivots[r] != usize::MAX {
+                continue;
+            }
             let (before, rest) = T.split_at_mut(r * stride);
             let (row, after) = rest.split_at_mut(stride);
             // what the entries of a row that depends on others are compared with: a contact's are of order one
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = e.choose(r, row, scale) else { return };
             e.place[k] = Place::Row(r);
-            e.pivots.push(k);
+            e.pivots[r] = k;
             let inverse = row[k].recip();
             for x in row.iter_mut() {
                 *x *= inverse;
             }
             row[k] = 1.0;
             let mask = mask(row);
-            for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride).take(all - r - 1)) {
+            for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride)) {
                 let factor = other[k];
                 if factor != 0.0 {
-                    subtract::<V>(other, row, factor, mask);
+                    subtract::<V, 1>(other, [row], [factor], mask);
                     other[k] = 0.0;
                 }
             }
+            e.late.push((r, 0));
+        }
+        // what the rows were solved for goes out of the joints' rows, several at once
+        e.late.iter_mut().for_each(|(r, blocks)| *blocks = mask(&T[*r * stride..][..stride]));
+        for other in motion.chunks_exact_mut(stride).take(if e.late.is_empty() { 0 } else { nv }) {
+            let (mut x, mut a, mut blocks, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0, 0);
+            for &(r, mask) in &e.late {
+                let factor = other[e.pivots[r]];
+                if factor == 0.0 {
+                    continue;
+                }
+                (x[count], a[count], blocks, count) = (&T[r * stride..][..stride], factor, blocks | mask, count + 1);
+                if count == TOGETHER {
+                    subtract::<V, TOGETHER>(other, x, a, blocks);
+                    (a, blocks, count) = ([0.0; TOGETHER], 0, 0);
+                }
+            }
+            if count > 0 {
+                subtract::<V, TOGETHER>(other, x, a, blocks);
+            }
+            e.late.iter().for_each(|&(r, _)| other[e.pivots[r]] = 0.0);
         }
 
         // the columns that are left are the unknowns
@@ -220,7 +267,7 @@ impl Vectorized for Run<'_> {
 
         // U; the dependent steps D; the dependent forces
         form.efforts.resize(m, size);
-        for (row, to) in T[solved * stride..].chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
+        for (row, to) in motion.chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
             gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
         }
         form.dependent.clear();

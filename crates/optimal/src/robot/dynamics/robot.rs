@@ -2,6 +2,7 @@
 
 use super::batch::{KnotBatch, Law, Pass};
 use super::kkt_elimination::{KktElimination, Tableau};
+use super::limb_elimination::LimbElimination;
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
 use crate::robot::actuation::Actuation;
@@ -14,7 +15,7 @@ use crate::robot::knot::{KnotData, KnotState, Sensitivities, add_matrix_row};
 use crate::robot::residuals::rows::Row;
 use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
-use condyle_dynamics::{IntegrateArgument, Model, aba_hessian, integrate_jacobian};
+use condyle_dynamics::{IntegrateArgument, Model, aba_hessian, integrate_jacobian_groups};
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Real, Witness};
 use core::ops::Range;
@@ -90,11 +91,15 @@ impl RobotDynamics {
             let what = format!("{why} {}: their accelerations are undefined", names.join(", "));
             return Err(Error::Actuation { what });
         }
-        let (lanes, vectors) = match (law, level()) {
+        let (lanes, mut vectors) = match (law, level()) {
             (Law::None, _) | (_, Level::Baseline) => (1, None),
-            (_, Level::Neon | Level::Avx2) => (Short::LANES, Some((KnotBatch::new(&model, law)?, None))),
+            (_, Level::Neon | Level::Avx2) => {
+                let short = KnotBatch::new(&model, law)?;
+                (Short::LANES, Some(Box::new(VectorBatches { short, long: None })))
+            }
             (_, Level::Avx512) => {
-                (Long::LANES, Some((KnotBatch::new(&model, law)?, Some(KnotBatch::new(&model, law)?))))
+                let (short, long) = (KnotBatch::new(&model, law)?, Some(KnotBatch::new(&model, law)?));
+                (Long::LANES, Some(Box::new(VectorBatches { short, long })))
             }
         };
         let moved_by = match law {
@@ -104,15 +109,22 @@ impl RobotDynamics {
         };
         // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
-        let elimination = form.map(|(moved_by, passive)| KktElimination::new(nv, passive, &moved_by));
         let given = if matches!(law, Law::Inverse) { Output::Acceleration } else { Output::Effort };
         let mut data = KnotData::new(nv, &capabilities, given);
-        if elimination.is_some() {
-            data.equations.resize(Tableau { nv, rows: capabilities.rows() }.len(), 0.0);
-        }
+        let elimination = form.zip(vectors.as_deref_mut()).map(|((moved_by, passive), vectors)| {
+            let damped = matches!(law, Law::Contact(_, damping) if damping != 0.0);
+            let limbs = Arc::new(LimbElimination::new(&model, passive, &moved_by, damped));
+            let tableau = Tableau { nv, rows: capabilities.rows() };
+            data.equations.resize(tableau.len(), 0.0);
+            match &mut vectors.long {
+                Some(long) => long.reserve(tableau, &limbs), // derivatives take the widest
+                None => vectors.short.reserve(tableau, &limbs),
+            }
+            KktElimination::new(nv, passive, &moved_by, &limbs)
+        });
         let groups = groups(&model);
         Ok(Self {
-            vectors: vectors.map(|(short, long)| Box::new(VectorBatches { short, long })),
+            vectors,
             data: vec![data; lanes],
             prepared: Wanted::Motion,
             group_hessian: GroupHessian::new(nv, &groups),
@@ -187,7 +199,8 @@ impl RobotDynamics {
     fn write_inverse_dynamics_form(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> bool {
         let Self { terms, data, elimination: Some(elimination), .. } = self else { return false };
         let (KnotInput { lane, t, x, u }, form) = (input, &mut node.inverse_dynamics);
-        if !elimination.run(&mut data[lane].equations, scale, form) {
+        let KnotData { equations, limbs_solved, .. } = &mut data[lane];
+        if !elimination.run(equations, *limbs_solved, scale, form) {
             return false;
         }
         form.active = true;
@@ -246,10 +259,10 @@ impl RobotDynamics {
         }
     }
 
-    /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
+    /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq, the blocks of groups.
     pub(crate) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
-        integrate_jacobian(&self.model, dq, IntegrateArgument::Position, by_q);
-        integrate_jacobian(&self.model, dq, IntegrateArgument::Velocity, by_dq);
+        integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Position, by_q);
+        integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Velocity, by_dq);
     }
 
     /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
@@ -258,7 +271,7 @@ impl RobotDynamics {
     }
 }
 
-/// How the outputs of a knot change, by the derivatives in its data.
+/// The derivatives of the outputs of a knot, from those in its data.
 pub(crate) struct DynamicsSensitivities<'a> {
     /// The output that is S u.
     pub given: Output,

@@ -1,0 +1,28 @@
+"""The examples of `python/examples` run as they stand."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SHARED = {"ground"}  # what examples have in common
+FOLDER = Path(__file__).parents[1] / "examples"
+EXAMPLES = sorted(path for path in FOLDER.glob("*.py") if path.stem not in SHARED)
+
+
+def test_there_are_examples() -> None:
+    assert {"dynamics", "derivatives", "mpc", "casadi_swing_up", "wholebody_trot"} <= {path.stem for path in EXAMPLES}
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example(path: Path, tmp_path: Path) -> None:
+    if path.stem.startswith("casadi"):
+        pytest.importorskip("casadi")
+    environment = {**os.environ, "PYTHONWARNINGS": "error"}
+    run = subprocess.run(
+        [sys.executable, path], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout
