@@ -6,7 +6,6 @@
 #![allow(non_snake_case)] // J, M
 
 use super::kkt_elimination::Tableau;
-use crate::Error;
 use crate::robot::contact::{Contact, constraint_set};
 use crate::robot::continuous::Wanted;
 use crate::robot::horizon_terms::HorizonTerms;
@@ -22,14 +21,14 @@ use condyle_spatial::block::{Block, Strided, gather_rows};
 use nalgebra::DMatrix;
 
 /// Where accelerations come from.
-#[derive(Clone, Copy)]
-pub(crate) enum Law<'a> {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Law {
     /// Nowhere: time stands still, or the state jumps.
     None,
     /// q̈ = M⁻¹ (τ − h).
     Free,
     /// M q̈ + h = τ + Jᵀλ, J q̈ + γ = 0, with the damping μ.
-    Contact(&'a [Contact], f64),
+    Contact(Vec<Contact>, f64),
     /// The controls: q̈ = u, and τ = M q̈ + h follows.
     Inverse,
 }
@@ -85,18 +84,15 @@ fn clone<T: Clone>(of: &T) -> T {
 }
 
 impl<S: Block<Number = f64>> KnotBatch<S> {
-    /// Scratch for a robot whose accelerations obey a law.
-    ///
-    /// # Errors
-    /// [`Error::Contact`] for contacts that do not fit.
+    /// Scratch for a robot whose accelerations obey a law that was checked.
     #[inline(never)]
-    pub(crate) fn new(model: &Model, law: Law<'_>) -> Result<Self, Error> {
+    pub(crate) fn new(model: &Model, law: &Law) -> Self {
         let (nv, zeros) = (model.nv(), |n| vec![S::zero(); n]);
         let pass = match law {
             Law::None => Pass::None,
             Law::Free => Pass::Free,
             Law::Contact(contacts, damping) => {
-                let set = Box::new(constraint_set(model, contacts, damping)?);
+                let set = Box::new(constraint_set(model, contacts, *damping).expect("was checked when it was given"));
                 let J = DMatrix::from_element(set.rows(), nv, S::zero());
                 Pass::Contact(set, J)
             }
@@ -104,7 +100,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         };
         let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
-        Ok(Self { data, pass, surplus, residuals, q, v, tau, a, visited: false })
+        Self { data, pass, surplus, residuals, q, v, tau, a, visited: false }
     }
 
     /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and what
