@@ -38,8 +38,10 @@ ALIASES = {
     "_Method": 'Literal["aba", "dense", "sparse"]',
     "_Integrator": 'Literal["semi_implicit_euler", "runge_kutta_4", "variational"]',
     "_Status": 'Literal["done", "not_converged", "not_finite"]',
+    "_Space": "Model | tuple[int, Callable[[NDArray[Any], NDArray[Any]], Any], Callable[[NDArray[Any], NDArray[Any]], Any]]",
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
-    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction",
+    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Unicycle | Action"
+    " | DifferentialAction | ConstrainedAction",
 }
 
 # The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
@@ -54,13 +56,13 @@ ARGUMENTS = {
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "str": "contact function joint_name name prefix text",
     "str | int": "body frame",
-    "int": "facets grain iterations k knot last max_iterations n nu nx seed size steps threads",
+    "int": "facets grain iterations k knot last max_iterations moved n nu nv nx seed size steps threads",
     "float": """
-        damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re
+        damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity""",
-    "float | None": "FreeDynamics.dt",
-    "bool": "mimic strict weightless_meshes FrictionCone.inner",
+    "float | None": "DifferentialAction.dt FreeDynamics.dt",
+    "bool": "batch mimic progress strict terminal verbose weightless_meshes FrictionCone.inner",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -77,7 +79,7 @@ ARGUMENTS = {
     "Sequence[str | int]": "Model.joints",
     "Inertia": "inertia",
     "Sequence[Inertia]": "inertias",
-    "tuple[float, float]": "position",
+    "tuple[float, float]": "position weights",
     "_Integrator": "Simulation.integrator",
     "Callable[[Control], None]": "control",
     "_Number": "value HyperDual.other HyperDual.x",
@@ -93,16 +95,23 @@ ARGUMENTS = {
     "dict[int, Sequence[Limit]]": "limits_at",
     "dict[str, ContactConstraint]": "contacts",
     "_Scheme": "integrator",
-    "_Action": "action terminal",
+    "_Action": "action Problem.terminal",
     "Sequence[_Action]": "models",
-    "Sequence[int]": "stages",
+    "Sequence[int] | None": "stages",
     "_Controls": "us",
     "Problem": "problem",
-    "Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]]": "Action.calc",
-    "Callable[[int, _Array, _Array], dict[str, ArrayLike]]": "Action.calc_diff",
+    # arrays of floats, or of numbers that know their derivatives
+    "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
+    "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": "Action.calc_diff DifferentialAction.calc_diff",
+    "_Space": "space",
+    "Callable[[Iteration], object]": "callback",
+    "Sequence[LqNode]": "nodes",
     "Callable[[int, _Array, _Array], ArrayLike]": "ConstrainedAction.calc",
-    "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": "ConstrainedAction.calc_diff",
-    "dict[str, Any]": "AugmentedLagrangian.inner",
+    "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc",
+    "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": "ConstrainedAction.calc_diff Residual.own.calc_diff",
+    "dict[str, Any]": "AugmentedLagrangian.inner Fddp._make.settings AugmentedLagrangian._make.settings",
+    "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner",
+    "Sequence[Any]": "parts",
     "float | str | None": "Fddp.settings",
 }
 
@@ -110,11 +119,13 @@ ARGUMENTS = {
 # returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
 RESULTS = {
     "_Array": """
-        ContactDynamics.quasi_static FreeDynamics.quasi_static FrictionCone.rows WrenchCone.rows
+        ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
+        InverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Problem.rollout Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration""",
     "_Array | None": "Joint.axis",
+    "_Array | list[_Array]": "Problem.quasi_static",
     "tuple[_Array, _Array]": """
         FrictionCone.bounds WrenchCone.bounds body_acceleration_derivatives frame_acceleration_derivatives
         frame_classical_acceleration_derivatives""",
@@ -151,6 +162,9 @@ RESULTS = {
     "AssemblySize": "DivideConquer.size",
     "_Status": "Simulation.run Simulation.step",
     "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
+    "Evaluation": "Problem.evaluate Problem._evaluate",
+    "list[LqNode]": "Problem.derivatives",
+    "SweepResult": "Sweep.run",
     "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
     "Outcome": "AugmentedLagrangian.outcome",
     "AllTerms": "compute_all_terms",
