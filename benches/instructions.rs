@@ -86,8 +86,8 @@ fn motion(robot: &Arc<Model>, feet: &[&str], bent: &[(&str, f64)]) -> (Problem, 
     let rest = Cost::new("rest", 1e1, Residual::State { reference: there }, Activation::Quadratic);
     let nu = if feet.is_empty() { nv } else { nv - 6 };
     let effort = Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic);
-    let tip = robot.frames().len() - 1;
-    let reach = Residual::FrameTranslation { frame: tip, target: [0.4, 0.2, 0.5].into() };
+    let tip = robot.frames().last().expect("a robot has frames");
+    let reach = Residual::FrameTranslation { frame: tip.into(), target: [0.4, 0.2, 0.5].into() };
     let reach = Cost::new("reach", 1e0, reach, Activation::Quadratic);
     let running = vec![rest.clone(), effort, reach];
     let (action, u): (Box<dyn ActionModel>, _) = if feet.is_empty() {

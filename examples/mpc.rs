@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release --example mpc`
 //!
-//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, move the horizon on by a knot, and improve the plan by
-//! one iteration within 5 ms. Prints how well the tool follows, and how punctual the loop was.
+//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, move the horizon on by a knot, and improve the plan
+//! by one iteration within 5 ms. Prints how well the tool follows, and how punctual the loop was.
 
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem, Status};
@@ -24,8 +24,7 @@ fn target(time: f64) -> Vec3<f64> {
 
 /// What leads the tool to where it should be after some steps, with so many controls.
 fn costs(arm: &Model, rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
-    let frame = arm.frame("tool").expect("the arm has a tool");
-    let follow = Residual::FrameTranslation { frame, target: target(step as f64 * DT) };
+    let follow = Residual::FrameTranslation { frame: "tool".into(), target: target(step as f64 * DT) };
     let effort = Residual::Control { reference: vec![0.0; controls] };
     vec![
         Cost::new("follow", 1e3, follow, Activation::Quadratic),

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let only_speed = Activation::Weighted([[0.0; 7], [1.0; 7]].concat());
     let state = Residual::State { reference: x0.clone() };
     let effort = Residual::Control { reference: vec![0.0; 7] };
-    let point = Residual::FrameTranslation { frame: tool, target };
+    let point = Residual::FrameTranslation { frame: "tool".into(), target };
     let running = vec![
         Cost::new("speed", 1e-2, state.clone(), only_speed.clone()),
         Cost::new("effort", 1e-4, effort, Activation::Quadratic),

@@ -38,8 +38,10 @@ ALIASES = {
     "_Method": 'Literal["aba", "dense", "sparse"]',
     "_Integrator": 'Literal["semi_implicit_euler", "runge_kutta_4", "variational"]',
     "_Status": 'Literal["done", "not_converged", "not_finite"]',
-    "_Space": "Model | tuple[int, Callable[[NDArray[Any], NDArray[Any]], Any], Callable[[NDArray[Any], NDArray[Any]], Any]]",
+    "_OfTwo": "Callable[[NDArray[Any], NDArray[Any]], Any]",
+    "_Space": "Model | tuple[int, _OfTwo, _OfTwo]",
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
+    "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
     "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Unicycle | Action"
     " | DifferentialAction | ConstrainedAction",
 }
@@ -48,21 +50,25 @@ ALIASES = {
 ARGUMENTS = {
     "ArrayLike": """
         A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
-        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference""",
+        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference
+        controls corners normal states times touches FrictionContact.size Plan.gains Task.joints""",
     "ArrayLike | None": "ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "str": "contact function joint_name name prefix text",
+    "str": "contact function joint_name name prefix text FrictionContact.frame Task.frame",
     "str | int": "body frame",
-    "int": "facets grain iterations k knot last max_iterations moved n nu nv nx seed size steps threads",
+    "int": """
+        facets grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
+        Plan.contact""",
     "float": """
         damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
-        ModelBuilder.friction ModelBuilder.velocity""",
+        ModelBuilder.friction ModelBuilder.velocity
+        fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt",
-    "bool": "batch mimic progress strict terminal verbose weightless_meshes FrictionCone.inner",
+    "bool": "batch mimic progress strict verbose Unicycle.terminal weightless_meshes FrictionCone.inner",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -79,7 +85,7 @@ ARGUMENTS = {
     "Sequence[str | int]": "Model.joints",
     "Inertia": "inertia",
     "Sequence[Inertia]": "inertias",
-    "tuple[float, float]": "position weights",
+    "tuple[float, float]": "position Unicycle.weights",
     "_Integrator": "Simulation.integrator",
     "Callable[[Control], None]": "control",
     "_Number": "value HyperDual.other HyperDual.x",
@@ -108,11 +114,22 @@ ARGUMENTS = {
     "Sequence[LqNode]": "nodes",
     "Callable[[int, _Array, _Array], ArrayLike]": "ConstrainedAction.calc",
     "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc",
-    "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": "ConstrainedAction.calc_diff Residual.own.calc_diff",
+    "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": """
+        ConstrainedAction.calc_diff Residual.own.calc_diff""",
     "dict[str, Any]": "AugmentedLagrangian.inner Fddp._make.settings AugmentedLagrangian._make.settings",
     "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner",
     "Sequence[Any]": "parts",
     "float | str | None": "Fddp.settings",
+    'Literal["world", "frame"]': "FrictionContact.axes",
+    'Literal["wrench", "corners"]': "forces",
+    "_Axes | None": "Task.axes",
+    "Gains": "Task.gains",
+    "Sequence[bool]": "mask",
+    "Sequence[FrictionContact]": "WholeBodyController.contacts",
+    "Sequence[Task]": "tasks",
+    "Settings": "WholeBodyController.settings",
+    "Plan": "plan",
+    "References": "references",
 }
 
 # The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
@@ -123,26 +140,39 @@ RESULTS = {
         InverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Problem.rollout Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
-        from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration""",
-    "_Array | None": "Joint.axis",
+        from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
+        FrictionContact.normal Task.joints""",
+    "_Array | None": "Joint.axis FrictionContact.corners",
     "_Array | list[_Array]": "Problem.quasi_static",
     "tuple[_Array, _Array]": """
         FrictionCone.bounds WrenchCone.bounds body_acceleration_derivatives frame_acceleration_derivatives
         frame_classical_acceleration_derivatives""",
     "float": """
         HyperDual.eps1 HyperDual.eps1eps2 HyperDual.eps2 HyperDual.re Model.total_mass Simulation.time
-        distance kinetic_energy mechanical_energy potential_energy""",
+        distance kinetic_energy mechanical_energy potential_energy
+        FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation Task.weight""",
+    "float | None": "FrictionContact.yaw_friction",
+    "tuple[float, float]": "Plan.span",
     "int": """
         ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame Model.joint
-        Model.nbodies Model.nq Model.nv Problem.horizon""",
+        Model.nbodies Model.nq Model.nv Problem.horizon Task.priority""",
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Problem.to_json _casadi_hold",
+    "str": "Model.name Problem.to_json _casadi_hold FrictionContact.frame Task.kind",
+    "str | None": "Task.frame",
+    'Literal["world", "frame"]': "FrictionContact.axes",
+    'Literal["wrench", "corners"] | None': "FrictionContact.forces",
+    "_Axes": "Task.axes",
+    "list[bool]": "Task.mask",
+    "Gains": "Task.gains",
+    "Settings": "WholeBodyController.settings",
+    "References": "WholeBodyController.hold",
+    "Command": "WholeBodyController.command WholeBodyController.step",
     "None": """
         _casadi_release AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
-        Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state check""",
+        Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track check""",
     "slice": "ConstraintSet.range",
     "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
     "list[str]": "Model.body_names Model.joint_types Model.names Model.warnings",
@@ -323,8 +353,8 @@ def alias(name: str, value: str) -> str:
     return line
 
 
-def stub(module: ModuleType, types: ModuleType) -> str:
-    """The text of the file."""
+def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str:
+    """The text of the file. Named tuples stand in `types`, other classes written in Python in others."""
     writer = Writer(module, types)
     body = "\n\n".join(writer.items())
     aliases = "\n".join(alias(name, value) for name, value in ALIASES.items())
@@ -332,7 +362,13 @@ def stub(module: ModuleType, types: ModuleType) -> str:
         if table.missing or table.unused:
             raise SystemExit(f"{name}: missing are {table.missing}, and nothing needs {sorted(table.unused)}")
     words = set(re.findall(r"\w+", re.sub(r'"""(.|\n)*?"""', "", body + aliases)))
-    imported = [name for name, item in sorted(vars(types).items()) if type(item) is type and name in words]
+    exported = set(module.__all__)
+    imports = []
+    for part in (types, *others):
+        own = [name for name, item in sorted(vars(part).items()) if type(item) is type and name in words - exported]
+        head = f"from .{part.__name__.split('.')[-1]} import "
+        line = head + ", ".join(own)
+        imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\
 """{inspect.getdoc(module)}"""
@@ -346,7 +382,7 @@ from typing import Any, Literal, TypeAlias, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-{wrapped("from ._types import (", imported, ")")}
+{chr(10).join(imports)}
 
 {wrapped("__all__ = [", [f'"{name}"' for name in names], "]")}
 
@@ -359,9 +395,9 @@ from numpy.typing import ArrayLike, NDArray
 def main() -> None:
     """Writes the file, or compares it."""
     sys.path.pop(0)  # the folder of the sources, where the module is not built
-    from condyle import _condyle, _types
+    from condyle import _condyle, _types, _wholebody
 
-    text = stub(_condyle, _types)
+    text = stub(_condyle, _types, [_wholebody])
     if sys.argv[1:] != ["--check"]:
         FILE.write_text(text, encoding="utf-8")
     elif FILE.read_text(encoding="utf-8") != text:

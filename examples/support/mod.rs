@@ -76,9 +76,10 @@ impl Gait {
 
     /// A foot should be at a point, a sole level too.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
+        let moved = (&self.model.frames()[frame]).into();
         let residual = match self.foot {
-            Foot::Point => Residual::FrameTranslation { frame, target },
-            Foot::Sole(_) => Residual::FramePlacement { frame, target: Se3::new(Mat3::identity(), target) },
+            Foot::Point => Residual::FrameTranslation { frame: moved, target },
+            Foot::Sole(_) => Residual::FramePlacement { frame: moved, target: Se3::new(Mat3::identity(), target) },
         };
         Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
     }

@@ -42,7 +42,7 @@ Derivatives of one's own function of the state are exact, by `HyperDual` numbers
 >>> value, by_q_and_v = condyle.gradient(arm, np.full(14, 0.3), effort)
 """
 
-from . import inertial_parameters, optimal, robots, simulation
+from . import inertial_parameters, optimal, robots, simulation, wholebody
 from ._condyle import (
     WORLD,
     BodyId,
@@ -271,4 +271,5 @@ __all__ = [
     "static_torque",
     "static_torque_derivative",
     "transport",
+    "wholebody",
 ]

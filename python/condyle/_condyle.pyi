@@ -24,18 +24,23 @@ from ._types import (
     Control,
     CoriolisDerivatives,
     EnergyDerivatives,
+    Evaluation,
     Frame,
     Impulse,
     ImpulseDerivatives,
     Inertia,
+    Iteration,
     Limits,
+    LqNode,
     Mimic,
     Outcome,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
     Solution,
+    SweepResult,
 )
+from ._wholebody import Command, Gains, References, Settings
 
 __all__ = [
     "ARM7",
@@ -50,13 +55,16 @@ __all__ = [
     "ConstrainedAction",
     "ConstraintSet",
     "ContactDynamics",
+    "ControllerError",
     "Cost",
     "Data",
+    "DifferentialAction",
     "DivideConquer",
     "Error",
     "Fddp",
     "FreeDynamics",
     "FrictionCone",
+    "FrictionContact",
     "HyperDual",
     "ImpulseDynamics",
     "InverseDynamics",
@@ -69,10 +77,15 @@ __all__ = [
     "ModelError",
     "NotPhysicalError",
     "ParseError",
+    "Plan",
     "Problem",
     "ProblemError",
     "Residual",
     "Simulation",
+    "Sweep",
+    "Task",
+    "Unicycle",
+    "WholeBodyController",
     "WrenchCone",
     "__version__",
     "_casadi_hold",
@@ -175,9 +188,20 @@ _Input: TypeAlias = (
 _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
 _Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_OfTwo: TypeAlias = Callable[[NDArray[Any], NDArray[Any]], Any]
+_Space: TypeAlias = Model | tuple[int, _OfTwo, _OfTwo]
 _Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
+_Axes: TypeAlias = Literal["world", "local"] | tuple[Literal["frame"], str]
 _Action: TypeAlias = (
-    FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction
+    FreeDynamics
+    | ContactDynamics
+    | ImpulseDynamics
+    | InverseDynamics
+    | Lqr
+    | Unicycle
+    | Action
+    | DifferentialAction
+    | ConstrainedAction
 )
 
 __version__: str
@@ -185,6 +209,9 @@ WORLD: BodyId
 ARM7: str
 QUADRUPED: str
 HUMANOID: str
+
+class ControllerError(Error):
+    """An error in the description of a whole-body controller or of a plan, or a step that was not solved."""
 
 class Error(Exception):
     """An error of this package: the base of all others."""
@@ -213,6 +240,9 @@ def aba(
     """Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
+
+    Raises `ModelError` if M is singular wherever the robot is. At a position at which it happens to be, a point of mass on
+    the axis about which it turns, the numbers are not finite, or as large as rounding has it.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -1155,7 +1185,8 @@ class Cholesky:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1258,7 +1289,8 @@ class Ltdl:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -2027,8 +2059,16 @@ class Action:
     calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
         state may be None.
     calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
-        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it calc is called with arrays of numbers
+        that know their derivatives, exact ones; once for all knots, if it leaves t alone and takes no branch that differs
+        from knot to knot. So make its results of its arguments (`np.array([...])`, `np.concatenate`), and do not write
+        them into arrays of floats. What cannot be called so is differentiated by hyper-dual numbers, else by differences.
     lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+    space: where states live: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate, difference), where
+        integrate(x, dx) is x ⊕ dx, difference(x0, x1) the dx with x0 ⊕ dx = x1, and dx has ndx numbers. Derivatives are taken
+        by dx.
+    batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and arrays with N rows
+        as results.
 
     >>> from condyle.optimal import Action, Fddp, Problem
     >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
@@ -2042,10 +2082,12 @@ class Action:
         cls,
         nx: int,
         nu: int,
-        calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
-        calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        calc: Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]],
+        calc_diff: Callable[[Any, _Array, _Array], dict[str, ArrayLike]] | None = None,
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
+        space: _Space | None = None,
+        batch: bool = False,
     ) -> Action: ...
 
 @final
@@ -2083,6 +2125,9 @@ class Activation:
         """The smooth cost √(ε + ‖r‖²), nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least
         eigenvalue of the exact one.
         """
+
+    @staticmethod
+    def _from_json(text: str) -> Activation: ...
 
 @final
 class AugmentedLagrangian:
@@ -2134,7 +2179,14 @@ class AugmentedLagrangian:
         ("interrupted"); None before the first.
         """
 
-    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+    def solve(
+        self,
+        xs: ArrayLike,
+        us: _Controls,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+    ) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
         Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
@@ -2143,16 +2195,26 @@ class AugmentedLagrangian:
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+        callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
+            ("interrupted"). What it raises is raised here.
+        verbose: whether to print a line for each iteration.
+        progress: whether to show the progress, by tqdm where that is installed, else as lines.
 
         Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
         """
 
-    def resume(self) -> Solution:
+    def resume(
+        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+    ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
-        Raises `ProblemError` as `solve`.
+        callback, verbose, progress: as of `solve`.
+
+        Raises `ProblemError` as `solve`, and if there is no solution yet.
         """
 
+    @staticmethod
+    def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> AugmentedLagrangian: ...
     def shift(self, last: int) -> None:
         """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
         with it.
@@ -2235,11 +2297,15 @@ class ContactDynamics:
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers."""
 
+    @staticmethod
+    def _from_json(model: Model, text: str) -> ContactDynamics: ...
+
 @final
 class Cost:
     """A term of a cost: weight times an activation of a residual.
 
     name: what `Problem.set_weight` and errors call it.
+    weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
     activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
         for other residuals.
@@ -2250,6 +2316,47 @@ class Cost:
     """
 
     def __new__(cls, name: str, weight: float, residual: Residual, activation: Activation | None = None) -> Cost: ...
+
+@final
+class DifferentialAction:
+    """An action of accelerations and a cost per second that are written in Python, in steps of a time.
+
+    The state is x = (q, v); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
+
+    nv, nu: the numbers of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
+    calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; of the terminal knot the
+        accelerations may be None.
+    dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
+    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among da_dq, da_dv, da_du, the derivatives of
+        the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`.
+    integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+    model: a robot whose positions q are, with its ⊕; None for vectors of nv numbers.
+
+    Raises `ProblemError` if dt is not above 0.
+
+    >>> from condyle.optimal import DifferentialAction, Fddp, Problem
+    >>> def spring(t, x, u):
+    ...     return u - x[:1], 0.5 * (x @ x + u @ u)
+    >>> knot = DifferentialAction(1, 1, spring, 0.1, integrator="runge_kutta_4")
+    >>> end = DifferentialAction(1, 0, lambda t, x, u: (None, 5.0 * (x @ x)), None)
+    >>> problem = Problem([1.0, 0.0], [knot], [0] * 30, end)
+    >>> Fddp(problem).solve(np.zeros((31, 2)), np.zeros((30, 1))).status
+    'converged'
+    """
+
+    def __new__(
+        cls,
+        nv: int,
+        nu: int,
+        calc: Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]],
+        dt: float | None,
+        calc_diff: Callable[[Any, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        model: Model | None = None,
+    ) -> DifferentialAction: ...
 
 @final
 class Fddp:
@@ -2282,7 +2389,14 @@ class Fddp:
         ("interrupted"); None before the first.
         """
 
-    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+    def solve(
+        self,
+        xs: ArrayLike,
+        us: _Controls,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+    ) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
         Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
@@ -2291,16 +2405,26 @@ class Fddp:
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+        callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
+            ("interrupted"). What it raises is raised here.
+        verbose: whether to print a line for each iteration.
+        progress: whether to show the progress, by tqdm where that is installed, else as lines.
 
         Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
         """
 
-    def resume(self) -> Solution:
+    def resume(
+        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+    ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
-        Raises `ProblemError` as `solve`.
+        callback, verbose, progress: as of `solve`.
+
+        Raises `ProblemError` as `solve`, and if there is no solution yet.
         """
 
+    @staticmethod
+    def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> Fddp: ...
     def shift(self, last: int) -> None:
         """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
         with it.
@@ -2349,13 +2473,16 @@ class FreeDynamics:
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The efforts that hold the robot still at the state x, nu numbers."""
 
+    @staticmethod
+    def _from_json(model: Model, text: str) -> FreeDynamics: ...
+
 @final
 class FrictionCone:
     """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
-    surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
-    default 0 and infinite.
+    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
+    rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
+    (N), by default 0 and infinite.
 
     Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
 
@@ -2403,6 +2530,11 @@ class ImpulseDynamics:
         damping: float = 0.0,
         limits: Sequence[Limit] | None = None,
     ) -> ImpulseDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """No controls: an impact has none."""
+
+    @staticmethod
+    def _from_json(model: Model, text: str) -> ImpulseDynamics: ...
 
 @final
 class InverseDynamics:
@@ -2426,6 +2558,11 @@ class InverseDynamics:
         upper: ArrayLike | None = None,
         limits: Sequence[Limit] | None = None,
     ) -> InverseDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """The accelerations that hold the robot still: nv zeros."""
+
+    @staticmethod
+    def _from_json(model: Model, text: str) -> InverseDynamics: ...
 
 @final
 class Limit:
@@ -2478,9 +2615,10 @@ class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`,
-        `ConstrainedAction`.
-    stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Action`,
+        `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+    stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
+        model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
     terminal: the model of the end, without controls.
 
     Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
@@ -2488,7 +2626,9 @@ class Problem:
     all knots.
     """
 
-    def __new__(cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int], terminal: _Action) -> Problem: ...
+    def __new__(
+        cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int] | None, terminal: _Action
+    ) -> Problem: ...
     @property
     def horizon(self) -> int:
         """The number of knots before the terminal one, N."""
@@ -2509,6 +2649,8 @@ class Problem:
         robots.
         """
 
+    @staticmethod
+    def _from_parts(x0: ArrayLike, parts: Sequence[Any], stages: Sequence[int] | None) -> Problem: ...
     def set_x0(self, x0: ArrayLike) -> None:
         """Sets the initial state, nx numbers, as an MPC does before each solve.
 
@@ -2518,7 +2660,7 @@ class Problem:
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
 
-        Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
+        Raises `KeyError` if there is no such term, `ProblemError` if the weight is negative or not finite.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
@@ -2530,10 +2672,35 @@ class Problem:
         Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
         """
 
+    def quasi_static(self, xs: ArrayLike) -> _Array | list[_Array]:
+        """The controls of all knots that hold their states still, each by itself, as far as they can: (N, nu), or a list of N
+        arrays where knots differ in nu. A robot's come from statics, others from steps of Newton.
+
+        xs: states, (N + 1, nx).
+        """
+
+    def evaluate(self, xs: ArrayLike, us: _Controls) -> Evaluation:
+        """The cost of states and controls, and what the dynamics compute there, as an `Evaluation`.
+
+        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+        """
+
+    def _evaluate(self, xs: ArrayLike, us: _Controls, moved: int) -> Evaluation:
+        """The evaluation of a solution, unless the horizon has moved on since."""
+
+    def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqNode]:
+        """The linear-quadratic problem around states and controls, a list of N + 1 `LqNode`s, which a `Sweep` solves.
+
+        xs, us: as of `evaluate`.
+        """
+
     def rollout(self, us: _Controls) -> _Array:
         """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
         us: (N, nu), or a list of N arrays where knots differ in nu.
+
+        Other threads run meanwhile; what a handler of a signal raises, as KeyboardInterrupt, ends it between knots.
         """
 
 @final
@@ -2627,6 +2794,69 @@ class Residual:
     @staticmethod
     def impulse_center_of_mass() -> Residual:
         """The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
+
+    @staticmethod
+    def own(
+        size: int,
+        calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
+        calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
+    ) -> Residual:
+        """A residual that is written in Python, r(t, x, u) of a knot t, size numbers.
+
+        size: the number of entries, at most 4096.
+        calc: a function of (t, x, u) that returns them; x = (q, v), and at the end u is empty.
+        calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the tangent
+            space of the state. Without it, those of calc, as for `Action`.
+
+        >>> from condyle.optimal import Residual
+        >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
+        """
+
+    @staticmethod
+    def _from_json(text: str) -> Residual: ...
+
+@final
+class Sweep:
+    """The backward Riccati sweep over a horizon of linear-quadratic knots: a step of `Fddp` without its line search.
+
+    nodes: a list of `LqNode`s, as `Problem.derivatives` gives them; the last is the terminal one, without controls.
+
+    Raises `ProblemError` if their shapes do not fit together.
+
+    >>> from condyle.optimal import Lqr, Problem, Sweep
+    >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
+    >>> problem = Problem([1.0], [knot], [0], end)
+    >>> result = Sweep(problem.derivatives([[1.0], [1.0]], [[0.0]])).run()
+    >>> bool(abs(result.K[0][0, 0] + 2 / 3) < 1e-15)  # δu = −⅔ δx
+    True
+    """
+
+    def __new__(cls, nodes: Sequence[LqNode]) -> Sweep: ...
+    def run(self, regularisation: float = 0.0) -> SweepResult:
+        """The feedback and the value functions, as a `SweepResult`.
+
+        regularisation: what is added to the diagonals of Quu and Vxx, at least 0.
+
+        Raises `ProblemError` if Quu of a knot is not positive definite.
+        """
+
+@final
+class Unicycle:
+    """The action of a unicycle: x = (x, y, θ), u = (v, ω), x⁺ = x + Δt (v cos θ, v sin θ, ω).
+
+    The cost is ½ (w₁² ‖x‖² + w₂² ‖u‖²); these are the rules of Crocoddyl's `ActionModelUnicycle`.
+
+    dt: Δt (s), above 0.
+    weights: w₁ and w₂.
+    terminal: whether it is an action of the end, without controls.
+
+    >>> from condyle.optimal import Fddp, Problem, Unicycle
+    >>> problem = Problem([-1.0, -1.0, 1.0], [Unicycle()], [0] * 20, Unicycle(terminal=True))
+    >>> Fddp(problem).solve(np.zeros((21, 3)), np.zeros((20, 2))).status
+    'converged'
+    """
+
+    def __new__(cls, dt: float = 0.1, weights: tuple[float, float] = ..., terminal: bool = False) -> Unicycle: ...
 
 @final
 class WrenchCone:
@@ -2731,13 +2961,13 @@ class Simulation:
     integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
         is conserved to rounding.
-    dt: h, the length of a step (s); a negative one goes back in time.
+    dt: h, the length of a step (s), above 0.
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
     max_iterations: it gives up after so many iterations.
 
-    Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
+    Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -2789,4 +3019,371 @@ class Simulation:
             efforts, then other threads run meanwhile.
 
         What a handler of a signal raises, as KeyboardInterrupt, ends the run after a step, whose state is kept.
+        """
+
+@final
+class FrictionContact:
+    """A contact with friction: what touches is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+
+    Whether it touches at a tick, and how strongly, is said by `ContactTarget.activation`. Numbers are checked when a
+    `WholeBodyController` is made.
+
+    Common arguments:
+    frame: the name of a frame of the robot.
+    friction: μ, Coulomb's coefficient; above 0.
+    min_force, max_force: least and greatest normal force of the whole contact (N).
+
+    >>> from condyle.wholebody import FrictionContact
+    >>> FrictionContact.sole("left_sole", 0.7, [0.2, 0.1]).corners.shape
+    (4, 3)
+    """
+
+    @property
+    def axes(self) -> Literal["world", "frame"]:
+        """The axes along which the normal is given: 'world' or 'frame'."""
+
+    @property
+    def corners(self) -> _Array | None:
+        """The corners of a surface in the frame (m), (n, 3); None of a point."""
+
+    @property
+    def forces(self) -> Literal["wrench", "corners"] | None:
+        """What describes the force on a surface: 'wrench' or 'corners'; None of a point."""
+
+    @property
+    def frame(self) -> str:
+        """The name of its frame."""
+
+    @property
+    def friction(self) -> float:
+        """μ."""
+
+    @property
+    def max_force(self) -> float:
+        """The greatest normal force (N)."""
+
+    @property
+    def min_force(self) -> float:
+        """The least normal force (N)."""
+
+    @property
+    def normal(self) -> _Array:
+        """The direction in which the environment pushes, 3 numbers."""
+
+    @property
+    def yaw_friction(self) -> float | None:
+        """γ (m); None for the default."""
+
+    @staticmethod
+    def point(
+        frame: str,
+        friction: float,
+        normal: ArrayLike | None = None,
+        axes: Literal["world", "frame"] = "world",
+        min_force: float = 0.0,
+        max_force: float = ...,
+    ) -> FrictionContact:
+        """A point: the frame's origin is held, the frame may turn about it.
+
+        normal: the direction in which the environment pushes, 3 numbers of any length but 0; None is z, level ground.
+        axes: 'world', along which the normal is given and stays, or 'frame', with which it turns.
+        """
+
+    @staticmethod
+    def surface(
+        frame: str,
+        friction: float,
+        corners: ArrayLike,
+        forces: Literal["wrench", "corners"] = "wrench",
+        normal: ArrayLike | None = None,
+        yaw_friction: float | None = None,
+        min_force: float = 0.0,
+        max_force: float = ...,
+    ) -> FrictionContact:
+        """An edge (two corners: the frame may turn about it) or a convex polygon (three or more: the frame is held).
+
+        corners: in the frame, in their order around the polygon, in one plane across the normal (m), (n, 3).
+        forces: 'wrench', a force with one friction cone, a centre of pressure within the polygon and a bounded moment about
+            the normal; or 'corners', a force with a friction cone at each corner.
+        normal: the direction in which the environment pushes, along the frame's axes, 3 numbers of any length but 0; None
+            is z.
+        yaw_friction: γ (m): the moment about the normal of a wrench is at most γ f_n. None is ⅔ μ r, r being the radius of
+            the greatest disc about the corners' mean within the polygon; ½ μ l on an edge of length 2 l.
+        """
+
+    @staticmethod
+    def sole(
+        frame: str,
+        friction: float,
+        size: ArrayLike,
+        forces: Literal["wrench", "corners"] = "wrench",
+        yaw_friction: float | None = None,
+        min_force: float = 0.0,
+        max_force: float = ...,
+    ) -> FrictionContact:
+        """A rectangular sole about the frame's origin, whose normal is the frame's z.
+
+        size: its sides along the frame's x and y (m); forces, yaw_friction: as of `surface`.
+        """
+
+@final
+class Plan:
+    """A planned motion with N + 1 knots: states at some times, efforts and gains between them, and which contacts touch when.
+
+    `WholeBodyController.track` makes references of it. Between knots q runs along the joints' own groups, v and a = Δv / Δt
+    are interpolated. Knots may share a time: then the velocity jumps there (an impact).
+
+    model: the robot.
+    times: N + 1 times, none smaller than the one before (s).
+    states: (q, v) of the knots, (N + 1, nq + nv).
+    touches: whether each of the controller's contacts touches from each knot to the next, (N, contacts).
+    controls: efforts of the actuated coordinates (all but those of free-flyers) from each knot to the next, (N, nu); None
+        if there are none.
+    gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
+    fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
+
+    Raises `ControllerError` for numbers that are not finite and times that run backwards.
+
+    >>> from condyle.wholebody import Plan
+    >>> robot = condyle.robots.quadruped()
+    >>> x = np.r_[condyle.neutral(robot), np.zeros(18)]
+    >>> plan = Plan(robot, [0.0, 0.5], [x, x], touches=np.ones((1, 4)))  # half a second on all feet
+    >>> plan.span, plan.activation(0, 0.2)
+    ((0.0, 0.5), 1.0)
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        times: ArrayLike,
+        states: ArrayLike,
+        touches: ArrayLike,
+        controls: ArrayLike | None = None,
+        gains: ArrayLike | None = None,
+        fade: float = 0.0,
+    ) -> Plan: ...
+    @property
+    def span(self) -> tuple[float, float]:
+        """The times of the first knot and of the last (s)."""
+
+    def activation(self, contact: int, t: float) -> float:
+        """The activation of a contact, by its number, at a time: 0 where it does not touch, ramped where it begins and ends
+        to, else 1.
+        """
+
+    def feedback(self, t: float, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
+        """The plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
+
+        t: the time (s); q: nq numbers; v: nv.
+
+        Raises `ValueError` if the plan has no controls.
+        """
+
+@final
+class Task:
+    """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
+
+    What it aims at is in the `References`. Tasks of priority 0 come first; those of priority 1 decide only what they leave
+    open, and so on. Within a priority the weights decide, and only their ratios matter. Numbers are checked when a
+    `WholeBodyController` is made.
+
+    Common arguments:
+    weight: w, at least 0; None is the default of the task.
+    gains: `Gains`, k (1/s²) and d (1/s); None is `Gains.critical(100.0)`.
+    mask: which of its numbers count, as many as it has; None is all.
+    axes: along whose axes these numbers are: 'world'; 'local', the frame's own (of tasks that move no frame, the world's);
+        or ('frame', name), those of another frame.
+    priority: 0 for the first; at most 2.
+
+    >>> from condyle.wholebody import Task
+    >>> Task.orientation("trunk", mask=[True, True, False])  # level, whatever its heading
+    <condyle.wholebody.Task orientation 'trunk', weight 10>
+    """
+
+    @property
+    def axes(self) -> _Axes:
+        """Along whose axes its numbers are: 'world', 'local' or ('frame', name)."""
+
+    @property
+    def frame(self) -> str | None:
+        """The name of its frame; None if it has none."""
+
+    @property
+    def gains(self) -> Gains:
+        """k and d, `Gains`."""
+
+    @property
+    def joints(self) -> _Array:
+        """Factors of the posture's weight, nv numbers; empty for all 1."""
+
+    @property
+    def kind(self) -> str:
+        """The quantity: the name of what made it."""
+
+    @property
+    def mask(self) -> list[bool]:
+        """Which of its numbers count."""
+
+    @property
+    def priority(self) -> int:
+        """Its priority: 0 for the first."""
+
+    @property
+    def weight(self) -> float:
+        """w."""
+
+    @staticmethod
+    def com(
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """The centre of mass, c̈: 3 numbers; weight 10."""
+
+    @staticmethod
+    def pose(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """A frame's origin and rotation, (p̈, ω̇): 6 numbers, linear first; weight 10."""
+
+    @staticmethod
+    def position(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """A frame's origin, p̈: 3 numbers; weight 10."""
+
+    @staticmethod
+    def orientation(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """A frame's rotation, ω̇: 3 numbers; weight 10."""
+
+    @staticmethod
+    def velocity(
+        frame: str,
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """The velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6 numbers, linear first;
+        weight 10.
+        """
+
+    @staticmethod
+    def angular_momentum(
+        weight: float | None = None,
+        gains: Gains | None = None,
+        mask: Sequence[bool] | None = None,
+        axes: _Axes | None | None = None,
+        priority: int = 0,
+    ) -> Task:
+        """The rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers; weight 0.1."""
+
+    @staticmethod
+    def posture(
+        weight: float | None = None, gains: Gains | None = None, joints: ArrayLike | None = None, priority: int = 0
+    ) -> Task:
+        """The actuated joints, q̈; weight 0.1.
+
+        joints: factors of the weight, one for each coordinate, nv numbers; None is all 1.
+        """
+
+    @staticmethod
+    def contact_force(
+        frame: str, weight: float | None = None, mask: Sequence[bool] | None = None, priority: int = 0
+    ) -> Task:
+        """The force of the contact of this frame: 6 numbers, force and moment at the contact's centre along its axes (t₁, t₂,
+        n), of which a point has 3; weight 1e-3. It has no gains, and does not act while the contact is off.
+        """
+
+@final
+class WholeBodyController:
+    """A whole-body controller: at each tick a cone program gives the accelerations, contact forces and joint efforts that best
+    do what the tasks ask.
+
+        x = (q̈, f)
+        minimise     ½ Σ w ‖J q̈ + J̇ v − a*‖²  +  ½ w_a ‖q̈‖²  +  ½ w_f ‖f − f_ref‖²
+        subject to   Sᵤ (M q̈ + h − Jᵀ f) = 0            no motor acts on a free-flyer
+                     J_c q̈ + J̇_c v = k (X_ref ⊖ X) − d v   contacts are held (k = d = 0 unless set)
+                     ‖(f₁, f₂)‖ ≤ μ f_n                  friction, a second-order cone for each force
+                     f_n p ∈ f_n · polygon, |τ_n| ≤ γ f_n   centre of pressure and yaw moment of a sole's wrench
+                     f_min ≤ Σ f_n ≤ f_max               for each contact, ramped while it fades in or out
+                     −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
+                     bounds on q̈                         from limits of position and velocity: `JointLimits`
+
+    Positions, velocities and accelerations of tasks and contacts are along the world's axes, accelerations classical. Memory
+    is fixed here.
+
+    model: the robot.
+    contacts: a list of `FrictionContact`, each of another frame; empty for a robot in free fall.
+    tasks: a list of `Task`.
+    settings: `Settings`; None for the default ones.
+
+    Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
+    without its contact, and for any number outside of its range.
+
+    >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
+    >>> robot = condyle.robots.quadruped()
+    >>> feet = [FrictionContact.point(f"{leg}_foot", 0.7) for leg in ("LF", "LH", "RF", "RH")]
+    >>> controller = WholeBodyController(robot, feet, [Task.com(), Task.orientation("trunk"), Task.posture()])
+    >>> knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # inwards
+    >>> q = np.r_[0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0, knees]
+    >>> command = controller.step(q, np.zeros(18), controller.hold(q)).solved()
+    >>> lift = command.forces[:, 2].sum()
+    >>> bool(abs(lift - 9.81 * robot.total_mass) < 0.1)  # the feet carry the weight
+    True
+    """
+
+    def __new__(
+        cls, model: Model, contacts: Sequence[FrictionContact], tasks: Sequence[Task], settings: Settings | None = None
+    ) -> WholeBodyController: ...
+    @property
+    def command(self) -> Command:
+        """The last `Command`; before the first step zeros."""
+
+    @property
+    def settings(self) -> Settings:
+        """The settings, all of them: `Settings`."""
+
+    def hold(self, q: ArrayLike) -> References:
+        """The `References` that keep a position at rest: all tasks where they are, each contact held where it is and touching,
+        the weight shared by the contacts in equal parts.
+
+        q: nq numbers.
+        """
+
+    def track(self, plan: Plan, t: float, references: References) -> None:
+        """Sets references to those of a plan at a time: joints, and where they bring centre of mass, momentum and frames;
+        contacts by their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
+
+        plan: a `Plan` of the same robot with as many contacts.
+        t: the time (s); before the first and after the last knot the plan rests in it.
+        references: `References` of this controller, which are changed.
+        """
+
+    def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
+        """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
+        Other threads run meanwhile.
+
+        q: nq numbers; v: nv.
+        references: `References` of this controller.
         """

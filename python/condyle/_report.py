@@ -13,7 +13,8 @@ class Reporter:
     """A callback of a solver that prints its iterations, or shows them by tqdm."""
 
     def __init__(self, callback: Callable[[Iteration], object] | None, verbose: bool, progress: bool) -> None:
-        self._callback, self._bar, self._lines = callback, None, verbose
+        self._callback, self._lines = callback, verbose
+        self._bar: Any = None
         if progress:
             self._bar = _bar()
             self._lines = verbose or self._bar is None

@@ -422,11 +422,10 @@ class Evaluation(NamedTuple):
     efforts: list[_Array]
     """The efforts of all joints of each knot of a robot, nv numbers; none of other knots and of impacts."""
     forces: list[dict[str, _Array]]
-    """The forces of each knot's contacts, by their names, 3 or 6 numbers in the axes of their rows; impulses of impacts."""
+    """The forces of each knot's contacts by name, 3 or 6 numbers in the axes of their rows; of impacts the impulses."""
 
 
 class _Solution(NamedTuple):
-
     xs: _Array
     """States, (N + 1, nx)."""
     us: _Array | list[_Array]

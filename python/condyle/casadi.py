@@ -139,6 +139,7 @@ def action(
     cost: the cost.
     lower, upper: bounds on the controls, as of `Action`.
 
+    >>> import casadi, condyle, condyle.casadi, numpy as np
     >>> x, u = casadi.SX.sym("x"), casadi.SX.sym("u")
     >>> knot = condyle.casadi.action(x, u, x + u, 0.5 * (x**2 + u**2))
     >>> end = condyle.casadi.action(x, None, None, 0.5 * x**2)

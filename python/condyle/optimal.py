@@ -13,13 +13,13 @@
 >>> solution.status, solution.xs.shape
 ('converged', (21, 14))
 
-What must hold exactly is a `Limit`, for `AugmentedLagrangian`: see there. An action for each knot costs no more than one
-for all: `Problem(x0, [action_0, action_1, ...], None, terminal)` computes those together that differ in costs only.
+What must hold exactly is a `Limit`, for `AugmentedLagrangian`: see there. An action for each knot costs no more than
+one for all: `Problem(x0, [action_0, action_1, ...], None, terminal)` computes those together that differ in costs only.
 
 What is one's own: an `Action` (the next state and the cost), a `DifferentialAction` (accelerations) or an `ode_action`
 (ẋ), residuals of a robot (`Residual.own`), constraints (`ConstrainedAction`), or expressions of CasADi
-(`condyle.casadi.action`). Derivatives that are not written are exact all the same, wherever functions can be called with
-numbers that know their derivatives.
+(`condyle.casadi.action`). Derivatives that are not written are exact all the same, wherever functions can be called
+with numbers that know their derivatives.
 
 The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are Crocoddyl's.
 """

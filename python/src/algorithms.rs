@@ -31,6 +31,9 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> VECTOR { b.r
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 ///
+/// Raises `ModelError` if M is singular wherever the robot is. At a position at which it happens to be, a point of mass on
+/// the axis about which it turns, the numbers are not finite, or as large as rounding has it.
+///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
 /// >>> a = condyle.aba(quadruped, condyle.Data(quadruped), q, zero, zero)

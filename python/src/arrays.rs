@@ -8,7 +8,7 @@ use condyle::{Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
 use numpy::ndarray::Dimension;
 use numpy::{
-    Element, Ix1, Ix2, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadwriteArrayDyn, PyUntypedArray,
+    Element, Ix1, Ix2, Ix3, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadwriteArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -87,6 +87,11 @@ pub(crate) fn vector<'py>(argument: &str, value: &Bound<'py, PyAny>, length: usi
 
 /// A matrix argument.
 pub(crate) fn matrix<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 2]) -> PyResult<Input<'py, Ix2>> {
+    input(argument, value, &shape)
+}
+
+/// An argument with three indices.
+pub(crate) fn tensor<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 3]) -> PyResult<Input<'py, Ix3>> {
     input(argument, value, &shape)
 }
 
@@ -342,11 +347,14 @@ impl<S: Number> Give for (DMatrix<S>, DMatrix<S>) {
     }
 }
 
-/// A class of `condyle._types`, looked up once.
+/// A class of `condyle._types`, or of another module, looked up once.
 macro_rules! class {
-    ($py:expr, $name:expr) => {{
+    ($py:expr, $name:expr) => {
+        $crate::arrays::class!($py, "condyle._types", $name)
+    };
+    ($py:expr, $module:expr, $name:expr) => {{
         static CLASS: pyo3::sync::PyOnceLock<Py<pyo3::types::PyType>> = pyo3::sync::PyOnceLock::new();
-        CLASS.import($py, "condyle._types", $name)
+        CLASS.import($py, $module, $name)
     }};
 }
 pub(crate) use class;

@@ -15,6 +15,12 @@ create_exception!(
 create_exception!(condyle, ProblemError, Error, "An error in an optimal control problem, a warm start or a setting.");
 create_exception!(
     condyle,
+    ControllerError,
+    Error,
+    "An error in the description of a whole-body controller or of a plan, or a step that was not solved."
+);
+create_exception!(
+    condyle,
     ModelError,
     Error,
     "An error in a model that is to be built, or a frame or joint that a model does not have."
@@ -36,6 +42,14 @@ pub(crate) fn exception(error: Cause) -> PyErr {
 /// An error of `condyle::optimal` as a `ProblemError`.
 pub(crate) fn problem_error(error: condyle::optimal::Error) -> PyErr {
     ProblemError::new_err(error.to_string())
+}
+
+/// An error of `condyle::wholebody` as a `ModelError` or a `ControllerError`.
+pub(crate) fn controller_error(error: condyle::wholebody::Error) -> PyErr {
+    match error {
+        condyle::wholebody::Error::Model(error) => exception(error),
+        other => ControllerError::new_err(other.to_string()),
+    }
 }
 
 /// The error for a word that is none of those that an argument may be.

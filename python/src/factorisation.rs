@@ -4,6 +4,7 @@ use crate::arrays::{Give, class, matrix, vector};
 use crate::exceptions::within;
 use crate::functions::{Argument, Forces, Position, Tangent, regular, rows};
 use crate::model::{MadeFor, Model};
+use crate::signals::{self, Signals};
 use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -33,11 +34,15 @@ macro_rules! factor {
 
             /// Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
             ///
-            /// Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+            /// Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+            /// signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
             fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
-                let M = matrix("M", M, [self.size, self.size])?.to_matrix();
-                self.inner.factorize(&M);
-                self.done = true;
+                let (py, M) = (M.py(), matrix("M", M, [self.size, self.size])?.to_matrix());
+                self.done = false;
+                let (inner, mut signals) = (&mut self.inner, Signals::new(signals::SHORT));
+                let done = py.detach(|| inner.factorize_while(&M, || signals.go_on().is_continue()));
+                signals.finish()?;
+                self.done = done;
                 Ok(())
             }
 
@@ -65,10 +70,18 @@ macro_rules! factor {
                 B: &Bound<'py, PyAny>,
                 out: Option<&Bound<'py, PyAny>>,
             ) -> PyResult<Bound<'py, PyAny>> {
-                let factor = self.factor()?;
-                let mut X = rows("B", B, self.size)?;
-                factor.solve_matrix(&mut X);
-                X.give(B.py(), out)
+                let (py, factor, mut X) = (B.py(), self.factor()?, rows::<f64>("B", B, self.size)?);
+                let mut signals = Signals::new(signals::SHORT);
+                py.detach(|| {
+                    for column in X.as_mut_slice().chunks_exact_mut(self.size.max(1)) {
+                        if signals.go_on().is_break() {
+                            return;
+                        }
+                        factor.solve(column);
+                    }
+                });
+                signals.finish()?;
+                X.give(py, out)
             }
 
             /// The inverse M⁻¹, both triangles filled.
@@ -78,8 +91,10 @@ macro_rules! factor {
                 py: Python<'py>,
                 out: Option<&Bound<'py, PyAny>>,
             ) -> PyResult<Bound<'py, PyAny>> {
-                let mut X = DMatrix::zeros(self.size, self.size);
-                self.factor()?.inverse(&mut X);
+                let (factor, mut X) = (self.factor()?, DMatrix::zeros(self.size, self.size));
+                let mut signals = Signals::new(signals::SHORT);
+                py.detach(|| factor.inverse_while(&mut X, || signals.go_on().is_continue()));
+                signals.finish()?;
                 X.give(py, out)
             }
         }

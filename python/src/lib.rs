@@ -7,7 +7,7 @@
 //! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
 //!   `regressors`, `simulation`: the library's functions and types, one to one;
-//! - `optimal`: the module `condyle.optimal`.
+//! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
 //!
 //! The doc comments here are the docstrings that Python sees; `stubs.py` writes them into `condyle/_condyle.pyi`.
 #![allow(non_snake_case)]
@@ -36,6 +36,7 @@ mod regressors;
 mod robots;
 mod signals;
 mod simulation;
+mod wholebody;
 
 use pyo3::exceptions::PyImportError;
 use pyo3::prelude::*;
@@ -79,7 +80,7 @@ mod _condyle {
         rnea_second_derivatives, static_torque_derivative,
     };
     #[pymodule_export]
-    use exceptions::{Error, ModelError, NotPhysicalError, ParseError, ProblemError};
+    use exceptions::{ControllerError, Error, ModelError, NotPhysicalError, ParseError, ProblemError};
     #[pymodule_export]
     use factorisation::{Cholesky, DivideConquer, Ltdl};
     #[pymodule_export]
@@ -113,6 +114,8 @@ mod _condyle {
     use robots::{arm7, humanoid, quadruped};
     #[pymodule_export]
     use simulation::Simulation;
+    #[pymodule_export]
+    use wholebody::{FrictionContact, Plan, Task, WholeBodyController};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

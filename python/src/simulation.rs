@@ -31,13 +31,13 @@ self_cell::self_cell!(
 /// integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
 ///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
 ///     is conserved to rounding.
-/// dt: h, the length of a step (s); a negative one goes back in time.
+/// dt: h, the length of a step (s), above 0.
 /// passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
 ///     none of either.
 /// tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
 /// max_iterations: it gives up after so many iterations.
 ///
-/// Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
+/// Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
 ///
 /// >>> from condyle.simulation import Simulation
 /// >>> quadruped = condyle.robots.quadruped()
@@ -83,8 +83,8 @@ impl Simulation {
             }
         };
         let passive = passive.map(|smoothing| positive_speed("passive", smoothing)).transpose()?;
-        if dt == 0.0 || !dt.is_finite() {
-            return Err(PyValueError::new_err(format!("dt: expected a finite number other than 0, found {dt}")));
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(PyValueError::new_err(format!("dt: expected a finite number above 0, found {dt}")));
         }
         if !(tolerance >= 0.0 && tolerance.is_finite()) {
             return Err(PyValueError::new_err(format!(

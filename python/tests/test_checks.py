@@ -100,9 +100,13 @@ def test_frames_travel_by_name() -> None:
     two.append(condyle.WORLD, None, ARM)
     two = two.build()
     assert two.frame("tool") != ARM.frame("tool")
-    x0 = np.zeros(28)
-    data = json.loads(Problem(x0, [FreeDynamics(two, 0.1, [point])], [0], FreeDynamics(two, None, [])).to_json())
-    assert data["knots"][0]["costs"][0]["residual"]["frame_translation"]["frame"] == two.frame("tool")
+    x0, there = np.zeros(28), condyle.frame_placement(two, condyle.Data(two), np.zeros(14), "tool")
+    reached = Cost("point", 1.0, Residual.frame_translation(ARM, "tool", there[:3, 3]))
+    problem = Problem(x0, [FreeDynamics(two, 0.1, [reached])], [0], FreeDynamics(two, None, []))
+    assert Fddp(problem, max_iterations=0).solve(np.zeros((2, 28)), np.zeros((1, 14))).cost == 0.0
+    data = json.loads(problem.to_json())
+    frame = data["knots"][0]["costs"][0]["residual"]["frame_translation"]["frame"]
+    assert frame == {"name": "tool", "kind": "Link"}
     # a robot without it
     quadruped = condyle.robots.quadruped()
     message = r"^cost `point`: unknown frame `tool`; nearest is `\w+`$"
@@ -178,10 +182,15 @@ def test_targets_that_are_none_are_refused() -> None:
 def test_weights_cones_and_settings_are_checked() -> None:
     problem, xs, us = reach()
     before = problem.to_json()
-    for bad in (np.nan, np.inf, -np.inf):
-        with pytest.raises(ProblemError, match="^cost `reach`: its weight is .*, expected a finite number$"):
+    for bad in (-1.0, np.nan, np.inf, -np.inf):
+        message = "^cost `reach`: its weight is .*, expected a finite number of at least 0$"
+        with pytest.raises(ProblemError, match=message):
             problem.set_weight("reach", bad)
+        with pytest.raises(ProblemError, match=message):
+            FreeDynamics(ARM, 0.05, [Cost("reach", bad, Residual.state(X0))])
     assert problem.to_json() == before
+    with pytest.raises(ProblemError, match="^cost `reach`: its weight is -1000, expected"):
+        Problem.from_json(before.replace('"weight":1000.0', '"weight":-1000.0'))
     with pytest.raises(KeyError):
         problem.set_weight("rest of it", 1.0)
     for weights in ([-1.0] * 7, [np.nan] * 7):
@@ -211,8 +220,8 @@ def test_weights_cones_and_settings_are_checked() -> None:
 
 
 def test_steps_of_a_simulation_are_numbers() -> None:
-    for dt in (0.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="^dt: expected a finite number other than 0, found"):
+    for dt in (0.0, -1e-3, np.nan, np.inf):
+        with pytest.raises(ValueError, match="^dt: expected a finite number above 0, found"):
             condyle.simulation.Simulation(ARM, dt=dt)
     with pytest.raises(ValueError, match="^tolerance: expected a finite number of at least 0, found NaN$"):
         condyle.simulation.Simulation(ARM, tolerance=np.nan)

@@ -103,7 +103,11 @@ def test_a_swing_up() -> None:
     [
         (lambda: DifferentialAction(1, 1, pendulum, -0.1), ProblemError, "its duration must be above 0"),
         (lambda: DifferentialAction(1, 1, pendulum, None), ValueError, "nu: expected 0 for a terminal knot"),
-        (lambda: DifferentialAction(6, 1, pendulum, 0.1, model=ARM), ValueError, "nv: expected 7, as of model, found 6"),
+        (
+            lambda: DifferentialAction(6, 1, pendulum, 0.1, model=ARM),
+            ValueError,
+            "nv: expected 7, as of model, found 6",
+        ),
         (lambda: DifferentialAction(1, 1, pendulum, 0.1, integrator="euler"), ValueError, "integrator: expected"),
     ],
 )

@@ -29,6 +29,7 @@ from condyle.optimal import (
     ProblemError,
     Residual,
     Sweep,
+    Unicycle,
 )
 
 ARM = condyle.robots.arm7()
@@ -62,7 +63,9 @@ def end() -> FreeDynamics:
 
 
 def gait() -> Problem:
-    return Problem(STANDING, [ContactDynamics(QUADRUPED, contacts(), 0.02, costs(t)) for t in range(KNOTS)], None, end())
+    return Problem(
+        STANDING, [ContactDynamics(QUADRUPED, contacts(), 0.02, costs(t)) for t in range(KNOTS)], None, end()
+    )
 
 
 def start(problem: Problem) -> Any:
@@ -272,7 +275,9 @@ def test_a_sweep_is_the_solvers() -> None:
     with pytest.raises(ProblemError, match="nodes: expected at least one"):
         Sweep([])
     with pytest.raises(ProblemError, match=r"nodes\[0\]: expected ndx = 1, found 14"):
-        Sweep([nodes[0], LqNode([[1.0]], np.zeros((1, 0)), [0.0], [[1.0]], np.zeros((1, 0)), np.zeros((0, 0)), [0], [])])
+        Sweep(
+            [nodes[0], LqNode([[1.0]], np.zeros((1, 0)), [0.0], [[1.0]], np.zeros((1, 0)), np.zeros((0, 0)), [0], [])]
+        )
 
 
 def power(t: Any, x: Any, u: Any) -> Any:
@@ -303,9 +308,7 @@ def test_residuals_of_ones_own(calc: Any) -> None:
     xs, us = start(ours)
     assert ours.evaluate(xs + 0.1, us).cost > gait().evaluate(xs + 0.1, us).cost
     for form in (True, False):
-        one, other = (
-            Fddp(p, max_iterations=5, inverse_dynamics_form=form).solve(xs, us) for p in (ours, expected)
-        )
+        one, other = (Fddp(p, max_iterations=5, inverse_dynamics_form=form).solve(xs, us) for p in (ours, expected))
         assert one.trace[1].accepted
         np.testing.assert_allclose([i.cost for i in one.trace], [i.cost for i in other.trace], rtol=1e-6)
     threaded = Fddp(expected, max_iterations=5, inverse_dynamics_form=False, threads=3).solve(xs, us)
@@ -372,6 +375,8 @@ KINDS: dict[str, Any] = {
     "ConstrainedAction": lambda: ConstrainedAction(Lqr([[1.0]]), 12, power),
     "DifferentialAction": lambda: DifferentialAction(1, 1, power, 0.1, integrator="runge_kutta_3", upper=[1.0]),
     "DifferentialAction of a robot": lambda: DifferentialAction(7, 7, power, 0.1, model=ARM),
+    "Unicycle": lambda: Unicycle(0.2, (3.0, 1.0)),
+    "Unicycle, end": lambda: Unicycle(terminal=True),
     "Cost": lambda: Cost("a", 2.0, Residual.frame_velocity(ARM, "tool"), Activation.smooth2(0.5)),
     "Cost of one's own": lambda: Cost("a", 2.0, Residual.own(12, power, power_diff)),
     "Cost of a cone": lambda: Cost("a", 2.0, Residual.friction_cone("foot", FrictionCone(0.7))),

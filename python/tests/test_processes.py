@@ -270,6 +270,8 @@ def test_control_c(name: str) -> None:
     """Ctrl-C raises KeyboardInterrupt within the call, and that ends the program."""
     program = PRELUDE + textwrap.dedent(LONG[name] + INTERRUPTED) + "print('begin', flush=True)\n"
     program += "interrupted(KeyboardInterrupt)\nprint('again', flush=True)\ncall()\n"
+    # whoever runs the tests in the background may have told them to ignore Ctrl-C
+    program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n" + program
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -295,6 +297,73 @@ def test_signals_on_another_thread() -> None:
         worker.join()
         assert seen
         assert simulation.time > 0.19
+        """
+    )
+
+
+MEANWHILE = {
+    "rollout": """
+        arm, knots = condyle.robots.arm7(), 500_000
+        problem = Problem(np.zeros(14), [FreeDynamics(arm, 1e-6, [])], [0] * knots, FreeDynamics(arm, None, []))
+        us = np.zeros((knots, 7))
+        def call():
+            return problem.rollout(us)
+    """,
+    "factorize": """
+        factor, M = condyle.Cholesky(2048), np.diag(np.full(2048, 2.0))
+        def call():
+            factor.factorize(M)
+    """,
+    "inverse": """
+        factor = condyle.Cholesky(1024)
+        factor.factorize(np.diag(np.full(1024, 2.0)))
+        def call():
+            factor.inverse()
+    """,
+    "solve": """
+        factor = condyle.Cholesky(1024)
+        factor.factorize(np.diag(np.full(1024, 2.0)))
+        def call():
+            factor.solve_matrix(np.ones((1024, 1024)))
+    """,
+    "a factor with the zeros of a tree": """
+        chain, body = condyle.ModelBuilder("chain"), condyle.WORLD
+        ball = condyle.Inertia.from_com(1.0, np.zeros(3), np.eye(3))
+        for k in range(1500):
+            body = chain.body(f"b{k}", body, condyle.Joint.revolute([0, 0, 1]), inertia=ball)
+        chain = chain.build()
+        factor, M = condyle.Ltdl(chain), np.diag(np.full(1500, 2.0))
+        def call():
+            factor.factorize(M)
+            factor.inverse()
+    """,
+}
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
+@pytest.mark.parametrize("call", MEANWHILE.values(), ids=MEANWHILE)
+def test_handlers_run_meanwhile(call: str) -> None:
+    """Handlers run again and again during a long call, not once when it has ended; and what they raise ends it."""
+    check(
+        call
+        + """
+        seen, ends = [], False
+        def handler(number, frame):
+            seen.append(number)
+            if ends:
+                raise TimeoutError
+        signal.signal(signal.SIGALRM, handler)
+        signal.setitimer(signal.ITIMER_REAL, 0.005, 0.005)
+        call()
+        assert len(seen) > 3, len(seen)
+        ends = True
+        try:
+            call()
+        except TimeoutError:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        else:
+            raise AssertionError("the call has ended by itself")
+        call()
         """
     )
 

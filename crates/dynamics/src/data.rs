@@ -42,7 +42,7 @@ use condyle_spatial::gate::{is, renamed};
 #[repr(C)]
 pub struct Data<S> {
     size: Size,
-    /// Of the tree that it was made for.
+    /// The hash of the tree that it was made for.
     tree: u64,
     pub(crate) world: World<S>,
     pub(crate) moving: Moving<S>,
@@ -65,7 +65,7 @@ pub struct Data<S> {
     pub(crate) all_terms: all_terms::Workspace<S>,
     pub(crate) forward_dynamics: factored_dynamics::Workspace<S>,
     pub(crate) regressor: regressor::Workspace<S>,
-    /// Of single calls on robots with limbs.
+    /// The scratch of single calls on robots with limbs.
     pub(crate) limbs: Option<Box<Scratch>>,
 }
 

@@ -4,9 +4,9 @@
 //! straight. So x of n numbers has n − nq + nv directions, and derivatives are by these: of f(x ⊕ δ) at δ = 0.
 //!
 //! In vector registers eight or four directions take one evaluation ([`LaneJacobian`]), of a function that is written for
-//! any scalar. One direction is a dual number, two are a hyper-dual one (Fike and Alonso, *The development of hyper-dual numbers for
-//! exact second-derivative calculations*, 2011): derivatives are exact, and cost one evaluation of f for each direction or
-//! pair of directions. What has a derivative by hand has it many times faster.
+//! any scalar. One direction is a dual number, two are a hyper-dual one (Fike and Alonso, *The development of hyper-dual
+//! numbers for exact second-derivative calculations*, 2011): derivatives are exact, and cost one evaluation of f for each
+//! direction or pair of directions. What has a derivative by hand has it many times faster.
 
 use crate::data::Data;
 use crate::workspace::{Long, Short};
@@ -31,7 +31,7 @@ fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
     out
 }
 
-/// How many directions a state has.
+/// The number of directions of a state.
 fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
     assert!(x.len() >= model.nq(), "x: expected at least {} numbers, found {}", model.nq(), x.len());
     x.len() - model.nq() + model.nv()

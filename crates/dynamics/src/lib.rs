@@ -50,6 +50,8 @@ pub use calls::second_derivatives::{
     AbaHessian, RneaHessian, RneaSecondDerivatives, aba_hessian, rnea_hessian, rnea_second_derivatives,
 };
 pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
+#[doc(hidden)]
+pub use condyle_model::integrate_jacobian_groups;
 pub use condyle_model::{
     Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, IntegrateArgument, Joint, JointOptions, Limits, Mimic,
     MjcfOptions, Model, ModelBuilder, SdfOptions, UrdfOptions, WORLD, Warning, difference, difference_jacobian,

@@ -1,7 +1,7 @@
 //! Which algorithm when: every threshold of this crate, with the measurement behind it.
 //!
-//! What depends on the model alone is decided when [`Data`](crate::Data) is made. How the limbs of a robot are scheduled, and
-//! whether they are, is decided when its model is built (`condyle_model::limbs`).
+//! Choices that depend on the model alone are made when [`Data`](crate::Data) is made. How the limbs of a robot are
+//! scheduled, and whether they are, is decided when its model is built (`condyle_model::limbs`).
 
 use crate::passes::factored_dynamics::ForwardDynamicsMethod;
 use condyle_model::Model;
@@ -9,16 +9,16 @@ use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 use condyle_spatial::gate::{Fused, is};
 
-/// How long the rows of the factor of M may be, in the mean, for M⁻¹ to come from the factor. Measured by
+/// The length that the rows of the factor of M may have, in the mean, for M⁻¹ to come from the factor. Measured by
 /// `benches/factorisation.rs`: equal at 12.5 on a chain of 24; the humanoid has 9.7, the arm 4.
 const SHORT_ROWS: usize = 12;
 
-/// How long the way to the root must be, in the mean, for −M⁻¹ B to be solved by the articulated bodies instead of being
-/// multiplied out. Measured by `benches/peers/dynamics.py` on chains.
+/// The length that the way to the root must have, in the mean, for −M⁻¹ B to be solved by the articulated bodies instead of
+/// being multiplied out. Measured by `benches/peers/dynamics.py` on chains.
 const LONG_WAY: usize = 24;
 
-/// How long the way to the root must be, in the mean, for ∂τ to be computed four columns at a time instead of pair by pair.
-/// Measured by `benches/peers/dynamics.py`.
+/// The length that the way to the root must have, in the mean, for ∂τ to be computed four columns at a time instead of pair
+/// by pair. Measured by `benches/peers/dynamics.py`.
 const LONG_SUPPORT: usize = 4;
 
 /// Whether M⁻¹ comes from the factor of M, of which there are `nonzeros` entries. It is the only way for joints that share
@@ -43,8 +43,8 @@ pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
 ///
 /// Measured by `benches/factorisation.rs` on chains, binary trees and stars of 6 to 200 joints and on the embedded robots: h
 /// and M alone cost as much as the whole recursion on the smallest and 1.1 to 3 times as much on the others, so no factor of
-/// M can win, however sparse. Where joints share a coordinate the recursion does not close. Of the factors, the sparse one is
-/// as fast as the dense one on chains, and on a star of 200 it makes forward dynamics 13 times faster.
+/// M can win, however sparse. Where joints share a coordinate the recursion does not close. Of the factors, the sparse one
+/// is as fast as the dense one on chains, and on a star of 200 it makes forward dynamics 13 times faster.
 pub(crate) fn forward_dynamics<R>(model: &Model<R>) -> ForwardDynamicsMethod {
     if model.has_mimic() { ForwardDynamicsMethod::Sparse } else { ForwardDynamicsMethod::ArticulatedBody }
 }

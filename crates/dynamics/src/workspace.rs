@@ -1,4 +1,4 @@
-//! What the workspaces of passes are made of.
+//! The arrays of which the workspaces of passes are made.
 //!
 //! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer.
 
@@ -20,7 +20,7 @@ pub(crate) type Short = gate::Short<Gate>;
 /// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
 pub(crate) type Long = gate::Long<Gate>;
 
-/// How large the arrays of a workspace are.
+/// The sizes of the arrays of a workspace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Size {
     /// Bodies, the world included.

@@ -183,7 +183,7 @@ fn energy_does_not_drift() {
     assert!(largest.iter().all(|&x| x < 1.2 * largest[0] && x < 2e-2));
 }
 
-/// A step back undoes a step, to rounding.
+/// A step back undoes a step, to rounding: what moves is turned round, since time runs forwards only.
 #[test]
 fn variational_steps_are_symmetric() {
     for seed in 0..4 {
@@ -193,9 +193,22 @@ fn variational_steps_are_symmetric() {
         let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 1e-3));
         simulation.set_state(&q, &v);
         assert!(simulation.step(&tau, &f_ext).is_done());
-        simulation.settings.dt = -1e-3;
+        let (there, back) = (simulation.q().to_vec(), simulation.v().iter().map(|v| -v).collect::<Vec<_>>());
+        simulation.set_state(&there, &back);
         assert!(simulation.step(&tau, &f_ext).is_done());
-        assert!(distance(&model, (simulation.q(), simulation.v()), (&q, &v)) < 1e-9, "seed {seed}");
+        let begin: Vec<f64> = v.iter().map(|v| -v).collect();
+        assert!(distance(&model, (simulation.q(), simulation.v()), (&q, &begin)) < 1e-9, "seed {seed}");
+    }
+}
+
+/// Neither back nor nowhere.
+#[test]
+fn time_runs_forwards() {
+    let arm = robots::arm7();
+    for dt in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
+        let run = || Simulation::<f64>::new(&arm, settings(Integrator::RungeKutta4, dt)).run(1, |_| ());
+        let said = std::panic::catch_unwind(run).unwrap_err().downcast::<String>().unwrap();
+        assert_eq!(*said, format!("settings.dt: expected a finite number above 0, found {dt}"));
     }
 }
 

@@ -7,10 +7,13 @@ use crate::check;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 
-/// L in place of the lower triangle of M.
+/// L in place of the lower triangle of M, as long as it is to go on; says whether it is done.
 #[inline(always)]
-fn factorize<S: Scalar>(M: &mut [S], n: usize) {
+fn factorize<S: Scalar>(M: &mut [S], n: usize, mut go_on: impl FnMut() -> bool) -> bool {
     for j in 0..n {
+        if !go_on() {
+            return false;
+        }
         let (left, rest) = M.split_at_mut(j * n);
         let column = &mut rest[j..n];
         for k in 0..j {
@@ -22,6 +25,7 @@ fn factorize<S: Scalar>(M: &mut [S], n: usize) {
             *x = *x * r;
         }
     }
+    true
 }
 
 /// x in place of b: L Lᵀ x = b.
@@ -100,10 +104,18 @@ impl<S: Scalar> Cholesky<S> {
     /// If `M` is not n × n.
     #[inline(always)]
     pub fn factorize(&mut self, M: &DMatrix<S>) {
+        self.factorize_while(M, || true);
+    }
+
+    /// As [`factorize`](Self::factorize), with a function that is asked before each column whether to go on; says whether
+    /// the factor is done.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn factorize_while(&mut self, M: &DMatrix<S>, go_on: impl FnMut() -> bool) -> bool {
         let n = self.L.nrows();
         assert!(M.shape() == (n, n), "M: expected {n} × {n}, found {:?}", M.shape());
         self.L.copy_from(M);
-        factorize(self.L.as_mut_slice(), n);
+        factorize(self.L.as_mut_slice(), n, go_on)
     }
 
     /// x = M⁻¹ b in place of b, in O(n²).
@@ -140,10 +152,21 @@ impl<S: Scalar> Cholesky<S> {
     /// If `X` is not n × n.
     #[inline(always)]
     pub fn inverse(&self, X: &mut DMatrix<S>) {
+        self.inverse_while(X, || true);
+    }
+
+    /// As [`inverse`](Self::inverse), with a function that is asked before each column whether to go on; says whether X is
+    /// done.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn inverse_while(&self, X: &mut DMatrix<S>, mut go_on: impl FnMut() -> bool) -> bool {
         let n = self.L.nrows();
         assert!(X.shape() == (n, n), "X: expected {n} × {n}, found {:?}", X.shape());
         let (L, X) = (self.L.as_slice(), X.as_mut_slice());
         for j in 0..n {
+            if !go_on() {
+                return false;
+            }
             let column = &mut X[j * n..(j + 1) * n];
             column.fill(S::zero());
             column[j] = S::one();
@@ -155,5 +178,6 @@ impl<S: Scalar> Cholesky<S> {
                 X[j * n + k] = X[k * n + j];
             }
         }
+        true
     }
 }

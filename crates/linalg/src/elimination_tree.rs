@@ -12,9 +12,9 @@ use std::collections::BTreeSet;
 ///
 /// A robot's model is one: a column is a degree of freedom of a joint, a row of M a coordinate.
 pub trait ColumnTree {
-    /// How many rows the matrix has.
+    /// The number of rows of the matrix.
     fn rows(&self) -> usize;
-    /// How many columns there are: as many as rows, or more if several stand for the same row.
+    /// The number of columns: as many as rows, or more if several stand for the same row.
     fn columns(&self) -> usize;
     /// The column before c on the way to the root; its number is smaller than c.
     fn parent(&self, c: usize) -> Option<usize>;
@@ -41,7 +41,7 @@ impl ColumnTree for [Option<usize>] {
 /// Stands for the parent of a root.
 pub const NONE: usize = usize::MAX;
 
-/// Where the factor L may differ from zero: a tree on *places*, numbered depth first, parents before children.
+/// The entries of the factor L that may differ from zero: a tree on *places*, numbered depth first, parents before children.
 #[derive(Clone, Debug)]
 pub struct EliminationTree {
     /// The row of the matrix that each place stands for. Shape: n.
@@ -50,11 +50,11 @@ pub struct EliminationTree {
     pub swaps: Vec<(usize, usize)>,
     /// The place before it on the way to the root. Shape: n.
     pub parent: Vec<usize>,
-    /// How many places are between it and the root. Shape: n.
+    /// The number of places between each and the root. Shape: n.
     pub depth: Vec<usize>,
     /// The first of the consecutive places that are all on its way to the root and end with it. Shape: n.
     pub run: Vec<usize>,
-    /// Where its row begins in `Ltdl::rows`, a multiple of the step, and at the end their length. Shape: n + 1.
+    /// The beginning of each row in `Ltdl::rows`, a multiple of the step, and at the end their length. Shape: n + 1.
     pub first: Vec<usize>,
 }
 

@@ -136,7 +136,7 @@ impl<S: Scalar> Ltdl<S> {
         &self.D_inv
     }
 
-    /// How many entries of L and D may differ from zero, the ones on L's diagonal not counted.
+    /// The number of entries of L and D that may differ from zero, the ones on L's diagonal not counted.
     pub fn nonzeros(&self) -> usize {
         self.tree.depth.iter().map(|d| d + 1).sum()
     }
@@ -173,6 +173,14 @@ impl<S: Scalar> Ltdl<S> {
     /// If `M` is not nv × nv.
     #[inline(always)]
     pub fn factorize(&mut self, M: &DMatrix<S>) {
+        self.factorize_while(M, || true);
+    }
+
+    /// As [`factorize`](Self::factorize), with a function that is asked before each few rows whether to go on; says whether
+    /// the factor is done.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn factorize_while(&mut self, M: &DMatrix<S>, mut go_on: impl FnMut() -> bool) -> bool {
         let nv = self.D_inv.len();
         assert!(M.shape() == (nv, nv), "M: expected {nv} × {nv}, found {:?}", M.shape());
         let Self { tree, rows, D_inv } = self;
@@ -189,6 +197,9 @@ impl<S: Scalar> Ltdl<S> {
         }
         let mut end = nv; // the rows from here on are done
         while end > 0 {
+            if !go_on() {
+                return false;
+            }
             // Several places of a run at a time where there are as many: rows above are loaded and stored once for all.
             end -= match end - run[end - 1] {
                 4.. => eliminate::<S, 4>(tree, rows, D_inv, end - 4),
@@ -196,6 +207,7 @@ impl<S: Scalar> Ltdl<S> {
                 _ => eliminate::<S, 1>(tree, rows, D_inv, end - 1),
             };
         }
+        true
     }
 
     /// x = M⁻¹ b in place of b, in O(n d): Lᵀ y = b, then L x = D⁻¹ y.
@@ -276,11 +288,22 @@ impl<S: Scalar> Ltdl<S> {
     /// If `X` is not nv × nv.
     #[inline(always)]
     pub fn inverse(&self, X: &mut DMatrix<S>) {
+        self.inverse_while(X, || true);
+    }
+
+    /// As [`inverse`](Self::inverse), with a function that is asked before each row whether to go on; says whether X is
+    /// done.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn inverse_while(&self, X: &mut DMatrix<S>, mut go_on: impl FnMut() -> bool) -> bool {
         let nv = self.D_inv.len();
         assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());
         let EliminationTree { swaps, parent, depth, first, .. } = &self.tree;
         let rows = X.as_mut_slice(); // row k is column k: X is symmetric
         for k in 0..nv {
+            if !go_on() {
+                return false;
+            }
             let L = &self.rows[first[k]..first[k] + depth[k]];
             let (above, rest) = rows.split_at_mut(k * nv);
             let row = &mut rest[..k];
@@ -317,5 +340,6 @@ impl<S: Scalar> Ltdl<S> {
             X.swap_rows(i, k);
             X.swap_columns(i, k);
         }
+        true
     }
 }

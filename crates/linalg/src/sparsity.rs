@@ -5,15 +5,18 @@
 pub struct NonzeroRows {
     /// The rows, in the order in which products go through them.
     pub rows: Vec<usize>,
-    /// How many columns one after the other, from this one on, have the same rows.
+    /// The number of columns one after the other, from this one on, that have the same rows.
     pub same_pattern: usize,
 }
 
 impl NonzeroRows {
     /// For all columns of a matrix, given the rows of each.
     pub fn of_columns(rows: Vec<Vec<usize>>) -> Vec<Self> {
-        let same = |c: usize| rows[c..].iter().take_while(|other| **other == rows[c]).count();
-        (0..rows.len()).map(|c| Self { rows: rows[c].clone(), same_pattern: same(c) }).collect()
+        let mut same = vec![1; rows.len()];
+        for c in (1..rows.len()).rev().filter(|&c| rows[c - 1] == rows[c]) {
+            same[c - 1] = same[c] + 1;
+        }
+        rows.into_iter().zip(same).map(|(rows, same_pattern)| Self { rows, same_pattern }).collect()
     }
 }
 

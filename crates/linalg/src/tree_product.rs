@@ -175,9 +175,9 @@ fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[N
     }
 }
 
-/// How many columns of B go together.
+/// The number of columns of B that go together.
 const SIDE: usize = 4;
-/// How many operations are under way at any time: fewer sums than that take no less time.
+/// The number of operations that are under way at any time: fewer sums than that take no less time.
 const UNDER_WAY: usize = 8;
 
 /// The products in vector registers.

@@ -52,9 +52,10 @@ impl JointOptions {
     }
 }
 
-/// How many degrees of freedom the joints of a model may have: algorithms have matrices of their number by their number.
+/// The most degrees of freedom that the joints of a model may have: algorithms have matrices of their number by their
+/// number.
 const MAX_DEGREES: usize = 4096;
-/// How many coordinates a model may have whose joints follow others: its inertia matrix is factored as a dense one.
+/// The most coordinates that a model may have whose joints follow others: its inertia matrix is factored as a dense one.
 const MAX_SHARED: usize = 1024;
 
 struct Draft {

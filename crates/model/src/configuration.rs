@@ -197,6 +197,15 @@ pub enum IntegrateArgument {
     Velocity,
 }
 
+impl IntegrateArgument {
+    fn jacobian(self) -> GroupJacobian {
+        match self {
+            Self::Position => GroupJacobian::Transport,
+            Self::Velocity => GroupJacobian::Exp,
+        }
+    }
+}
+
 /// ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v, nv × nv, block-diagonal, between tangent spaces; it does not depend on q.
 ///
 /// v: nv numbers; J is overwritten. Allocates nothing.
@@ -204,11 +213,7 @@ pub enum IntegrateArgument {
 /// # Panics
 /// If `v` has not nv numbers or `J` is not nv × nv.
 pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
-    let which = match argument {
-        IntegrateArgument::Position => GroupJacobian::Transport,
-        IntegrateArgument::Velocity => GroupJacobian::Exp,
-    };
-    block_diagonal(model, ("v", v), which, S::one(), J);
+    block_diagonal(model, ("v", v), argument.jacobian(), S::one(), J);
 }
 
 /// The argument with respect to which a Jacobian of [`difference`] is taken.
@@ -245,21 +250,29 @@ fn block_diagonal<S: Scalar, R>(
     check(name, v.len(), model.nv());
     assert!(J.shape() == (model.nv(), model.nv()), "J: expected {0} × {0}, found {1:?}", model.nv(), J.shape());
     J.as_mut_slice().fill(S::zero());
-    for Space { joint, v: iv, .. } in model.tree.spaces.iter().cloned() {
+    (0..model.nv()).for_each(|k| J[(k, k)] = sign);
+    group_blocks(model, v, which, sign, J);
+}
+
+/// The blocks of [`integrate_jacobian`] for joints whose positions are no vector space; all else in J stays.
+#[doc(hidden)]
+pub fn integrate_jacobian_groups<S: Scalar>(model: &Model, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
+    group_blocks(model, v, argument.jacobian(), S::one(), J);
+}
+
+/// The blocks of sign · J(sign · v) for joints whose positions are no vector space.
+fn group_blocks<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, sign: S, J: &mut DMatrix<S>) {
+    for Space { joint, v: iv, .. } in &model.tree.spaces {
         let mut signed = [S::zero(); 6];
         for (signed, &v) in signed.iter_mut().zip(&v[iv.clone()]) {
             *signed = v * sign;
         }
-        match joint.jacobian(which, &signed[..iv.len().min(6)]) {
-            None => iv.for_each(|k| J[(k, k)] = sign),
-            Some(map) => {
-                let columns = map.columns();
-                for (k, &column) in joint.axes().iter().enumerate() {
-                    let column = columns[column].scale(sign).to_array();
-                    for (r, &row) in joint.axes().iter().enumerate() {
-                        J[(iv.start + r, iv.start + k)] = column[row];
-                    }
-                }
+        let Some(map) = joint.jacobian(which, &signed[..iv.len().min(6)]) else { continue };
+        let columns = map.columns();
+        for (k, &column) in joint.axes().iter().enumerate() {
+            let column = columns[column].scale(sign).to_array();
+            for (r, &row) in joint.axes().iter().enumerate() {
+                J[(iv.start + r, iv.start + k)] = column[row];
             }
         }
     }

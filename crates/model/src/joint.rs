@@ -51,7 +51,7 @@ pub enum Joint {
     FreeFlyer,
 }
 
-/// How a joint follows another one: its position is ratio · q + offset, q being the leader's position.
+/// A joint that follows another one: its position is ratio · q + offset, q being the leader's position.
 ///
 /// Both have one degree of freedom, and the leader follows nobody. A continuous leader has q = [cos θ, sin θ]: ratio is
 /// then a whole number, and what follows turns, by ratio · θ + offset. A continuous follower of a leader with one number
@@ -66,7 +66,7 @@ pub struct Mimic {
     pub offset: f64,
 }
 
-/// How far from 1 rounding takes the length of a vector that was divided by it.
+/// The distance from 1 to which rounding takes the length of a vector that was divided by it.
 const UNIT: f64 = 1e-15;
 
 impl Joint {

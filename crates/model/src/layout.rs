@@ -1,4 +1,4 @@
-//! How a pass sees model and state.
+//! Layouts: the views of model and state that passes have.
 //!
 //! An algorithm is written once, over [`Layout`]. It reaches its parent, its children's sums and its coordinates only
 //! through the verbs below, so that one source runs on

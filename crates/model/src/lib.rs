@@ -49,6 +49,7 @@ pub mod layout;
 pub mod limbs;
 mod magnitude;
 mod model;
+mod real;
 pub mod robots;
 #[doc(hidden)]
 pub mod tree;
@@ -58,6 +59,8 @@ mod variants;
 pub use body::{Body, Frame, FrameKind, Limits};
 pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 pub use condyle_spatial::{Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
+#[doc(hidden)]
+pub use configuration::integrate_jacobian_groups;
 pub use configuration::{
     DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
     interpolate, neutral, normalize, random_configuration, transport,

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::Model;
-use condyle_spatial::{Inertia, Se3, Sym3};
+use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
 
 /// The largest mass, length, inertia, gravity, armature, pitch or ratio of a model, in SI units. Inertia about a point that
 /// far away, the third power, can be multiplied by itself.
@@ -29,9 +29,17 @@ impl Model {
             let wrong = |what| Error::Joint { joint: body.joint_name.clone(), what };
             check(armature.iter().copied()).map_err(wrong)?;
         }
-        let wrong = |what| Error::Body { body: self.bodies[0].name.clone(), what };
-        check(self.gravity.to_array()).map_err(wrong)
+        check_gravity(self.gravity)
     }
+}
+
+/// Says what is wrong with a gravity.
+pub(crate) fn check_gravity(gravity: Vec3<f64>) -> Result<(), Error> {
+    let gravity = gravity.to_array();
+    if gravity.iter().any(|g| !g.is_finite()) {
+        return Err(Error::Gravity { gravity });
+    }
+    check(gravity).map_err(|what| Error::Body { body: "universe".to_owned(), what })
 }
 
 fn translation(X: &Se3<f64>) -> impl Iterator<Item = f64> + use<> {

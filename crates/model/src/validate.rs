@@ -1,5 +1,5 @@
-//! The validation of a model, by whatever way it is made: numbers that none can have are errors; inertias that no body has and
-//! degrees of freedom along which M is singular are warnings.
+//! The validation of a model, by whatever way it is made: numbers that none can have are errors; inertias that no body has
+//! and degrees of freedom along which M is singular are warnings.
 
 use crate::body::{Body, Frame};
 use crate::configuration::random_configuration;
@@ -20,8 +20,8 @@ const LEAST_PIVOT: f64 = 1e-200;
 /// Positions at which M is looked at. A joint is called singular if it is so at all of them.
 const SAMPLES: usize = 3;
 
-/// How far from 1 the length of a quaternion or of (cos, sin) in a position may be: 0.707 in place of √½ is off by 1.5e-4, an
-/// estimate that was integrated in single precision by less.
+/// The distance from 1 that the length of a quaternion or of (cos, sin) in a position may have: 0.707 in place of √½ is off
+/// by 1.5e-4, an estimate that was integrated in single precision by less.
 const UNIT_ROUNDING: f64 = 1e-3;
 
 /// Says what is wrong with a body's inertia or placement.
@@ -53,7 +53,7 @@ fn check_placement(X: &Se3<f64>) -> Result<(), String> {
     Ok(())
 }
 
-/// What a joint has for each coordinate.
+/// The numbers that a joint has for each coordinate.
 pub(crate) struct CoordinateNumbers {
     pub lower: f64,
     pub upper: f64,
@@ -113,11 +113,6 @@ fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
 }
 
 impl Model {
-    /// Warnings about the robot, which is odd though it could be built.
-    pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
-    }
-
     /// Checks all numbers of the model, and finds anew what is odd about it: the end of every way to make a model.
     ///
     /// # Errors
@@ -141,10 +136,6 @@ impl Model {
                 }
                 .check(&body.joint_name)?;
             }
-        }
-        let gravity = self.gravity.to_array();
-        if gravity.iter().any(|g| !g.is_finite()) {
-            return Err(Error::Gravity { gravity });
         }
         self.check_magnitudes()?;
         let mut warnings = Vec::new();
@@ -303,6 +294,11 @@ impl Model {
 }
 
 impl<R> Model<R> {
+    /// Warnings about the robot, which is odd though it could be built.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
     /// The bodies whose joints make M singular: nothing that they carry has inertia along them. Forward dynamics and
     /// M⁻¹ refuse such a robot; armature on these joints cures it.
     pub fn singular_joints(&self) -> &[usize] {

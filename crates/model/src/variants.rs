@@ -1,28 +1,24 @@
 //! The same robot with something changed.
 
-use crate::body::Body;
 use crate::error::Error;
 use crate::limbs::Plan;
+use crate::magnitude::check_gravity;
 use crate::model::Model;
+use crate::real::{real_inertia, real_vector};
 use condyle_linalg::check;
 use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
 use core::any::Any;
 
-impl<R: 'static> Model<R> {
+impl<R: Scalar> Model<R> {
     /// The same robot under another gravity (m/s², in the world's frame).
     ///
     /// # Errors
-    /// [`Error::Gravity`] if it is of plain numbers and not finite.
+    /// [`Error::Gravity`] if it is not finite; of several lanes this is not looked at.
     pub fn with_gravity(mut self, gravity: Vec3<R>) -> Result<Self, Error> {
-        self.gravity = gravity;
-        self.revalidated()
-    }
-
-    /// The model with its checks made anew; of other numbers than `f64` it keeps what was found.
-    fn revalidated(mut self) -> Result<Self, Error> {
-        if let Some(plain) = (&mut self as &mut dyn Any).downcast_mut::<Model>() {
-            plain.validate()?;
+        if R::LANES == 1 {
+            check_gravity(real_vector(gravity))?;
         }
+        self.gravity = gravity;
         Ok(self)
     }
 }
@@ -38,14 +34,16 @@ impl Model {
     pub fn with_armature(mut self, armature: &[f64]) -> Result<Self, Error> {
         check("armature", armature.len(), self.nv());
         self.armature.copy_from_slice(armature);
-        self.revalidated()
+        self.validate()?;
+        Ok(self)
     }
 
     /// The same robot with constants of another type, its inertias given by a function of (body, inertia).
     ///
-    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters. [`Body::inertia`]
-    /// is a plain number: it follows if the new ones are, and so do [`warnings`](Self::warnings) and
-    /// [`singular_joints`](Self::singular_joints).
+    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters. [`Body::inertia`] has
+    /// their real parts, by which the robot is checked: [`warnings`](Self::warnings) and
+    /// [`singular_joints`](Self::singular_joints) are those of the new inertias. Inertias of several lanes are not looked
+    /// at: the model keeps what was found of the plain ones.
     ///
     /// ```
     /// use condyle_model::{Inertia, robots};
@@ -61,41 +59,42 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Body`] if a mass is negative or a number is not finite, of plain numbers.
+    /// [`Error::Body`] if a mass is negative or a number is not finite.
     pub fn with_inertias<T: Scalar + Constant<T>>(
         &self,
         mut inertia: impl FnMut(usize, Inertia<f64>) -> Inertia<T>,
     ) -> Result<Model<T>, Error> {
-        let mut bodies = self.bodies.clone();
-        let replace = |(i, b): (usize, &mut Body)| {
-            let I = inertia(i, b.inertia);
-            if let Some(&plain) = (&I as &dyn Any).downcast_ref::<Inertia<f64>>() {
-                b.inertia = plain;
+        let mut plain = self.clone();
+        let inertias: Vec<Inertia<T>> = self.bodies.iter().enumerate().map(|(i, b)| inertia(i, b.inertia)).collect();
+        if T::LANES == 1 {
+            for ((body, node), &I) in plain.bodies.iter_mut().zip(&mut plain.tree.nodes).zip(&inertias) {
+                body.inertia = real_inertia(I);
+                node.inertia = Se3::new(node.axis_rotation, Vec3::zero()).act_inv(body.inertia);
             }
-            I
-        };
-        let inertias: Vec<Inertia<T>> = bodies.iter_mut().enumerate().map(replace).collect();
+            plain.validate()?;
+        }
         let turned = |i: usize| Se3::new(self.tree.nodes[i].axis_rotation, Vec3::zero()).lift(); // bXz
+        let tree = plain.tree.map(|X| X.lift(), |i| turned(i).act_inv(inertias[i]));
         let mut model = Model {
-            tree: self.tree.map(|X| X.lift(), |i| turned(i).act_inv(inertias[i])),
-            armature: self.armature.iter().map(|&a| T::of(a)).collect(),
-            gravity: self.gravity.lift(),
-            name: self.name.clone(),
-            bodies,
-            frames: self.frames.clone(),
-            limits: self.limits.clone(),
-            damping: self.damping.clone(),
-            friction: self.friction.clone(),
+            tree,
+            armature: plain.armature.iter().map(|&a| T::of(a)).collect(),
+            gravity: plain.gravity.lift(),
+            name: plain.name,
+            bodies: plain.bodies,
+            frames: plain.frames,
+            limits: plain.limits,
+            damping: plain.damping,
+            friction: plain.friction,
             limbs: None,
-            geometry: self.geometry,
-            between: self.between.clone(),
-            warnings: self.warnings.clone(),
-            singular: self.singular.clone(),
+            geometry: plain.geometry,
+            between: plain.between,
+            warnings: plain.warnings,
+            singular: plain.singular,
         };
         if let Some(plain) = (&mut model as &mut dyn Any).downcast_mut::<Model>() {
             plain.limbs = self.limbs.as_ref().and_then(|_| Plan::new(&plain.tree));
         }
-        model.revalidated()
+        Ok(model)
     }
 
     /// The same robot, with its limbs side by side in single calls or one body after the other.

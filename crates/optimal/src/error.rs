@@ -1,6 +1,6 @@
 //! What can be wrong with a problem, a warm start or the settings, found before a solve begins.
 
-/// What is wrong with a problem, a warm start or the settings.
+/// A fault of a problem, a warm start or the settings.
 ///
 /// How a solve *ends* is no error: see [`Status`](crate::Status).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

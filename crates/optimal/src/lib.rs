@@ -70,6 +70,7 @@ mod ddp;
 mod error;
 mod lq;
 mod problem;
+mod read;
 pub mod robot;
 
 pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint};

@@ -1,4 +1,5 @@
-//! What makes no sense is refused by name, with its numbers, where it is given: never a NaN, a wrong result or an abort later.
+//! What makes no sense is refused by name, with its numbers, where it is given: never a NaN, a wrong result or an abort
+//! later.
 
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Error as ModelError, Force, Mat3, Motion, Se3, Vec3, neutral, robots,
@@ -31,9 +32,9 @@ fn rotations_that_are_none_are_refused() {
     let turned = || Se3 { rotation: half_turned(), ..Se3::identity() };
     let plain = Activation::Quadratic;
     let none = "is no rotation: expected three unit vectors at right angles";
-    let pose = Residual::FramePlacement { frame: 0, target: turned() };
+    let pose = Residual::FramePlacement { frame: "LF_foot".into(), target: turned() };
     assert_eq!(said(pose, plain.clone()), format!("cost `c`: its target {none}"));
-    let axes = Residual::FrameRotation { frame: 0, target: half_turned() };
+    let axes = Residual::FrameRotation { frame: "LF_foot".into(), target: half_turned() };
     assert_eq!(said(axes, plain.clone()), format!("cost `c`: its target {none}"));
     let pressure = Residual::CenterOfPressure { contact: "foot".to_owned(), rotation: half_turned(), size: [0.1, 0.1] };
     assert_eq!(said(pressure, plain.clone()), format!("cost `c`: its rotation {none}"));
@@ -138,11 +139,13 @@ fn states_are_states() {
 }
 
 #[test]
-fn weights_that_are_no_numbers_are_refused_between_solves() {
+fn weights_that_make_no_sense_are_refused_between_solves() {
     let (mut problem, _) = arm_problem();
     let knot = problem.model_mut::<FreeDynamics>(0).unwrap();
-    for bad in [NAN, f64::INFINITY] {
-        let message = format!("cost `rest`: its weight is {bad}, expected a finite number");
+    for bad in [NAN, f64::INFINITY, -1.0] {
+        let message = format!("cost `rest`: its weight is {bad}, expected a finite number of at least 0");
+        let wrong = Cost::new("rest", bad, Residual::ControlGravity, Activation::Quadratic);
+        assert_eq!(knot.set_costs(1, vec![wrong]).unwrap_err().to_string(), message);
         assert_eq!(knot.set_weight("rest", bad).unwrap_err().to_string(), message);
         assert_eq!(knot.costs_mut().set_weight("rest", bad).unwrap_err().to_string(), message);
         assert_eq!(knot.costs_mut().terms()[0].weight, 1.0);
@@ -256,6 +259,10 @@ fn problem_files_are_checked_before_memory_is_asked_for() {
     assert_eq!(
         refused(|json| json["knots"][0]["dynamics"]["free"]["dt"] = json!(0.0)),
         "a knot of 0 s: its duration must be above 0"
+    );
+    assert_eq!(
+        refused(|json| json["knots"][0]["costs"][0]["weight"] = json!(-2.0)),
+        "cost `effort`: its weight is -2, expected a finite number of at least 0"
     );
     assert!(refused(|json| json["stages"] = json!([0, 1])).contains("there is no action model 1"));
     assert!(refused(|json| json["x0"] = json!([0.0, 0.0, 0.0])).contains("expected length 14, found 3"));

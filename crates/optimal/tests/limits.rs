@@ -127,7 +127,7 @@ fn reaching_is_ipopts() {
         ]
     };
     let end = || {
-        let reach = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: point };
+        let reach = Residual::FrameTranslation { frame: "tool".into(), target: point };
         let limits = vec![
             Limit::equality("reach", reach),
             Limit::new("stop", state(), within(-infinite, 0.0), within(infinite, 0.0)),
@@ -207,7 +207,7 @@ fn limits_and_constraints_find_one_optimum() {
         let (lower, upper) = bounds(rows);
         Box::new(Constrained::new(Box::new(knot), Box::new(Weak { lower, upper })))
     };
-    let reach = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: Vec3::new(0.35, 0.2, 0.6) };
+    let reach = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.35, 0.2, 0.6) };
     let infinite = vec![f64::INFINITY; 7];
     let (below, above) = (infinite.iter().map(|x| -x).collect::<Vec<_>>(), infinite);
     let stop = Residual::State { reference: ARM.to_vec() };
@@ -425,7 +425,7 @@ fn a_receding_horizon_keeps_its_multipliers() {
     let costs = vec![quadratic("rest", 1e-1, rest.clone()), quadratic("effort", 1e-3, control(7))];
     let weak = Limit::new("weak", control(7), vec![-WEAK; 7], vec![WEAK; 7]);
     let knot = FreeDynamics::running(arm.clone(), 0.05, costs).unwrap().with_limits(vec![weak]).unwrap();
-    let tool = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: Vec3::new(0.35, 0.2, 0.6) };
+    let tool = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.35, 0.2, 0.6) };
     let reach = Limit::equality("reach", tool);
     let end = FreeDynamics::terminal(arm.clone(), vec![quadratic("rest", 1.0, rest)]).unwrap();
     let end = end.with_limits(vec![reach]).unwrap();

@@ -30,7 +30,7 @@ fn costs(model: &Model, t: usize) -> Vec<Cost> {
         quadratic("com", 1e1, com),
     ];
     if t % 3 == 0 {
-        let frame = model.frame("RF_foot").unwrap();
+        let frame = "RF_foot".into();
         let target = Vec3::new(0.2 + 0.01 * time, -0.1, 0.1);
         costs.push(quadratic("foot", 1e2, Residual::FrameTranslation { frame, target }));
     }
@@ -151,6 +151,9 @@ fn a_model_that_was_merged_is_changed_alone() {
     assert_eq!(knot.costs_mut().terms().len(), 4);
     assert_eq!(knot.costs_mut().terms()[2].weight, 1e1);
     let knot: &mut ContactDynamics = shared.model_mut(0).unwrap();
+    let wrong = quadratic("effort", 1.0, Residual::Control { reference: vec![0.0; 3] });
+    let text = "cost `effort`: its reference has 3 numbers, expected 12 (knot 5)";
+    assert_eq!(knot.set_costs(5, vec![wrong]).unwrap_err().to_string(), text);
     assert!(knot.costs_at_mut(4).set_weight("com", 77.0).unwrap());
     let expected = solve(&mut shared, &xs, &us, 1);
     assert!(solve(&mut apart, &xs, &us, 3) == expected);
@@ -267,7 +270,7 @@ fn what_holds_a_state_still_is_found() {
 fn a_unicycle_has_the_derivatives_of_differences() {
     use condyle_optimal::{Hessian, NumDiff, Unicycle};
     let (x, u, lambda) = ([0.3, -0.2, 0.7], [0.9, -0.4], [0.5, -1.5, 2.0]);
-    let action = Unicycle { dt: 0.2, weights: [3.0, 0.7], ..Unicycle::default() };
+    let action = Unicycle::new(0.2, [3.0, 0.7]);
     for action in [action.clone(), action.at_the_end()] {
         let nu = action.nu();
         let (mut ours, mut theirs) = (LqNode::zeros(3, nu), LqNode::zeros(3, nu));

@@ -6,6 +6,7 @@ use common::{HANGING, Linear, cartpole, random, random_matrix, random_node, stra
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Limit, Residual};
 use condyle_optimal::{ActionModel, Error, Fddp, Iteration, Problem, Solution, Status};
+use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -156,12 +157,43 @@ fn a_solution_survives_a_file() {
     assert!(text.contains("\"status\":\"converged\""));
 }
 
+/// A solution from a file has the lengths of one horizon, or is refused before anything reads beyond them.
+#[test]
+fn a_solution_from_a_file_is_checked() {
+    let mut problem = cartpole(&HANGING, 4, 1);
+    let xs = straight(problem.x0(), problem.x0(), 4);
+    let mut solver = Fddp::new(&problem);
+    let solution = serde_json::to_value(solver.solve(&mut problem, &xs, &[0.0; 4]).unwrap()).unwrap();
+    let refused = |at: &str, value: Value| {
+        let mut changed = solution.clone();
+        *changed.pointer_mut(at).unwrap() = value;
+        serde_json::from_value::<Solution>(changed).unwrap_err().to_string()
+    };
+    assert_eq!(refused("/xs", json!([0.0])), "`xs`: expected length 20, found 1");
+    assert_eq!(refused("/us", json!([])), "`us`: expected length 4, found 0");
+    assert_eq!(refused("/K", json!([])), "`K`: expected length 4, found 0");
+    assert_eq!(refused("/k", json!([])), "`k`: expected length 4, found 0");
+    let gains = "knot 2: expected gains of 1 × 4, but K is 4 × 1, k has length 1";
+    assert_eq!(refused("/K/2", json!([[0.0, 0.0, 0.0, 0.0], 4, 1])), gains);
+    for (rows, columns) in [(1_u64 << 63, 2), (u64::MAX, u64::MAX), (1, 5)] {
+        let found = format!("a matrix of {rows} × {columns} with 0 numbers, at most 4096 rows");
+        assert_eq!(refused("/K/0", json!([[], rows, columns])), found);
+    }
+    let offsets = "a horizon of 0 offsets: expected at least two, the first 0";
+    assert_eq!(refused("/shape/offsets", json!([])), offsets);
+    assert_eq!(refused("/shape/offsets", json!([0, 1, 2, 1, 4])), "knot 2: its controls end at 1, and begin at 2");
+    let huge = "knot 3: its controls end at 18446744073709551615, and begin at 3";
+    assert_eq!(refused("/shape/offsets/4", json!(u64::MAX)), huge);
+    assert_eq!(refused("/shape/nx", json!(u64::MAX)), "a state of 18446744073709551615 numbers: expected 1 to 4096");
+    assert!(refused("/shape/ndx", json!(3)).starts_with("knot 0: expected gains of 1 × 3"));
+}
+
 /// What knots have of their own moves with them: costs and limits, also of copies on other threads. A new last knot has
 /// what all have, until it is given something.
 #[test]
 fn costs_and_limits_of_a_knot_move_with_it() {
     const HORIZON: usize = 9;
-    let (arm, tool) = (Arc::new(robots::arm7()), robots::arm7().frame("tool").unwrap());
+    let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
     let cost = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
     let common = || {
@@ -171,7 +203,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
     // of the knot that is the `time`-th since the beginning
     let own = |time: usize| {
         let target = Vec3::new(0.4, 0.01 * time as f64, 0.5);
-        let follow = cost("follow", 10.0 + time as f64, Residual::FrameTranslation { frame: tool, target });
+        let follow = cost("follow", 10.0 + time as f64, Residual::FrameTranslation { frame: "tool".into(), target });
         [common(), vec![follow]].concat()
     };
     let limits = |time: usize| {

@@ -490,7 +490,7 @@ fn settings_that_count_are_limited() {
 fn reckless_reach(dt: f64, effort: f64, point: f64) -> (Problem, Vec<f64>) {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
-    let there = Residual::FrameTranslation { frame: arm.frame("tool").unwrap(), target: Vec3::new(0.4, 0.2, 0.5) };
+    let there = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
     let effort = Cost::new("effort", effort, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
     let point = Cost::new("point", point, there, Activation::Quadratic);
     let knot = FreeDynamics::running(arm.clone(), dt, vec![effort]).unwrap();

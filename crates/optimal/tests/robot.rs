@@ -1,8 +1,11 @@
 //! The free dynamics of robots and their costs: exact derivatives, references, limits.
 #![allow(non_snake_case)] // the names of the literature
 
-use condyle_dynamics::{Act, Data, Model, Se3, Vec3, forward_kinematics, integrate, neutral, robots};
-use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle_dynamics::{
+    Act, Data, FrameKind, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, forward_kinematics, integrate,
+    neutral, robots,
+};
+use condyle_optimal::robot::{Activation, Cost, Dynamics, FrameName, FreeDynamics, Knot, Limit, Residual};
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Sweep};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
@@ -24,17 +27,19 @@ fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     [q, random(model.nv(), 1.0, rng)].concat()
 }
 
-fn frame_of(model: &Model) -> usize {
-    model.frames().len() - 1
+/// The last frame, by its number and by its name.
+fn last_frame(model: &Model) -> (usize, FrameName) {
+    let frames = model.frames();
+    (frames.len() - 1, (&frames[frames.len() - 1]).into())
 }
 
 /// Every residual with every activation that fits it.
 fn all_costs(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Cost> {
     let nv = model.nv();
-    let frame = frame_of(model);
+    let (number, frame) = last_frame(model);
     let mut data = Data::new(model);
     let x = random_state(model, rng);
-    let target = forward_kinematics(model, &mut data, &x[..model.nq()]).frame(frame);
+    let target = forward_kinematics(model, &mut data, &x[..model.nq()]).frame(number);
     let reference = random_state(model, rng);
     let barrier = |n: usize| Activation::Barrier { lower: vec![-0.1; n], upper: vec![0.2; n] };
     vec![
@@ -48,7 +53,7 @@ fn all_costs(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Cost> {
         Cost::new("limits", 2.0, Residual::State { reference }, barrier(2 * nv)),
         Cost::new("effort", 0.1, Residual::Control { reference: random(nu, 1.0, rng) }, Activation::Quadratic),
         Cost::new("effort limits", 0.7, Residual::Control { reference: vec![0.0; nu] }, barrier(nu)),
-        Cost::new("pose", 1.5, Residual::FramePlacement { frame, target }, Activation::Quadratic),
+        Cost::new("pose", 1.5, Residual::FramePlacement { frame: frame.clone(), target }, Activation::Quadratic),
         Cost::new(
             "place",
             0.9,
@@ -148,11 +153,11 @@ fn a_cost_is_zero_at_its_reference() {
     let model = Arc::new(robots::humanoid());
     let mut data = Data::new(&model);
     let x = random_state(&model, &mut rng);
-    let frame = frame_of(&model);
-    let target: Se3<f64> = forward_kinematics(&model, &mut data, &x[..model.nq()]).frame(frame);
+    let (number, frame) = last_frame(&model);
+    let target: Se3<f64> = forward_kinematics(&model, &mut data, &x[..model.nq()]).frame(number);
     let terms = vec![
         Cost::new("state", 1.0, Residual::State { reference: x.clone() }, Activation::Quadratic),
-        Cost::new("pose", 1.0, Residual::FramePlacement { frame, target }, Activation::Quadratic),
+        Cost::new("pose", 1.0, Residual::FramePlacement { frame: frame.clone(), target }, Activation::Quadratic),
         Cost::new(
             "place",
             1.0,
@@ -165,6 +170,53 @@ fn a_cost_is_zero_at_its_reference() {
     assert!(action.calc(0, &x, &[], &mut next) < 1e-28);
     assert_eq!(action.costs_mut().set_weight("pose", 3.0), Ok(true));
     assert_eq!(action.costs_mut().set_weight("rose", 3.0), Ok(false));
+}
+
+/// A residual of a frame looks at the frame of that name of whatever robot its action is made for: the number is that
+/// robot's.
+#[test]
+fn frames_travel_by_name() {
+    let arm = robots::arm7();
+    let mut builder = ModelBuilder::new("two arms");
+    builder.append(WORLD, Se3::identity(), &arm, "left_");
+    builder.append(WORLD, Se3 { translation: Vec3::new(1.0, 0.0, 0.0), ..Se3::identity() }, &arm, "");
+    let two = Arc::new(builder.build().unwrap());
+    let (mut data, q) = (Data::new(&two), neutral(&two));
+    let target = forward_kinematics(&two, &mut data, &q).frame(two.frame("tool").unwrap()).translation;
+    assert_ne!(two.frame("tool"), arm.frame("tool"));
+    let x = [q, vec![0.0; 14]].concat();
+    for frame in [FrameName::from("tool"), (&arm.frames()[arm.frame("tool").unwrap()]).into()] {
+        let reach = Cost::new("reach", 1.0, Residual::FrameTranslation { frame, target }, Activation::Quadratic);
+        let mut action = FreeDynamics::terminal(two.clone(), vec![reach.clone()]).unwrap();
+        assert_eq!(action.calc(0, &x, &[], &mut x.clone()), 0.0);
+        // another robot refuses it, wherever it is given
+        let quadruped = Arc::new(robots::quadruped());
+        let unknown = |error: Error| assert!(error.to_string().contains("`reach`: unknown frame `tool`"), "{error}");
+        unknown(FreeDynamics::terminal(quadruped.clone(), vec![reach.clone()]).map(|_| ()).unwrap_err());
+        let mut end = FreeDynamics::terminal(quadruped.clone(), vec![]).unwrap();
+        unknown(end.set_costs(1, vec![reach.clone()]).unwrap_err());
+        let limit = Limit::equality("reach", reach.residual.clone());
+        unknown(end.with_limits(vec![limit]).map(|_| ()).unwrap_err());
+        // and so does a file of it
+        let knot = serde_json::to_string(&Knot::new(Dynamics::End, vec![reach.clone()])).unwrap();
+        let read: Knot = serde_json::from_str(&knot).unwrap();
+        assert_eq!(read.costs, [reach]);
+        assert!(read.build(&two).is_ok());
+        unknown(read.build(&quadruped).map(|_| ()).unwrap_err());
+    }
+    // of two frames with one name the one of the wanted kind, else a link's
+    let mut builder = ModelBuilder::new("twice");
+    let body = builder.body("tip", WORLD, Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) }, Se3::identity(), rod());
+    builder.frame("tip", body, Se3 { translation: Vec3::new(0.0, 0.0, 2.0), ..Se3::identity() });
+    let twice = builder.build().unwrap();
+    let named = |kind| FrameName { name: "tip".to_owned(), kind }.number(&twice).unwrap();
+    assert_eq!(twice.frames()[named(Some(FrameKind::User))].kind, FrameKind::User);
+    assert_eq!(named(None), twice.frame("tip").unwrap());
+    assert_ne!(named(None), named(Some(FrameKind::User)));
+}
+
+fn rod() -> Inertia<f64> {
+    Inertia::from_com(1.0, Vec3::new(0.0, 0.0, 0.5), Sym3::diagonal(0.1))
 }
 
 #[test]
@@ -183,9 +235,9 @@ fn what_does_not_fit_is_refused_by_name() {
         message(cost(control(7), Activation::Weighted(vec![1.0]))),
         "cost `reach`: its weighting has 1 numbers, expected 7"
     );
-    let far = Residual::FrameTranslation { frame: 99, target: Vec3::zero() };
-    assert!(message(cost(far, Activation::Quadratic)).starts_with("cost `reach`: there is no frame 99"));
-    let nowhere = Residual::FrameTranslation { frame: 1, target: Vec3::new(f64::NAN, 0.0, 0.0) };
+    let far = Residual::FrameTranslation { frame: "tol".into(), target: Vec3::zero() };
+    assert_eq!(message(cost(far, Activation::Quadratic)), "cost `reach`: unknown frame `tol`; nearest is `tool`");
+    let nowhere = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(f64::NAN, 0.0, 0.0) };
     assert_eq!(message(cost(nowhere, Activation::Quadratic)), "cost `reach`: its target holds a NaN");
     assert_eq!(message(FreeDynamics::running(arm.clone(), 0.0, vec![])), "a knot of 0 s: its duration must be above 0");
 }

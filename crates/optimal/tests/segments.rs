@@ -295,12 +295,11 @@ fn quadruped() -> (Problem, Vec<f64>, Vec<f64>) {
         Contact::new(name, ContactConstraint { kd: 20.0, ..ContactConstraint::point(model.frame(name).unwrap()) })
     };
     let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
-    let frame = model.frame("RF_foot").unwrap();
     let costs = |target| {
         vec![
             quadratic("state", 1e-1, Residual::State { reference: x0.clone() }),
             quadratic("com", 1e3, Residual::CenterOfMass { target: Vec3::new(0.03, 0.02, 0.36) }),
-            quadratic("foot", 1e2, Residual::FrameTranslation { frame, target }),
+            quadratic("foot", 1e2, Residual::FrameTranslation { frame: "RF_foot".into(), target }),
         ]
     };
     let driven = |target| {

@@ -90,6 +90,11 @@ impl Plan {
         Ok(Self { model: model.clone(), contacts, data, controls })
     }
 
+    /// The arrays that it was made of.
+    pub fn data(&self) -> &PlanData {
+        &self.data
+    }
+
     /// The time of the first knot, and of the last.
     pub fn span(&self) -> [f64; 2] {
         [self.data.times[0], self.data.times[self.data.times.len() - 1]]

@@ -40,7 +40,7 @@ fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult
     Ok((Some(matrix("actuation", map, [model.nv(), nu])?.to_matrix()), nu))
 }
 
-pub(super) fn terms(model: &Arc<condyle::Model>, costs: &[PyRef<'_, Cost>]) -> PyResult<Vec<robot::Cost>> {
+pub(super) fn terms(model: &Arc<condyle::Model>, costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
     costs.iter().map(|cost| cost.of(model)).collect()
 }
 
@@ -63,7 +63,7 @@ fn kept_at(
     costs.filter_map(|cost| cost.own(py)).chain(limits.filter_map(|limit| limit.own(py))).collect()
 }
 
-fn limits(model: &Arc<condyle::Model>, limits: Limits<'_>) -> PyResult<Vec<robot::Limit>> {
+fn limits(model: &Arc<condyle::Model>, limits: Limits<'_>) -> Vec<robot::Limit> {
     limits.into_iter().flatten().map(|limit| limit.of(model)).collect()
 }
 
@@ -82,13 +82,12 @@ fn knot(
     (costs, costs_at): (&[PyRef<'_, Cost>], At<'_, Cost>),
     (all, limits_at): (Limits<'_>, At<'_, Limit>),
     bounds: Option<[Vec<f64>; 2]>,
-) -> PyResult<Knot> {
-    let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| Ok((t, terms(model, &costs)?)));
-    let limits_at = limits_at.into_iter().flatten().map(|(t, those)| Ok((t, limits(model, Some(those))?)));
-    let (costs_at, limits_at) = (costs_at.collect::<PyResult<_>>()?, limits_at.collect::<PyResult<_>>()?);
+) -> Knot {
+    let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(model, &costs))).collect();
+    let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(model, Some(those)))).collect();
     let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
-    let (costs, limits) = (terms(model, costs)?, limits(model, all)?);
-    Ok(Knot { dynamics, costs, costs_at, limits, limits_at, bounds })
+    let (costs, limits) = (terms(model, costs), limits(model, all));
+    Knot { dynamics, costs, costs_at, limits, limits_at, bounds }
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.
@@ -132,7 +131,7 @@ impl FreeDynamics {
         let Some(dt) = dt else {
             let kept = kept_at(model.py(), &costs, &None, &limits, &None);
             let end = |model: &_| {
-                Ok(Knot { limits: self::limits(model, limits)?, ..Knot::new(Dynamics::End, terms(model, &costs)?) })
+                Ok(Knot { limits: self::limits(model, limits), ..Knot::new(Dynamics::End, terms(model, &costs)) })
             };
             return Ok(Self(RobotAction::new(model, kept, end)?));
         };
@@ -141,7 +140,7 @@ impl FreeDynamics {
         Ok(Self(RobotAction::new(model, kept, |model| {
             let (actuation, nu) = self::actuation(model, actuation)?;
             let dynamics = Dynamics::Free { actuation, integrator, dt };
-            knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?)
+            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
@@ -213,7 +212,7 @@ impl ContactDynamics {
         Ok(Self(RobotAction::new(model, kept, |model| {
             let ((actuation, nu), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);
             let dynamics = Dynamics::Contact { contacts, damping, actuation, integrator, dt };
-            knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?)
+            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
@@ -271,7 +270,7 @@ impl ImpulseDynamics {
         Ok(Self(RobotAction::new(model, kept, |model| {
             let contacts = self::contacts(model, contacts)?;
             let dynamics = Dynamics::Impulse { contacts, restitution, damping };
-            knot(model, dynamics, (&costs, None), (limits, None), None)
+            Ok(knot(model, dynamics, (&costs, None), (limits, None), None))
         })?))
     }
 
@@ -326,7 +325,7 @@ impl InverseDynamics {
         let kept = kept_at(model.py(), &costs, &None, &limits, &None);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let bounds = bounds(model.nv(), lower, upper)?;
-            knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds)
+            Ok(knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds))
         })?))
     }
 

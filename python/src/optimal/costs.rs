@@ -78,6 +78,7 @@ impl Activation {
 /// A term of a cost: weight times an activation of a residual.
 ///
 /// name: what `Problem.set_weight` and errors call it.
+/// weight: finite and at least 0; a term whose weight is 0 is not computed.
 /// residual: a `Residual`.
 /// activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
 ///     for other residuals.
@@ -95,9 +96,8 @@ pub(crate) struct Cost {
 
 impl Cost {
     /// The term for a robot.
-    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> PyResult<robot::Cost> {
-        let residual = self.residual.get().resolved(&format!("cost `{}`", self.name), model)?;
-        Ok(robot::Cost::new(&self.name, self.weight, residual, self.activation.clone()))
+    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Cost {
+        robot::Cost::new(&self.name, self.weight, self.residual.get().of(model), self.activation.clone())
     }
 
     /// The residual, if it is written in Python.
@@ -162,9 +162,8 @@ pub(crate) struct Limit {
 
 impl Limit {
     /// The limit for a robot.
-    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> PyResult<robot::Limit> {
-        let residual = self.residual.get().resolved(&format!("limit `{}`", self.name), model)?;
-        Ok(robot::Limit::new(&self.name, residual, self.lower.clone(), self.upper.clone()))
+    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Limit {
+        robot::Limit::new(&self.name, self.residual.get().of(model), self.lower.clone(), self.upper.clone())
     }
 
     /// The residual, if it is written in Python.

@@ -10,16 +10,18 @@ use super::sweep::give;
 use crate::arrays::{matrix, numbers, output, vector};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::model::Model;
+use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
 use pyo3::exceptions::{PyKeyError, PyRuntimeError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
+use rust::Observer;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The value behind a lock; an error if another call holds it.
-pub(super) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
+pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
     value.try_lock().map_err(|_| PyRuntimeError::new_err(format!("{name}: in use by another call")))
 }
 
@@ -192,7 +194,7 @@ impl Problem {
 
     /// Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
     ///
-    /// Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
+    /// Raises `KeyError` if there is no such term, `ProblemError` if the weight is negative or not finite.
     fn set_weight(&self, name: &str, weight: f64) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let mut described = lock("problem", &self.described)?;
@@ -225,7 +227,7 @@ impl Problem {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
         };
         let own: Vec<_> = costs.iter().filter_map(|cost| cost.own(py)).collect();
-        let costs = terms(&model, &costs)?;
+        let costs = terms(&model, &costs);
         let Some(set) = change!(&mut problem, k, |action| action.set_costs(knot, costs.clone())) else {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
         };
@@ -322,11 +324,20 @@ impl Problem {
     /// The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
     ///
     /// us: (N, nu), or a list of N arrays where knots differ in nu.
+    ///
+    /// Other threads run meanwhile; what a handler of a signal raises, as KeyboardInterrupt, ends it between knots.
     fn rollout<'py>(&self, py: Python<'py>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut problem = lock("problem", &self.inner)?;
         let us = controls(&problem, us)?;
-        let xs = problem.rollout(&us).map_err(problem_error)?;
-        self.raise()?;
+        let failed = || self.has_failed();
+        let signals = Signals::new(signals::SHORT);
+        let mut interruptions = Interruptions { signals, failed: &failed, observer: None, raised: None };
+        let inner = &mut *problem;
+        let xs = py.detach(|| inner.rollout_while(&us, || Observer::go_on(&mut &mut interruptions)));
+        let raised = self.raise();
+        interruptions.signals.finish()?;
+        raised?;
+        let xs = xs.map_err(problem_error)?;
         output(py, None, &[problem.horizon() + 1, problem.nx()], |out| out.copy_from_slice(&xs))
     }
 }

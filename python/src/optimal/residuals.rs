@@ -6,7 +6,7 @@ use crate::exceptions::{ProblemError, problem_error, within};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
-use condyle::{Force, FrameKind, Mat3, Motion};
+use condyle::{Force, Mat3, Motion};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -28,27 +28,15 @@ pub(crate) struct Residual(Kind);
 
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 enum Kind {
-    /// With the number that its frame has in the robot it was made with.
-    Given {
-        inner: robot::Residual,
-        /// The name and kind of its frame, if it looks at one: the number is found anew in each robot.
-        frame: Option<FrameName>,
-    },
+    Given(robot::Residual),
     /// A function, written in Python, with the number of its entries.
     #[serde(skip)]
     Own(usize, Functions),
 }
 
-/// A frame as other robots may have it too.
-#[derive(Clone, PartialEq, Serialize, Deserialize)]
-struct FrameName {
-    name: String,
-    kind: FrameKind,
-}
-
 impl From<robot::Residual> for Residual {
     fn from(inner: robot::Residual) -> Self {
-        Self(Kind::Given { inner, frame: None })
+        Self(Kind::Given(inner))
     }
 }
 
@@ -106,8 +94,8 @@ impl Residual {
         frame: &Bound<'_, PyAny>,
         target: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let (frame, target) = (frame_index(&model.get().inner, frame)?, pose("target", target)?);
-        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FramePlacement { frame, target }))
+        let (frame, target) = (frame_name(model, frame)?, pose("target", target)?);
+        Ok(Self::from(robot::Residual::FramePlacement { frame, target }))
     }
 
     /// The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m).
@@ -117,15 +105,15 @@ impl Residual {
         frame: &Bound<'_, PyAny>,
         target: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let (frame, target) = (frame_index(&model.get().inner, frame)?, three("target", target)?);
-        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FrameTranslation { frame, target }))
+        let (frame, target) = (frame_name(model, frame)?, three("target", target)?);
+        Ok(Self::from(robot::Residual::FrameTranslation { frame, target }))
     }
 
     /// The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix.
     #[staticmethod]
     fn frame_rotation(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (frame, target) = (frame_index(&model.get().inner, frame)?, rotation("target", target)?);
-        Ok(Self::of_frame(&model.get().inner, frame, robot::Residual::FrameRotation { frame, target }))
+        let (frame, target) = (frame_name(model, frame)?, rotation("target", target)?);
+        Ok(Self::from(robot::Residual::FrameRotation { frame, target }))
     }
 
     /// The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
@@ -138,10 +126,9 @@ impl Residual {
         target: Option<&Bound<'_, PyAny>>,
         reference: &str,
     ) -> PyResult<Self> {
-        let model = &model.get().inner;
-        let (frame, target) = (frame_index(model, frame)?, Motion::from(six(target)?));
-        let reference = Reference::read("reference", reference, model)?;
-        Ok(Self::of_frame(model, frame, robot::Residual::FrameVelocity { frame, target, reference }))
+        let (frame, target) = (frame_name(model, frame)?, Motion::from(six(target)?));
+        let reference = Reference::read("reference", reference, &model.get().inner)?;
+        Ok(Self::from(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
     /// The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
@@ -198,7 +185,7 @@ impl Residual {
     /// The residual as the JSON of a problem has it.
     fn __repr__(&self) -> String {
         match &self.0 {
-            Kind::Given { inner, .. } => {
+            Kind::Given(inner) => {
                 let json = serde_json::to_string(inner).expect("is made of numbers and words");
                 format!("<condyle.optimal.Residual {json}>")
             }
@@ -230,7 +217,7 @@ impl Residual {
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
         match &self.0 {
             Kind::Own(_, functions) => functions.traverse(&visit),
-            Kind::Given { .. } => Ok(()),
+            Kind::Given(_) => Ok(()),
         }
     }
 
@@ -242,32 +229,16 @@ impl Residual {
 }
 
 impl Residual {
-    /// A residual that looks at a frame of a model.
-    fn of_frame(model: &condyle::Model, frame: usize, inner: robot::Residual) -> Self {
-        let frame = &model.frames()[frame];
-        Self(Kind::Given { inner, frame: Some(FrameName { name: frame.name.clone(), kind: frame.kind }) })
-    }
-
-    /// The residual with the number that its frame has in a model, or an error of what it belongs to.
-    pub(super) fn resolved(&self, what: &str, model: &Arc<condyle::Model>) -> PyResult<robot::Residual> {
-        let (inner, frame) = match &self.0 {
-            Kind::Given { inner, frame } => (inner, frame),
+    /// The residual for a robot.
+    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Residual {
+        match &self.0 {
+            Kind::Given(inner) => inner.clone(),
             Kind::Own(size, functions) => {
                 let (space, functions) = (Space::Robot(model.clone()), functions.clone());
                 let own = OwnFunction { size: *size, functions, space, way: Way::default(), fault: Fault::default() };
-                return Ok(robot::Residual::Own(robot::OwnResidual::new(own)));
+                robot::Residual::Own(robot::OwnResidual::new(own))
             }
-        };
-        let mut residual = inner.clone();
-        let (Some(number), Some(FrameName { name, kind })) = (frame_mut(&mut residual), frame) else {
-            return Ok(residual);
-        };
-        let same = |f: &condyle::Frame| f.name == *name && f.kind == *kind;
-        *number = match model.frames().iter().position(same) {
-            Some(number) => number,
-            None => model.frame(name).map_err(|error| ProblemError::new_err(format!("{what}: {error}")))?,
-        };
-        Ok(residual)
+        }
     }
 
     /// Whether it is written in Python.
@@ -277,7 +248,7 @@ impl Residual {
 
     /// The bounds that a residual has of its own: those of a cone, or of a centre of pressure.
     pub(super) fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
-        let Kind::Given { inner, .. } = &self.0 else { return None };
+        let Kind::Given(inner) = &self.0 else { return None };
         match inner {
             robot::Residual::FrictionCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::WrenchCone { cone, .. } => Some(cone.bounds()),
@@ -287,22 +258,17 @@ impl Residual {
     }
 }
 
-/// The number of the frame that a residual looks at.
-fn frame_mut(residual: &mut robot::Residual) -> Option<&mut usize> {
-    match residual {
-        robot::Residual::FramePlacement { frame, .. }
-        | robot::Residual::FrameTranslation { frame, .. }
-        | robot::Residual::FrameRotation { frame, .. }
-        | robot::Residual::FrameVelocity { frame, .. } => Some(frame),
-        _ => None,
-    }
+/// A frame, given by its name or number in a model, as a residual keeps it.
+fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<robot::FrameName> {
+    let model = &model.get().inner;
+    Ok((&model.frames()[frame_index(model, frame)?]).into())
 }
 
 /// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 ///
-/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
-/// surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
-/// default 0 and infinite.
+/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
+/// rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
+/// (N), by default 0 and infinite.
 ///
 /// Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
 ///

@@ -86,7 +86,7 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    /// How many states it has room for.
+    /// The number of states for which it has room.
     pub fn capacity(&self) -> usize {
         self.states
     }
@@ -276,7 +276,7 @@ impl<'b, T: Real> Matrices<'b, T> {
         }
     }
 
-    /// Those of all states.
+    /// The matrices of all states.
     pub fn iter(&self) -> impl Iterator<Item = StateMatrix<'b, T>> {
         let this = *self;
         (0..self.states).map(move |k| this.at(k))

@@ -1,4 +1,4 @@
-//! How a batch computes: groups of states, a lane for each, spread over threads.
+//! Passes of a batch: groups of states, a lane for each, spread over threads.
 
 use super::StateMatrix;
 use crate::calls::derivatives::{aba_derivatives, rnea_derivatives};
@@ -16,11 +16,11 @@ use nalgebra::{DMatrix, DMatrixView};
 
 #[derive(Debug)]
 pub(super) struct Group<S: Block> {
-    /// One for each thread.
+    /// The workers, one for each thread.
     workers: Vec<Worker<S>>,
-    /// How many groups of as many states as there are lanes there may be.
+    /// The most groups of as many states as there are lanes.
     groups: usize,
-    /// One for each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
+    /// The matrices of each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
     matrices: Vec<[DMatrix<S>; KINDS]>,
 }
 
@@ -35,7 +35,7 @@ pub(super) const DA: [usize; 2] = [5, 6];
 
 const KINDS: usize = 7;
 
-/// One thread's scratch.
+/// The scratch of a thread.
 #[derive(Debug)]
 pub(super) struct Worker<S: Block> {
     data: Data<S>,
@@ -92,14 +92,14 @@ pub(super) struct Arguments<'a, T> {
     pub f_ext: &'a [Force<T>],
 }
 
-/// Where the results of some states go.
+/// The places for the results of some states.
 struct Results<'a, S: Block> {
     /// Both are empty where a function has none.
     vectors: &'a mut [S::Number],
     matrices: &'a mut [[DMatrix<S>; KINDS]],
 }
 
-/// What is done with a group of states: with the arguments of a worker, to where its vectors and matrices go.
+/// The work on a group of states: with the arguments of a worker, to where its vectors and matrices go.
 pub(super) trait Pass<T: Real>: Copy + Sync {
     /// The kinds of matrices that it gives.
     const KINDS: &'static [usize];

@@ -23,8 +23,8 @@ pub struct Constrained<'d, S> {
     pub lambda: &'d [S],
     /// The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied.
     pub residual: S,
-    /// How many rows of J depend on rows before them, up to rounding: they have no force of their own (in f64, J M⁻¹ Jᵀ +
-    /// μ 1 is singular to 13 digits). 0 says that the solution is the only one.
+    /// The number of rows of J that depend on rows before them, up to rounding: they have no force of their own (in f64, J
+    /// M⁻¹ Jᵀ + μ 1 is singular to 13 digits). 0 says that the solution is the only one.
     pub redundant: S,
 }
 
@@ -118,7 +118,7 @@ pub struct ConstrainedEquations<'d, S> {
     pub lambda: &'d [S],
     /// The largest number in J q̈ + γ (m/s², rad/s²).
     pub residual: S,
-    /// How many rows of J depend on rows before them, up to rounding.
+    /// The number of rows of J that depend on rows before them, up to rounding.
     pub redundant: S,
     /// M, nv × nv, armature included.
     pub M: &'d DMatrix<S>,
@@ -210,7 +210,7 @@ pub struct ConstrainedDerivatives<'d, S> {
     pub lambda: &'d [S],
     /// The largest number in J q̈ + γ (m/s², rad/s²).
     pub residual: S,
-    /// How many rows of J depend on rows before them, up to rounding.
+    /// The number of rows of J that depend on rows before them, up to rounding.
     pub redundant: S,
     /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ when q moves to q ⊕ δ, per δ.
     pub da_dq: &'d DMatrix<S>,

@@ -29,8 +29,11 @@ use condyle_spatial::{Constant, Force, Scalar};
 /// assert!(back.iter().all(|&tau| f64::abs(tau - 1.0) < 1e-10));
 /// ```
 ///
+/// M may be regular and yet singular at one position: a mass without extent on the axis about which it turns. Nothing looks
+/// for that: the accelerations are then not finite, or as large as rounding has it, as they are of all that needs M⁻¹.
+///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular wherever the robot is
 /// ([`Model::singular_joints`]).
 pub fn aba<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -23,7 +23,7 @@ pub struct Impulse<'d, S> {
     pub lambda: &'d [S],
     /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
     pub residual: S,
-    /// How many rows of J depend on rows before them, up to rounding.
+    /// The number of rows of J that depend on rows before them, up to rounding.
     pub redundant: S,
 }
 
@@ -110,7 +110,7 @@ pub struct ImpulseDerivatives<'d, S> {
     pub lambda: &'d [S],
     /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
     pub residual: S,
-    /// How many rows of J depend on rows before them, up to rounding.
+    /// The number of rows of J that depend on rows before them, up to rounding.
     pub redundant: S,
     /// ∂v⁺/∂q in the tangent space, nv × nv: the change of v⁺ when q moves to q ⊕ δ, per δ.
     pub dv_dq: &'d DMatrix<S>,

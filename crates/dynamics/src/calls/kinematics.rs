@@ -1,4 +1,4 @@
-//! Where the bodies are and how they move.
+//! Kinematics: the placements and the motions of the bodies.
 
 use super::limbs::spread;
 use crate::data::Data;

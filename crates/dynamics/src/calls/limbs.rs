@@ -14,7 +14,7 @@ use condyle_spatial::gate::{Fused, Level, is, level, renamed};
 use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Force, Mat3, Motion, Scalar, Se3, Vec3};
 
-/// What is asked for.
+/// The function that is asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Task {
     Rnea,

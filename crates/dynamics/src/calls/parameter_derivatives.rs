@@ -43,7 +43,7 @@ pub enum Input {
 }
 
 impl Input {
-    /// How many numbers the input has, and so how many columns a derivative with respect to it.
+    /// The number of numbers of the input, and of columns of a derivative with respect to it.
     ///
     /// ```
     /// use condyle_dynamics::{Input, robots};

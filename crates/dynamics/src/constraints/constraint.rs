@@ -7,7 +7,7 @@ use condyle_spatial::{Constant, Motion, Scalar, Se3};
 use core::any::Any;
 use serde::{Deserialize, Serialize};
 
-/// What a constraint holds.
+/// The motion that a constraint holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ConstraintKind {
@@ -27,7 +27,7 @@ impl ConstraintKind {
     }
 }
 
-/// Where a constraint wants its frame to be and how it should move there.
+/// The target of a constraint: where its frame should be, and how it should move there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Target<S> {

@@ -5,7 +5,7 @@ use condyle_model::Model;
 use condyle_model::limbs::LANES;
 use condyle_spatial::gate::is;
 
-/// So many rows of constraints stand side by side: in one vector, or in two.
+/// The number of rows of constraints that stand side by side: in one vector, or in two.
 pub(crate) const WIDE: usize = 2 * LANES;
 
 /// A body that feels the forces of a constraint.
@@ -22,7 +22,7 @@ pub(crate) struct Link {
 pub(crate) struct Rows {
     /// From the body of the first frame, from that of the other, and from where both ways meet: to the root, without it.
     pub ways: [Vec<Link>; 3],
-    /// How many numbers of each of its places there are in Y, and where those of place 0 begin.
+    /// The number of numbers that each of its places has in Y, and the beginning of those of place 0.
     pub wide: usize,
     pub start: usize,
     /// The constraints before it and itself, and the runs of places beyond the root that both touch, as in its plan.
@@ -40,7 +40,7 @@ pub(crate) struct All {
     pub root: usize,
     pub nv: usize,
     pub stride: usize,
-    /// What the root feels: all of the forces on the bodies that it carries, and what remains of them. Shape: 6 × stride.
+    /// The force on the root: all of the forces on the bodies that it carries, and what remains of them. Shape: 6 × stride.
     /// Written by: `carry`.
     pub whole: Vec<f64>,
     pub rest: Vec<f64>,

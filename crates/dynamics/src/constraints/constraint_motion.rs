@@ -1,4 +1,4 @@
-//! How the frames of a constraint move relative to each other: J, the acceleration γ for q̈ = 0, and their derivatives.
+//! The relative motion of the frames of a constraint: J, the acceleration γ for q̈ = 0, and their derivatives.
 //!
 //! In the world's frame, where body 1 carries frame 1 at ₀X₁ and body 2 the target, with Δv = v₁ − v₂, the acceleration
 //! that shall vanish is
@@ -25,7 +25,7 @@ use condyle_spatial::lie::{Quaternion, jlog6, log6};
 use condyle_spatial::{Act, Cross, Motion, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
-/// Where the two frames of a constraint are and how their bodies move, in the world's frame.
+/// The poses of the two frames of a constraint and the motions of their bodies, in the world's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FramePair<S> {
     /// ₀X₁: the frame.
@@ -45,7 +45,7 @@ pub(crate) struct Columns<'w, S> {
     pub PsidSd: &'w [Motion<S>],
 }
 
-/// What a rigid motion does to the point p: v + ω × p.
+/// The velocity of the point p of a rigid motion: v + ω × p.
 #[inline(always)]
 fn at<S: Scalar>(m: Motion<S>, p: Vec3<S>) -> Vec3<S> {
     m.linear + m.angular.cross(p)
@@ -69,7 +69,7 @@ fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
 }
 
 impl<S: Scalar> FramePair<S> {
-    /// Of bodies in these poses, at rest.
+    /// The frames of bodies in these poses, at rest.
     #[inline(always)]
     pub(crate) fn between(plan: &Plan, target: &Target<S>, [one, other]: [Se3<S>; 2]) -> Self {
         let x1 = one * plan.turned[0].lift();
@@ -77,14 +77,14 @@ impl<S: Scalar> FramePair<S> {
         Self { x1, x2, v: [Motion::zero(); 2], a: [Motion::zero(); 2] }
     }
 
-    /// Of bodies that are placed and at rest.
+    /// The frames of bodies that are placed and at rest.
     #[inline(always)]
     pub(crate) fn at_rest(plan: &Plan, target: &Target<S>, World { oX, .. }: &World<S>) -> Self {
         let [i, j] = plan.bodies;
         Self::between(plan, target, [oX[i], oX[j]])
     }
 
-    /// Of bodies that move.
+    /// The frames of bodies that move.
     #[inline(always)]
     pub(crate) fn new(plan: &Plan, target: &Target<S>, w: &World<S>, v: &[Motion<S>], a: &[Motion<S>]) -> Self {
         let [i, j] = plan.bodies;
@@ -103,7 +103,7 @@ impl<S: Scalar> FramePair<S> {
         if plan.aligned() { x } else { self.x1.rotation.transpose_mul(x) }
     }
 
-    /// What is along the axes of frame 1 as the constraint's rows express it.
+    /// A motion along the axes of frame 1 as the constraint's rows express it.
     #[inline(always)]
     pub(crate) fn outward(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
         let R = self.x1.rotation;

@@ -34,7 +34,7 @@ pub struct ConstraintSet<S> {
     pub(crate) plans: Vec<Plan>,
     pub(crate) targets: Vec<Target<S>>,
     pub(crate) nv: usize,
-    /// Of the robot that it was made for: the frames and the axes of its joints are in here.
+    /// The hash of the robot that it was made for: the frames and the axes of its joints are in it.
     geometry: u64,
     /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
     pub(crate) nonzero_rows: Vec<NonzeroRows>,
@@ -49,17 +49,18 @@ pub struct ConstraintSet<S> {
     pub(crate) lambda: Vec<S>,
     /// J q̈ + γ. Shape: rows. Written by: the algorithms.
     pub(crate) error: Vec<S>,
-    /// Of the constraints' accelerations (velocities). Shape: rows × nv. Written by: the algorithms' derivatives.
+    /// The derivatives of the constraints' accelerations (velocities). Shape: rows × nv. Written by: the algorithms'
+    /// derivatives.
     pub(crate) dgamma_dq: DMatrix<S>,
     pub(crate) dgamma_dv: DMatrix<S>,
     /// M⁻¹ Jᵀ, and M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
     pub(crate) U: DMatrix<S>,
     pub(crate) Jbar: DMatrix<S>,
-    /// Of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
+    /// The derivatives of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
     pub(crate) dlambda_dq: DMatrix<S>,
     pub(crate) dlambda_dv: DMatrix<S>,
     pub(crate) dlambda_dtau: DMatrix<S>,
-    /// Of single calls on robots with limbs.
+    /// The scratch of single calls on robots with limbs.
     pub(crate) limbs: Option<Box<ConstraintLanes>>,
 }
 
@@ -68,7 +69,8 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Errors
     /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
-    /// is `World`, a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
+    /// is `World`, a gain is negative or not finite, a target is not finite or no placement, or two constraints are the
+    /// same.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let plans = Plan::of_constraints(model, constraints)?;
         let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));
@@ -106,7 +108,7 @@ impl<S: Scalar> ConstraintSet<S> {
         constraints.iter().enumerate().try_for_each(|(i, one)| one.bodies(model, &constraints[..i]).map(drop))
     }
 
-    /// How many constraints there are.
+    /// The number of constraints.
     pub fn len(&self) -> usize {
         self.plans.len()
     }
@@ -116,7 +118,7 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans.is_empty()
     }
 
-    /// How many rows J has, and λ numbers.
+    /// The number of rows of J, and of numbers of λ.
     pub fn rows(&self) -> usize {
         self.lambda.len()
     }

@@ -20,7 +20,7 @@ const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { STEP } else { 1 }
 }
 
-/// Of single numbers.
+/// The step of single numbers.
 const STEP: usize = 8;
 
 #[derive(Clone, Debug)]
@@ -38,9 +38,9 @@ pub(crate) struct Delassus<S> {
     rows: Vec<S>,
     /// 1/E; 0 where there is no pivot. Shape: rows. Written by: `decompose`.
     E_inv: Vec<S>,
-    /// How many rows have no pivot. Written by: `decompose`.
+    /// The number of rows without a pivot. Written by: `decompose`.
     pub redundant: S,
-    /// What is being solved for, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
+    /// The right-hand side, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
     x: Vec<S>,
     /// C⁻¹ b. Shape: rows. Written by: `substitute`.
     y: Vec<S>,

@@ -24,7 +24,7 @@ use std::collections::BTreeSet;
 pub struct Proximal {
     /// μ (1/kg): small beside J M⁻¹ Jᵀ, large beside its rounding errors, as 1e-8.
     pub mu: f64,
-    /// How many iterations; 0 counts as 1.
+    /// The number of iterations; 0 counts as 1.
     pub iterations: usize,
 }
 
@@ -40,7 +40,7 @@ impl Default for Proximal {
 pub(crate) struct SupportColumn {
     /// The joint's column.
     pub column: usize,
-    /// Where its coordinate stands among the constraint's.
+    /// The place of its coordinate among the constraint's.
     pub at: usize,
     pub coordinate: usize,
     pub ratio: f64,
@@ -66,11 +66,11 @@ pub(crate) struct Plan {
     /// The places that it touches, the roots' first, and their coordinates.
     pub places: Vec<usize>,
     pub coordinates: Vec<usize>,
-    /// How many places both ways share, and where the second way goes on.
+    /// The number of places that both ways share, and the place at which the second way goes on.
     pub shared: usize,
     pub second: usize,
     pub touches: Vec<SupportColumn>,
-    /// Where its rows begin in an array with an entry for each place of each row.
+    /// The beginning of its rows in an array with an entry for each place of each row.
     pub start: usize,
     /// For each constraint up to this one, the runs of places that both touch: where here, where there, how many.
     pub common: Vec<Vec<[usize; 3]>>,
@@ -157,7 +157,7 @@ impl Plan {
         self.start + r * n..self.start + (r + 1) * n
     }
 
-    /// Where the array of all rows goes on behind it.
+    /// The place at which the array of all rows goes on behind it.
     pub(crate) fn end(&self) -> usize {
         self.start + self.rows() * self.places.len()
     }

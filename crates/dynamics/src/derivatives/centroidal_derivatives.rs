@@ -1,4 +1,4 @@
-//! How the centre of mass, the centroidal momentum and its rate change with position, velocity and acceleration.
+//! Derivatives of the centre of mass, the centroidal momentum and its rate by position, velocity and acceleration.
 //!
 //! About the world's origin, momentum h = Σ I v and rate F = Σ I a + v ×* I v change with coordinate e by what its joint
 //! carries (Ψ̇, Ψ̈, B of `rnea_derivatives.rs`, Y = Ψ̇ + Ṡ):

@@ -1,4 +1,4 @@
-//! How the velocity and the acceleration of bodies and frames change with position and velocity.
+//! Derivatives of the velocity and the acceleration of bodies and frames by position and velocity.
 //!
 //! When coordinate e changes, whatever its joint carries turns rigidly about S_e, and beside that its velocity and
 //! acceleration change because the joint's own parent moves (`rnea_derivatives.rs`):

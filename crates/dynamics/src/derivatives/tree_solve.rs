@@ -11,7 +11,7 @@ use crate::workspace::filled;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 
-/// How many columns of B go together.
+/// The number of columns of B that go together.
 const SIDE: usize = 16;
 
 /// The same for a scalar that has several numbers already.

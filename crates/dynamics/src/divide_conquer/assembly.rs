@@ -17,7 +17,7 @@ const FREE: f64 = 1e-9;
 /// Stands for the handle above a piece in place of a parent among its links.
 pub(crate) const HANDLE: usize = usize::MAX;
 
-/// How a piece is made.
+/// The way in which a piece is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Some bodies, connected with each other or with the body above, one after the other.
@@ -36,11 +36,11 @@ pub(crate) struct Piece {
     pub kind: Kind,
     /// Another piece hangs on its last body: it has two handles.
     pub open: bool,
-    /// How many bodies it has in all.
+    /// The number of its bodies.
     pub links: usize,
-    /// How many degrees of freedom their joints have.
+    /// The number of degrees of freedom of their joints.
     pub dofs: usize,
-    /// How many pieces it is made of, itself included.
+    /// The number of pieces of which it is made, itself included.
     pub pieces: usize,
     /// Over how many pieces the longest way from it to a run leads, itself included.
     levels: usize,
@@ -58,7 +58,7 @@ pub(crate) struct Link {
     pub spine: bool,
 }
 
-/// What an assembly costs, counted.
+/// The cost of an assembly, counted.
 ///
 /// ```
 /// use condyle_dynamics::{AssemblySize, DivideConquer, robots};
@@ -77,7 +77,7 @@ pub struct AssemblySize {
     pub joins: usize,
     /// Pairs of pieces that are added up, both on one body.
     pub gathers: usize,
-    /// How many pieces, from a run to the whole, wait for one another.
+    /// The number of pieces, from a run to the whole, that wait for one another.
     pub levels: usize,
 }
 
@@ -128,7 +128,7 @@ impl Assembly {
 
 struct Planner {
     children: Vec<Vec<usize>>,
-    /// How many bodies each one carries, itself included.
+    /// The number of bodies that each one carries, itself included.
     weight: Vec<usize>,
     nv: Vec<usize>,
     /// Its own inertia resists each degree of freedom of its joint.

@@ -124,7 +124,7 @@ impl<S: Scalar> Ties<S> {
         }
     }
 
-    /// How many joints share a coordinate with others.
+    /// The number of joints that share a coordinate with others.
     pub(crate) fn len(&self) -> usize {
         self.members.len()
     }

@@ -3,9 +3,10 @@
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
 //! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999). The robot is cut in two
 //! at a joint, each half again, and so on (`assembly.rs`); two pieces that are known at their handles make one that is
-//! (`articulated_pair.rs`), and from the whole the accelerations and forces at the cuts follow, down to each joint. Positions
-//! and velocities are found the same way, so no pass waits for a chain of bodies. All joints may have armature and any
-//! number of degrees of freedom. Joints that share a coordinate are set free, and tied again afterwards (`mimic.rs`).
+//! (`articulated_pair.rs`), and from the whole the accelerations and forces at the cuts follow, down to each joint.
+//! Positions and velocities are found the same way, so no pass waits for a chain of bodies. All joints may have armature
+//! and any number of degrees of freedom. Joints that share a coordinate are set free, and tied again afterwards
+//! (`mimic.rs`).
 
 mod articulated_pair;
 pub(crate) mod assembly;
@@ -48,7 +49,7 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// ```
 #[derive(Clone, Debug)]
 pub struct DivideConquer<S> {
-    /// Of the robot that it was planned for.
+    /// The hash of the robot that it was planned for.
     geometry: u64,
     assembly: Assembly,
     /// In the order of the assembly. Shape: moving bodies.
@@ -111,8 +112,8 @@ impl<S: Scalar> DivideConquer<S> {
     /// and steps, and O(n z + z³) for the ties.
     ///
     /// # Panics
-    /// If an argument has the wrong length, `model` has joints or frames elsewhere than the one that was planned for, or M is singular
-    /// ([`Model::singular_joints`]).
+    /// If an argument has the wrong length, `model` has joints or frames elsewhere than the one that was planned for, or M
+    /// is singular ([`Model::singular_joints`]).
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);
         let other = if bodies == planned { " of another robot" } else { "" };

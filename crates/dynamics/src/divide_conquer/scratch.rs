@@ -5,7 +5,7 @@ use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Kind, Link, Piece};
 use condyle_spatial::{ArticulatedInertia, Force, Motion, Se3};
 
-/// What is computed of a body; along the world's axes, at the origin of the piece.
+/// The quantities of a body; along the world's axes, at the origin of the piece.
 #[derive(Clone, Debug)]
 pub(crate) struct Body<S> {
     /// λXi. Written by: `relate`.
@@ -24,7 +24,7 @@ pub(crate) struct Body<S> {
     pub a: Motion<S>,
 }
 
-/// What is computed of a degree of freedom; along the world's axes, at the origin of the piece.
+/// The quantities of a degree of freedom; along the world's axes, at the origin of the piece.
 #[derive(Clone, Debug)]
 pub(crate) struct Dof<S> {
     /// Effort. Written by: `aba` and `run`.
@@ -53,7 +53,7 @@ pub(crate) struct Part<'d, S> {
 }
 
 impl<'d, S> Part<'d, S> {
-    /// The same once more.
+    /// A second borrow of the same memory, for a shorter time.
     #[inline(always)]
     pub(crate) fn again(&mut self) -> Part<'_, S> {
         let Self { pieces, links, bodies, dofs, handles } = self;

@@ -98,7 +98,7 @@ pub(crate) fn pass<L: Layout>(
     outward(l, w, d);
 }
 
-/// What each joint feels of all that it carries: down and up each branch in turn.
+/// The articulated inertia that each joint carries: down and up each branch in turn.
 #[inline(always)]
 pub(crate) fn inward<L: Layout>(
     l: &L,

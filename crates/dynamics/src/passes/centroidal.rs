@@ -143,7 +143,7 @@ pub(crate) fn shift_rate<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspac
     CentroidalMapRate { Ag: &d.Ag, dAg: &d.dAg, hg, Ig, com, com_velocity, Jcom: &d.Jcom }
 }
 
-/// What depends on the position in hg = Ag(q) v. The axes are the world's.
+/// The part of hg = Ag(q) v that depends on the position. The axes are the world's.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMap<'d, S> {
     /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.

@@ -25,7 +25,7 @@ pub enum ReferenceFrame {
     Local,
     /// In the world's frame: the velocity of the body's point at the world's origin.
     World,
-    /// Of the frame's origin, along the axes of the world.
+    /// The motion of the frame's origin, along the axes of the world.
     LocalWorldAligned,
 }
 
@@ -59,7 +59,8 @@ pub struct Placements<'d, S, R = f64> {
     pub(crate) world: &'d World<S>,
 }
 
-/// The placements and velocities of a robot, as [`forward_velocities`](crate::forward_velocities) left them. It is a [`Placements`] too.
+/// The placements and velocities of a robot, as [`forward_velocities`](crate::forward_velocities) left them. It is a
+/// [`Placements`] too.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Velocities<'d, S, R = f64> {
@@ -67,7 +68,8 @@ pub struct Velocities<'d, S, R = f64> {
     pub(crate) moving: &'d Moving<S>,
 }
 
-/// The placements, velocities and accelerations of a robot, as [`forward_accelerations`](crate::forward_accelerations) left them. It is a
+/// The placements, velocities and accelerations of a robot, as [`forward_accelerations`](crate::forward_accelerations) left
+/// them. It is a
 /// [`Velocities`] and a [`Placements`] too.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]

@@ -1,5 +1,5 @@
-//! Where the bodies are and how they move: one pass from the root to the tips for all bodies. What can then be asked is
-//! in `frames.rs`.
+//! Kinematics, the placements and motions of all bodies: one pass from the root to the tips for all bodies. What can then
+//! be asked is in `frames.rs`.
 
 use crate::workspace::{Size, filled};
 use condyle_model::Model;
@@ -9,7 +9,7 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Cross, Motion, Scalar, Se3};
 
-/// What depends on the position alone, in the world's frame.
+/// The quantities that depend on the position alone, in the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct World<S> {
@@ -19,11 +19,11 @@ pub(crate) struct World<S> {
     pub oX: Vec<Se3<S>>,
     /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
     pub S: Vec<Motion<S>>,
-    /// Where the last call has placed the bodies. Written by: `place`, by `rnea`, and by limbs.
+    /// The place of the last call's placements. Written by: `place`, by `rnea`, and by limbs.
     pub placed: PlacementCache,
 }
 
-/// Where the bodies' placements stand.
+/// The place of the bodies' placements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PlacementCache {
     /// They were not computed.
@@ -59,7 +59,7 @@ pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut Wor
     }
 }
 
-/// How the bodies move, in the world's frame: what depends on the velocity and the acceleration too.
+/// The motions of the bodies, in the world's frame: what depends on the velocity and the acceleration too.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Moving<S> {

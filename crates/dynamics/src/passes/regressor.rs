@@ -15,7 +15,7 @@ use crate::workspace::{Size, filled, zero_matrix};
 use condyle_spatial::{Cross, Motion, Scalar};
 use nalgebra::DMatrix;
 
-/// How many numbers describe the inertia of a body.
+/// The number of numbers that describe the inertia of a body.
 pub(crate) const PARAMETERS: usize = 10;
 
 #[derive(Clone, Debug)]

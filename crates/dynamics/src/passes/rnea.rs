@@ -15,8 +15,8 @@
 //! | τ_i = S_iᵀ f_i | `project`, when the pass has left the subtree of body i |
 //! | f_λ += λX*_i f_i | `add_to_parent_on_stack` |
 //!
-//! The two loops of the book are one here: a body's subtree is finished when the pass has gone down to its last body, and its
-//! force then goes to the parent. The test `the_book_gives_the_same` runs the book's form beside it.
+//! The two loops of the book are one here: a body's subtree is finished when the pass has gone down to its last body, and
+//! its force then goes to the parent. The test `the_book_gives_the_same` runs the book's form beside it.
 
 use crate::passes::kinematics::{PlacementCache, World};
 use crate::workspace::{Size, filled};
@@ -33,7 +33,8 @@ use condyle_spatial::{Act, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 pub(crate) struct Workspace<S> {
     /// λXi. Shape: levels. Written by: `pass`.
     pub X: Vec<Se3<S>>,
-    /// How the body turns and its origin accelerates, with gravity as the world's. Shape: levels. Written by: `pass`.
+    /// The rotation of the body and the acceleration of its origin, with gravity as the world's. Shape: levels. Written by:
+    /// `pass`.
     pub motion: Vec<ClassicalMotion<S>>,
     /// K; the world's stays 0. Shape: levels. Written by: `pass`.
     pub K: Vec<Mat3<S>>,

@@ -28,7 +28,8 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 
-/// How a step is computed. τ and the external forces stay as they are during a step, forces in the body's frame;
+/// The method by which a step is computed. τ and the external forces stay as they are during a step, forces in the body's
+/// frame;
 /// [passive torques](crate::passive_torque) follow the velocity within it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -53,7 +54,7 @@ pub enum Integrator {
 pub struct Settings {
     /// The method.
     pub integrator: Integrator,
-    /// h, the length of a step (s).
+    /// h, the length of a step (s), above 0.
     pub dt: f64,
     /// The smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s), if the joints' damping and friction
     /// are to act; `None` for none of either.
@@ -72,7 +73,7 @@ impl Default for Settings {
     }
 }
 
-/// How a step, or a run of steps, has ended.
+/// The outcome of a step, or of a run of steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 #[non_exhaustive]
@@ -82,7 +83,7 @@ pub enum Status {
     /// Newton's method has not reached the tolerance: the step was not taken, the state is the one before it. A shorter
     /// step helps.
     NotConverged {
-        /// How many were made.
+        /// The number that were made.
         iterations: usize,
     },
     /// The velocity is no longer finite: the step was not taken, the state is the one before it.
@@ -96,7 +97,7 @@ impl Status {
     }
 }
 
-/// What a control law sees before a step, and what it sets.
+/// The state that a control law sees before a step, and the efforts and forces that it sets.
 #[derive(Debug)]
 pub struct Control<'a, S> {
     /// The time at which the step begins (s).
@@ -112,7 +113,7 @@ pub struct Control<'a, S> {
     pub f_ext: &'a mut [Force<S>],
 }
 
-/// What acts during a step.
+/// The efforts and forces that act during a step.
 #[derive(Clone, Copy)]
 struct Input<'a, S> {
     h: S,
@@ -137,7 +138,7 @@ pub struct Simulation<'m, S: Scalar, R = f64> {
     /// The state after the step that is being computed.
     q_next: Vec<S>,
     v_next: Vec<S>,
-    /// What the control law sets.
+    /// The efforts that the control law sets, and the forces.
     tau: Vec<S>,
     f_ext: Vec<Force<S>>,
     euler: euler::Workspace<S>,
@@ -211,13 +212,13 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is 0 or not
-    /// finite.
+    /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is not above
+    /// 0 or not finite.
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
         check("tau", tau.len(), self.model.nv());
         check_forces(f_ext.len(), self.model.nodes().len());
         let Settings { integrator, dt, passive, .. } = self.settings;
-        assert!(dt != 0.0 && dt.is_finite(), "settings.dt: expected a finite number other than 0, found {dt}");
+        assert!(dt > 0.0 && dt.is_finite(), "settings.dt: expected a finite number above 0, found {dt}");
         let input = Input { h: S::splat(dt), tau, f_ext, passive };
         let (model, data, state) = (self.model, &mut self.data, (&self.q[..], &self.v[..]));
         let (q, v) = (&mut self.q_next, &mut self.v_next);
@@ -239,12 +240,12 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
         status
     }
 
-    /// So many steps, with a control law that is called before each of them; ends early when one fails.
+    /// A number of steps, with a control law that is called before each of them; ends early when one fails.
     ///
     /// Allocates nothing, unless the law does.
     ///
     /// # Panics
-    /// If the smoothing of passive torques is not positive.
+    /// As [`step`](Self::step).
     pub fn run(&mut self, steps: usize, mut control: impl FnMut(&mut Control<S>)) -> Status {
         let (mut tau, mut f_ext) = (core::mem::take(&mut self.tau), core::mem::take(&mut self.f_ext));
         let mut status = Status::Done;

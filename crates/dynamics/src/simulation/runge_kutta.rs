@@ -21,7 +21,7 @@ use condyle_spatial::{Constant, Scalar};
 pub(super) struct Workspace<S> {
     /// Efforts, the passive ones included. Shape: nv. Written by: `step`.
     effort: Vec<S>,
-    /// Where a stage looks: ξ, v. Shape: nv. Written by: `step`.
+    /// The state of a stage: ξ, v. Shape: nv. Written by: `step`.
     xi: Vec<S>,
     v: Vec<S>,
     /// Its rates. Shape: nv. Written by: `step`.
@@ -47,7 +47,7 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// How far from the beginning each stage looks, and the weight of what it finds there.
+/// The time of each stage as a part of the step, and the weight of its slope.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
 /// The whole method.

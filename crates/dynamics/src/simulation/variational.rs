@@ -46,13 +46,13 @@ pub(super) struct Workspace<S> {
     minus_x: Vec<S>,
     /// f = ∂L/∂q + τ. Written by: `evaluate`.
     f: Vec<S>,
-    /// What acts at the joints by itself, and its slope. Written by: `evaluate`.
+    /// The passive efforts of the joints, and their slope. Written by: `evaluate`.
     passive: Vec<S>,
     passive_slope: Vec<S>,
     /// J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
     carried: Vec<S>,
     pushed: Vec<S>,
-    /// How far the equation is from holding, then Newton's step.
+    /// The residual of the equation, then Newton's step.
     residual: Vec<S>,
     /// The slope of the equation, and its factor. Shape: nv × nv. Written by: `slope`.
     slope: Vec<S>,

@@ -28,6 +28,27 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, inside: &str) -> Str
     )
 }
 
+/// A quaternion says the same as angles, of joints and of inertias; its length is rounded away.
+#[test]
+fn quaternions() {
+    let robot = |version: &str, turned: &str| {
+        let inertial = r#"<mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="2.5"/>"#;
+        let arm = format!(r#"<link name="arm"><inertial><origin xyz="0.1 0 0" {turned}/>{inertial}</inertial></link>"#);
+        let hinge = joint("j", "revolute", "base", "arm", &format!(r#"<origin xyz="0 0.2 0" {turned}/>"#));
+        load(&format!("<robot name='r' {version}><link name='base'/>{arm}{hinge}</robot>"))
+    };
+    // yaw of a quarter turn after roll of half a turn: the product of (0, 0, √½, √½) and (1, 0, 0, 0)
+    let angles = robot("", &format!(r#"rpy="{} 0 {}""#, std::f64::consts::PI, std::f64::consts::FRAC_PI_2));
+    for version in ["version='1.1'", "version='1.2'"] {
+        let turned = robot(version, r#"quat_xyzw="0.7071 0.7071 0 0""#);
+        let (a, b) = (&angles.bodies()[1], &turned.bodies()[1]);
+        assert!(relative(&flat(a.placement), &flat(b.placement)) < ROUNDING);
+        let moments = |I: Inertia<f64>| [I.rotational.xx, I.rotational.yy, I.rotational.zz, I.mass_com.x, I.mass_com.y];
+        assert!(relative(&moments(a.inertia), &moments(b.inertia)) < ROUNDING);
+    }
+    assert_eq!(robot("version='1.0'", r#"rpy="0 0 0""#).nv(), 1);
+}
+
 /// Depth first, siblings by the bytes of their joints' names, whatever the order in the file.
 #[test]
 fn numbering() {

@@ -111,6 +111,25 @@ fn joints() {
     let said = "is no finite number";
     expect(&with(axis, &origin("xyz", "0 inf 0")), &format!("<string>:9: joint `j`: origin xyz: `inf` {said}"));
     expect(&with(axis, &origin("rpy", "nan 0 0")), &format!("<string>:9: joint `j`: origin rpy: `nan` {said}"));
+    let versioned = |version: &str, value: &str| {
+        let version = format!(r#"<robot name="r" version="{version}">"#);
+        with(axis, &origin("quat_xyzw", value)).replace(r#"<robot name="r">"#, &version)
+    };
+    let (at, unit) = ("<string>:9: joint `j`: origin", "1 0 0 0");
+    let unknown = format!("{at} has quat_xyzw, which version 1.0 does not know: expected <robot version=\"1.1\">");
+    expect(&with(axis, &origin("quat_xyzw", unit)), &unknown);
+    expect(&versioned("1.0", unit), &unknown);
+    expect(&versioned("1.1", "1 1 0 0"), &format!("{at} quat_xyzw: has the length 1.4142135623730951, expected 1"));
+    expect(&versioned("1.1", "0 0 0 0"), &format!("{at} quat_xyzw: has the length 0, expected 1"));
+    expect(&versioned("1.2", "1 0 0"), &format!("{at} quat_xyzw: expected 4 numbers, found 3"));
+    let both = versioned("1.1", unit).replace("quat_xyzw=", r#"rpy="0 0 0" quat_xyzw="#);
+    expect(&both, &format!("{at} has both rpy and quat_xyzw"));
+    for version in ["2.0", "1.3", "", "one"] {
+        expect(
+            &versioned(version, unit),
+            &format!("<string>:1: robot `r`: version `{version}` is none of 1.0, 1.1, 1.2"),
+        );
+    }
     let fixed = with("revolute", "fixed").replace(axis, &origin("rpy", "nan 0 0"));
     expect(&fixed, &format!("<string>:9: joint `j`: origin rpy: `nan` {said}"));
     let kinds = "revolute, continuous, prismatic, fixed, floating, planar, spherical";

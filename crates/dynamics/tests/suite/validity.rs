@@ -1,9 +1,11 @@
 //! Every way to make a model goes through the same checks: what is odd is found anew, and what is impossible is refused.
 
+use condyle_dynamics::simulation::{Settings, Simulation, Status};
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, DivideConquer, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD,
     Warning, aba, neutral, robots,
 };
+use num_dual::Dual64;
 use std::panic::catch_unwind;
 
 /// An arm whose last link has no mass, so that forward dynamics has no answer.
@@ -46,6 +48,54 @@ fn other_inertias_are_judged_anew() {
         assert_eq!((read.singular_joints(), read.warnings()), (model.singular_joints(), model.warnings()));
         assert_eq!(read.geometry_hash(), model.geometry_hash());
     }
+}
+
+/// Inertias of dual numbers are judged by their real parts, as plain ones are.
+#[test]
+fn dual_inertias_are_judged_as_plain_ones() {
+    let seeded = |I: Inertia<f64>| Inertia { mass: Dual64::new(I.mass, 1.0), ..I.lift::<Dual64>() };
+    let ball = Inertia::from_com(0.3, Vec3::zero(), Sym3::diagonal(0.01));
+    let sick = massless_tip();
+    let same = sick.with_inertias(|_, I| seeded(I)).unwrap();
+    assert_eq!((same.singular_joints(), same.warnings()), (sick.singular_joints(), sick.warnings()));
+    let cured = sick.with_inertias(|body, I| seeded(if body == 2 { ball } else { I })).unwrap();
+    assert!(cured.singular_joints().is_empty() && cured.warnings().is_empty());
+    assert_eq!(cured.total_mass(), 1.3);
+    let zero = [Dual64::from(0.0); 2];
+    let a = aba(&cured, &mut Data::new(&cured), &zero, &zero, &zero, &[]).to_vec();
+    assert!(a.iter().all(|a| a.re.is_finite() && a.eps.is_finite()));
+    let healthy = robots::arm7();
+    let made_sick = healthy.with_inertias(|body, I| if body == 7 { Inertia::zero() } else { seeded(I) }).unwrap();
+    assert_eq!(made_sick.singular_joints(), [7]);
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        let mass = |body| Dual64::new(if body == 3 { bad } else { 1.0 }, 0.0);
+        let error = healthy.with_inertias(|body, I| Inertia { mass: mass(body), ..I.lift() }).unwrap_err().to_string();
+        assert!(error.starts_with("body `link3`: mass is "), "{error}");
+    }
+    let nowhere = Vec3::new(Dual64::from(0.0), Dual64::from(f64::NAN), Dual64::from(0.0));
+    assert_eq!(cured.with_gravity(nowhere).unwrap_err().to_string(), "gravity: (0, NaN, 0) m/s² is not finite");
+}
+
+/// A robot may be regular, and its M singular at one position: here a point of mass on a rod that has none, drawn in to the
+/// axis about which it turns. `aba` gives numbers there that are not finite; those who iterate say so.
+#[test]
+fn a_position_may_be_singular() {
+    let (z, x) = (Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 0.0));
+    let mut builder = ModelBuilder::new("sling");
+    let rod = builder.body("rod", WORLD, Joint::Revolute { axis: z }, Se3::identity(), Inertia::zero());
+    let point = Inertia::from_com(1.0, Vec3::zero(), Sym3::zero());
+    builder.body("point", rod, Joint::Prismatic { axis: x }, Se3::identity(), point);
+    let sling = builder.build().unwrap();
+    assert!(sling.singular_joints().is_empty());
+    let mut data = Data::new(&sling);
+    let efforts = [1.0, 1.0];
+    let drawn_in: Vec<f64> = aba(&sling, &mut data, &[0.0; 2], &[0.0; 2], &efforts, &[]).to_vec();
+    assert!(drawn_in.iter().any(|a| !a.is_finite()), "{drawn_in:?}");
+    let out: Vec<f64> = aba(&sling, &mut data, &[0.0, 0.5], &[0.0; 2], &efforts, &[]).to_vec();
+    assert!((out[0] - 4.0).abs() < 1e-12 && (out[1] - 1.0).abs() < 1e-12, "{out:?}"); // τ / m r²
+    let mut simulation = Simulation::new(&sling, Settings::default());
+    assert_eq!(simulation.step(&efforts, &[]), Status::NotFinite);
+    assert_eq!((simulation.q(), simulation.v()), (&[0.0; 2][..], &[0.0; 2][..])); // the step was not taken
 }
 
 #[test]

@@ -18,7 +18,7 @@ use include::Includes;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// How an MJCF becomes a model.
+/// Options of reading an MJCF.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MjcfOptions {
     /// Whether what is only odd, or left out ([`Model::warnings`]), is an error.

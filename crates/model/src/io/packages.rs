@@ -4,7 +4,7 @@ use crate::error::Error;
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
-/// How an address of a file in a package begins.
+/// The beginning of the address of a file in a package.
 const SCHEME: &str = "package://";
 
 /// The file that a path or a `package://` address names.

@@ -15,7 +15,7 @@ use poses::{Poses, optional, three};
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::Path;
 
-/// How an SDF becomes a model.
+/// Options of reading an SDF.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SdfOptions {
     /// The joint between the world and a root link, named `root_joint`; none fixes the root link to the world.

@@ -1,5 +1,7 @@
 //! Robots from URDF: kinematics, inertias, limits. Meshes are never looked at.
 
+mod origin;
+
 use super::packages;
 use super::xml::{self, Amount, Element};
 use crate::body::FrameKind;
@@ -7,11 +9,12 @@ use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::{Joint, Mimic};
 use crate::model::Model;
-use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
+use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
+use origin::Origins;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// How a URDF becomes a model.
+/// Options of reading a URDF.
 #[derive(Clone, Debug, Default)]
 pub struct UrdfOptions {
     /// The joint between the world and the root link, named `root_joint`; none fixes the root link to the world.
@@ -30,7 +33,8 @@ impl Model {
     /// Reads a URDF file, given by its path or as `package://name/path/in/the/package`
     /// ([`UrdfOptions::packages`]).
     ///
-    /// Shapes are not read, and the meshes that they name need not be there.
+    /// Shapes are not read, and the meshes that they name need not be there. Versions 1.0 to 1.2 are; where there is
+    /// none, 1.0, in which an `<origin>` has no quaternion.
     /// Fixed joints are merged into the body that they sit on and stay as frames; siblings are numbered in the order of
     /// their joints' names (bytes), as Pinocchio does.
     ///
@@ -77,6 +81,7 @@ struct Edge<'a> {
 
 struct Reader<'a> {
     robot: &'a Element,
+    origins: Origins,
     links: HashMap<&'a str, &'a Element>,
     /// The names of the joints, in the order of the file.
     order: Vec<&'a str>,
@@ -94,7 +99,8 @@ impl<'a> Reader<'a> {
             return Err(robot.wrong("the root element of a URDF is <robot>"));
         }
         let (links, joints, children) = (HashMap::new(), HashMap::new(), HashMap::new());
-        let mut reader = Self { robot, links, order: Vec::new(), joints, root: "", children };
+        let origins = Origins::of(robot)?;
+        let mut reader = Self { robot, origins, links, order: Vec::new(), joints, root: "", children };
         for element in robot.children.iter().filter(|c| matches!(&*c.tag, "link" | "joint")) {
             let Some(name) = element.attribute("name").filter(|n| !n.is_empty()) else {
                 return Err(element.wrong("has no name"));
@@ -158,7 +164,7 @@ impl<'a> Reader<'a> {
 
     fn model(&self, options: &UrdfOptions) -> Result<Model, Error> {
         let mut builder = ModelBuilder::new(self.robot.attribute("name").unwrap_or_default());
-        let own = inertia(self.links[self.root])?;
+        let own = self.inertia(self.links[self.root])?;
         let root = match options.root_joint {
             None => {
                 builder.merge(WORLD, Se3::identity(), own);
@@ -182,8 +188,8 @@ impl<'a> Reader<'a> {
         wait(&mut waiting, self.root, root, Se3::identity());
         while let Some((name, parent, pXl)) = waiting.pop() {
             let Edge { element, child: link, .. } = self.joints[name];
-            let pXj = pXl * pose(element, element)?;
-            let inertia = inertia(self.links[link])?;
+            let pXj = pXl * self.origins.pose(element, element)?;
+            let inertia = self.inertia(self.links[link])?;
             let (body, bXl) = match kind(element)? {
                 None => {
                     builder.merge(parent, pXj, inertia);
@@ -225,6 +231,32 @@ impl<'a> Reader<'a> {
             builder.mimic(follower, leader, Mimic { ratio, offset });
         }
         Ok(())
+    }
+
+    /// The link's inertia in the link's frame.
+    fn inertia(&self, link: &Element) -> Result<Inertia<f64>, Error> {
+        let Some(inertial) = only(link, "inertial")? else { return Ok(Inertia::zero()) };
+        let number = |inside: &Element, name: &str| match array(link, inside, name)? {
+            Some([x]) => Ok(x),
+            None => Err(link.wrong_inside(inside, format!("{} has no {name}", inside.tag))),
+        };
+        let part = |tag: &str| {
+            let found = only_inside(link, inertial, tag)?;
+            found.ok_or_else(|| link.wrong_inside(inertial, format!("inertial has no <{tag}>")))
+        };
+        let (mass, I) = (number(part("mass")?, "value")?, part("inertia")?);
+        if mass < 0.0 {
+            return Err(link.wrong(format!("mass is {mass} kg")));
+        }
+        let rotational = Sym3 {
+            xx: number(I, "ixx")?,
+            xy: number(I, "ixy")?,
+            yy: number(I, "iyy")?,
+            xz: number(I, "ixz")?,
+            yz: number(I, "iyz")?,
+            zz: number(I, "izz")?,
+        };
+        Ok(self.origins.pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
     }
 
     /// The error that the builder found, with the line of the link or joint.
@@ -293,45 +325,6 @@ fn joint_options(joint: &Element) -> Result<JointOptions, Error> {
         (options.damping, options.friction) = if with_axis { (damping, friction) } else { (0.0, 0.0) };
     }
     Ok(options)
-}
-
-/// The link's inertia in the link's frame.
-fn inertia(link: &Element) -> Result<Inertia<f64>, Error> {
-    let Some(inertial) = only(link, "inertial")? else { return Ok(Inertia::zero()) };
-    let number = |inside: &Element, name: &str| match array(link, inside, name)? {
-        Some([x]) => Ok(x),
-        None => Err(link.wrong_inside(inside, format!("{} has no {name}", inside.tag))),
-    };
-    let part = |tag: &str| {
-        let found = only_inside(link, inertial, tag)?;
-        found.ok_or_else(|| link.wrong_inside(inertial, format!("inertial has no <{tag}>")))
-    };
-    let (mass, I) = (number(part("mass")?, "value")?, part("inertia")?);
-    if mass < 0.0 {
-        return Err(link.wrong(format!("mass is {mass} kg")));
-    }
-    let rotational = Sym3 {
-        xx: number(I, "ixx")?,
-        xy: number(I, "ixy")?,
-        yy: number(I, "iyy")?,
-        xz: number(I, "ixz")?,
-        yz: number(I, "iyz")?,
-        zz: number(I, "izz")?,
-    };
-    Ok(pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
-}
-
-/// The `<origin>` inside something, or none: R = Rz(yaw) Ry(pitch) Rx(roll). Errors name `of`.
-fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
-    let Some(origin) = only_inside(of, inside, "origin")? else { return Ok(Se3::identity()) };
-    let rpy = array(of, origin, "rpy")?.unwrap_or_default();
-    let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(f64::sin_cos);
-    let rotation = Mat3 {
-        x: Vec3::new(cy * cp, sy * cp, -sp),
-        y: Vec3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),
-        z: Vec3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
-    };
-    Ok(Se3::new(rotation, vector(of, origin, "xyz")?.unwrap_or(Vec3::zero())))
 }
 
 /// The child with a tag, of which there is at most one.

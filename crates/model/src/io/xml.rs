@@ -11,17 +11,17 @@ use std::io::Read;
 use std::path::Path;
 use std::rc::Rc;
 
-/// How many bytes the files of one robot may have together.
+/// The most bytes that the files of one robot may have together.
 const MAX_BYTES: usize = 64 << 20;
-/// How many tags they may have together, each comment and each end of an element counted.
+/// The most tags that they may have together, each comment and each end of an element counted.
 const MAX_TAGS: usize = 1 << 20;
-/// How many equals signs they may have together: as many attributes, and memory for them.
+/// The most equals signs that they may have together: as many attributes, and memory for them.
 const MAX_EQUALS: usize = 1 << 22;
-/// How many attributes an element may have.
+/// The most attributes of an element.
 const MAX_ATTRIBUTES: usize = 256;
-/// How many prefixes of namespaces a file may have, and how often it may declare one.
+/// The most prefixes of namespaces in a file, and the most declarations of one.
 const MAX_NAMESPACES: [usize; 2] = [256, 1 << 16];
-/// How deep elements may be nested: one level for each body of a chain in MJCF, and then some.
+/// The most levels of nested elements: one level for each body of a chain in MJCF, and then some.
 pub(crate) const MAX_DEPTH: usize = 256;
 
 /// An element, with all that is in it.

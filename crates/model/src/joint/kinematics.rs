@@ -1,4 +1,4 @@
-//! What a pass asks of a joint: where its body is, how it moves, what efforts a force exerts.
+//! Kinematics of joints: the placement and the motion of a body, and the efforts that a force exerts.
 
 use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;

@@ -79,11 +79,11 @@ pub struct AugmentedLagrangian {
     outcome: Outcome,
     /// The adjoint state, and its predecessor.
     adjoint: [DVector<f64>; 2],
-    /// How long the residuals took the last time.
+    /// The time that the residuals took the last time.
     measuring: Duration,
 }
 
-/// What a constrained solve says beside its [`Solution`].
+/// The state of the constraints after a solve, beside its [`Solution`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outcome {
     /// The cost Σ ℓ without the terms of the constraints.
@@ -257,7 +257,7 @@ impl AugmentedLagrangian {
         &self.solver.solution
     }
 
-    /// What the last solve says of the constraints.
+    /// The state of the constraints after the last solve.
     pub fn outcome(&self) -> &Outcome {
         &self.outcome
     }

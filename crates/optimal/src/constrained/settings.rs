@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConstraintSettings {
-    /// How far a constraint may be from its bounds, and the dynamics from holding.
+    /// The distance that a constraint may have from its bounds, and the dynamics from holding.
     pub tolerance: f64,
-    /// How large an entry of the gradient of the Lagrangian may be.
+    /// The largest entry that the gradient of the Lagrangian may have.
     pub tolerance_dual: f64,
     /// Inner solves after which a solve stops.
     pub max_solves: usize,

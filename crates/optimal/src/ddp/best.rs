@@ -9,8 +9,9 @@ use crate::problem::Problem;
 const SAME_GAP: f64 = 1e-12;
 /// Costs that differ by less, beside 1 + their size, are the same: they are sums, which are rounded.
 const SAME_COST: f64 = 1e-12;
-/// An iterate that costs so many times as much as the cheapest one of the solve, and 1, has run away, whatever its gaps: those
-/// that close gaps may cost much more than the warm start, but a weight of 1e6 at a distance of ten is still within it.
+/// An iterate that costs so many times as much as the cheapest one of the solve, and 1, has run away, whatever its gaps:
+/// those that close gaps may cost much more than the warm start, but a weight of 1e6 at a distance of ten is still within
+/// it.
 const RUNAWAY: f64 = 1e8;
 
 /// The best iterate from which a direction could be computed: the one with the smallest gap, and among equals the cheapest.
@@ -27,7 +28,7 @@ pub(super) struct Best {
     lowest: f64,
 }
 
-/// What an iterate is worth, and how its feedback was found.
+/// The merit of an iterate, and how its feedback was found.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Value {
     pub(super) gap: f64,
@@ -61,7 +62,8 @@ impl Best {
         (self.value, self.lowest) = (None, f64::INFINITY);
     }
 
-    /// Exchanges the iterate that a step leaves with the best one, if it is not worse. Returns whether it is the best one now.
+    /// Exchanges the iterate that a step leaves with the best one, if it is not worse. Returns whether it is the best one
+    /// now.
     pub(super) fn leave(&mut self, solution: &mut Solution, next: &mut Vec<f64>, value: Value) -> bool {
         self.lowest = self.lowest.min(value.cost);
         let good = !self.is_better_than(&value);

@@ -1,6 +1,6 @@
 //! Time that a solve may take, and other reasons to stop.
 
-use super::observer::Watch;
+use super::observer::PacedObserver;
 use super::solution::Status;
 use std::time::{Duration, Instant};
 
@@ -27,7 +27,7 @@ impl Clock {
 
     /// `Ok` if there is time for a phase and the observer wants to go on, else why not. A refusal halves what is expected of
     /// the phase, so that one late phase does not stop all solves to come.
-    pub(super) fn allows(&mut self, phase: Phase, watch: &mut Watch<'_>) -> Result<(), Status> {
+    pub(super) fn allows(&mut self, phase: Phase, watch: &mut PacedObserver<'_>) -> Result<(), Status> {
         let now = Instant::now();
         if watch.go_on(now).is_break() {
             return Err(Status::Interrupted);

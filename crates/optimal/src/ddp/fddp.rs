@@ -3,7 +3,7 @@
 
 use super::best::{Best, Value};
 use super::clock::{Clock, Phase};
-use super::observer::{Observer, Unobserved, Watch};
+use super::observer::{Observer, PacedObserver, Unobserved};
 use super::rollout::Sum;
 use super::search::{Iterate, LineSearch, Search};
 use super::settings::{DdpMethod, Settings};
@@ -61,8 +61,8 @@ use std::time::Instant;
 /// #     }
 /// # }
 /// // x⁺ = x + u, ℓ = ½ (x² + u²): linear and quadratic, so the first step is the last.
-/// let mut problem = Problem::new(vec![1.0], vec![Box::new(Integrator { nu: 1 })], vec![0; 30], Box::new(Integrator { nu: 0 }))?;
-/// let mut solver = Fddp::new(&problem);
+/// let mut problem = Problem::new(vec![1.0], vec![Box::new(Integrator { nu: 1 })], vec![0; 30], Box::new(Integrator { nu: 0
+/// }))?; let mut solver = Fddp::new(&problem);
 /// let solution = solver.solve(&mut problem, &[0.0; 31], &[0.0; 30])?;
 ///
 /// assert_eq!(solution.status, Status::Converged);
@@ -85,7 +85,7 @@ pub struct Fddp {
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
     gaps: Vec<f64>,
-    /// What the solution becomes if the last iterate is worse.
+    /// The best iterate, which the solution becomes if the last one is worse.
     pub(super) best: Best,
     clock: Clock,
     /// Whether knots may come as equations of inverse dynamics.
@@ -217,7 +217,7 @@ impl Fddp {
         self.sweep.forget();
         self.best.start();
         self.clock.start(begin, self.settings.time_budget);
-        let status = self.iterate(problem, &mut progress, &mut Watch::new(observer, begin));
+        let status = self.iterate(problem, &mut progress, &mut PacedObserver::new(observer, begin));
         self.finish(problem, &mut progress, status);
         self.solution.timings.total = begin.elapsed();
         Ok(&self.solution)
@@ -229,7 +229,7 @@ impl Fddp {
     }
 
     /// The iterations, until one of the reasons to stop.
-    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, watch: &mut Watch<'_>) -> Status {
+    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, watch: &mut PacedObserver<'_>) -> Status {
         self.calc(problem);
         let mut gap = self.update_gaps(problem);
         if !(self.solution.cost.is_finite() && gap.is_finite()) {

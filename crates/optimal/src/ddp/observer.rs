@@ -1,4 +1,4 @@
-//! Who looks at a solve while it goes on, and may end it.
+//! Observers, who look at a solve while it goes on, and may end it.
 
 use super::solution::Iteration;
 use core::ops::ControlFlow;
@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 /// An observer of a solve, who may end it: the solution is then the best iterate so far, with
 /// [`Status::Interrupted`](crate::Status::Interrupted).
 ///
-/// A closure of an [`Iteration`] is one that sees each iteration, and if it returns a [`ControlFlow`] may end the solve after
-/// it:
+/// A closure of an [`Iteration`] is one that sees each iteration, and if it returns a [`ControlFlow`] may end the solve
+/// after it:
 ///
 /// ```
 /// use condyle_optimal::{Iteration, Observer};
@@ -34,7 +34,7 @@ impl<R: Verdict, F: FnMut(&Iteration) -> R> Observer for F {
     }
 }
 
-/// What a closure that is an [`Observer`] may return: whether to go on, or nothing, which is yes.
+/// The value that a closure that is an [`Observer`] may return: whether to go on, or nothing, which is yes.
 pub trait Verdict {
     /// Whether to go on.
     fn verdict(self) -> ControlFlow<()>;
@@ -52,7 +52,7 @@ impl Verdict for ControlFlow<()> {
     }
 }
 
-/// Nobody.
+/// The observer of a solve that nobody observes.
 pub(crate) struct Unobserved;
 
 impl Observer for Unobserved {
@@ -65,12 +65,12 @@ impl Observer for Unobserved {
 const PERIOD: Duration = Duration::from_millis(10);
 
 /// An observer, and when it was last asked.
-pub(crate) struct Watch<'a> {
+pub(crate) struct PacedObserver<'a> {
     observer: &'a mut dyn Observer,
     asked: Instant,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> PacedObserver<'a> {
     /// A solve begins.
     pub(super) fn new(observer: &'a mut dyn Observer, begin: Instant) -> Self {
         Self { observer, asked: begin }

@@ -2,7 +2,7 @@
 
 use super::best::{Best, Value};
 use super::clock::{Clock, Phase};
-use super::observer::Watch;
+use super::observer::PacedObserver;
 use super::rollout::{Nominal, Trials};
 use super::settings::{DdpMethod, Settings};
 use super::solution::{Solution, Status};
@@ -47,7 +47,7 @@ pub(super) struct Iterate<'a, 'o> {
     pub(super) feasible: bool,
     pub(super) settings: &'a Settings,
     pub(super) clock: &'a mut Clock,
-    pub(super) watch: &'a mut Watch<'o>,
+    pub(super) watch: &'a mut PacedObserver<'o>,
 }
 
 /// The line search, with its workspace.

@@ -41,8 +41,8 @@ pub struct Settings {
     /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
     /// as the last of its kind. `None` for no limit. A solve that goes back to a better iterate may take a sweep longer.
     pub time_budget: Option<Duration>,
-    /// How many segments of the horizon a sweep works on at the same time: see [`Sweep::set_segments`]. It is not the number
-    /// of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.
+    /// The number of segments of the horizon on which a sweep works at the same time: see [`Sweep::set_segments`]. It is
+    /// not the number of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.
     ///
     /// [`Sweep::set_segments`]: crate::Sweep::set_segments
     pub segments: usize,

@@ -1,14 +1,15 @@
-//! What a solve gives back: the trajectory, its feedback, how the solve ended and what happened on the way.
+//! Solutions: the trajectory, its feedback, how the solve ended and what happened on the way.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
 use crate::problem::{Problem, Shape};
+use crate::read::matrices;
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::time::Duration;
 
-/// How a solve ended. Whatever it says, the [`Solution`] holds the best iterate found: a converged one; else, of those from
-/// which a step could be computed and of the last one, the one with the smallest gap, and among equals that of least cost. An
-/// iterate that costs 1e8 times as much as the cheapest one and 1 has run away and is no candidate.
+/// The outcome of a solve. Whatever it says, the [`Solution`] holds the best iterate found: a converged one; else, of those
+/// from which a step could be computed and of the last one, the one with the smallest gap, and among equals that of least
+/// cost. An iterate that costs 1e8 times as much as the cheapest one and 1 has run away and is no candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -31,7 +32,7 @@ pub enum Status {
     NotFinite,
 }
 
-/// What happened in one iteration.
+/// A record of one iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Iteration {
     /// Its number, from 0.
@@ -60,7 +61,7 @@ pub struct Iteration {
     pub accepted: bool,
 }
 
-/// Where the time of a solve went.
+/// The times that the phases of a solve took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Timings {
     /// Dynamics and cost of the warm start.
@@ -75,14 +76,16 @@ pub struct Timings {
     pub total: Duration,
 }
 
-/// The result of a solve.
+/// The result of a solve. One that is read from a file is checked: its parts have the lengths of one horizon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")] // the fields; the implementations below check them
 pub struct Solution {
     /// States x₀ … x_N, flat: (N + 1)·nx.
     pub xs: Vec<f64>,
     /// Controls u₀ … u_{N−1}, flat.
     pub us: Vec<f64>,
     /// Feedback gains of the last sweep, per knot nu × ndx: uₜ + Kₜ (x ⊖ xₜ) is the control near the trajectory.
+    #[serde(deserialize_with = "matrices")]
     pub K: Vec<DMatrix<f64>>,
     /// Feed-forward of the last sweep, per knot nu: the full step it asked for.
     pub k: Vec<DVector<f64>>,
@@ -94,11 +97,11 @@ pub struct Solution {
     pub feasible: bool,
     /// Regularisation at the end.
     pub regularisation: f64,
-    /// How the solve ended.
+    /// The outcome of the solve.
     pub status: Status,
     /// A record per iteration.
     pub trace: Vec<Iteration>,
-    /// Where the time went.
+    /// The times of its phases.
     pub timings: Timings,
     shape: Shape,
 }
@@ -167,5 +170,47 @@ impl Solution {
 
     pub(crate) fn shape(&self) -> &Shape {
         &self.shape
+    }
+
+    /// Says which part of a solution from a file has not the length that its horizon asks for.
+    fn check(&self) -> Result<(), String> {
+        self.shape.check_itself()?;
+        let Shape { nx, ndx, .. } = self.shape;
+        let (horizon, wrong) = (self.shape.horizon(), |name, expected: usize, found: usize| {
+            (expected != found).then(|| format!("`{name}`: expected length {expected}, found {found}"))
+        });
+        let lengths = [
+            ("xs", (horizon + 1) * nx, self.xs.len()),
+            ("us", self.shape.offsets[horizon], self.us.len()),
+            ("K", horizon, self.K.len()),
+            ("k", horizon, self.k.len()),
+        ];
+        let mut faults = lengths.into_iter().filter_map(|(name, expected, found)| wrong(name, expected, found));
+        if let Some(fault) = faults.next() {
+            return Err(fault);
+        }
+        for (t, (K, k)) in self.K.iter().zip(&self.k).enumerate() {
+            let nu = self.shape.nu(t);
+            if K.shape() != (nu, ndx) || k.len() != nu {
+                let (rows, columns) = K.shape();
+                let found = format!("K is {rows} × {columns}, k has length {}", k.len());
+                return Err(format!("knot {t}: expected gains of {nu} × {ndx}, but {found}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Serialize for Solution {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, to)
+    }
+}
+
+impl<'de> Deserialize<'de> for Solution {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let solution = Self::deserialize(from)?;
+        solution.check().map_err(serde::de::Error::custom)?;
+        Ok(solution)
     }
 }

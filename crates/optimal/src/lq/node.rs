@@ -39,7 +39,7 @@ pub struct LqNode {
     pub lower: DVector<f64>,
     /// Greatest δu, nu; ∞ for none. Written by the solver.
     pub upper: DVector<f64>,
-    /// What is known of the form of A and B.
+    /// The form of A and B, as far as it is known.
     pub structure: Structure,
     /// The equations of inverse dynamics, which stand for A, B, S, R and part of Q where solver and action can use them.
     pub(crate) inverse_dynamics: InverseDynamicsForm,

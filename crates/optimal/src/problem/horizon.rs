@@ -7,7 +7,7 @@ use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
 use std::any::Any;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 /// An optimal control problem in discrete time, with N knots and a terminal one:
 ///
@@ -70,9 +70,10 @@ impl Problem {
     /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has controls,
-    /// a model that has [no next state](ActionModel::is_end) serves a knot, x̂₀ has a wrong length or an entry that is not finite or is no state, a state or the controls of a knot have more than 4096
-    /// entries, or there are more than 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
+    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has
+    /// controls, a model that has [no next state](ActionModel::is_end) serves a knot, x̂₀ has a wrong length or an entry that
+    /// is not finite or is no state, a state or the controls of a knot have more than 4096 entries, or there are more than
+    /// 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
@@ -209,10 +210,23 @@ impl Problem {
     /// # Errors
     /// [`Error`] if `us` has a wrong length or an entry that is not finite, or a state `xs` becomes infinite.
     pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
+        self.rollout_while(us, || ControlFlow::Continue(()))
+    }
+
+    /// As [`rollout`](Self::rollout), with a function that is asked at each knot whether to go on; the states of knots that
+    /// were not reached are zeros.
+    ///
+    /// # Errors
+    /// As of [`rollout`](Self::rollout).
+    #[doc(hidden)]
+    pub fn rollout_while(&mut self, us: &[f64], mut go_on: impl FnMut() -> ControlFlow<()>) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
         let mut xs = vec![0.0; (self.horizon() + 1) * self.nx()];
         xs[..self.shape.nx].copy_from_slice(&self.x0);
         for t in 0..self.horizon() {
+            if go_on().is_break() {
+                break;
+            }
             let (done, ahead) = xs.split_at_mut((t + 1) * self.shape.nx);
             let u = &us[self.shape.u(t)];
             self.models.of_mut(self.stages[t]).calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);

@@ -2,14 +2,10 @@
 //! are computed in groups.
 
 use super::action::ActionModel;
+use super::shape::{MOST_ENTRIES, MOST_KNOTS};
 use crate::error::Error;
-use crate::lq::LqNode;
 use std::any::Any;
 
-/// The most knots of a horizon.
-pub(crate) const MOST_KNOTS: usize = 1 << 20;
-/// The most entries of a state, a change of state, or the controls of a knot: matrices of that size take 128 MiB each.
-pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
 /// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
 const MOST_NUMBERS: usize = 1 << 28;
 

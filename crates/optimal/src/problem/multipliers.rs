@@ -76,7 +76,7 @@ pub(crate) fn leave_a_value(lower: f64, upper: f64) -> bool {
 /// 1/μ unless a solve has chosen another.
 pub(crate) const PENALTY: f64 = 10.0;
 
-/// How far z is beyond its bounds, with its sign.
+/// The distance of z beyond its bounds, with its sign.
 #[inline(always)]
 fn outside(z: f64, lower: f64, upper: f64) -> f64 {
     match z {

@@ -1,8 +1,14 @@
 //! The dimensions of a horizon.
 
 use crate::error::Error;
+use crate::lq::LqNode;
 use core::ops::Range;
 use serde::{Deserialize, Serialize};
+
+/// The most knots of a horizon.
+pub(crate) const MOST_KNOTS: usize = 1 << 20;
+/// The most entries of a state, a change of state, or the controls of a knot: matrices of that size take 128 MiB each.
+pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
 
 /// The dimensions of a horizon: what trajectories and workspaces are allocated by.
 #[derive(Debug, PartialEq, Default, Serialize, Deserialize)]
@@ -47,6 +53,23 @@ impl Shape {
     /// The place of uₜ in flat controls; empty at the terminal knot.
     pub(crate) fn u(&self, t: usize) -> Range<usize> {
         self.offsets[t]..self.offsets[t] + self.nu(t)
+    }
+
+    /// Says what is wrong with a shape from a file: it must be that of a problem.
+    pub(crate) fn check_itself(&self) -> Result<(), String> {
+        let Self { nx, ndx, offsets } = self;
+        if offsets.len() < 2 || offsets.len() > MOST_KNOTS + 1 || offsets[0] != 0 {
+            return Err(format!("a horizon of {} offsets: expected at least two, the first 0", offsets.len()));
+        }
+        if let Some(t) =
+            (1..offsets.len()).find(|&t| offsets[t] < offsets[t - 1] || offsets[t] - offsets[t - 1] > MOST_ENTRIES)
+        {
+            return Err(format!("knot {}: its controls end at {}, and begin at {}", t - 1, offsets[t], offsets[t - 1]));
+        }
+        match [nx, ndx].into_iter().find(|n| !(1..=MOST_ENTRIES).contains(*n)) {
+            Some(n) => Err(format!("a state of {n} numbers: expected 1 to {MOST_ENTRIES}")),
+            None => Ok(()),
+        }
     }
 
     /// `Ok` if a problem has the dimensions for which a solver was made.

@@ -140,7 +140,7 @@ pub(super) struct Knots<'a> {
     pub(super) us: &'a [f64],
     /// The number of entries of a state.
     pub(super) nx: usize,
-    /// Where the controls of a knot start.
+    /// The place at which the controls of each knot start.
     pub(super) offsets: &'a [usize],
 }
 

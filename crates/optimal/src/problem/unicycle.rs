@@ -32,11 +32,16 @@ pub struct Unicycle {
 impl Default for Unicycle {
     /// A step of 0.1 s with the weights 10 and 1.
     fn default() -> Self {
-        Self { dt: 0.1, weights: [10.0, 1.0], end: false }
+        Self::new(0.1, [10.0, 1.0])
     }
 }
 
 impl Unicycle {
+    /// A unicycle with the step Δt and the weights w₁ and w₂.
+    pub fn new(dt: f64, weights: [f64; 2]) -> Self {
+        Self { dt, weights, end: false }
+    }
+
     /// The same as an action of the end, without controls.
     #[must_use]
     pub fn at_the_end(self) -> Self {

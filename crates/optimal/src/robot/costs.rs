@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub struct Cost {
     /// The name of the term.
     pub name: String,
-    /// The weight w, finite; a term whose weight is 0 is not computed.
+    /// The weight w, finite and at least 0; a term whose weight is 0 is not computed.
     pub weight: f64,
     /// The residual r.
     pub residual: Residual,
@@ -62,11 +62,14 @@ impl Cost {
     }
 }
 
-/// Refuses the weight of the term called `name` if it is not finite.
+/// Refuses the weight of the term called `name` if it is negative or not finite: solvers minimise, and take Hessians of
+/// costs to be positive semidefinite.
 pub(super) fn check_weight(name: &str, weight: f64) -> Result<(), Error> {
-    let wrong =
-        || Error::Cost { name: name.to_owned(), what: format!("its weight is {weight}, expected a finite number") };
-    weight.is_finite().then_some(()).ok_or_else(wrong)
+    if weight >= 0.0 && weight.is_finite() {
+        return Ok(());
+    }
+    let what = format!("its weight is {weight}, expected a finite number of at least 0");
+    Err(Error::Cost { name: name.to_owned(), what })
 }
 
 /// A factor times w a(r).
@@ -108,7 +111,7 @@ impl Costs {
     /// Changes the weight of the term called `name`, between solves; says whether there is one.
     ///
     /// # Errors
-    /// [`Error::Cost`] if the weight is not finite; the old one then stays.
+    /// [`Error::Cost`] if the weight is negative or not finite; the old one then stays.
     pub fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
         check_weight(name, weight)?;
         let cost = self.terms.all_mut().iter_mut().find(|cost| cost.name == name);

@@ -56,7 +56,10 @@ impl HorizonTerms {
     /// Gives knot t costs of its own.
     pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         Error::check_size("knot", t, MOST_KNOTS)?;
-        let costs = Costs::new(self.model.clone(), self.capabilities.clone(), costs)?;
+        let costs = Costs::new(self.model.clone(), self.capabilities.clone(), costs).map_err(|error| match error {
+            Error::Cost { name, what } => Error::Cost { name, what: format!("{what} (knot {t})") },
+            other => other,
+        })?;
         self.costs.chosen_mut().set(Some(t), costs);
         self.update_layouts();
         Ok(())

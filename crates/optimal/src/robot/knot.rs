@@ -7,7 +7,7 @@ use super::residuals::rows::Row;
 use condyle_spatial::block::{Block, Strided, scatter_matrix, scatter_rows};
 use nalgebra::DMatrix;
 
-/// What the dynamics of a knot give, and what its residuals read.
+/// The outputs of the dynamics of a knot, and the quantities that its residuals read.
 #[derive(Clone, Debug)]
 pub(crate) struct KnotData {
     /// q̈, or v⁺ − v at an impact. Shape: nv.
@@ -24,6 +24,8 @@ pub(crate) struct KnotData {
     pub dtau: [DMatrix<f64>; 3],
     /// The equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
+    /// Whether the limbs in contact are solved in it.
+    pub limbs_solved: bool,
     pub residuals: ResidualData,
 }
 
@@ -45,6 +47,7 @@ impl KnotData {
             dlambda: [wide(), wide(), wide()],
             dtau: [(); 3].map(|()| DMatrix::zeros(n, n)),
             equations: Vec::new(),
+            limbs_solved: false,
             residuals: ResidualData::default(),
         }
     }
@@ -58,7 +61,7 @@ pub(crate) struct KnotState<'a> {
     pub data: &'a KnotData,
 }
 
-/// How the outputs of a knot change with x and u.
+/// The derivatives of the outputs of a knot by x and u.
 pub(crate) trait Sensitivities {
     /// g += c · ∂y_row/∂(u, v, q) for entry `row` of an output y.
     fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>);

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 /// // an arm reaches a point exactly, with no effort above 30 N m
 /// let effort = Residual::Control { reference: vec![0.0; 7] };
 /// let limit = Limit::new("effort", effort.clone(), vec![-30.0; 7], vec![30.0; 7]);
-/// let point = Residual::FrameTranslation { frame: arm.frame("tool")?, target: [0.5, 0.1, 0.6].into() };
+/// let point = Residual::FrameTranslation { frame: "tool".into(), target: [0.5, 0.1, 0.6].into() };
 /// let costs = vec![
 ///     Cost::new("effort", 1e-3, effort, Activation::Quadratic),
 ///     Cost::new("rest", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic),

@@ -17,8 +17,7 @@
 //!
 //! // an arm reaches for a point in 20 knots of 50 ms
 //! let arm = Arc::new(robots::arm7());
-//! let tool = arm.frame("tool")?;
-//! let reach = Residual::FrameTranslation { frame: tool, target: [0.4, 0.2, 0.5].into() };
+//! let reach = Residual::FrameTranslation { frame: "tool".into(), target: [0.4, 0.2, 0.5].into() };
 //! let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
 //! let rest = Residual::State { reference: x0.clone() };
 //! let effort = Residual::Control { reference: vec![0.0; 7] };
@@ -73,6 +72,7 @@ pub use integrators::{Integrated, Integrator};
 pub use limits::Limit;
 pub use problem::{ControlBounds, Dynamics, Knot, RobotProblem};
 pub use residuals::cones::{FrictionCone, WrenchCone};
+pub use residuals::frame_name::FrameName;
 pub use residuals::own::{OwnResidual, ResidualFunction};
 pub use residuals::residual::Residual;
 pub use state::groups;

@@ -12,12 +12,11 @@ use super::dynamics::knots::HasRobot;
 use super::integrators::{Integrated, Integrator};
 use super::limits::Limit;
 use crate::ActionModel;
-use crate::problem::MOST_ENTRIES;
+use crate::read::optional_matrix;
 use crate::{Error, Problem};
 use condyle_dynamics::Model;
 use nalgebra::DMatrix;
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -92,19 +91,6 @@ pub struct ControlBounds {
     pub upper: Vec<f64>,
 }
 
-/// A matrix as nalgebra writes it, (numbers column after column, rows, columns): it must have as many numbers as it says.
-fn matrix<'de, D: Deserializer<'de>>(from: D) -> Result<Option<DMatrix<f64>>, D::Error> {
-    let Some((numbers, rows, columns)) = Option::<(Vec<f64>, usize, usize)>::deserialize(from)? else {
-        return Ok(None);
-    };
-    if rows.max(columns) > MOST_ENTRIES || rows * columns != numbers.len() {
-        let what =
-            format!("a matrix of {rows} × {columns} with {} numbers, at most {MOST_ENTRIES} rows", numbers.len());
-        return Err(D::Error::custom(what));
-    }
-    Ok(Some(DMatrix::from_vec(rows, columns, numbers)))
-}
-
 /// The rule by which the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -112,7 +98,7 @@ pub enum Dynamics {
     /// [`FreeDynamics`].
     Free {
         /// S.
-        #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "matrix")]
+        #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_matrix")]
         actuation: Option<DMatrix<f64>>,
         /// The integrator.
         integrator: Integrator,
@@ -126,7 +112,7 @@ pub enum Dynamics {
         /// μ (1/kg).
         damping: f64,
         /// S.
-        #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "matrix")]
+        #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_matrix")]
         actuation: Option<DMatrix<f64>>,
         /// The integrator.
         integrator: Integrator,

@@ -3,7 +3,7 @@
 use super::{DT, contact_costs, feet, random, random_state};
 use condyle_dynamics::{ReferenceFrame, Vec3, robots};
 use condyle_optimal::robot::{
-    Activation, ControlBounds, Cost, Dynamics, FrictionCone, Integrator, Knot, Limit, Residual, RobotProblem,
+    Activation, ControlBounds, Cost, Dynamics, FrameName, FrictionCone, Integrator, Knot, Limit, Residual, RobotProblem,
 };
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -14,9 +14,9 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     let nv = model.nv();
     let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
     let costs = contact_costs(&model, &contacts, nv - 6, rng);
-    let frame = model.frame(&contacts[0].name).unwrap();
-    let stand = Residual::FramePlacement { frame, target: condyle_dynamics::Se3::identity() };
-    let point = Residual::FrameTranslation { frame, target: Vec3::new(0.1, -0.2, 0.3) };
+    let foot = || FrameName::from(&*contacts[0].name);
+    let stand = Residual::FramePlacement { frame: foot(), target: condyle_dynamics::Se3::identity() };
+    let point = Residual::FrameTranslation { frame: foot(), target: Vec3::new(0.1, -0.2, 0.3) };
     let rest = Residual::State { reference: random_state(&model, rng) };
     let still =
         |nu| vec![Cost::new("still", 0.1, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic)];

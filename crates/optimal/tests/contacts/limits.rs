@@ -3,8 +3,8 @@
 use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, ImpulseDynamics, Integrated,
-    Integrator, InverseDynamics, Limit, Residual,
+    Activation, Actuation, ContactDynamics, Cost, FrameName, FreeAcceleration, FreeDynamics, ImpulseDynamics,
+    Integrated, Integrator, InverseDynamics, Limit, Residual,
 };
 use condyle_optimal::{ActionModel, Error, LqNode};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -36,11 +36,11 @@ fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
 fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
     let contacts = feet(model, ReferenceFrame::LocalWorldAligned);
     let rows = contacts[1].constraint.kind.rows();
-    let frame = model.frame(&contacts[0].name).unwrap();
+    let foot = || FrameName::from(&*contacts[0].name);
     let place = Se3 { rotation: rotation(rng), translation: Vec3::new(0.1, 0.3, -0.2) };
     let mut residuals: Vec<_> = contact_costs(model, &contacts, nu, rng).into_iter().map(|c| c.residual).collect();
-    residuals.push(Residual::FramePlacement { frame, target: place });
-    residuals.push(Residual::FrameTranslation { frame, target: place.translation });
+    residuals.push(Residual::FramePlacement { frame: foot(), target: place });
+    residuals.push(Residual::FrameTranslation { frame: foot(), target: place.translation });
     residuals.push(Residual::ImpulseCenterOfMass);
     let limit = |(k, residual): (usize, Residual)| {
         let n = size(&residual, model, nu, rows);

@@ -10,8 +10,8 @@ use condyle_dynamics::{
     forward_velocities, integrate, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FreeAcceleration, FreeDynamics,
-    FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FrameName, FreeAcceleration,
+    FreeDynamics, FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;
@@ -102,7 +102,7 @@ fn barrier(n: usize) -> Activation {
 /// Every residual of a robot in contact.
 fn contact_costs(model: &Model, contacts: &[Contact], nu: usize, rng: &mut StdRng) -> Vec<Cost> {
     let (nv, name, rows) = (model.nv(), contacts[1].name.clone(), contacts[1].constraint.kind.rows());
-    let frame = model.frame(&contacts[0].name).unwrap();
+    let foot = || FrameName::from(&*contacts[0].name);
     let friction = FrictionCone { rotation: rotation(rng), inner: true, facets: 6, ..FrictionCone::new(0.6) };
     let force: [f64; 6] = core::array::from_fn(|k| if k < rows { rng.random::<f64>() } else { 0.0 });
     let velocity: [f64; 6] = core::array::from_fn(|_| rng.random::<f64>());
@@ -129,7 +129,7 @@ fn contact_costs(model: &Model, contacts: &[Contact], nu: usize, rng: &mut StdRn
             Residual::CentroidalMomentum { target: Force::from(velocity) },
             Activation::Smooth2 { epsilon: 0.5 },
         ),
-        Cost::new("turn", 0.7, Residual::FrameRotation { frame, target: rotation(rng) }, Activation::Quadratic),
+        Cost::new("turn", 0.7, Residual::FrameRotation { frame: foot(), target: rotation(rng) }, Activation::Quadratic),
         Cost::new(
             "force",
             1e-4,
@@ -152,7 +152,7 @@ fn contact_costs(model: &Model, contacts: &[Contact], nu: usize, rng: &mut StdRn
         (ReferenceFrame::World, "fast in the world"),
         (ReferenceFrame::LocalWorldAligned, "fast along the world"),
     ] {
-        let residual = Residual::FrameVelocity { frame, target: Motion::from(velocity), reference: axes };
+        let residual = Residual::FrameVelocity { frame: foot(), target: Motion::from(velocity), reference: axes };
         costs.push(Cost::new(label, 0.2, residual, Activation::Quadratic));
     }
     if rows == 6 {
@@ -232,8 +232,7 @@ fn derivatives_of_inverse_dynamics_are_those_of_the_action() {
 fn inverse_and_forward_dynamics_have_one_optimum() {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
-    let frame = arm.frame("tool").unwrap();
-    let reach = Residual::FrameTranslation { frame, target: Vec3::new(0.4, 0.2, 0.5) };
+    let reach = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
     let effort = || Residual::JointEffort { reference: vec![0.0; 7] };
     let acceleration = || Residual::JointAcceleration { reference: vec![0.0; 7] };
     let running = || {
@@ -267,7 +266,7 @@ fn derivatives_of_runge_kutta_are_those_of_the_action() {
         for method in methods {
             let drives = Actuation::joints(&model);
             let nu = drives.nu();
-            let frame = model.frames().len() - 1;
+            let frame = model.frames().last().unwrap().into();
             let costs = vec![
                 Cost::new(
                     "state",
@@ -333,8 +332,8 @@ fn residuals_are_what_they_say() {
     for residual in [
         Residual::CenterOfMass { target: com },
         Residual::CentroidalMomentum { target: momentum },
-        Residual::FrameRotation { frame, target: R },
-        Residual::FrameVelocity { frame, target: speed, reference },
+        Residual::FrameRotation { frame: "LF_foot".into(), target: R },
+        Residual::FrameVelocity { frame: "LF_foot".into(), target: speed, reference },
     ] {
         let terms = vec![Cost::new("zero", 1.0, residual, Activation::Quadratic)];
         let mut action = FreeDynamics::terminal(model.clone(), terms).unwrap();
@@ -496,14 +495,14 @@ fn knots_with_costs_of_their_own_are_single_knots() {
     let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
     let costs = contact_costs(&model, &contacts, 12, &mut rng);
     let mut stance = ContactDynamics::running(model.clone(), &contacts, DT, costs.clone()).unwrap();
-    let frame = model.frame("LH_foot").unwrap();
+    let foot = || FrameName::from("LH_foot");
     let mut other = |knot: usize, turn: bool| {
         let mut own = costs.clone();
         for cost in &mut own {
             match &mut cost.residual {
                 Residual::CenterOfMass { target } => *target = Vec3::new(rng.random(), rng.random(), 0.3),
                 Residual::FrameRotation { target, .. } => *target = rotation(&mut rng),
-                Residual::FrameVelocity { frame: own, .. } if turn => *own = frame,
+                Residual::FrameVelocity { frame: own, .. } if turn => *own = foot(),
                 Residual::CentroidalMomentum { .. } if knot == 5 => cost.weight = 0.0,
                 _ => {}
             }
@@ -513,10 +512,14 @@ fn knots_with_costs_of_their_own_are_single_knots() {
     for (knot, turn) in [(1, false), (4, true), (5, false), (6, true), (9, true), (13, false)] {
         stance.set_costs(knot, other(knot, turn)).unwrap();
     }
-    let lift =
-        vec![Cost::new("lift", 1.0, Residual::FrameTranslation { frame, target: Vec3::zero() }, Activation::Quadratic)];
+    let lift = vec![Cost::new(
+        "lift",
+        1.0,
+        Residual::FrameTranslation { frame: foot(), target: Vec3::zero() },
+        Activation::Quadratic,
+    )];
     stance.set_costs(2, lift).unwrap();
-    let height = Residual::FrameTranslation { frame, target: Vec3::new(0.0, 0.0, 0.1) };
+    let height = Residual::FrameTranslation { frame: foot(), target: Vec3::new(0.0, 0.0, 0.1) };
     stance.set_limits(3, vec![Limit::equality("height", height)]).unwrap();
     check_group(stance, &model, &mut rng);
 }

@@ -15,9 +15,9 @@ pub trait Cross<T> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Motion<S> {
-    /// Of the point of the body at the origin of the frame: m/s or m/s².
+    /// The motion of the point of the body at the origin of the frame: m/s or m/s².
     pub linear: Vec3<S>,
-    /// Of the body's rotation: rad/s or rad/s².
+    /// The motion of the body's rotation: rad/s or rad/s².
     pub angular: Vec3<S>,
 }
 impl_linear!(Motion { linear, angular });

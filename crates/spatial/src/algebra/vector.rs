@@ -247,7 +247,8 @@ impl<S: Scalar> Mat3<S> {
     }
 }
 
-/// How far a rotation may be from one (in length, in cosines of right angles): what a file of seven digits is off.
+/// The distance from a rotation that a matrix may have (in length, in cosines of right angles): that of a file of seven
+/// digits.
 const ROTATION_ROUNDING: f64 = 1e-6;
 
 impl Mat3<f64> {

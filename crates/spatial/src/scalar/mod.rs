@@ -45,7 +45,7 @@ pub trait Scalar:
 {
     /// The outcome of a comparison: `bool`, or one for each lane.
     type Mask: Copy;
-    /// How many numbers lie side by side in one value.
+    /// The number of numbers that lie side by side in one value.
     const LANES: usize;
     /// Whether the crates that own algorithms have compiled them for it: `f64` and its lanes.
     #[doc(hidden)]

@@ -4,7 +4,7 @@ use super::Scalar;
 
 /// A number that lanes are made of.
 pub trait Number: Scalar<Mask = bool> {
-    /// How large an angle may be for `near`.
+    /// The largest angle that `near` takes.
     const LARGEST: f64;
 
     /// (sin x, cos x) in this precision, for |x| up to `LARGEST`.

@@ -8,7 +8,7 @@
 use super::Scalar;
 use super::number::Number;
 
-/// What a precision needs to know.
+/// The constants of a precision.
 struct Precision<const T: usize> {
     /// π/2 in parts, the largest first.
     parts: [f64; 3],

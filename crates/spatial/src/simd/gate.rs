@@ -1,15 +1,17 @@
 //! The gate to vector instructions: where kernels are compiled, for which scalars, and with what.
 //!
-//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factor, whose body is generic and inlined throughout, into a function
-//! that is called:
+//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factor, whose body is generic and inlined throughout, into a
+//! function that is called:
 //!
 //! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
 //!   instructions that the scalar is made of; whoever uses the library calls that code;
-//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same 64 bits
+//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same 64
+//! bits
 //!   under another name;
 //! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
 //!
-//! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one state.
+//! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one
+//! state.
 #![allow(unsafe_code)]
 
 pub use crate::simd::fused::Fused;
@@ -37,6 +39,11 @@ pub fn is<A: 'static, B: 'static>() -> bool {
 /// structs of spatial algebra are `repr(C)`, hence laid out alike; nalgebra's matrices are transparent and `repr(C)` structs
 /// over a `Vec`. Of `Vec` it is taken for granted that its three words stand in the same order whatever it holds;
 /// `tests::one_layout` looks.
+///
+/// Why not one type from the start: workspaces keep vectors and nalgebra's matrices of the user's scalar, and calls give out
+/// borrows of them (`&DMatrix<f64>`), while a pass computes on the scalar whose vectors they are. Casts of plain slices,
+/// which need no such trust, would name each field of each workspace a second time, and could not make a matrix. A scalar
+/// of one name would have to ask at each product whether it is fused.
 #[inline(always)]
 pub unsafe fn renamed<A, B>(a: A) -> B {
     assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
@@ -44,7 +51,8 @@ pub unsafe fn renamed<A, B>(a: A) -> B {
     unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
-/// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
+/// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants;
+/// see
 /// [`gate`](crate::simd::gate). It returns nothing: what it computes is in its arguments.
 #[macro_export]
 #[doc(hidden)]
@@ -100,8 +108,9 @@ macro_rules! kernel {
     };
 }
 
-/// A function on `f64` whose body is generic over the vector registers `V` that it may use: the widest of the level, compiled
-/// for them in the crate that owns it. It is for levels that have registers, above the baseline, and returns nothing.
+/// A function on `f64` whose body is generic over the vector registers `V` that it may use: the widest of the level,
+/// compiled for them in the crate that owns it. It is for levels that have registers, above the baseline, and returns
+/// nothing.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! register_kernel {

@@ -71,9 +71,9 @@ pub fn scatter_matrix<S: Block>(from: &Strided<'_, S>, to: &mut [&mut [S::Number
 pub struct Strided<'a, S> {
     /// Its entries.
     pub vectors: &'a [S],
-    /// How far it is from one row to the next, and from one column to the next.
+    /// The distances from one row to the next, and from one column to the next.
     pub strides: [usize; 2],
-    /// How many rows and columns it has.
+    /// The numbers of rows and columns.
     pub shape: [usize; 2],
     /// Whether minus the matrix is meant.
     pub negative: bool,
@@ -223,9 +223,9 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
 }
 
-/// A promise, by which the types of vectors can be named. Their operations are instructions that not every processor has, and
-/// no operation looks whether this one does; so nobody else can name them, and code that is generic over its scalar meets
-/// them only where it was entered through a door that does look ([`Scalar::enter`]).
+/// A promise, by which the types of vectors can be named. Their operations are instructions that not every processor has,
+/// and no operation looks whether this one does; so nobody else can name them, and code that is generic over its scalar
+/// meets them only where it was entered through a door that does look ([`Scalar::enter`]).
 ///
 /// ```compile_fail
 /// use condyle_spatial::{Scalar, block::Real};
@@ -246,15 +246,16 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 /// ```
 ///
 /// # Safety
-/// Whoever implements this uses vectors only where the processor has their instructions: in kernels that were entered through
-/// their door, and in functions that were called at their level.
+/// Whoever implements this uses vectors only where the processor has their instructions: in kernels that were entered
+/// through their door, and in functions that were called at their level.
 pub unsafe trait Witness: 'static {}
 
 /// A number with its vectors.
 pub trait Real: Block<Number = Self> {
-    /// Those of [`Level::Avx2`](crate::simd::level::Level::Avx2), or of [`Level::Neon`](crate::simd::level::Level::Neon).
+    /// The vectors of [`Level::Avx2`](crate::simd::level::Level::Avx2), or of
+    /// [`Level::Neon`](crate::simd::level::Level::Neon).
     type Short<W: Witness>: Block<Number = Self>;
-    /// Those of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as short ones where there is none.
+    /// The vectors of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as short ones where there is none.
     type Long<W: Witness>: Block<Number = Self>;
 }
 

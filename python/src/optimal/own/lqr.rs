@@ -91,7 +91,7 @@ impl Unicycle {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(problem_error(rust::Error::TimeStep { dt }));
         }
-        let action = rust::Unicycle { dt, weights, ..rust::Unicycle::default() };
+        let action = rust::Unicycle::new(dt, weights);
         Ok(Self(if terminal { action.at_the_end() } else { action }))
     }
 

@@ -33,7 +33,7 @@ use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 use vectorized::Rows;
 
-/// What is computed of the bodies and of the columns of their joints, in the world's frame.
+/// The quantities of the bodies and of the columns of their joints, in the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Bodies<S> {

@@ -11,14 +11,14 @@ use condyle_spatial::gate::Fused;
 use condyle_spatial::{Force, Scalar, Vec3};
 use core::any::Any;
 
-/// How many columns go together.
+/// The number of columns that go together.
 const SIDE: usize = 4;
 
-/// How many numbers a column has: Iᶜ S, 2Bᵀ S, `by_q` and `by_v`.
+/// The number of numbers of a column: Iᶜ S, 2Bᵀ S, `by_q` and `by_v`.
 const NUMBERS: usize = 6 + 3 + 6 + 6;
 
-/// What each column brings to its pairs with the columns before it. Shape: columns / `SIDE`, rounded up, each `NUMBERS` ×
-/// `SIDE`.
+/// The part that each column brings to its pairs with the columns before it. Shape: columns / `SIDE`, rounded up, each
+/// `NUMBERS` × `SIDE`.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Rows<S> {

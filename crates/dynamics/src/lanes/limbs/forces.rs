@@ -1,4 +1,4 @@
-//! How the unit forces of the rows of J go through the articulated bodies to the root: see `constrained.rs`.
+//! The way of the unit forces of the rows of J through the articulated bodies to the root: see `constrained.rs`.
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, numbers};
@@ -14,7 +14,7 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 
-/// What the articulated-body algorithm has left, number by number.
+/// The results of the articulated-body algorithm, number by number.
 #[derive(Clone, Copy)]
 pub(crate) struct Left<'a> {
     plan: &'a Plan,

@@ -2,8 +2,8 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. With U = Iᴬ S and D = Sᵀ U of the articulated
 //! bodies, a unit acceleration of column e that no other joint resists is felt on the way out as T, first T = S_e, and
-//! turns column d by Z_de = −D_d⁻¹ U_dᵀ T, beyond which T + S_d Z_de is felt. That is Z = L⁻¹ of M = Lᵀ D L: with the zeros of
-//! the tree, and ones on its diagonal. So
+//! turns column d by Z_de = −D_d⁻¹ U_dᵀ T, beyond which T + S_d Z_de is felt. That is Z = L⁻¹ of M = Lᵀ D L: with the zeros
+//! of the tree, and ones on its diagonal. So
 //!
 //! ```text
 //! M⁻¹ = Z D⁻¹ Zᵀ
@@ -21,7 +21,7 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::{Motion, Scalar};
 
-/// How many vectors of each row are summed up at once.
+/// The number of vectors of each row that are summed up at once.
 const SIDE: usize = 3;
 
 #[derive(Clone, Debug)]

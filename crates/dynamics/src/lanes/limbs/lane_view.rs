@@ -1,4 +1,4 @@
-//! What a pass over steps has left, body by body.
+//! Results of a pass over steps, body by body.
 
 use super::Plan;
 use super::lanes::Four;
@@ -6,7 +6,7 @@ use super::pass::Scratch;
 use condyle_spatial::block::lanes;
 use condyle_spatial::{Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// Of the derivatives of inverse dynamics.
+/// The results for the derivatives of inverse dynamics.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LaneView<'d> {
     plan: &'d Plan,

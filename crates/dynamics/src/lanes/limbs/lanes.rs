@@ -149,7 +149,7 @@ impl Layout for Limbs<'_> {
     fn stack_index(&self, i: usize) -> usize {
         i
     }
-    /// All of them, when the pass has gone down to the last.
+    /// All bodies, when the pass has gone down to the last step.
     #[inline(always)]
     fn closed_by(&self, i: usize) -> &[usize] {
         if i + 1 == self.steps.len() { self.closed } else { &[] }

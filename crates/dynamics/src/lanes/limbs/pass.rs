@@ -71,7 +71,7 @@ impl Scratch {
     }
 }
 
-/// What a call is given.
+/// The arguments of a call.
 #[derive(Clone, Copy)]
 pub(crate) struct Arguments<'a> {
     pub q: &'a [Fused],

@@ -1,4 +1,4 @@
-//! What an MJCF element says, with the defaults of its class, in SI units.
+//! Attributes of MJCF elements, with the defaults of their classes, in SI units.
 
 use crate::error::{Error, nearest};
 use crate::io::xml::{self, Element};
@@ -8,7 +8,7 @@ use std::collections::HashMap;
 /// Attributes of a class, for each kind of element.
 type Class<'a> = HashMap<&'a str, HashMap<&'a str, &'a str>>;
 
-/// How many attributes all classes may have together, what they inherit included.
+/// The most attributes that all classes may have together, what they inherit included.
 const MAX_INHERITED: usize = 1 << 20;
 
 /// The name of the class that elements have without being asked.

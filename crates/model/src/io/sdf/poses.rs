@@ -2,8 +2,9 @@
 
 use super::WORLD_LINK;
 use crate::error::{Error, nearest};
+use crate::io::from_rpy;
 use crate::io::xml::{self, Element};
-use condyle_spatial::{Mat3, Quaternion, Se3, Vec3};
+use condyle_spatial::{Quaternion, Se3, Vec3};
 use std::collections::HashMap;
 
 /// The frame of the model itself.
@@ -186,12 +187,7 @@ pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
     }
     let [x, y, z, roll, pitch, yaw] = xml::array(&pose.text).map_err(wrong)?;
     let degrees = pose.attribute("degrees").is_some_and(|d| matches!(d, "true" | "1"));
-    let [(sr, cr), (sp, cp), (sy, cy)] = [roll, pitch, yaw].map(|a| if degrees { a.to_radians() } else { a }.sin_cos());
-    let rotation = Mat3 {
-        x: Vec3::new(cy * cp, sy * cp, -sp),
-        y: Vec3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),
-        z: Vec3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
-    };
+    let rotation = from_rpy([roll, pitch, yaw].map(|a| if degrees { a.to_radians() } else { a }));
     Ok(Se3::new(rotation, Vec3::new(x, y, z)))
 }
 

@@ -77,7 +77,7 @@ pub trait ActionModel: Any + Send {
         false
     }
 
-    /// How many states a group call computes at the price of one; 1 unless it uses vector lanes.
+    /// The number of states that a group call computes at the price of one; 1 unless it uses vector lanes.
     ///
     /// A line search tries so many step lengths side by side.
     fn lanes(&self) -> usize {
@@ -135,8 +135,9 @@ pub trait ActionModel: Any + Send {
     /// The derivatives of both at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B = ∂x⁺/∂u, q = ∂ℓ/∂x,
     /// r = ∂ℓ/∂u, and the Hessian of ℓ or its Gauss–Newton approximation, Q, S, R. The gap f is the solver's.
     ///
-    /// By default central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff)'s: slow, allocating, and right to
-    /// about 1e-9 (1e-7 the Hessian). [`AutoDiff`](crate::AutoDiff) has exact ones of what is written for any scalar.
+    /// By default central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff)'s: slow, allocating, and
+    /// right to about 1e-9 (1e-7 the Hessian). [`AutoDiff`](crate::AutoDiff) has exact ones of what is written for any
+    /// scalar.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         differences::calc_diff(self, t, x, u, node);
     }
@@ -194,8 +195,8 @@ pub trait ActionModel: Any + Send {
         hold::newton(self, t, x)
     }
 
-    /// The horizon has [moved on](crate::Problem::shift) by a knot: what was said of knot t now holds of knot t − 1. Nothing by
-    /// default. May not allocate.
+    /// The horizon has [moved on](crate::Problem::shift) by a knot: what was said of knot t now holds of knot t − 1.
+    /// Nothing by default. May not allocate.
     fn shift(&mut self) {}
 
     /// A copy that computes the same, for another thread; `None`, unless an implementation gives one: then its knots are

@@ -6,10 +6,13 @@
 #![allow(non_snake_case)] // J, M
 
 use super::kkt_elimination::Tableau;
+use super::limb_elimination::{
+    LimbElimination, invert_limbs, put_back, solve_limbs, write_drift, write_jacobian, write_motion,
+};
 use crate::robot::contact::{Contact, constraint_set};
 use crate::robot::continuous::Wanted;
 use crate::robot::horizon_terms::HorizonTerms;
-use crate::robot::knot::{KnotData, WIDEST, unpack, unpack_matrix};
+use crate::robot::knot::{KnotData, WIDEST, unpack};
 use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use crate::robot::residuals::surplus::Surplus;
 use condyle_dynamics::{
@@ -17,8 +20,9 @@ use condyle_dynamics::{
     constrained_dynamics_equations, rnea, rnea_derivatives,
 };
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Strided, gather_rows};
+use condyle_spatial::block::{Block, gather_rows};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// Where accelerations come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +59,7 @@ pub(crate) struct KnotBatch<S> {
     /// The output that the controls drive: τ, or q̈.
     tau: Vec<S>,
     a: Vec<S>,
+    linear: LinearEquations<S>,
     /// Whether the last pass was at q.
     visited: bool,
 }
@@ -62,7 +67,7 @@ pub(crate) struct KnotBatch<S> {
 impl<S: Scalar> Clone for KnotBatch<S> {
     #[inline(never)] // large
     fn clone(&self) -> Self {
-        let Self { data, pass, surplus, residuals, q, v, tau, a, visited } = self;
+        let Self { data, pass, surplus, residuals, q, v, tau, a, linear, visited } = self;
         let (data, pass, surplus, residuals) = (clone(data), clone(pass), clone(surplus), clone(residuals));
         Self {
             data,
@@ -73,6 +78,7 @@ impl<S: Scalar> Clone for KnotBatch<S> {
             v: v.clone(),
             tau: tau.clone(),
             a: a.clone(),
+            linear: linear.clone(),
             visited: *visited,
         }
     }
@@ -100,7 +106,13 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         };
         let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
-        Self { data, pass, surplus, residuals, q, v, tau, a, visited: false }
+        let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Arc::default());
+        Self { data, pass, surplus, residuals, q, v, tau, a, linear, visited: false }
+    }
+
+    /// Makes room for the equations of knots in inverse-dynamics form.
+    pub(crate) fn reserve(&mut self, tableau: Tableau, limbs: &Arc<LimbElimination>) {
+        self.linear = LinearEquations::new(tableau, limbs.clone());
     }
 
     /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and what
@@ -169,37 +181,28 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// Accelerations and forces, and the equations that they satisfy: the tableau [J μ1 c_v c_q; M −Jᵀ r_v r_q].
+    /// Accelerations and forces, and the equations that they satisfy, in which limbs are solved.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
-        let Self { data, pass, q, v, tau, a, .. } = self;
-        let nv = model.nv();
+        let Self { data, pass, q, v, tau, a, linear, .. } = self;
         match pass {
             Pass::Contact(set, J) => {
-                let tableau = Tableau { nv, rows: J.nrows() };
-                let (Tableau { rows, .. }, mu, x) = (tableau, set.proximal.mu, nv + J.nrows());
+                let mu = set.proximal.mu;
                 let d = constrained_dynamics_equations(model, data, set, q, v, tau, &[]);
                 a.copy_from_slice(d.a);
                 unpack(d.lambda, to, |to| &mut to.lambda);
-                unpack_block(d.dgamma_dv, false, false, to, [0, x], tableau);
-                unpack_block(d.dgamma_dq, false, false, to, [0, x + nv], tableau);
-                unpack_dynamics([d.M, d.dtau_dv, d.dtau_dq], to, tableau);
+                let LinearEquations { size, tableau, .. } = linear;
+                write_motion(*size, d.M, d.dtau_dv, d.dtau_dq, tableau);
+                write_drift(*size, d.dgamma_dv, d.dgamma_dq, mu, tableau);
                 set.jacobian(J);
-                unpack_block(J, false, false, to, [0, 0], tableau);
-                unpack_block(J, true, true, to, [rows, nv], tableau);
-                for equations in to.iter_mut().map(|to| &mut to.equations) {
-                    for r in 0..rows {
-                        let forces = &mut equations[r * tableau.stride() + nv..][..rows];
-                        forces.fill(0.0);
-                        forces[r] = mu;
-                    }
-                }
+                write_jacobian(*size, J, tableau);
             }
             _ => {
                 a.copy_from_slice(aba(model, data, q, v, tau, &[]));
                 let d = rnea_derivatives(model, data, q, v, a, &[]);
-                unpack_dynamics([d.dtau_da, d.dtau_dv, d.dtau_dq], to, Tableau { nv, rows: 0 });
+                write_motion(linear.size, d.dtau_da, d.dtau_dv, d.dtau_dq, &mut linear.tableau);
             }
         }
+        linear.solve_limbs(to);
         unpack(a, to, |to| &mut to.a);
         self.visited = true;
     }
@@ -252,6 +255,45 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     }
 }
 
+/// The linear equations of some knots, side by side.
+#[derive(Clone, Debug)]
+struct LinearEquations<S> {
+    size: Tableau,
+    limbs: Arc<LimbElimination>,
+    tableau: Vec<S>,
+    /// The tableau as it was written.
+    before: Vec<S>,
+    /// B⁻¹ of each limb.
+    inverses: Vec<S>,
+}
+
+impl<S: Block<Number = f64>> LinearEquations<S> {
+    fn new(size: Tableau, limbs: Arc<LimbElimination>) -> Self {
+        let (tableau, inverses) = (vec![S::zero(); size.len()], vec![S::zero(); limbs.room()]);
+        Self { size, limbs, before: tableau.clone(), tableau, inverses }
+    }
+
+    /// Solves the limbs of the knots where that can be, and writes the equations to the data of each.
+    fn solve_limbs(&mut self, to: &mut [KnotData]) {
+        let Self { size, limbs, tableau, before, inverses } = self;
+        let (mut regular, mut each) = (S::zero(), [0.0; WIDEST]);
+        invert_limbs(limbs, *size, tableau, inverses, &mut regular);
+        regular.store(&mut each);
+        for (to, regular) in to.iter_mut().zip(each) {
+            to.limbs_solved = regular == 1.0;
+        }
+        let all = to.iter().all(|to| to.limbs_solved);
+        if !all {
+            before.copy_from_slice(tableau);
+        }
+        solve_limbs(limbs, *size, tableau, inverses);
+        if !all {
+            put_back(regular, before, tableau);
+        }
+        unpack(tableau, to, |to| &mut to.equations);
+    }
+}
+
 /// Writes numbers of some knots side by side.
 fn pack<'a, S: Block<Number = f64>>(count: usize, of: impl Fn(usize) -> &'a [f64], to: &mut [S]) {
     let rows: [&[f64]; WIDEST] = core::array::from_fn(|k| of(k.min(count - 1)));
@@ -267,30 +309,4 @@ fn unpack_matrices<S: Block<Number = f64>>(
     for (k, from) in from.into_iter().enumerate() {
         unpack(from.as_slice(), to, |to| part(to)[k].as_mut_slice());
     }
-}
-
-/// Writes a matrix, or its transpose, or minus it, to the equations of each knot: `at` is its first row and column there.
-fn unpack_block<S: Block<Number = f64>>(
-    from: &DMatrix<S>,
-    transposed: bool,
-    negative: bool,
-    to: &mut [KnotData],
-    at: [usize; 2],
-    tableau: Tableau,
-) {
-    let ((rows, columns), stride) = (from.shape(), tableau.stride());
-    let (strides, shape) = match transposed {
-        false => ([1, rows], [rows, columns]),
-        true => ([rows, 1], [columns, rows]),
-    };
-    let from = Strided { vectors: from.as_slice(), strides, shape, negative };
-    unpack_matrix(&from, to, stride, |to| &mut to.equations[at[0] * stride + at[1]..]);
-}
-
-/// Writes M, ∂τ/∂v and ∂τ/∂q to the equations of each knot.
-fn unpack_dynamics<S: Block<Number = f64>>([M, by_v, by_q]: [&DMatrix<S>; 3], to: &mut [KnotData], tableau: Tableau) {
-    let Tableau { nv, rows } = tableau;
-    unpack_block(M, true, false, to, [rows, 0], tableau); // M is symmetric
-    unpack_block(by_v, false, false, to, [rows, nv + rows], tableau);
-    unpack_block(by_q, false, false, to, [rows, 2 * nv + rows], tableau);
 }

@@ -11,9 +11,11 @@
 //! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those that
 //! it may best do without. A contact's rows prefer joints that move no other contact; where these are close to singular
 //! (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are redundant is there
-//! no pivot, and the knot stays explicit.
+//! no pivot, and the knot stays explicit. What the limbs in contact do is mostly solved before, for several knots side by
+//! side: see [`limb_elimination`](super::limb_elimination).
 #![allow(non_snake_case)] // J, M, T, U, D
 
+use super::limb_elimination::LimbElimination;
 use crate::lq::InverseDynamicsForm;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
@@ -21,7 +23,7 @@ use crate::robot::residuals::rows::Row;
 use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, block, copy_scaled, mask, max_abs};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
-const PREFERENCE: f64 = 1e-2;
+pub(super) const PREFERENCE: f64 = 1e-2;
 /// A pivot that is so much smaller than the row's largest entry was at first counts as zero.
 const REDUNDANT: f64 = 1e-7;
 
@@ -54,6 +56,8 @@ pub(crate) struct KktElimination {
     passive: usize,
     /// The coordinates that each contact's row prefers.
     preferred: Vec<Vec<usize>>,
+    /// The rows that limbs were solved for, each with its column.
+    limbs: Vec<(usize, usize)>,
     /// The column that each row was solved for.
     pivots: Vec<usize>,
     /// The place of each column of δa and δf: its unknown, if it is one, or else the row that was solved for it.
@@ -73,7 +77,7 @@ enum Place {
 impl KktElimination {
     /// The elimination for contacts whose rows are moved by some coordinates each, of a robot whose first `passive`
     /// coordinates are not driven.
-    pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
+    pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>], limbs: &LimbElimination) -> Self {
         let rows = moved_by.len();
         let driven = |k: &usize| *k >= passive;
         let alone = |r: usize, k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
@@ -85,6 +89,7 @@ impl KktElimination {
             tableau: Tableau { nv, rows },
             passive,
             preferred: preferred.collect(),
+            limbs: limbs.solved().collect(),
             pivots: Vec::with_capacity(rows + passive),
             place: vec![Place::Unknown(0); nv + rows],
             runs: Vec::with_capacity(nv + rows),
@@ -97,10 +102,11 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt; says whether there were pivots. Overwrites the tableau.
-    pub(crate) fn run(&mut self, tableau: &mut [f64], dt: f64, form: &mut InverseDynamicsForm) -> bool {
+    /// Writes U and D for steps of Δt, from a tableau of which the limbs are solved or are not; says whether there were
+    /// pivots. Overwrites the tableau.
+    pub(crate) fn run(&mut self, tableau: &mut [f64], limbs: bool, dt: f64, form: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
-        at_level(Run { elimination: self, T: tableau, dt, form, done: &mut done });
+        at_level(Run { elimination: self, T: tableau, limbs, dt, form, done: &mut done });
         done
     }
 
@@ -142,6 +148,7 @@ impl KktElimination {
 struct Run<'a> {
     elimination: &'a mut KktElimination,
     T: &'a mut [f64],
+    limbs: bool,
     dt: f64,
     form: &'a mut InverseDynamicsForm,
     done: &'a mut bool,
@@ -166,7 +173,7 @@ fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
 impl Vectorized for Run<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { elimination: e, T, dt, form, done } = self;
+        let Self { elimination: e, T, limbs, dt, form, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
         let (solved, all) = (rows + e.passive, rows + nv);
         let mut force_scale = 0.0_f64;
@@ -175,14 +182,21 @@ impl Vectorized for Run<'_> {
         }
         e.place.fill(Place::Unknown(0));
         e.pivots.clear();
+        e.pivots.resize(solved, usize::MAX);
+        for &(r, k) in e.limbs.iter().filter(|_| limbs) {
+            (e.place[k], e.pivots[r]) = (Place::Row(r), k);
+        }
         for r in 0..solved {
+            if e.pivots[r] != usize::MAX {
+                continue;
+            }
             let (before, rest) = T.split_at_mut(r * stride);
             let (row, after) = rest.split_at_mut(stride);
             // what the entries of a row that depends on others are compared with: a contact's are of order one
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = e.choose(r, row, scale) else { return };
             e.place[k] = Place::Row(r);
-            e.pivots.push(k);
+            e.pivots[r] = k;
             let inverse = row[k].recip();
             for x in row.iter_mut() {
                 *x *= inverse;

@@ -64,7 +64,7 @@ macro_rules! robot_knots {
             /// Changes the weights of the terms called `name` of all knots, between solves; says whether there is one.
             ///
             /// # Errors
-            /// [`Error::Cost`] if the weight is not finite; the old ones then stay.
+            /// [`Error::Cost`] if the weight is negative or not finite; the old ones then stay.
             pub fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
                 self.robot_mut().terms.set_weight(name, weight)
             }

@@ -7,4 +7,5 @@ pub(super) mod impulse;
 pub(super) mod inverse;
 pub(super) mod kkt_elimination;
 pub(super) mod knots;
+mod limb_elimination;
 mod robot;

@@ -3,6 +3,7 @@
 
 use super::batch::{KnotBatch, Law, Pass};
 use super::kkt_elimination::{KktElimination, Tableau};
+use super::limb_elimination::LimbElimination;
 use crate::Error;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
@@ -17,7 +18,7 @@ use crate::robot::residuals::rows::Row;
 use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
-    Data, IntegrateArgument, Model, aba_hessian, constrained_dynamics, gravity, integrate_jacobian,
+    Data, IntegrateArgument, Model, aba_hessian, constrained_dynamics, gravity, integrate_jacobian_groups,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Real, Witness};
@@ -91,7 +92,7 @@ impl Work {
     fn new(of: &RobotDynamics) -> Self {
         let RobotDynamics { model, actuation, law, given, capabilities, groups, .. } = of;
         let (nv, lanes) = (model.nv(), lanes(law));
-        let vectors = (lanes > 1).then(|| {
+        let mut vectors = (lanes > 1).then(|| {
             let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, law));
             VectorBatches { short: KnotBatch::new(model, law), long }
         });
@@ -102,11 +103,18 @@ impl Work {
         };
         // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
-        let elimination = form.map(|(moved_by, passive)| KktElimination::new(nv, passive, &moved_by));
         let mut data = KnotData::new(nv, capabilities, *given);
-        if elimination.is_some() {
-            data.equations.resize(Tableau { nv, rows: capabilities.rows() }.len(), 0.0);
-        }
+        let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
+            let damped = matches!(law, Law::Contact(_, damping) if *damping != 0.0);
+            let limbs = Arc::new(LimbElimination::new(model, passive, &moved_by, damped));
+            let tableau = Tableau { nv, rows: capabilities.rows() };
+            data.equations.resize(tableau.len(), 0.0);
+            match &mut vectors.long {
+                Some(long) => long.reserve(tableau, &limbs), // derivatives take the widest
+                None => vectors.short.reserve(tableau, &limbs),
+            }
+            KktElimination::new(nv, passive, &moved_by, &limbs)
+        });
         Self {
             single: KnotBatch::new(model, law),
             vectors,
@@ -128,7 +136,8 @@ impl Work {
     ) -> bool {
         let Self { data, elimination: Some(elimination), .. } = self else { return false };
         let form = &mut node.inverse_dynamics;
-        if !elimination.run(&mut data[lane].equations, scale, form) {
+        let KnotData { equations, limbs_solved, .. } = &mut data[lane];
+        if !elimination.run(equations, *limbs_solved, scale, form) {
             return false;
         }
         form.active = true;
@@ -344,10 +353,10 @@ impl RobotDynamics {
         }
     }
 
-    /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
+    /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq, the blocks of groups.
     pub(crate) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
-        integrate_jacobian(&self.model, dq, IntegrateArgument::Position, by_q);
-        integrate_jacobian(&self.model, dq, IntegrateArgument::Velocity, by_dq);
+        integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Position, by_q);
+        integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Velocity, by_dq);
     }
 
     /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
@@ -358,7 +367,7 @@ impl RobotDynamics {
     }
 }
 
-/// How the outputs of a knot change, by the derivatives in its data.
+/// The derivatives of the outputs of a knot, from those in its data.
 pub(crate) struct DynamicsSensitivities<'a> {
     /// The output that is S u.
     pub given: Output,

@@ -122,7 +122,7 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
             let numbers: [_; WIDEST] =
                 core::array::from_fn(|k| target(k).map_or([0.0; 12], |(residual, ..)| residual.target()));
             gather_rows(&numbers.each_ref().map(<[f64; 12]>::as_slice)[..group.terms.len()], t);
-            let (frame, slopes) = (residual.frame().unwrap_or(0), group.slopes);
+            let (frame, slopes) = (plan.frame, group.slopes);
             let velocities = || velocities.expect("velocities are computed where a residual needs them");
             match *residual {
                 Residual::CenterOfMass { .. } => center_of_mass(placements, t, r),

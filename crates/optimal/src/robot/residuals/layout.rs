@@ -16,6 +16,8 @@ pub(crate) struct Plan {
     pub first: usize,
     /// The place of a residual of kinematics among those of its knot.
     pub index: usize,
+    /// The number of its frame in the robot; 0 if it looks at none.
+    pub frame: usize,
     /// The rows of its contact in λ.
     pub rows: Range<usize>,
     /// Whether its knot has contacts.
@@ -28,9 +30,10 @@ impl Plan {
     /// The plan of a residual, or what does not fit the robot and the capabilities of its dynamics.
     pub(crate) fn new(model: &Model, capabilities: &Capabilities, residual: &Residual) -> Result<Self, String> {
         let n = residual.check(model, capabilities)?;
+        let frame = residual.frame().map_or(Ok(0), |name| name.number(model)).map_err(|error| error.to_string())?;
         let rows = residual.contact().map_or(Ok(0..0), |name| capabilities.contact(name))?;
         let (W, in_contact) = (residual.force_rows(rows.len()), !capabilities.contacts.is_empty());
-        Ok(Self { n, first: 0, index: 0, rows, in_contact, W })
+        Ok(Self { n, first: 0, index: 0, frame, rows, in_contact, W })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Residuals: what costs and limits look at, and how it is computed.
 
 pub(super) mod cones;
+pub(super) mod frame_name;
 pub(super) mod kernel;
 pub(super) mod layout;
 pub(super) mod own;

@@ -1,14 +1,15 @@
 //! Residuals: what a cost looks at.
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
+use super::frame_name::FrameName;
 use super::own::OwnResidual;
 use crate::robot::capabilities::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// What a cost looks at: a vector r(x, u) that should be small.
+/// A residual: a vector r(x, u) that should be small.
 ///
-/// Frames are numbers of the model's frames; contacts and impulses are called by the name that the action gives them.
+/// Frames are called by their names in the robot, contacts and impulses by those that the action gives them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Residual {
@@ -47,28 +48,28 @@ pub enum Residual {
     /// log(refXo oXf), the twist from the target to the frame, in the target's frame: 6 numbers, linear first.
     FramePlacement {
         /// The frame.
-        frame: usize,
+        frame: FrameName,
         /// The frame's wanted pose in the world.
         target: Se3<f64>,
     },
     /// p − p_ref, 3 numbers, in the world.
     FrameTranslation {
         /// The frame.
-        frame: usize,
+        frame: FrameName,
         /// The wanted position of its origin in the world (m).
         target: Vec3<f64>,
     },
     /// log(R_refᵀ R), 3 numbers, in the target's axes.
     FrameRotation {
         /// The frame.
-        frame: usize,
+        frame: FrameName,
         /// The frame's wanted axes in the world.
         target: Mat3<f64>,
     },
     /// v − v_ref, 6 numbers, linear first.
     FrameVelocity {
         /// The frame.
-        frame: usize,
+        frame: FrameName,
         /// The wanted velocity (m/s, rad/s).
         target: Motion<f64>,
         /// The frame in which both are expressed.
@@ -119,7 +120,7 @@ pub(crate) enum Part {
     Diagonal,
     /// The block of positions with positions.
     Positions,
-    /// All of it.
+    /// The whole Hessian.
     All,
 }
 
@@ -156,10 +157,9 @@ impl Residual {
         self.frame().is_some() || matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. })
     }
 
-    /// Whether another residual looks at the same, with a target of its own.
+    /// Whether another residual, of the same frame if it has one, looks at the same, with a target of its own.
     pub(crate) fn differs_in_target(&self, other: &Self) -> bool {
-        core::mem::discriminant(self) == core::mem::discriminant(other)
-            && (self.frame(), self.reference()) == (other.frame(), other.reference())
+        core::mem::discriminant(self) == core::mem::discriminant(other) && self.reference() == other.reference()
     }
 
     /// The numbers of its target: a position, a twist or a wrench, then a rotation by columns; zeros where there is none.
@@ -181,12 +181,12 @@ impl Residual {
     }
 
     /// The frame that it looks at.
-    pub(crate) fn frame(&self) -> Option<usize> {
+    pub(crate) fn frame(&self) -> Option<&FrameName> {
         match self {
             Self::FramePlacement { frame, .. }
             | Self::FrameTranslation { frame, .. }
             | Self::FrameRotation { frame, .. }
-            | Self::FrameVelocity { frame, .. } => Some(*frame),
+            | Self::FrameVelocity { frame, .. } => Some(frame),
             _ => None,
         }
     }
@@ -222,9 +222,6 @@ impl Residual {
             true => finite("reference", numbers),
             false => Err(format!("its reference has {} numbers, expected {expected}", numbers.len())),
         };
-        if let Some(frame) = self.frame().filter(|&frame| frame >= model.frames().len()) {
-            return Err(format!("there is no frame {frame}; the robot has {}", model.frames().len()));
-        }
         let rows = self.contact().map_or(Ok(0), |name| capabilities.contact(name).map(|rows| rows.len()))?;
         let rigid = |what: &str| match rows {
             6 => Ok(()),

@@ -155,7 +155,7 @@ impl KnotTerms<'_> {
         let alike = |a: &dyn KinematicTerms, b: &dyn KinematicTerms| {
             a.layout().kinematic == b.layout().kinematic
                 && (0..a.layout().kinematic).all(|i| match (a.kinematic(i), b.kinematic(i)) {
-                    (Some((a, ..)), Some((b, ..))) => a.differs_in_target(b),
+                    (Some((a, _, own)), Some((b, _, its))) => own.frame == its.frame && a.differs_in_target(b),
                     _ => false,
                 })
         };

@@ -27,7 +27,7 @@ fn long(kernel: impl Kernel) {
     unsafe { with_instructions(kernel) }
 }
 
-/// What is done alike in all registers, by the names of the instructions, and what is not.
+/// The operations of all registers, by the names of the instructions.
 macro_rules! register {
     (
         $register:ident of $n:literal $float:ident, $mask:ident, $enter:ident;

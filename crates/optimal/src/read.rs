@@ -1,0 +1,32 @@
+//! Matrices from files of serde's formats, as nalgebra writes them: (numbers column after column, rows, columns). Each must
+//! have as many numbers as it says.
+
+use crate::lq::LqNode;
+use nalgebra::DMatrix;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
+
+/// A matrix as it stands in a file.
+#[derive(Deserialize)]
+struct Written(Vec<f64>, usize, usize);
+
+impl Written {
+    fn matrix<E: Error>(self) -> Result<DMatrix<f64>, E> {
+        let (Self(numbers, rows, columns), most) = (self, LqNode::MOST_SIZE);
+        if rows.max(columns) > most || rows * columns != numbers.len() {
+            let found = numbers.len();
+            return Err(E::custom(format!("a matrix of {rows} × {columns} with {found} numbers, at most {most} rows")));
+        }
+        Ok(DMatrix::from_vec(rows, columns, numbers))
+    }
+}
+
+/// A matrix, if there is one.
+pub(crate) fn optional_matrix<'de, D: Deserializer<'de>>(from: D) -> Result<Option<DMatrix<f64>>, D::Error> {
+    Option::<Written>::deserialize(from)?.map(Written::matrix).transpose()
+}
+
+/// Some matrices.
+pub(crate) fn matrices<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DMatrix<f64>>, D::Error> {
+    Vec::<Written>::deserialize(from)?.into_iter().map(Written::matrix).collect()
+}

@@ -1,0 +1,86 @@
+"""Whole-body control: which joint efforts make a robot in contact do what it is told.
+
+At each tick one cone program gives accelerations, contact forces and efforts that best follow weighted tasks under the
+full dynamics, with true friction cones: see `WholeBodyController`.
+
+>>> import condyle, numpy as np
+>>> from condyle.wholebody import FrictionContact, Gains, Settings, Task, WholeBodyController
+>>> robot = condyle.robots.humanoid()
+>>> soles = [FrictionContact.sole(sole, 0.7, [0.2, 0.1]) for sole in ("left_sole", "right_sole")]
+>>> tasks = [Task.com(gains=Gains.critical(30.0)), Task.orientation("pelvis"), Task.posture()]
+>>> controller = WholeBodyController(robot, soles, tasks, Settings(contact_gains=Gains(0.0, 40.0)))
+>>> q, v = condyle.neutral(robot), np.zeros(robot.nv)
+>>> references = controller.hold(q)
+>>> references.com.velocity[1] = 0.1  # m/s, to the left
+>>> command = controller.step(q, v, references)
+>>> command.status, command.tau.shape, command.forces.shape
+('solved', (38,), (2, 6))
+
+`plan_of` turns a solution of `condyle.optimal` into a `Plan`, which `WholeBodyController.track` follows.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._condyle import ControllerError, FrictionContact, Model, Plan, Task, WholeBodyController
+from ._types import Solution
+from ._wholebody import (
+    Command,
+    ComTarget,
+    ContactTarget,
+    FrameTarget,
+    Gains,
+    JointLimits,
+    MomentumTarget,
+    PostureTarget,
+    Pyramid,
+    References,
+    Settings,
+)
+
+__all__ = [
+    "ComTarget",
+    "Command",
+    "ContactTarget",
+    "ControllerError",
+    "FrameTarget",
+    "FrictionContact",
+    "Gains",
+    "JointLimits",
+    "MomentumTarget",
+    "Plan",
+    "PostureTarget",
+    "Pyramid",
+    "References",
+    "Settings",
+    "Task",
+    "WholeBodyController",
+    "plan_of",
+]
+
+
+def plan_of(model: Model, solution: Solution, times: ArrayLike, touches: ArrayLike, fade: float = 0.0) -> Plan:
+    """The plan of a solution of `condyle.optimal`.
+
+    model: the robot.
+    times: of the N + 1 knots (s); an impact's two knots share theirs.
+    touches: whether each of the controller's contacts touches from each knot to the next, (N, contacts).
+    fade: the time over which contacts are loaded and unloaded (s).
+
+    Controls and gains are taken over from knots that have one control for each actuated coordinate; impacts have none.
+
+    >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
+    >>> from condyle.wholebody import plan_of
+    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+    >>> rest = Cost("rest", 1.0, Residual.state(np.zeros(14)))
+    >>> step = FreeDynamics(arm, 0.05, [rest])
+    >>> problem = Problem(x0, [step], [0] * 10, FreeDynamics(arm, None, [rest]))
+    >>> solution = Fddp(problem).solve(np.tile(x0, (11, 1)), np.tile(step.quasi_static(x0), (10, 1)))
+    >>> plan = plan_of(arm, solution, 0.05 * np.arange(11), np.ones((10, 0)))  # an arm without contacts
+    >>> np.array_equal(plan.feedback(0.0, x0[:7], x0[7:]), solution.us[0])  # on the plan, the plan's control
+    True
+    """
+    nu = max((len(u) for u in solution.us), default=0)
+    controls = [u if len(u) == nu else np.zeros(nu) for u in solution.us]
+    gains = [K if len(K) == nu else np.zeros((nu, 2 * model.nv)) for K in solution.K]
+    return Plan(model, times, solution.xs, touches, np.array(controls), np.array(gains), fade)

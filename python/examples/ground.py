@@ -1,0 +1,53 @@
+"""A robot on level ground, by constrained dynamics: what touches is held as long as the ground pushes, what comes down
+is stopped by an impact. Friction has no bound here: who uses it looks at the forces."""
+
+import numpy as np
+
+import condyle
+from condyle import ConstraintSet, ContactConstraint
+
+HOLD = 50.0  # how fast a held foot's drift decays (1/s)
+
+
+class Ground:
+    """The robot's state, and which of its feet stand. All stand at first, where they are."""
+
+    def __init__(self, model, q, feet, kind="point"):
+        self.model, self.data, self.kind = model, condyle.Data(model), kind
+        self.q, self.v, self.feet = np.array(q), np.zeros(model.nv), list(feet)
+        self.standing = [True] * len(self.feet)
+        self.sets = {}
+
+    def step(self, tau, dt, f_ext=None):
+        """One step of dt under efforts τ and forces on the bodies. Returns the force on each foot in the world (N)."""
+        forces = np.zeros((len(self.feet), 3))
+        while True:
+            held, contacts = self._contacts()
+            found = condyle.constrained_dynamics(self.model, self.data, contacts, self.q, self.v, tau, f_ext)
+            here = [found.lambda_[contacts.range(i)][:3] for i in range(len(held))]
+            pulled = min(range(len(held)), key=lambda i: here[i][2], default=None)
+            if pulled is None or here[pulled][2] >= 0.0:
+                break
+            self.standing[held[pulled]] = False  # the ground does not pull
+        for k, force in zip(held, here, strict=True):
+            forces[k] = force
+        self.v = self.v + dt * found.a  # v⁺ = v + Δt q̈
+        self.q = condyle.integrate(self.model, self.q, dt * self.v)  # q⁺ = q ⊕ Δt v⁺
+        self._land()
+        return forces
+
+    def _contacts(self):
+        held = tuple(k for k, standing in enumerate(self.standing) if standing)
+        if held not in self.sets:
+            contacts = [ContactConstraint(self.feet[k], self.kind, None, "local_world_aligned", kd=HOLD) for k in held]
+            self.sets[held] = ConstraintSet(self.model, contacts)
+        return held, self.sets[held]
+
+    def _land(self):
+        """Stops what has come down by an impact: J v⁺ = 0."""
+        height = [condyle.frame_placement(self.model, self.data, self.q, foot)[2, 3] for foot in self.feet]
+        landed = [not standing and z < 0.0 for standing, z in zip(self.standing, height, strict=True)]
+        if any(landed):
+            self.standing = [a or b for a, b in zip(self.standing, landed, strict=True)]
+            contacts = self._contacts()[1]
+            self.v = condyle.impulse_dynamics(self.model, self.data, contacts, self.q, self.v).v

@@ -1,0 +1,13 @@
+//! Whole-body control as Python sees it: the module `condyle.wholebody`.
+
+mod contacts;
+mod controller;
+mod plan;
+mod references;
+mod settings;
+mod tasks;
+
+pub(crate) use contacts::FrictionContact;
+pub(crate) use controller::WholeBodyController;
+pub(crate) use plan::Plan;
+pub(crate) use tasks::Task;

@@ -1,0 +1,194 @@
+//! The controller.
+
+use super::contacts::FrictionContact;
+use super::plan::Plan;
+use super::tasks::Task;
+use super::{references, settings};
+use crate::arrays::{Give, class, vector};
+use crate::exceptions::controller_error;
+use crate::model::Model;
+use crate::optimal::lock;
+use condyle::wholebody as rust;
+use pyo3::exceptions::PyValueError;
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use rust::{CommandSource, Status};
+use std::sync::Mutex;
+
+/// A whole-body controller: at each tick a cone program gives the accelerations, contact forces and joint efforts that best
+/// do what the tasks ask.
+///
+///     x = (q̈, f)
+///     minimise     ½ Σ w ‖J q̈ + J̇ v − a*‖²  +  ½ w_a ‖q̈‖²  +  ½ w_f ‖f − f_ref‖²
+///     subject to   Sᵤ (M q̈ + h − Jᵀ f) = 0            no motor acts on a free-flyer
+///                  J_c q̈ + J̇_c v = k (X_ref ⊖ X) − d v   contacts are held (k = d = 0 unless set)
+///                  ‖(f₁, f₂)‖ ≤ μ f_n                  friction, a second-order cone for each force
+///                  f_n p ∈ f_n · polygon, |τ_n| ≤ γ f_n   centre of pressure and yaw moment of a sole's wrench
+///                  f_min ≤ Σ f_n ≤ f_max               for each contact, ramped while it fades in or out
+///                  −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
+///                  bounds on q̈                         from limits of position and velocity: `JointLimits`
+///
+/// Positions, velocities and accelerations of tasks and contacts are along the world's axes, accelerations classical. Memory
+/// is fixed here.
+///
+/// model: the robot.
+/// contacts: a list of `FrictionContact`, each of another frame; empty for a robot in free fall.
+/// tasks: a list of `Task`.
+/// settings: `Settings`; None for the default ones.
+///
+/// Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
+/// without its contact, and for any number outside of its range.
+///
+/// >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
+/// >>> robot = condyle.robots.quadruped()
+/// >>> feet = [FrictionContact.point(f"{leg}_foot", 0.7) for leg in ("LF", "LH", "RF", "RH")]
+/// >>> controller = WholeBodyController(robot, feet, [Task.com(), Task.orientation("trunk"), Task.posture()])
+/// >>> knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # inwards
+/// >>> q = np.r_[0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0, knees]
+/// >>> command = controller.step(q, np.zeros(18), controller.hold(q)).solved()
+/// >>> lift = command.forces[:, 2].sum()
+/// >>> bool(abs(lift - 9.81 * robot.total_mass) < 0.1)  # the feet carry the weight
+/// True
+#[pyclass(frozen, module = "condyle.wholebody")]
+pub(crate) struct WholeBodyController {
+    model: Py<Model>,
+    settings: rust::Settings,
+    contacts: usize,
+    inner: Mutex<Inner>,
+}
+
+struct Inner {
+    controller: rust::WholeBodyController,
+    /// Scratch: the references of a call.
+    references: rust::References,
+    q: Vec<f64>,
+    v: Vec<f64>,
+}
+
+#[pymethods]
+impl WholeBodyController {
+    #[new]
+    #[pyo3(signature = (model, contacts, tasks, settings=None))]
+    fn new(
+        model: &Bound<'_, Model>,
+        contacts: Vec<PyRef<'_, FrictionContact>>,
+        tasks: Vec<PyRef<'_, Task>>,
+        settings: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let settings = settings.map_or_else(|| Ok(rust::Settings::default()), settings::read)?;
+        let contacts: Vec<_> = contacts.iter().map(|contact| contact.0.clone()).collect();
+        let tasks: Vec<_> = tasks.iter().map(|task| task.0.clone()).collect();
+        let robot = &model.get().inner;
+        let mut controller =
+            rust::WholeBodyController::new(robot, &contacts, &tasks, settings.clone()).map_err(controller_error)?;
+        let q = condyle::neutral(robot);
+        let references = controller.hold(&q);
+        let inner = Mutex::new(Inner { controller, references, q, v: vec![0.0; robot.nv()] });
+        Ok(Self { model: model.clone().unbind(), settings, contacts: contacts.len(), inner })
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.model)
+    }
+
+    /// The settings, all of them: `Settings`.
+    #[getter]
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        settings::give(py, &self.settings)
+    }
+
+    /// The `References` that keep a position at rest: all tasks where they are, each contact held where it is and touching,
+    /// the weight shared by the contacts in equal parts.
+    ///
+    /// q: nq numbers.
+    fn hold<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let mut inner = lock("controller", &self.inner)?;
+        let q = vector("q", q, inner.q.len())?;
+        references::give(py, &inner.controller.hold(&q))
+    }
+
+    /// Sets references to those of a plan at a time: joints, and where they bring centre of mass, momentum and frames;
+    /// contacts by their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
+    ///
+    /// plan: a `Plan` of the same robot with as many contacts.
+    /// t: the time (s); before the first and after the last knot the plan rests in it.
+    /// references: `References` of this controller, which are changed.
+    fn track(&self, plan: &Bound<'_, Plan>, t: f64, references: &Bound<'_, PyAny>) -> PyResult<()> {
+        let plan = plan.get();
+        plan.made_for.check("plan", self.model.get())?;
+        if plan.contacts != self.contacts {
+            let (expected, found) = (self.contacts, plan.contacts);
+            return Err(PyValueError::new_err(format!("plan: expected {expected} contacts, found {found}")));
+        }
+        let mut inner = lock("controller", &self.inner)?;
+        let Inner { controller, references: numbers, .. } = &mut *inner;
+        references::read(references, numbers)?;
+        controller.track(&plan.inner, t, numbers);
+        references::write(numbers, references)
+    }
+
+    /// The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
+    /// Other threads run meanwhile.
+    ///
+    /// q: nq numbers; v: nv.
+    /// references: `References` of this controller.
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        v: &Bound<'_, PyAny>,
+        references: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut inner = lock("controller", &self.inner)?;
+        let Inner { controller, references: numbers, q: position, v: velocity } = &mut *inner;
+        let (q, v) = (vector("q", q, position.len())?, vector("v", v, velocity.len())?);
+        position.copy_from_slice(&q);
+        velocity.copy_from_slice(&v);
+        references::read(references, numbers)?;
+        give(py, py.detach(|| controller.step(position, velocity, numbers)))
+    }
+
+    /// The last `Command`; before the first step zeros.
+    #[getter]
+    fn command<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give(py, lock("controller", &self.inner)?.controller.command())
+    }
+
+    fn __repr__(&self) -> String {
+        let name = self.model.get().inner.name();
+        format!("<condyle.wholebody.WholeBodyController of '{name}', {} contacts>", self.contacts)
+    }
+}
+
+/// A command as Python sees it.
+fn give<'py>(py: Python<'py>, command: &rust::Command) -> PyResult<Bound<'py, PyAny>> {
+    let status = match command.status {
+        Status::Solved => "solved",
+        Status::Infeasible => "infeasible",
+        Status::IterationLimit => "iteration_limit",
+        Status::TimeLimit => "time_limit",
+        Status::NotFinite { .. } => "not_finite",
+        _ => "numerical_error",
+    };
+    let source = match command.source {
+        CommandSource::Solution => "solution",
+        CommandSource::LastSolution => "last_solution",
+        CommandSource::GravityCompensation => "gravity_compensation",
+    };
+    let forces: Vec<[f64; 6]> = command.forces.iter().map(|force| force.to_array()).collect();
+    let members = [
+        status.into_pyobject(py)?.into_any(),
+        command.status.to_string().into_pyobject(py)?.into_any(),
+        source.into_pyobject(py)?.into_any(),
+        command.tau.give(py, None)?,
+        command.a.give(py, None)?,
+        forces.give(py, None)?,
+        command.com_acceleration.give(py, None)?,
+        command.violation.give(py, None)?,
+        command.iterations.into_pyobject(py)?.into_any(),
+        command.reduced_accuracy.into_pyobject(py)?.to_owned().into_any(),
+        command.limits_relaxed.into_pyobject(py)?.to_owned().into_any(),
+    ];
+    class!(py, "condyle._wholebody", "Command")?.call1(PyTuple::new(py, members)?)
+}

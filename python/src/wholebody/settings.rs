@@ -1,0 +1,112 @@
+//! The settings of a controller, in and out: `Settings` of `condyle._wholebody`.
+
+use crate::arrays::{Give, class, numbers};
+use crate::exceptions::wrong_word;
+use condyle::wholebody as rust;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rust::{Backend, Form, Friction, JointLimits, Settings};
+
+/// The gains that are given as a pair.
+pub(super) fn gains(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<rust::Gains> {
+    let wrong = |_| PyValueError::new_err(format!("{argument}: expected Gains(stiffness, damping)"));
+    let (stiffness, damping) = given.extract().map_err(wrong)?;
+    Ok(rust::Gains { stiffness, damping })
+}
+
+/// The numbers of a member, if it is not None.
+fn list(given: &Bound<'_, PyAny>, prefix: &str, name: &str) -> PyResult<Option<Vec<f64>>> {
+    let value = given.getattr(name)?;
+    (!value.is_none()).then(|| numbers(&format!("{prefix}{name}"), &value)).transpose()
+}
+
+/// The settings as the library has them.
+pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
+    let get = |name: &str| given.getattr(name);
+    let friction = get("friction")?;
+    let friction = match (friction.extract::<String>().as_deref(), friction.extract::<(usize, bool)>()) {
+        (Ok("cone"), _) => Friction::Cone,
+        (_, Ok((sides, inscribed))) => Friction::Pyramid { sides, inscribed },
+        _ => {
+            let message = format!("friction: expected 'cone' or Pyramid(sides, inscribed), found {}", friction.repr()?);
+            return Err(PyValueError::new_err(message));
+        }
+    };
+    let limits = get("joint_limits")?;
+    let joint_limits = if limits.is_none() {
+        None
+    } else {
+        let list = |name| list(&limits, "joint_limits.", name);
+        Some(JointLimits {
+            look_ahead: limits.getattr("look_ahead")?.extract()?,
+            max_acceleration: limits.getattr("max_acceleration")?.extract()?,
+            lower: list("lower")?,
+            upper: list("upper")?,
+            velocity: list("velocity")?,
+        })
+    };
+    Ok(Settings {
+        acceleration_weight: get("acceleration_weight")?.extract()?,
+        force_weight: get("force_weight")?.extract()?,
+        contact_gains: gains("contact_gains", &get("contact_gains")?)?,
+        max_correction: get("max_correction")?.extract()?,
+        friction,
+        effort: list(given, "", "effort")?,
+        joint_limits,
+        hold_ticks: get("hold_ticks")?.extract()?,
+        damping: get("damping")?.extract()?,
+        backend: match get("backend")?.extract::<String>()?.as_str() {
+            "interior_point" => Backend::InteriorPoint,
+            "clarabel" => Backend::Clarabel,
+            other => return Err(wrong_word("backend", "'interior_point' or 'clarabel'", other)),
+        },
+        form: match get("form")?.extract::<String>()?.as_str() {
+            "condensed" => Form::Condensed,
+            "full" => Form::Full,
+            other => return Err(wrong_word("form", "'condensed' or 'full'", other)),
+        },
+        warm_start: get("warm_start")?.extract()?,
+        tolerance: get("tolerance")?.extract()?,
+        max_iterations: get("max_iterations")?.extract()?,
+        time_limit: get("time_limit")?.extract()?,
+    })
+}
+
+/// `Gains` as Python sees them.
+pub(super) fn give_gains(py: Python<'_>, gains: rust::Gains) -> PyResult<Bound<'_, PyAny>> {
+    class!(py, "condyle._wholebody", "Gains")?.call1((gains.stiffness, gains.damping))
+}
+
+/// `Settings` as Python sees them.
+pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, PyAny>> {
+    let list = |numbers: &Option<Vec<f64>>| numbers.as_ref().map(|x| x.give(py, None)).transpose();
+    let friction = match s.friction {
+        Friction::Cone => "cone".into_pyobject(py)?.into_any(),
+        Friction::Pyramid { sides, inscribed } => {
+            class!(py, "condyle._wholebody", "Pyramid")?.call1((sides, inscribed))?
+        }
+    };
+    let limits = |l: &JointLimits| {
+        let (lower, upper, velocity) = (list(&l.lower)?, list(&l.upper)?, list(&l.velocity)?);
+        let all = (l.look_ahead, l.max_acceleration, lower, upper, velocity);
+        class!(py, "condyle._wholebody", "JointLimits")?.call1(all)
+    };
+    let all = [
+        s.acceleration_weight.give(py, None)?,
+        s.force_weight.give(py, None)?,
+        give_gains(py, s.contact_gains)?,
+        s.max_correction.give(py, None)?,
+        friction,
+        list(&s.effort)?.into_pyobject(py)?.into_any(),
+        s.joint_limits.as_ref().map(limits).transpose()?.into_pyobject(py)?.into_any(),
+        s.hold_ticks.into_pyobject(py)?.into_any(),
+        s.damping.give(py, None)?,
+        if s.backend == Backend::Clarabel { "clarabel" } else { "interior_point" }.into_pyobject(py)?.into_any(),
+        if s.form == Form::Full { "full" } else { "condensed" }.into_pyobject(py)?.into_any(),
+        s.warm_start.into_pyobject(py)?.to_owned().into_any(),
+        s.tolerance.give(py, None)?,
+        s.max_iterations.into_pyobject(py)?.into_any(),
+        s.time_limit.give(py, None)?,
+    ];
+    class!(py, "condyle._wholebody", "Settings")?.call1(pyo3::types::PyTuple::new(py, all)?)
+}
