@@ -454,12 +454,26 @@ class Timings(NamedTuple):
     """The whole solve."""
 
 
-class Solution(NamedTuple):
-    """The result of a solve: the best iterate, whatever the status says.
+class Evaluation(NamedTuple):
+    """The cost of states and controls, and what the dynamics of their knots compute."""
 
-    Where knots differ in nu, what belongs to controls is a list of N arrays instead of one array.
-    """
+    cost: float
+    """The sum of the costs of all knots."""
+    costs: _Array
+    """The cost of each knot, N + 1 numbers, the terminal one last."""
+    next_states: _Array
+    """The next states φ(x, u), (N, nx)."""
+    gaps: _Array
+    """x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁, (N + 1, ndx)."""
+    accelerations: list[_Array]
+    """The accelerations of each knot of a robot, nv numbers; none of other knots and of impacts."""
+    efforts: list[_Array]
+    """The efforts of all joints of each knot of a robot, nv numbers; none of other knots and of impacts."""
+    forces: list[dict[str, _Array]]
+    """The forces of each knot's contacts by name, 3 or 6 numbers in the axes of their rows; of impacts the impulses."""
 
+
+class _Solution(NamedTuple):
     xs: _Array
     """States, (N + 1, nx)."""
     us: _Array | list[_Array]
@@ -488,6 +502,77 @@ class Solution(NamedTuple):
     """A record per iteration."""
     timings: Timings
     """The time that its parts took."""
+
+
+class Solution(_Solution):
+    """The result of a solve: the best iterate, whatever the status says.
+
+    Where knots differ in nu, what belongs to controls is a list of N arrays instead of one array.
+    """
+
+    _source: Any = None
+    _evaluation: Evaluation | None = None
+
+    def _evaluated(self) -> Evaluation:
+        if self._evaluation is None:
+            if self._source is None:
+                raise AttributeError("this solution was copied from its problem: call Problem.evaluate(xs, us)")
+            problem, moved = self._source
+            self._evaluation = problem._evaluate(self.xs, self.us, moved)
+        return self._evaluation
+
+    @property
+    def accelerations(self) -> list[_Array]:
+        """The accelerations of each knot, as in an `Evaluation`; computed when they are first asked for."""
+        return self._evaluated().accelerations
+
+    @property
+    def efforts(self) -> list[_Array]:
+        """The efforts of all joints of each knot, likewise."""
+        return self._evaluated().efforts
+
+    @property
+    def forces(self) -> list[dict[str, _Array]]:
+        """The forces of each knot's contacts, by their names, likewise."""
+        return self._evaluated().forces
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The parts of a pickle: the numbers, without the problem."""
+        return type(self), tuple(self)
+
+
+class LqNode(NamedTuple):
+    """A knot's linear-quadratic problem: δx⁺ = A δx + B δu + f, ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu."""
+
+    A: ArrayLike
+    """∂x⁺/∂x, (ndx, ndx)."""
+    B: ArrayLike
+    """∂x⁺/∂u, (ndx, nu)."""
+    f: ArrayLike
+    """The gap φ(x, u) ⊖ x⁺, ndx numbers."""
+    Q: ArrayLike
+    """∂²ℓ/∂x², (ndx, ndx)."""
+    S: ArrayLike
+    """∂²ℓ/∂x∂u, (ndx, nu)."""
+    R: ArrayLike
+    """∂²ℓ/∂u², (nu, nu)."""
+    q: ArrayLike
+    """∂ℓ/∂x, ndx numbers."""
+    r: ArrayLike
+    """∂ℓ/∂u, nu numbers."""
+
+
+class SweepResult(NamedTuple):
+    """The feedback and the value functions of a `Sweep`: V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx + a constant."""
+
+    K: list[_Array]
+    """The gains of each knot, (nu, ndx)."""
+    k: list[_Array]
+    """The feed-forward of each knot, nu numbers."""
+    Vx: _Array
+    """The gradients of the value functions, (N + 1, ndx)."""
+    Vxx: _Array
+    """Their Hessians, (N + 1, ndx, ndx)."""
 
 
 class Outcome(NamedTuple):
@@ -548,6 +633,9 @@ _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",
     "Solution": "optimal",
+    "Evaluation": "optimal",
+    "SweepResult": "optimal",
+    "LqNode": "optimal",
     "Outcome": "optimal",
     "Control": "simulation",
 }

@@ -127,7 +127,7 @@ factor! {
 Ltdl {
     #[new]
     fn new(model: &Bound<'_, Model>) -> Self {
-        let model = &model.get().inner;
+        let model = &*model.get().inner;
         Self { inner: condyle::Ltdl::new(model), size: model.nv(), done: false }
     }
 

@@ -104,8 +104,9 @@ mod _condyle {
     use model::{Model, model_from_bytes};
     #[pymodule_export]
     use optimal::{
-        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, Fddp, FreeDynamics,
-        FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, WrenchCone,
+        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, DifferentialAction, Fddp,
+        FreeDynamics, FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, Sweep, Unicycle,
+        WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList, PyString};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 ///
@@ -24,7 +25,7 @@ use std::path::PathBuf;
 /// (7, 7, ['universe', 'joint1', 'joint2'])
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct Model {
-    pub(crate) inner: condyle::Model,
+    pub(crate) inner: Arc<condyle::Model>,
     /// A hash that is equal for models of the same bodies and joints, which can share a `Data`.
     structure: u64,
     cached: Cached,
@@ -69,7 +70,7 @@ impl From<condyle::Model> for Model {
         for b in inner.bodies() {
             (&b.joint_name, b.parent, kind(b.joint), b.idx_q, b.idx_v, b.mimic.is_some()).hash(&mut hasher);
         }
-        Self { structure: hasher.finish(), inner, cached: Cached::new() }
+        Self { structure: hasher.finish(), inner: Arc::new(inner), cached: Cached::new() }
     }
 }
 
@@ -468,7 +469,7 @@ impl Model {
     /// Raises `ModelError` if it is not finite.
     fn with_gravity(&self, gravity: &Bound<'_, PyAny>) -> PyResult<Self> {
         let gravity = three("gravity", gravity)?;
-        Ok(self.inner.clone().with_gravity(gravity).map_err(exception)?.into())
+        Ok((*self.inner).clone().with_gravity(gravity).map_err(exception)?.into())
     }
 
     /// The same robot with another armature, nv numbers (kg m², kg).
@@ -476,7 +477,7 @@ impl Model {
     /// Raises `ModelError` if one is negative or not finite.
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
         let armature = vector("armature", armature, self.inner.nv())?;
-        Ok(self.inner.clone().with_armature(&armature).map_err(exception)?.into())
+        Ok((*self.inner).clone().with_armature(&armature).map_err(exception)?.into())
     }
 
     /// The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
@@ -506,7 +507,7 @@ impl Model {
                 *limit = vector(name, given, limit.len())?.to_vec();
             }
         }
-        Ok(self.inner.clone().with_limits(limits).map_err(exception)?.into())
+        Ok((*self.inner).clone().with_limits(limits).map_err(exception)?.into())
     }
 
     /// The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
@@ -587,7 +588,7 @@ impl Model {
     /// The parts of a pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let py = slf.py();
-        let bytes = postcard::to_extend(&slf.get().inner, MAGIC.as_bytes().to_vec())
+        let bytes = postcard::to_extend(&*slf.get().inner, MAGIC.as_bytes().to_vec())
             .map_err(|e| ModelError::new_err(format!("cannot be pickled: {e}")))?;
         let make = py.import("condyle._condyle")?.getattr("_model_from_bytes")?;
         Ok((make, (PyBytes::new(py, &bytes),)))

@@ -333,6 +333,10 @@ impl Unknowns<'_> {
 }
 
 impl Sensitivities for Unknowns<'_> {
+    fn add_control(&self, k: usize, c: f64, g: &mut Row<'_>) {
+        self.add(&self.form.efforts, k, c, g); // each control drives one coordinate
+    }
+
     fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>) {
         let KktElimination { tableau, passive, place, forces, .. } = self.elimination;
         let per_step = c / self.dt; // δa = (y − δv) / Δt
