@@ -117,9 +117,10 @@ impl Gait {
 
     /// A foot should be at a point, a sole level too.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
+        let named = (&self.model.frames()[frame]).into();
         let residual = match self.sole {
-            None => Residual::FrameTranslation { frame, target },
-            Some(_) => Residual::FramePlacement { frame, target: Se3::new(Mat3::identity(), target) },
+            None => Residual::FrameTranslation { frame: named, target },
+            Some(_) => Residual::FramePlacement { frame: named, target: Se3::new(Mat3::identity(), target) },
         };
         Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
     }

@@ -189,7 +189,6 @@ fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
     if model.nv() == 0 {
         return Err(Error::Rigid);
     }
-<<<<<<< HEAD
     let reach = task.and_then(|task| task.reach.as_ref());
     let frame = match (reach.and_then(|reach| reach.frame.as_ref()), &arguments.frame) {
         (Some(frame), _) => {
@@ -197,41 +196,6 @@ fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
             model
                 .frame(name)
                 .map_err(|error| task.map_or(error.clone().into(), |t| t.place.wrong(name, error.to_string())))?
-=======
-    for (k, &speed) in limits.velocity.iter().enumerate().filter(|(_, v)| **v > 0.0) {
-        (lower[nv + k], upper[nv + k]) = (-speed, speed);
-    }
-    let within = || Activation::Barrier { lower: lower.clone(), upper: upper.clone() };
-    let bounds: Vec<f64> = limits.effort.iter().map(|&e| if e > 0.0 { e } else { f64::INFINITY }).collect();
-    let share = bounds.iter().map(|e| if e.is_finite() { e.powi(-2) } else { WITHOUT_LIMIT }).collect();
-    let efforts = Activation::Barrier { lower: bounds.iter().map(|e| -e).collect(), upper: bounds };
-    let hold = gravity(model, &mut Data::new(model), q0).to_vec();
-    let position = Residual::FrameTranslation { frame: (&model.frames()[frame]).into(), target };
-    let running = vec![
-        Cost::new("speed", 1e-1, state(), moving(1.0)),
-        Cost::new("effort", 1e0, Residual::Control { reference: hold }, Activation::Weighted(share)),
-        Cost::new("limits", 1e2, state(), within()),
-        Cost::new("effort limits", 1e1, Residual::Control { reference: vec![0.0; nv] }, efforts),
-    ];
-    let terminal = vec![
-        Cost::new("target", 1e4, position, Activation::Quadratic),
-        Cost::new("stop", 1e0, state(), moving(1.0)),
-        Cost::new("limits", 1e2, state(), within()),
-    ];
-    // the straight way with the least jerk: q0 ⊕ s(t) way, s = 10 r³ − 15 r⁴ + 6 r⁵, r = t/T
-    let (mut data, mut q, mut way) = (Data::new(model), q0.to_vec(), vec![0.0; nv]);
-    difference(model, q0, q_end, &mut way);
-    let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();
-    let duration = knots as f64 * dt;
-    let (mut xs, mut us) = (Vec::new(), Vec::new());
-    for t in 0..=knots {
-        let r = t as f64 / knots as f64;
-        let v = along(30.0 * r * r * (1.0 - r) * (1.0 - r) / duration);
-        let a = along(60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / (duration * duration));
-        integrate(model, q0, &along(r * r * r * (10.0 + r * (6.0 * r - 15.0))), &mut q);
-        if t < knots {
-            us.extend(rnea(model, &mut data, &q, &v, &a, &[]));
->>>>>>> main
         }
         (None, Some(name)) => model.frame(name)?,
         (None, None) if own => model.frame(DEFAULT_FRAME)?,

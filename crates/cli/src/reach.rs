@@ -46,7 +46,7 @@ pub(crate) fn problem(
     let share = bounds.iter().map(|e| if e.is_finite() { e.powi(-2) } else { WITHOUT_LIMIT }).collect();
     let efforts = Activation::Barrier { lower: bounds.iter().map(|e| -e).collect(), upper: bounds };
     let hold = gravity(model, &mut Data::new(model), q0).to_vec();
-    let position = Residual::FrameTranslation { frame, target };
+    let position = Residual::FrameTranslation { frame: (&model.frames()[frame]).into(), target };
     let running = vec![
         Cost::new("speed", 1e-1, state(), moving(1.0)),
         Cost::new("effort", 1e0, Residual::Control { reference: hold }, Activation::Weighted(share)),

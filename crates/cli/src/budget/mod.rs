@@ -7,9 +7,9 @@ mod solver;
 mod text;
 
 use crate::error::{Error, positive};
-use crate::limits;
 use crate::robot::{self, RobotArguments};
 use crate::terminal::{say, say_json};
+use crate::{limits, watch};
 use clock::Effort;
 use condyle::optimal::robot::Contact;
 use condyle::{ContactConstraint, level};
@@ -129,7 +129,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let most = knots.last().copied().unwrap_or(1);
 
     let mut bench = dynamics::Bench::new(&model, most, &pool, effort);
-    let horizons = knots.iter().map(|&n| bench.horizon(n)).collect();
+    let bar = watch::bar(2 + knots.len() as u64 * 2, "measuring");
+    let mut horizons = Vec::new();
+    for &n in &knots {
+        horizons.push(bench.horizon(n));
+        bar.inc(1);
+    }
     let algorithms = bench.algorithms(nearest(&knots, 100));
     let model = Arc::new(model.clone());
     let iterate = solver::Bench { q: limits::start(&model), model: model.clone(), contacts, pool: &pool, effort };
@@ -140,9 +145,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         if !in_contact || !iterate.contacts.is_empty() {
             for &n in half.iter().chain(&knots) {
                 iterations.push(iterate.iteration(n, in_contact)?);
+                bar.inc(1);
             }
         }
     }
+    bar.finish_and_clear();
     let verdicts = verdicts(&iterations, &knots, arguments);
     let report = Report {
         robot: found.source,
