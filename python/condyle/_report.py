@@ -1,5 +1,6 @@
 """What is shown of a solve while it goes on."""
 
+import importlib
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -43,7 +44,7 @@ class Reporter:
 def _bar() -> Any:
     """A bar of tqdm, or None where that is not installed."""
     try:
-        from tqdm.auto import tqdm
+        tqdm: Any = importlib.import_module("tqdm.auto")
     except ImportError:
         return None
-    return tqdm(desc="FDDP", unit=" iterations")
+    return tqdm.tqdm(desc="FDDP", unit=" iterations")

@@ -1,9 +1,18 @@
 """The results of functions that are more than an array, and some arguments: named tuples."""
 
-from typing import Any, Literal, NamedTuple, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from typing_extensions import disjoint_base
+else:
+
+    def disjoint_base(cls: type) -> type:
+        """Says to type checkers that a class has room of its own beside that of its base."""
+        return cls
+
 
 _Array: TypeAlias = NDArray[np.float64]
 
@@ -504,6 +513,7 @@ class _Solution(NamedTuple):
     """The time that its parts took."""
 
 
+@disjoint_base
 class Solution(_Solution):
     """The result of a solve: the best iterate, whatever the status says.
 

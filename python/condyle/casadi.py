@@ -147,14 +147,15 @@ def action(
     >>> round(condyle.optimal.Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
     0.809017
     """
-    kind = type(x)
-    if u is None:
-        u = kind.sym("u", 0)
-    nx, nu = x.numel(), u.numel()
-    end = next_state is None
-    values = _Mapped(kind, [x, u], [cost] if end else [cost, next_state])
-    z = _casadi.vertcat(x, u)
-    slopes, curvature = _casadi.gradient(cost, z), _casadi.hessian(cost, z)[0]
+    kind: Any = type(x)
+    symbols: list[Any] = [x, kind.sym("u", 0) if u is None else u]
+    nx, nu = (symbol.numel() for symbol in symbols)
+    value: Any = cost
+    state: Any = next_state
+    end = state is None
+    values = _Mapped(kind, symbols, [value] if end else [value, state])
+    z = _casadi.vertcat(*symbols)
+    slopes, curvature = _casadi.gradient(value, z), _casadi.hessian(value, z)[0]
     parts = {
         "q": slopes[:nx],
         "r": slopes[nx:],
@@ -163,10 +164,10 @@ def action(
         "R": curvature[nx:, nx:],
     }
     if not end:
-        jacobian = _casadi.jacobian(next_state, z)
+        jacobian = _casadi.jacobian(state, z)
         parts |= {"A": jacobian[:, :nx], "B": jacobian[:, nx:]}
     parts = {name: part for name, part in parts.items() if part.numel()}
-    derivatives = _Mapped(kind, [x, u], list(parts.values()))
+    derivatives = _Mapped(kind, symbols, list(parts.values()))
 
     def calc(t: Any, x: NDArray[Any], u: NDArray[Any]) -> tuple[Any, Any]:
         found = values(x, u)
@@ -197,9 +198,10 @@ class _Mapped:
             if rows not in self._buffers:
                 self._buffers[rows] = self._function.map(rows).buffer()
             buffer, call = self._buffers[rows]
-            for k, argument in enumerate(arguments):
-                buffer.set_arg(k, memoryview(np.ascontiguousarray(argument)))
+            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # alive until the call
+            for k, argument in enumerate(inputs):
+                buffer.set_arg(k, argument.data)
             for k, result in enumerate(results):
-                buffer.set_res(k, memoryview(result))
+                buffer.set_res(k, result.data)
             call()
         return [result.transpose(0, 2, 1) for result in results]
