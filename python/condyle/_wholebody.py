@@ -90,7 +90,7 @@ class Settings(NamedTuple):
     backend: Literal["interior_point", "clarabel"] = "interior_point"
     """The solver: our own dense interior point method, warm-started from the last tick, or clarabel."""
     form: Literal["automatic", "condensed", "full"] = "automatic"
-    """The unknowns: what is left when the rows of base and contacts are eliminated, or all of (q̈, f)."""
+    """The unknowns: what the elimination of base and contacts leaves, all of (q̈, f), or the faster of them."""
     warm_start: bool = True
     """Whether the solver begins at the last tick's solution, if it can."""
     tolerance: float = 1e-9

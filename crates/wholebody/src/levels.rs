@@ -20,7 +20,7 @@ const WIDENED: f64 = 1e-7;
 const DECIDED: f64 = 1e-9;
 
 /// Up to so many limited torques, about as many unknowns as an elimination leaves, a sparse solver takes less time for the
-/// condensed program: ANYmal's 12 took 0.23 ms instead of 0.31 ms, Talos's 32 1.9 ms instead of 0.9 ms.
+/// condensed program: ANYmal's 12 took 0.22 ms instead of 0.37 ms, Talos's 32 1.8 ms instead of 1.0 ms.
 const FEW: usize = 20;
 
 /// What the solver of a priority gets.

@@ -7,7 +7,7 @@ mod workload;
 
 use common::{check_forces, max_abs};
 use condyle_wholebody::inspection::{Optimum, Program};
-use condyle_wholebody::{Backend, Friction, Settings};
+use condyle_wholebody::{Backend, Form, Friction, Settings};
 use nalgebra::{DMatrix, DVector};
 use workload::{Robot, Tick, record};
 
@@ -102,9 +102,9 @@ fn every_command_is_optimal() {
 #[test]
 fn back_ends_agree_on_every_command() {
     all(|robot, what, ticks| {
-        let settings = |backend, tolerance| Settings { backend, tolerance, ..Robot::settings() };
-        let mut ours = robot.controller(settings(Backend::InteriorPoint, 1e-14));
-        let mut theirs = robot.controller(settings(Backend::Clarabel, 1e-13));
+        let settings = |backend, form, tolerance| Settings { backend, form, tolerance, ..Robot::settings() };
+        let mut ours = robot.controller(settings(Backend::InteriorPoint, Form::Condensed, 1e-14));
+        let mut theirs = robot.controller(settings(Backend::Clarabel, Form::Full, 1e-13));
         for (k, Tick { q, v, references }) in ticks.iter().enumerate() {
             let a = ours.step(q, v, references).a.clone();
             if k % EACH != 0 {
