@@ -29,7 +29,7 @@ fn costs(model: &Model, t: usize) -> Vec<Cost> {
         quadratic("effort", 1e-3 * (1.0 + time), Residual::Control { reference: vec![0.0; 12] }),
         quadratic("com", 1e1, com),
     ];
-    if t % 3 == 0 {
+    if t.is_multiple_of(3) {
         let frame = "RF_foot".into();
         let target = Vec3::new(0.2 + 0.01 * time, -0.1, 0.1);
         costs.push(quadratic("foot", 1e2, Residual::FrameTranslation { frame, target }));
