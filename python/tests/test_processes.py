@@ -173,6 +173,7 @@ LONG = {
         first = solver.solve(xs, us)
         np.testing.assert_array_equal(solver.solution.xs, first.xs)
         solver = Fddp(problem, max_iterations=10**9, tolerance=0.0, threads=2)
+        solver.solve(xs, us, callback=lambda now: False)
         def call():
             solver.resume()
         def check():

@@ -92,7 +92,8 @@ def conforms(value: Any, kind: Any) -> bool:
     if origin is tuple:
         return len(value) == len(parts) and all(conforms(*pair) for pair in zip(value, parts, strict=True))
     if hasattr(kind, "_fields"):
-        members = typing.get_type_hints(kind, NAMES).values()
+        hints = typing.get_type_hints(kind, NAMES)
+        members = [hints[name] for name in kind._fields]
         return type(value) is kind and all(conforms(*pair) for pair in zip(value, members, strict=True))
     return isinstance(value, kind)
 
