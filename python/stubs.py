@@ -38,16 +38,19 @@ ALIASES = {
     "_Method": 'Literal["aba", "dense", "sparse"]',
     "_Integrator": 'Literal["semi_implicit_euler", "runge_kutta_4", "variational"]',
     "_Status": 'Literal["done", "not_converged", "not_finite"]',
+    "_OfTwo": "Callable[[NDArray[Any], NDArray[Any]], Any]",
+    "_Space": "Model | tuple[int, _OfTwo, _OfTwo]",
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
     "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
-    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction",
+    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Unicycle | Action"
+    " | DifferentialAction | ConstrainedAction",
 }
 
 # The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
 ARGUMENTS = {
     "ArrayLike": """
         A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
-        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference
+        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
         controls corners normal states times touches FrictionContact.size Plan.gains Task.joints""",
     "ArrayLike | None": "ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
@@ -56,14 +59,17 @@ ARGUMENTS = {
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "str": "contact function joint_name name prefix text FrictionContact.frame Task.frame",
     "str | int": "body frame",
-    "int": "facets grain iterations k knot last max_iterations n nu nx priority seed size steps threads Plan.contact",
+    "int": """
+        facets grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
+        Plan.contact""",
     "float": """
-        damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re
+        damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
-    "float | None": "FreeDynamics.dt",
-    "bool": "mimic strict weightless_meshes FrictionCone.inner",
+    "float | None": "DifferentialAction.dt FreeDynamics.dt",
+    "bool": """batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
+        Unicycle.terminal""",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -80,7 +86,7 @@ ARGUMENTS = {
     "Sequence[str | int]": "Model.joints",
     "Inertia": "inertia",
     "Sequence[Inertia]": "inertias",
-    "tuple[float, float]": "position",
+    "tuple[float, float]": "position Unicycle.weights",
     "_Integrator": "Simulation.integrator",
     "Callable[[Control], None]": "control",
     "_Number": "value HyperDual.other HyperDual.x",
@@ -96,16 +102,24 @@ ARGUMENTS = {
     "dict[int, Sequence[Limit]]": "limits_at",
     "dict[str, ContactConstraint]": "contacts",
     "_Scheme": "integrator",
-    "_Action": "action terminal",
+    "_Action": "action Problem.terminal",
     "Sequence[_Action]": "models",
-    "Sequence[int]": "stages",
+    "Sequence[int] | None": "stages",
     "_Controls": "us",
     "Problem": "problem",
-    "Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]]": "Action.calc",
-    "Callable[[int, _Array, _Array], dict[str, ArrayLike]]": "Action.calc_diff",
+    # arrays of floats, or of numbers that know their derivatives
+    "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
+    "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": "Action.calc_diff DifferentialAction.calc_diff",
+    "_Space": "space",
+    "Callable[[Iteration], object]": "callback",
+    "Sequence[LqNode]": "nodes",
     "Callable[[int, _Array, _Array], ArrayLike]": "ConstrainedAction.calc",
-    "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": "ConstrainedAction.calc_diff",
-    "dict[str, Any]": "AugmentedLagrangian.inner",
+    "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc",
+    "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": """
+        ConstrainedAction.calc_diff Residual.own.calc_diff""",
+    "dict[str, Any]": "AugmentedLagrangian.inner Fddp._make.settings AugmentedLagrangian._make.settings",
+    "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner",
+    "Sequence[Any]": "parts",
     "float | str | None": "Fddp.settings",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"]': "forces",
@@ -123,12 +137,14 @@ ARGUMENTS = {
 # returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
 RESULTS = {
     "_Array": """
-        ContactDynamics.quasi_static FreeDynamics.quasi_static FrictionCone.rows WrenchCone.rows
+        ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
+        InverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Problem.rollout Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
         FrictionContact.normal Task.joints""",
     "_Array | None": "Joint.axis FrictionContact.corners",
+    "_Array | list[_Array]": "Problem.quasi_static",
     "tuple[_Array, _Array]": """
         FrictionCone.bounds WrenchCone.bounds body_acceleration_derivatives frame_acceleration_derivatives
         frame_classical_acceleration_derivatives""",
@@ -144,7 +160,7 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Problem.to_json _casadi_hold FrictionContact.frame Task.kind",
+    "str": "Model.name Model.tree Problem.to_json _casadi_hold FrictionContact.frame Task.kind",
     "str | None": "Task.frame",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"] | None': "FrictionContact.forces",
@@ -166,7 +182,7 @@ RESULTS = {
     "HyperDual": "HyperDual",
     "Model": """
         Model.__copy__ Model.__deepcopy__ Model.lock Model.with_armature Model.with_gravity
-        Model.with_inertias ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
+        Model.with_inertias Model.with_limits ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",
@@ -177,6 +193,9 @@ RESULTS = {
     "AssemblySize": "DivideConquer.size",
     "_Status": "Simulation.run Simulation.step",
     "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
+    "Evaluation": "Problem.evaluate Problem._evaluate",
+    "list[LqNode]": "Problem.derivatives",
+    "SweepResult": "Sweep.run",
     "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
     "Outcome": "AugmentedLagrangian.outcome",
     "AllTerms": "compute_all_terms",

@@ -1,12 +1,13 @@
 //! What Condyle takes for one call: see `dynamics.py`, which builds and runs this beside Pinocchio.
 //!
 //! ```text
-//! ours URDF fixed|free_flyer LOCKED,JOINTS STATES
+//! ours URDF fixed|free_flyer LOCKED,JOINTS STATES [batch]
 //! ```
 //!
 //! STATES has q, v, a, τ of one state after the other as doubles. Prints a line for each algorithm: its name and the median
 //! time of a call in ns; of the derivatives of `rnea` also by dual numbers and by central differences; then, after `batch:`,
-//! the time for each state of a batch of them, and after `horizon:`, that of N knots with `aba`, its derivatives and `rnea`.
+//! the time for each state of a batch of them, and after `horizon:`, that of N knots with `aba`, its derivatives and `rnea`. With
+//! `batch` there are those of batches alone, and the least instead of the median: see `python.py`.
 
 use condyle::{
     Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, aba_hessian, crba, integrate, minv, rnea,
@@ -24,7 +25,12 @@ struct State {
 }
 
 /// The median over batches of the mean time of a call, in ns.
-fn median(states: &[State], mut call: impl FnMut(&State)) -> f64 {
+fn median(states: &[State], call: impl FnMut(&State)) -> f64 {
+    timed(states, 10, call)
+}
+
+/// The mean time of a call in the batch of this rank among 21, the fastest first, in ns.
+fn timed(states: &[State], rank: usize, mut call: impl FnMut(&State)) -> f64 {
     let mut batch = |calls: usize| {
         let start = Instant::now();
         (0..calls).for_each(|i| call(black_box(&states[i % states.len()])));
@@ -34,7 +40,7 @@ fn median(states: &[State], mut call: impl FnMut(&State)) -> f64 {
     let calls = ((2e6 / batch(50)) as usize).max(2);
     let mut times: Vec<f64> = (0..21).map(|_| batch(calls)).collect();
     times.sort_by(f64::total_cmp);
-    times[10]
+    times[rank]
 }
 
 /// ∂τ/∂q by dual numbers, a column at a time.
@@ -67,9 +73,25 @@ fn by_differences(model: &Model, data: &mut Data<f64>, s: &State) -> f64 {
     sum
 }
 
+/// Times of calls for one state.
+fn singles(m: &Model, states: &[State]) {
+    let (d, duals) = (&mut Data::new(m), &mut Data::<Dual64>::new(m));
+    let print = |name: &str, ns: f64| println!("{name} {ns:.2}");
+    print("rnea", median(states, |s| _ = black_box(rnea(m, d, &s.q, &s.v, &s.a, &[]))));
+    print("aba", median(states, |s| _ = black_box(aba(m, d, &s.q, &s.v, &s.tau, &[]))));
+    print("crba", median(states, |s| _ = black_box(crba(m, d, &s.q))));
+    print("minv", median(states, |s| _ = black_box(minv(m, d, &s.q))));
+    print("rnea_derivatives", median(states, |s| _ = black_box(rnea_derivatives(m, d, &s.q, &s.v, &s.a, &[]))));
+    print("aba_derivatives", median(states, |s| _ = black_box(aba_derivatives(m, d, &s.q, &s.v, &s.tau, &[]))));
+    print("rnea_hessian", median(states, |s| _ = black_box(rnea_hessian(m, d, &s.q, &s.v, &s.a, &[], &s.tau))));
+    print("aba_hessian", median(states, |s| _ = black_box(aba_hessian(m, d, &s.q, &s.v, &s.tau, &[], &s.a))));
+    print("dtau_dq_by_duals", median(states, |s| _ = black_box(by_duals(m, duals, s))));
+    print("dtau_dq_by_differences", median(states, |s| _ = black_box(by_differences(m, d, s))));
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
-    let [urdf, root, locked, states] = arguments.as_slice() else {
+    let [urdf, root, locked, states, only @ ..] = arguments.as_slice() else {
         println!("python3 benches/peers/dynamics.py runs this");
         return Ok(());
     };
@@ -88,29 +110,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             State { q: x[..nq].to_vec(), v: part(0), a: part(1), tau: part(2) }
         })
         .collect();
-    let (m, d, duals) = (&model, &mut Data::new(&model), &mut Data::<Dual64>::new(&model));
-    let print = |name: &str, ns: f64| println!("{name} {ns:.2}");
-    print("rnea", median(&states, |s| _ = black_box(rnea(m, d, &s.q, &s.v, &s.a, &[]))));
-    print("aba", median(&states, |s| _ = black_box(aba(m, d, &s.q, &s.v, &s.tau, &[]))));
-    print("crba", median(&states, |s| _ = black_box(crba(m, d, &s.q))));
-    print("minv", median(&states, |s| _ = black_box(minv(m, d, &s.q))));
-    print("rnea_derivatives", median(&states, |s| _ = black_box(rnea_derivatives(m, d, &s.q, &s.v, &s.a, &[]))));
-    print("aba_derivatives", median(&states, |s| _ = black_box(aba_derivatives(m, d, &s.q, &s.v, &s.tau, &[]))));
-    print("rnea_hessian", median(&states, |s| _ = black_box(rnea_hessian(m, d, &s.q, &s.v, &s.a, &[], &s.tau))));
-    print("aba_hessian", median(&states, |s| _ = black_box(aba_hessian(m, d, &s.q, &s.v, &s.tau, &[], &s.a))));
-    print("dtau_dq_by_duals", median(&states, |s| _ = black_box(by_duals(m, duals, s))));
-    print("dtau_dq_by_differences", median(&states, |s| _ = black_box(by_differences(m, d, s))));
+    let m = &model;
+    if only.is_empty() {
+        singles(m, &states);
+    }
     let all = |part: fn(&State) -> &[f64]| states.iter().flat_map(part).copied().collect::<Vec<f64>>();
     let (q, v, a, tau) = (all(|s| &s.q), all(|s| &s.v), all(|s| &s.a), all(|s| &s.tau));
     let b = &mut Batch::new(m, states.len(), 1);
     let print = |name: &str, ns: f64| println!("batch:{name} {:.2}", ns / states.len() as f64);
-    let one = &states[..1];
-    print("rnea", median(one, |_| _ = black_box(b.rnea(m, &q, &v, &a, &[]))));
-    print("aba", median(one, |_| _ = black_box(b.aba(m, &q, &v, &tau, &[]))));
-    print("crba", median(one, |_| _ = black_box(b.crba(m, &q))));
-    print("minv", median(one, |_| _ = black_box(b.minv(m, &q))));
-    print("rnea_derivatives", median(one, |_| _ = black_box(b.rnea_derivatives(m, &q, &v, &a, &[]))));
-    print("aba_derivatives", median(one, |_| _ = black_box(b.aba_derivatives(m, &q, &v, &tau, &[]))));
+    let (one, rank) = (&states[..1], if only.is_empty() { 10 } else { 0 });
+    print("rnea", timed(one, rank, |_| _ = black_box(b.rnea(m, &q, &v, &a, &[]))));
+    print("aba", timed(one, rank, |_| _ = black_box(b.aba(m, &q, &v, &tau, &[]))));
+    print("crba", timed(one, rank, |_| _ = black_box(b.crba(m, &q))));
+    print("minv", timed(one, rank, |_| _ = black_box(b.minv(m, &q))));
+    print("rnea_derivatives", timed(one, rank, |_| _ = black_box(b.rnea_derivatives(m, &q, &v, &a, &[]))));
+    print("aba_derivatives", timed(one, rank, |_| _ = black_box(b.aba_derivatives(m, &q, &v, &tau, &[]))));
+    if !only.is_empty() {
+        return Ok(());
+    }
     for knots in [20, 60, 100, 200] {
         let cycle = |x: &[f64], n: usize| x.iter().copied().cycle().take(knots * n).collect::<Vec<_>>();
         let (q, v, a, tau) = (cycle(&q, nq), cycle(&v, nv), cycle(&a, nv), cycle(&tau, nv));

@@ -7,7 +7,7 @@ use condyle::optimal::robot::{
     Activation, Contact, ControlBounds, Cost, Dynamics, Integrator, Knot, Limit, Residual, RobotProblem,
 };
 use condyle::{
-    ContactConstraint, Data, Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, aba, crba, neutral,
+    ContactConstraint, Data, Joint, MjcfOptions, Model, SdfOptions, Se3, UrdfOptions, aba, crba, neutral,
     random_configuration, rnea, robots,
 };
 use rand::rngs::StdRng;
@@ -48,7 +48,11 @@ impl Kind {
     fn new_seeds(self) -> Vec<Vec<u8>> {
         let texts = match self {
             Self::Urdf => {
-                [robots::ARM7, robots::QUADRUPED, robots::HUMANOID, file!("mimic.urdf")].map(str::to_owned).into()
+                let version = "<robot version=\"1.1\" name=\"arm7\">";
+                let quaternions = robots::ARM7.replacen("<robot name=\"arm7\">", version, 1);
+                let quaternions = quaternions.replace("rpy=\"1.5707963267948966 0 0\"", "quat_xyzw=\"0.6 0 0 0.8\"");
+                let others = [robots::ARM7, robots::QUADRUPED, robots::HUMANOID, file!("mimic.urdf")];
+                others.map(str::to_owned).into_iter().chain([quaternions]).collect()
             }
             Self::Mjcf => {
                 let defaults = file!("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
@@ -117,10 +121,13 @@ fn problems() -> Vec<RobotProblem> {
     let rest = |model: &Model| Residual::State { reference: state(model) };
     let effort = |n: usize| Residual::Control { reference: vec![0.0; n] };
     let integrator = Integrator::SemiImplicitEuler;
+    let frame = arm.frames().last().expect("has frames").into();
+    let tool = Residual::FramePlacement { frame, target: Se3::identity() };
     let mut reach = Knot::new(
         Dynamics::Free { actuation: None, integrator, dt: 0.05 },
         vec![
             Cost::new("rest", 1e-2, rest(&arm), Activation::Quadratic),
+            Cost::new("tool", 1.0, tool, Activation::Quadratic),
             Cost::new("effort", 1e-3, effort(7), Activation::Weighted(vec![1.0; 7])),
             Cost::new(
                 "centre",

@@ -40,6 +40,38 @@ Derivatives of one's own function of the state are exact, by `HyperDual` numbers
 >>> def effort(x):
 ...     return (condyle.rnea(arm, data, x[:7], x[7:], np.zeros(7)) ** 2).sum()
 >>> value, by_q_and_v = condyle.gradient(arm, np.full(14, 0.3), effort)
+
+By theme; `help(condyle.rnea)` says more of each:
+
+Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mimic`, `BodyId`, `WORLD`, `Frame`,
+`Limits`,
+    `robots`, `inertial_parameters`; `Data`, the scratch
+Dynamics: `rnea`, `aba`, `crba`, `minv`, `nonlinear_effects`, `gravity`, `static_torque`, `coriolis_matrix`,
+    `forward_dynamics`, `compute_all_terms` (`AllTerms`), `passive_torque`; `DivideConquer` (`AssemblySize`)
+Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivatives` (`AbaDerivatives`),
+    `static_torque_derivative`, `coriolis_derivatives` (`CoriolisDerivatives`), `passive_torque_derivative`,
+    `rnea_input_derivative`, `aba_input_derivative`
+Second derivatives: `rnea_hessian` (`RneaHessian`), `aba_hessian` (`AbaHessian`), `rnea_second_derivatives`
+    (`RneaSecondDerivatives`)
+Derivatives of one's own functions: `gradient`, `jacobian`, `hessian`, `HyperDual`
+Bodies and frames: `forward_kinematics`, `frame_placement`, `frame_jacobian`, `frame_velocity`, `frame_acceleration`,
+    `frame_classical_acceleration`, `frame_jacobian_rate`, `body_jacobian`, `body_velocity`, `body_acceleration`,
+    `body_classical_acceleration`, `body_jacobian_rate`; by q, v and a: `frame_velocity_derivative`,
+    `frame_acceleration_derivatives`, `frame_classical_acceleration_derivatives`, `body_velocity_derivative`,
+    `body_acceleration_derivatives`
+Positions: `neutral`, `random_configuration`, `integrate`, `difference`, `interpolate`, `distance`, `normalize`,
+    `integrate_jacobian`, `difference_jacobian`, `transport`
+Centre of mass, momentum, energy: `com`, `com_velocity`, `com_acceleration`, `com_jacobian`, `centroidal_map`
+    (`CentroidalMap`), `centroidal_map_rate` (`CentroidalMapRate`), `centroidal_momentum`, `centroidal_momentum_rate`,
+    `centroidal_derivatives` (`CentroidalDerivatives`), `kinetic_energy`, `potential_energy`, `mechanical_energy`,
+    `energy_derivatives` (`EnergyDerivatives`)
+Contacts, loops, impacts: `ContactConstraint`, `ConstraintSet`, `constrained_dynamics` (`Constrained`),
+    `constrained_dynamics_derivatives` (`ConstrainedDerivatives`), `constrained_dynamics_equations`
+    (`ConstrainedEquations`), `impulse_dynamics` (`Impulse`), `impulse_dynamics_derivatives` (`ImpulseDerivatives`)
+Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
+Factors of the inertia matrix: `Ltdl`, `Cholesky`
+Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
+Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `casadi` (imported by itself)
 """
 
 from . import inertial_parameters, optimal, robots, simulation, wholebody

@@ -24,17 +24,21 @@ from ._types import (
     Control,
     CoriolisDerivatives,
     EnergyDerivatives,
+    Evaluation,
     Frame,
     Impulse,
     ImpulseDerivatives,
     Inertia,
+    Iteration,
     Limits,
+    LqNode,
     Mimic,
     Outcome,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
     Solution,
+    SweepResult,
 )
 from ._wholebody import Command, Gains, References, Settings
 
@@ -54,6 +58,7 @@ __all__ = [
     "ControllerError",
     "Cost",
     "Data",
+    "DifferentialAction",
     "DivideConquer",
     "Error",
     "Fddp",
@@ -77,7 +82,9 @@ __all__ = [
     "ProblemError",
     "Residual",
     "Simulation",
+    "Sweep",
     "Task",
+    "Unicycle",
     "WholeBodyController",
     "WrenchCone",
     "__version__",
@@ -181,10 +188,20 @@ _Input: TypeAlias = (
 _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
 _Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_OfTwo: TypeAlias = Callable[[NDArray[Any], NDArray[Any]], Any]
+_Space: TypeAlias = Model | tuple[int, _OfTwo, _OfTwo]
 _Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
 _Axes: TypeAlias = Literal["world", "local"] | tuple[Literal["frame"], str]
 _Action: TypeAlias = (
-    FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Action | ConstrainedAction
+    FreeDynamics
+    | ContactDynamics
+    | ImpulseDynamics
+    | InverseDynamics
+    | Lqr
+    | Unicycle
+    | Action
+    | DifferentialAction
+    | ConstrainedAction
 )
 
 __version__: str
@@ -223,6 +240,9 @@ def aba(
     """Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
+
+    Raises `ModelError` if M is singular wherever the robot is. At a position at which it happens to be, a point of mass on
+    the axis about which it turns, the numbers are not finite, or as large as rounding has it.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -1165,7 +1185,8 @@ class Cholesky:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1268,7 +1289,8 @@ class Ltdl:
     def factorize(self, M: ArrayLike) -> None:
         """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite.
+        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
+        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1989,6 +2011,23 @@ class Model:
         Raises `ModelError` if one is negative or not finite.
         """
 
+    def with_limits(
+        self,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+    ) -> Model:
+        """The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
+        are, and infinite numbers are none.
+
+        Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity or effort is negative.
+
+        >>> arm = condyle.robots.arm7()
+        >>> arm.with_limits(effort=0.5 * arm.limits.effort).limits.effort[0].item()
+        43.5
+        """
+
     def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
         """The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
         them is in its `warnings` and `singular_joints`.
@@ -2017,6 +2056,15 @@ class Model:
         Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
         """
 
+    def tree(self, frames: bool = False) -> str:
+        """The tree of bodies as text: each joint with its kind and where its coordinates stand in q and v, and the body that it
+        carries; frames: whether the names of other frames stand with the bodies.
+
+        >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
+        universe
+        └─ root_joint: free_flyer, q[0:7], v[0:6] → trunk, 30.000 kg
+        """
+
     def __copy__(self) -> Model:
         """The model itself: it never changes."""
 
@@ -2037,8 +2085,16 @@ class Action:
     calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
         state may be None.
     calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
-        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, central differences of calc.
+        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it calc is called with arrays of numbers
+        that know their derivatives, exact ones; once for all knots, if it leaves t alone and takes no branch that differs
+        from knot to knot. So make its results of its arguments (`np.array([...])`, `np.concatenate`), and do not write
+        them into arrays of floats. What cannot be called so is differentiated by hyper-dual numbers, else by differences.
     lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+    space: where states live: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate, difference), where
+        integrate(x, dx) is x ⊕ dx, difference(x0, x1) the dx with x0 ⊕ dx = x1, and dx has ndx numbers. Derivatives are taken
+        by dx.
+    batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and arrays with N rows
+        as results.
 
     >>> from condyle.optimal import Action, Fddp, Problem
     >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
@@ -2052,10 +2108,12 @@ class Action:
         cls,
         nx: int,
         nu: int,
-        calc: Callable[[int, _Array, _Array], tuple[ArrayLike | None, float]],
-        calc_diff: Callable[[int, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        calc: Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]],
+        calc_diff: Callable[[Any, _Array, _Array], dict[str, ArrayLike]] | None = None,
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
+        space: _Space | None = None,
+        batch: bool = False,
     ) -> Action: ...
 
 @final
@@ -2093,6 +2151,9 @@ class Activation:
         """The smooth cost √(ε + ‖r‖²), nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least
         eigenvalue of the exact one.
         """
+
+    @staticmethod
+    def _from_json(text: str) -> Activation: ...
 
 @final
 class AugmentedLagrangian:
@@ -2144,7 +2205,14 @@ class AugmentedLagrangian:
         ("interrupted"); None before the first.
         """
 
-    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+    def solve(
+        self,
+        xs: ArrayLike,
+        us: _Controls,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+    ) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
         Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
@@ -2153,16 +2221,26 @@ class AugmentedLagrangian:
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+        callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
+            ("interrupted"). What it raises is raised here.
+        verbose: whether to print a line for each iteration.
+        progress: whether to show the progress, by tqdm where that is installed, else as lines.
 
         Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
         """
 
-    def resume(self) -> Solution:
+    def resume(
+        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+    ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
-        Raises `ProblemError` as `solve`.
+        callback, verbose, progress: as of `solve`.
+
+        Raises `ProblemError` as `solve`, and if there is no solution yet.
         """
 
+    @staticmethod
+    def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> AugmentedLagrangian: ...
     def shift(self, last: int) -> None:
         """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
         with it.
@@ -2245,11 +2323,15 @@ class ContactDynamics:
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers."""
 
+    @staticmethod
+    def _from_json(model: Model, text: str) -> ContactDynamics: ...
+
 @final
 class Cost:
     """A term of a cost: weight times an activation of a residual.
 
     name: what `Problem.set_weight` and errors call it.
+    weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
     activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
         for other residuals.
@@ -2260,6 +2342,47 @@ class Cost:
     """
 
     def __new__(cls, name: str, weight: float, residual: Residual, activation: Activation | None = None) -> Cost: ...
+
+@final
+class DifferentialAction:
+    """An action of accelerations and a cost per second that are written in Python, in steps of a time.
+
+    The state is x = (q, v); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
+
+    nv, nu: the numbers of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
+    calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; of the terminal knot the
+        accelerations may be None.
+    dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
+    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among da_dq, da_dv, da_du, the derivatives of
+        the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`.
+    integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
+    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+    model: a robot whose positions q are, with its ⊕; None for vectors of nv numbers.
+
+    Raises `ProblemError` if dt is not above 0.
+
+    >>> from condyle.optimal import DifferentialAction, Fddp, Problem
+    >>> def spring(t, x, u):
+    ...     return u - x[:1], 0.5 * (x @ x + u @ u)
+    >>> knot = DifferentialAction(1, 1, spring, 0.1, integrator="runge_kutta_4")
+    >>> end = DifferentialAction(1, 0, lambda t, x, u: (None, 5.0 * (x @ x)), None)
+    >>> problem = Problem([1.0, 0.0], [knot], [0] * 30, end)
+    >>> Fddp(problem).solve(np.zeros((31, 2)), np.zeros((30, 1))).status
+    'converged'
+    """
+
+    def __new__(
+        cls,
+        nv: int,
+        nu: int,
+        calc: Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]],
+        dt: float | None,
+        calc_diff: Callable[[Any, _Array, _Array], dict[str, ArrayLike]] | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        model: Model | None = None,
+    ) -> DifferentialAction: ...
 
 @final
 class Fddp:
@@ -2292,7 +2415,14 @@ class Fddp:
         ("interrupted"); None before the first.
         """
 
-    def solve(self, xs: ArrayLike, us: _Controls) -> Solution:
+    def solve(
+        self,
+        xs: ArrayLike,
+        us: _Controls,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+    ) -> Solution:
         """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
 
         Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
@@ -2301,16 +2431,26 @@ class Fddp:
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+        callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
+            ("interrupted"). What it raises is raised here.
+        verbose: whether to print a line for each iteration.
+        progress: whether to show the progress, by tqdm where that is installed, else as lines.
 
         Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
         """
 
-    def resume(self) -> Solution:
+    def resume(
+        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+    ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
-        Raises `ProblemError` as `solve`.
+        callback, verbose, progress: as of `solve`.
+
+        Raises `ProblemError` as `solve`, and if there is no solution yet.
         """
 
+    @staticmethod
+    def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> Fddp: ...
     def shift(self, last: int) -> None:
         """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
         with it.
@@ -2359,13 +2499,16 @@ class FreeDynamics:
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The efforts that hold the robot still at the state x, nu numbers."""
 
+    @staticmethod
+    def _from_json(model: Model, text: str) -> FreeDynamics: ...
+
 @final
 class FrictionCone:
     """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone; rotation: the
-    surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force (N), by
-    default 0 and infinite.
+    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
+    rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
+    (N), by default 0 and infinite.
 
     Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
 
@@ -2413,6 +2556,11 @@ class ImpulseDynamics:
         damping: float = 0.0,
         limits: Sequence[Limit] | None = None,
     ) -> ImpulseDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """No controls: an impact has none."""
+
+    @staticmethod
+    def _from_json(model: Model, text: str) -> ImpulseDynamics: ...
 
 @final
 class InverseDynamics:
@@ -2436,6 +2584,11 @@ class InverseDynamics:
         upper: ArrayLike | None = None,
         limits: Sequence[Limit] | None = None,
     ) -> InverseDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """The accelerations that hold the robot still: nv zeros."""
+
+    @staticmethod
+    def _from_json(model: Model, text: str) -> InverseDynamics: ...
 
 @final
 class Limit:
@@ -2488,9 +2641,10 @@ class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`,
-        `ConstrainedAction`.
-    stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Action`,
+        `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+    stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
+        model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
     terminal: the model of the end, without controls.
 
     Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
@@ -2498,7 +2652,9 @@ class Problem:
     all knots.
     """
 
-    def __new__(cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int], terminal: _Action) -> Problem: ...
+    def __new__(
+        cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int] | None, terminal: _Action
+    ) -> Problem: ...
     @property
     def horizon(self) -> int:
         """The number of knots before the terminal one, N."""
@@ -2519,6 +2675,8 @@ class Problem:
         robots.
         """
 
+    @staticmethod
+    def _from_parts(x0: ArrayLike, parts: Sequence[Any], stages: Sequence[int] | None) -> Problem: ...
     def set_x0(self, x0: ArrayLike) -> None:
         """Sets the initial state, nx numbers, as an MPC does before each solve.
 
@@ -2528,7 +2686,7 @@ class Problem:
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
 
-        Raises `KeyError` if there is no such term, `ProblemError` if the weight is not finite.
+        Raises `KeyError` if there is no such term, `ProblemError` if the weight is negative or not finite.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
@@ -2540,10 +2698,35 @@ class Problem:
         Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
         """
 
+    def quasi_static(self, xs: ArrayLike) -> _Array | list[_Array]:
+        """The controls of all knots that hold their states still, each by itself, as far as they can: (N, nu), or a list of N
+        arrays where knots differ in nu. A robot's come from statics, others from steps of Newton.
+
+        xs: states, (N + 1, nx).
+        """
+
+    def evaluate(self, xs: ArrayLike, us: _Controls) -> Evaluation:
+        """The cost of states and controls, and what the dynamics compute there, as an `Evaluation`.
+
+        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+        """
+
+    def _evaluate(self, xs: ArrayLike, us: _Controls, moved: int) -> Evaluation:
+        """The evaluation of a solution, unless the horizon has moved on since."""
+
+    def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqNode]:
+        """The linear-quadratic problem around states and controls, a list of N + 1 `LqNode`s, which a `Sweep` solves.
+
+        xs, us: as of `evaluate`.
+        """
+
     def rollout(self, us: _Controls) -> _Array:
         """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
         us: (N, nu), or a list of N arrays where knots differ in nu.
+
+        Other threads run meanwhile; what a handler of a signal raises, as KeyboardInterrupt, ends it between knots.
         """
 
 @final
@@ -2637,6 +2820,69 @@ class Residual:
     @staticmethod
     def impulse_center_of_mass() -> Residual:
         """The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
+
+    @staticmethod
+    def own(
+        size: int,
+        calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
+        calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
+    ) -> Residual:
+        """A residual that is written in Python, r(t, x, u) of a knot t, size numbers.
+
+        size: the number of entries, at most 4096.
+        calc: a function of (t, x, u) that returns them; x = (q, v), and at the end u is empty.
+        calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the tangent
+            space of the state. Without it, those of calc, as for `Action`.
+
+        >>> from condyle.optimal import Residual
+        >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
+        """
+
+    @staticmethod
+    def _from_json(text: str) -> Residual: ...
+
+@final
+class Sweep:
+    """The backward Riccati sweep over a horizon of linear-quadratic knots: a step of `Fddp` without its line search.
+
+    nodes: a list of `LqNode`s, as `Problem.derivatives` gives them; the last is the terminal one, without controls.
+
+    Raises `ProblemError` if their shapes do not fit together.
+
+    >>> from condyle.optimal import Lqr, Problem, Sweep
+    >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
+    >>> problem = Problem([1.0], [knot], [0], end)
+    >>> result = Sweep(problem.derivatives([[1.0], [1.0]], [[0.0]])).run()
+    >>> bool(abs(result.K[0][0, 0] + 2 / 3) < 1e-15)  # δu = −⅔ δx
+    True
+    """
+
+    def __new__(cls, nodes: Sequence[LqNode]) -> Sweep: ...
+    def run(self, regularisation: float = 0.0) -> SweepResult:
+        """The feedback and the value functions, as a `SweepResult`.
+
+        regularisation: what is added to the diagonals of Quu and Vxx, at least 0.
+
+        Raises `ProblemError` if Quu of a knot is not positive definite.
+        """
+
+@final
+class Unicycle:
+    """The action of a unicycle: x = (x, y, θ), u = (v, ω), x⁺ = x + Δt (v cos θ, v sin θ, ω).
+
+    The cost is ½ (w₁² ‖x‖² + w₂² ‖u‖²); these are the rules of Crocoddyl's `ActionModelUnicycle`.
+
+    dt: Δt (s), above 0.
+    weights: w₁ and w₂.
+    terminal: whether it is an action of the end, without controls.
+
+    >>> from condyle.optimal import Fddp, Problem, Unicycle
+    >>> problem = Problem([-1.0, -1.0, 1.0], [Unicycle()], [0] * 20, Unicycle(terminal=True))
+    >>> Fddp(problem).solve(np.zeros((21, 3)), np.zeros((20, 2))).status
+    'converged'
+    """
+
+    def __new__(cls, dt: float = 0.1, weights: tuple[float, float] = ..., terminal: bool = False) -> Unicycle: ...
 
 @final
 class WrenchCone:
@@ -2741,13 +2987,13 @@ class Simulation:
     integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
         is conserved to rounding.
-    dt: h, the length of a step (s); a negative one goes back in time.
+    dt: h, the length of a step (s), above 0.
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
     max_iterations: it gives up after so many iterations.
 
-    Raises `ModelError` if M is singular, `ValueError` if dt is 0 or not finite or tolerance is negative.
+    Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -2782,7 +3028,11 @@ class Simulation:
         """The velocity, nv numbers."""
 
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
-        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0."""
+        """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
+
+        Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+        `ValueError` if one of v is not finite.
+        """
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
         """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the

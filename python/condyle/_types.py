@@ -1,11 +1,68 @@
 """The results of functions that are more than an array, and some arguments: named tuples."""
 
-from typing import Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+if TYPE_CHECKING:
+    from typing_extensions import disjoint_base
+else:
+
+    def disjoint_base(cls: type) -> type:
+        """Says to type checkers that a class has room of its own beside that of its base."""
+        return cls
+
+
 _Array: TypeAlias = NDArray[np.float64]
+
+
+class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
+    """Numbers of a model, which never changes. Whoever writes to them is told how to make another model.
+
+    Results of arithmetic, and copies, are plain arrays.
+    """
+
+    _instead: str
+
+    @classmethod
+    def of(cls, numbers: _Array, instead: str) -> "ReadOnly":
+        """These numbers; `instead` is the method of `Model` that makes a model with others, if there is one."""
+        array = numbers.view(cls)
+        array._instead = instead
+        array.flags.writeable = False
+        return array
+
+    def __array_finalize__(self, other: Any) -> None:
+        self._instead = getattr(other, "_instead", "")
+
+    def _refuse(self) -> NoReturn:
+        other = f"model.{self._instead}(...) makes another one" if self._instead else "a ModelBuilder makes another one"
+        raise ValueError(f"read-only: a model never changes; {other}, and array.copy() is an array of your own")
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if not self.flags.writeable:
+            self._refuse()
+        super().__setitem__(key, value)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, out: Any = None, **options: Any) -> Any:
+        if out is not None:
+            for array in out:
+                if isinstance(array, ReadOnly) and not array.flags.writeable:
+                    array._refuse()
+            options["out"] = out
+        plain = (x.view(np.ndarray) if isinstance(x, ReadOnly) else x for x in inputs)
+        return getattr(ufunc, method)(*plain, **options)
+
+    def copy(self, order: Literal["K", "A", "C", "F"] | None = "C") -> _Array:  # type: ignore[override]
+        """A plain array with these numbers."""
+        return np.array(self, order=order)
+
+    def __reduce__(self) -> Any:
+        return self.view(np.ndarray).__reduce__()
+
+    def __repr__(self) -> str:
+        return repr(self.view(np.ndarray))
 
 
 class RneaDerivatives(NamedTuple):
@@ -406,12 +463,26 @@ class Timings(NamedTuple):
     """The whole solve."""
 
 
-class Solution(NamedTuple):
-    """The result of a solve: the best iterate, whatever the status says.
+class Evaluation(NamedTuple):
+    """The cost of states and controls, and what the dynamics of their knots compute."""
 
-    Where knots differ in nu, what belongs to controls is a list of N arrays instead of one array.
-    """
+    cost: float
+    """The sum of the costs of all knots."""
+    costs: _Array
+    """The cost of each knot, N + 1 numbers, the terminal one last."""
+    next_states: _Array
+    """The next states φ(x, u), (N, nx)."""
+    gaps: _Array
+    """x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁, (N + 1, ndx)."""
+    accelerations: list[_Array]
+    """The accelerations of each knot of a robot, nv numbers; none of other knots and of impacts."""
+    efforts: list[_Array]
+    """The efforts of all joints of each knot of a robot, nv numbers; none of other knots and of impacts."""
+    forces: list[dict[str, _Array]]
+    """The forces of each knot's contacts by name, 3 or 6 numbers in the axes of their rows; of impacts the impulses."""
 
+
+class _Solution(NamedTuple):
     xs: _Array
     """States, (N + 1, nx)."""
     us: _Array | list[_Array]
@@ -440,6 +511,78 @@ class Solution(NamedTuple):
     """A record per iteration."""
     timings: Timings
     """The time that its parts took."""
+
+
+@disjoint_base
+class Solution(_Solution):
+    """The result of a solve: the best iterate, whatever the status says.
+
+    Where knots differ in nu, what belongs to controls is a list of N arrays instead of one array.
+    """
+
+    _source: Any = None
+    _evaluation: Evaluation | None = None
+
+    def _evaluated(self) -> Evaluation:
+        if self._evaluation is None:
+            if self._source is None:
+                raise AttributeError("this solution was copied from its problem: call Problem.evaluate(xs, us)")
+            problem, moved = self._source
+            self._evaluation = problem._evaluate(self.xs, self.us, moved)
+        return self._evaluation
+
+    @property
+    def accelerations(self) -> list[_Array]:
+        """The accelerations of each knot, as in an `Evaluation`; computed when they are first asked for."""
+        return self._evaluated().accelerations
+
+    @property
+    def efforts(self) -> list[_Array]:
+        """The efforts of all joints of each knot, likewise."""
+        return self._evaluated().efforts
+
+    @property
+    def forces(self) -> list[dict[str, _Array]]:
+        """The forces of each knot's contacts, by their names, likewise."""
+        return self._evaluated().forces
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The parts of a pickle: the numbers, without the problem."""
+        return type(self), tuple(self)
+
+
+class LqNode(NamedTuple):
+    """A knot's linear-quadratic problem: δx⁺ = A δx + B δu + f, ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu."""
+
+    A: ArrayLike
+    """∂x⁺/∂x, (ndx, ndx)."""
+    B: ArrayLike
+    """∂x⁺/∂u, (ndx, nu)."""
+    f: ArrayLike
+    """The gap φ(x, u) ⊖ x⁺, ndx numbers."""
+    Q: ArrayLike
+    """∂²ℓ/∂x², (ndx, ndx)."""
+    S: ArrayLike
+    """∂²ℓ/∂x∂u, (ndx, nu)."""
+    R: ArrayLike
+    """∂²ℓ/∂u², (nu, nu)."""
+    q: ArrayLike
+    """∂ℓ/∂x, ndx numbers."""
+    r: ArrayLike
+    """∂ℓ/∂u, nu numbers."""
+
+
+class SweepResult(NamedTuple):
+    """The feedback and the value functions of a `Sweep`: V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx + a constant."""
+
+    K: list[_Array]
+    """The gains of each knot, (nu, ndx)."""
+    k: list[_Array]
+    """The feed-forward of each knot, nu numbers."""
+    Vx: _Array
+    """The gradients of the value functions, (N + 1, ndx)."""
+    Vxx: _Array
+    """Their Hessians, (N + 1, ndx, ndx)."""
 
 
 class Outcome(NamedTuple):
@@ -476,13 +619,36 @@ class Control(NamedTuple):
     """The force on each body during the step, (nbodies, 6), at its origin and in its frame; likewise."""
 
 
+_NUMBERS = 12
+"""The number of numbers of a vector, and of things in a list, that a result shows; else it shows the shape."""
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        if value.ndim > 1 or value.size > _NUMBERS:
+            return f"<array {value.shape}>"
+        return np.array2string(value, separator=", ", max_line_width=1000)
+    if isinstance(value, list) and len(value) > _NUMBERS:
+        return f"<list of {len(value)}>"
+    return repr(value)
+
+
+def _repr(self: Any) -> str:
+    """The members in short."""
+    return f"{type(self).__name__}({', '.join(f'{k}={_shown(v)}' for k, v in self._asdict().items())})"
+
+
 # where users find them, and pickle too
 _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",
     "Solution": "optimal",
+    "Evaluation": "optimal",
+    "SweepResult": "optimal",
+    "LqNode": "optimal",
     "Outcome": "optimal",
     "Control": "simulation",
 }
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and issubclass(_item, tuple)]:
+    setattr(_class, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced
     _class.__module__ = f"condyle.{_MODULES[_class.__name__]}" if _class.__name__ in _MODULES else "condyle"

@@ -23,11 +23,15 @@ by any number of expressions; the same function of the same robot counts once.
 CasADi is an extra: `pip install condyle[casadi]`.
 """
 
+import threading
 from collections.abc import Sequence
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from . import _condyle
-from ._condyle import Model
+from ._condyle import Action, Model
 from ._types import ContactConstraint
 
 try:
@@ -37,6 +41,7 @@ except ImportError:
 
 __all__ = [
     "aba",
+    "action",
     "centroidal_momentum",
     "com",
     "constrained_dynamics",
@@ -117,3 +122,86 @@ def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint])
     (6, 1)
     """
     return _function(model, "constrained_dynamics", constraints=list(constraints))
+
+
+def action(
+    x: "_casadi.SX | _casadi.MX",
+    u: "_casadi.SX | _casadi.MX | None",
+    next_state: "_casadi.SX | _casadi.MX | None",
+    cost: "_casadi.SX | _casadi.MX",
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+) -> Action:
+    """An `Action` of `condyle.optimal` from expressions, with their exact derivatives, computed for all knots at once.
+
+    x, u: the symbols of the state and of the control; u is None at the end of the horizon.
+    next_state: the next state as an expression of x and u; None at the end.
+    cost: the cost.
+    lower, upper: bounds on the controls, as of `Action`.
+
+    >>> import casadi, condyle, condyle.casadi, numpy as np
+    >>> x, u = casadi.SX.sym("x"), casadi.SX.sym("u")
+    >>> knot = condyle.casadi.action(x, u, x + u, 0.5 * (x**2 + u**2))
+    >>> end = condyle.casadi.action(x, None, None, 0.5 * x**2)
+    >>> problem = condyle.optimal.Problem([1.0], [knot], [0] * 30, end)
+    >>> round(condyle.optimal.Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
+    0.809017
+    """
+    kind: Any = type(x)
+    symbols: list[Any] = [x, kind.sym("u", 0) if u is None else u]
+    nx, nu = (symbol.numel() for symbol in symbols)
+    value: Any = cost
+    state: Any = next_state
+    end = state is None
+    values = _Mapped(kind, symbols, [value] if end else [value, state])
+    z = _casadi.vertcat(*symbols)
+    slopes, curvature = _casadi.gradient(value, z), _casadi.hessian(value, z)[0]
+    parts = {
+        "q": slopes[:nx],
+        "r": slopes[nx:],
+        "Q": curvature[:nx, :nx],
+        "S": curvature[:nx, nx:],
+        "R": curvature[nx:, nx:],
+    }
+    if not end:
+        jacobian = _casadi.jacobian(state, z)
+        parts |= {"A": jacobian[:, :nx], "B": jacobian[:, nx:]}
+    parts = {name: part for name, part in parts.items() if part.numel()}
+    derivatives = _Mapped(kind, symbols, list(parts.values()))
+
+    def calc(t: Any, x: NDArray[Any], u: NDArray[Any]) -> tuple[Any, Any]:
+        found = values(x, u)
+        return (None if end else found[1][:, :, 0]), found[0][:, 0, 0]
+
+    def calc_diff(t: Any, x: NDArray[np.float64], u: NDArray[np.float64]) -> dict[str, ArrayLike]:
+        found = dict(zip(parts, derivatives(x, u), strict=True))
+        return {name: part[:, :, 0] if name in "qr" else part for name, part in found.items()}
+
+    return Action(nx, nu, calc, calc_diff, lower, upper, batch=True)
+
+
+class _Mapped:
+    """A function of rows of arguments, which gives an array (rows, m, n) for each of its results."""
+
+    def __init__(self, kind: Any, arguments: list[Any], results: list[Any]) -> None:
+        results = [_casadi.densify(kind(result)) for result in results]
+        self._function = _casadi.Function("knot", arguments, results)
+        self._shapes = [result.shape for result in results]
+        self._buffers: dict[int, Any] = {}
+        self._lock = threading.Lock()  # a buffer serves one call at a time
+
+    def __call__(self, *arguments: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        rows = len(arguments[0])
+        # column by column, as CasADi has matrices: a row of numbers for each knot
+        results = [np.empty((rows, n, m)) for m, n in self._shapes]
+        with self._lock:
+            if rows not in self._buffers:
+                self._buffers[rows] = self._function.map(rows).buffer()
+            buffer, call = self._buffers[rows]
+            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # alive until the call
+            for k, argument in enumerate(inputs):
+                buffer.set_arg(k, argument.data)
+            for k, result in enumerate(results):
+                buffer.set_res(k, result.data)
+            call()
+        return [result.transpose(0, 2, 1) for result in results]

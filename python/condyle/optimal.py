@@ -13,11 +13,18 @@
 >>> solution.status, solution.xs.shape
 ('converged', (21, 14))
 
-What must hold exactly is a `Limit`, for `AugmentedLagrangian`: see there.
+What must hold exactly is a `Limit`, for `AugmentedLagrangian`: see there. An action for each knot costs no more than
+one for all: `Problem(x0, [action_0, action_1, ...], None, terminal)` computes those together that differ in costs only.
+
+What is one's own: an `Action` (the next state and the cost), a `DifferentialAction` (accelerations) or an `ode_action`
+(ẋ), residuals of a robot (`Residual.own`), constraints (`ConstrainedAction`), or expressions of CasADi
+(`condyle.casadi.action`). Derivatives that are not written are exact all the same, wherever functions can be called
+with numbers that know their derivatives.
 
 The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are Crocoddyl's.
 """
 
+from ._actions import ode_action, thrusters
 from ._condyle import (
     Action,
     Activation,
@@ -25,6 +32,7 @@ from ._condyle import (
     ConstrainedAction,
     ContactDynamics,
     Cost,
+    DifferentialAction,
     Fddp,
     FreeDynamics,
     FrictionCone,
@@ -35,9 +43,11 @@ from ._condyle import (
     Problem,
     ProblemError,
     Residual,
+    Sweep,
+    Unicycle,
     WrenchCone,
 )
-from ._types import Iteration, Outcome, Solution, Timings
+from ._types import Evaluation, Iteration, LqNode, Outcome, Solution, SweepResult, Timings
 
 __all__ = [
     "Action",
@@ -46,6 +56,8 @@ __all__ = [
     "ConstrainedAction",
     "ContactDynamics",
     "Cost",
+    "DifferentialAction",
+    "Evaluation",
     "Fddp",
     "FreeDynamics",
     "FrictionCone",
@@ -53,12 +65,18 @@ __all__ = [
     "InverseDynamics",
     "Iteration",
     "Limit",
+    "LqNode",
     "Lqr",
     "Outcome",
     "Problem",
     "ProblemError",
     "Residual",
     "Solution",
+    "Sweep",
+    "SweepResult",
     "Timings",
+    "Unicycle",
     "WrenchCone",
+    "ode_action",
+    "thrusters",
 ]

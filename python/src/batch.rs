@@ -4,18 +4,45 @@
 //! milliseconds, with the interpreter's lock released, and each part is written to the arrays that the caller gets;
 //! everything else is called state after state. Between parts and states signals are looked at.
 
-use crate::arrays::{Array, Input, matrix, members, place, writable};
+use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
+use crate::hyper_dual;
 use crate::signals::{self, Signals};
 use condyle::{Batch, BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices, Scalar};
-use numpy::{Ix2, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{Ix2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::iter;
 use std::ops::{Deref, Range};
 
+/// What a call wants to know of an argument before it reads it.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Look {
+    /// Whether it contains hyper-dual numbers.
+    pub(crate) dual: bool,
+    /// The number of states that it is given for; none if it is given for a single one, or is no part of a state.
+    pub(crate) states: Option<usize>,
+}
+
+/// Looks at an argument that has some shape for one state.
+#[inline]
+pub(crate) fn look(name: &str, given: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Look> {
+    let Ok(array) = given.cast::<PyUntypedArray>() else {
+        return Ok(Look { dual: hyper_dual::within(given), states: states(given, shape.len())? });
+    };
+    let dual = array.dtype().kind() == b'O' && hyper_dual::within(given);
+    let found = array.shape();
+    if found.len() != shape.len() + 1 {
+        return check_shape(name, found, shape).map(|()| Look { dual, states: None });
+    }
+    if found[1..] != *shape {
+        return Err(Expected::States(shape).error(name, found));
+    }
+    Ok(Look { dual, states: Some(found[0]) })
+}
+
 /// The number of states of an argument that has `axes` of them for a single one: none if it is given for a single one.
-pub(crate) fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<usize>> {
+fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<usize>> {
     if let Ok(array) = given.cast::<PyUntypedArray>() {
         return Ok((array.ndim() == axes + 1).then(|| array.shape()[0]));
     }
@@ -29,8 +56,8 @@ pub(crate) fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<u
 
 /// The number of states that a call is for, from what its arguments are given for; none if all are given for a single
 /// one.
-pub(crate) fn agreed(arguments: &[(&str, Option<usize>)]) -> PyResult<Option<usize>> {
-    let mut all = arguments.iter().filter_map(|(name, states)| Some((name, (*states)?)));
+pub(crate) fn agreed(arguments: &[(&str, Look)]) -> PyResult<Option<usize>> {
+    let mut all = arguments.iter().filter_map(|(name, look)| Some((name, look.states?)));
     let Some((first, n)) = all.next() else { return Ok(None) };
     if n == 0 {
         return Err(PyValueError::new_err(format!("{first}: expected at least one state, found none")));
@@ -151,9 +178,7 @@ impl Results for &[f64] {
 
 impl Results for Matrices<'_, f64> {
     fn write(&self, to: &mut [&mut [f64]]) {
-        for (matrix, to) in self.iter().zip(to[0].chunks_exact_mut(self.at(0).len().max(1))) {
-            matrix.write(to);
-        }
+        self.write_rows(to[0]);
     }
 }
 
@@ -177,11 +202,12 @@ impl Results for BatchAbaDerivatives<'_, f64> {
     }
 }
 
-/// The number of states of a part, at most: some thousand multiplications a number of a matrix nv × nv take some
-/// milliseconds, and the matrices of a part some megabytes; each thread has two registers full at least.
+/// The number of states of a part, at most: the three matrices nv × nv of each are in a processor's own cache, of a megabyte,
+/// when they are written to the caller's arrays; a part takes some hundred microseconds. Each thread has two registers
+/// full at least.
 pub(crate) fn part_size(nv: usize, threads: usize) -> usize {
-    const NUMBERS: usize = 1 << 19;
-    (NUMBERS / (nv * nv).max(64)).max(16 * threads)
+    const NUMBERS: usize = 1 << 15;
+    (NUMBERS / (nv * nv).max(64)).next_multiple_of(16).max(16) * threads
 }
 
 /// An argument's numbers for some of all states.
@@ -231,6 +257,9 @@ pub(crate) fn run<'py>(
     drop(borrowed);
     match kind.class {
         None => Ok(out.cloned().unwrap_or_else(|| arrays.remove(0).into_any())),
-        Some(class) => py.import("condyle._types")?.getattr(class)?.call1(PyTuple::new(py, arrays)?),
+        Some(class) => {
+            let class = py.import("condyle._types")?.getattr(class)?.cast_into()?;
+            named(&class, PyTuple::new(py, arrays)?)
+        }
     }
 }

@@ -56,6 +56,7 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
 pub(crate) struct ModelBuilder {
     /// The library's builder; none once the model is built.
     inner: Option<condyle::ModelBuilder>,
+    name: String,
     /// A number that no other builder has.
     number: u64,
 }
@@ -91,7 +92,14 @@ impl ModelBuilder {
     #[new]
     fn new(name: &str) -> Self {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
-        Self { inner: Some(condyle::ModelBuilder::new(name)), number: NUMBER.fetch_add(1, Ordering::Relaxed) }
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        Self { inner: Some(condyle::ModelBuilder::new(name)), name: name.to_owned(), number }
+    }
+
+    /// The robot's name, and whether the model is built.
+    fn __repr__(&self) -> String {
+        let built = if self.inner.is_none() { ", built" } else { "" };
+        format!("<condyle.ModelBuilder '{}'{built}>", self.name)
     }
 
     /// Adds a body and its joint.

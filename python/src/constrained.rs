@@ -1,14 +1,14 @@
 //! Dynamics under constraints: the library's types and functions one to one.
 
-use crate::arrays::{Give, array, named_tuples, pose};
+use crate::arrays::{Give, array, class, named_tuples, pose, type_name};
 use crate::data::{Holds, Scratch};
 use crate::exceptions::{exception, within, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
 use crate::hyper_dual::Hyper;
-use crate::model::{MadeFor, Model, frame_index};
+use crate::model::{MadeFor, Model, frame_index, members_of};
 use condyle::{ContactConstraint, Motion, Proximal, Scalar, Target};
 use nalgebra::DMatrix;
-use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 
@@ -28,6 +28,10 @@ named_tuples! {
 
 /// A `ContactConstraint` of `condyle._types` as the library has it.
 pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::ContactConstraint> {
+    if !given.is_instance(class!(given.py(), "ContactConstraint")?)? {
+        let found = type_name(given);
+        return Err(PyTypeError::new_err(format!("constraints: expected `ContactConstraint`s, found a {found}")));
+    }
     let optional = |name: &str| given.getattr(name).map(|x| (!x.is_none()).then_some(x));
     let frame = frame_index(model, &given.getattr("frame")?)?;
     let mut constraint = match given.getattr("kind")?.extract()? {
@@ -133,16 +137,23 @@ impl Holds<Hyper> for ConstraintSet {
 impl ConstraintSet {
     #[new]
     #[pyo3(signature = (model, constraints, mu=0.0, iterations=1))]
-    fn new(model: &Bound<'_, Model>, constraints: Vec<Bound<'_, PyAny>>, mu: f64, iterations: usize) -> PyResult<Self> {
+    fn new(model: &Bound<'_, Model>, constraints: &Bound<'_, PyAny>, mu: f64, iterations: usize) -> PyResult<Self> {
         if !(mu.is_finite() && mu >= 0.0) {
             return Err(PyValueError::new_err(format!("mu: expected a number of at least 0, found {mu}")));
         }
         within("iterations", iterations, 1, 10_000)?;
         let (made_for, model) = (MadeFor::with_geometry(model.get()), &model.get().inner);
+        let constraints = members_of("constraints", "`ContactConstraint`s", constraints)?;
         let constraints = constraints.iter().map(|c| constraint(model, c)).collect::<PyResult<Vec<_>>>()?;
         let mut inner = condyle::ConstraintSet::new(model, &constraints).map_err(exception)?;
         inner.proximal = Proximal { mu, iterations };
         Ok(Self { inner, dual: None, constraints, nv: model.nv(), made_for })
+    }
+
+    /// The robot's name, and how many constraints and rows there are.
+    fn __repr__(&self) -> String {
+        let (robot, n, rows) = (&self.made_for.name, self.inner.len(), self.inner.rows());
+        format!("<condyle.ConstraintSet of '{robot}': {n} constraints, {rows} rows>")
     }
 
     /// The number of constraints.

@@ -32,6 +32,11 @@ macro_rules! factor {
         impl $class {
             $($own)*
 
+            /// The size of M.
+            fn __repr__(&self) -> String {
+                format!("<condyle.{} of a matrix ({n}, {n})>", stringify!($class), n = self.size)
+            }
+
             /// Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
             ///
             /// Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
@@ -122,7 +127,7 @@ factor! {
 Ltdl {
     #[new]
     fn new(model: &Bound<'_, Model>) -> Self {
-        let model = &model.get().inner;
+        let model = &*model.get().inner;
         Self { inner: condyle::Ltdl::new(model), size: model.nv(), done: false }
     }
 
@@ -213,6 +218,12 @@ impl DivideConquer {
     fn new(model: &Bound<'_, Model>, grain: usize) -> Self {
         let model = model.get();
         Self { inner: condyle::DivideConquer::new(&model.inner, grain), made_for: MadeFor::with_geometry(model) }
+    }
+
+    /// The robot's name, and how many runs of bodies there are.
+    fn __repr__(&self) -> String {
+        let size = self.inner.size();
+        format!("<condyle.DivideConquer of '{}': {} bodies in {} runs>", self.made_for.name, size.bodies, size.runs)
     }
 
     /// The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`.

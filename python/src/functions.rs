@@ -16,7 +16,7 @@
 //! tangent vectors and forces may be given for many states, with one axis more: then so are the results, see `batch.rs`.
 
 use crate::arrays::Number;
-use crate::batch;
+use crate::batch::{self, Look};
 use crate::exceptions::{ModelError, wrong_word};
 use crate::hyper_dual;
 use crate::model::{body_index, frame_index};
@@ -45,13 +45,9 @@ pub(crate) trait Argument<'a, 'py> {
         model: &Model,
         state: Option<usize>,
     ) -> PyResult<Self::Read<S>>;
-    /// Whether it contains hyper-dual numbers.
-    fn is_dual(_given: &Self::Given) -> bool {
-        false
-    }
-    /// The number of states that it is given for; none if it is given for a single one, or is no part of a state.
-    fn states(_given: &Self::Given) -> PyResult<Option<usize>> {
-        Ok(None)
+    /// Looks at the argument before anything is read.
+    fn look(_name: &str, _given: &Self::Given, _model: &Model) -> PyResult<Look> {
+        Ok(Look::default())
     }
     /// Reads the argument for so many states; as a copy, if the array may change before all are computed.
     fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize, copy: bool) -> PyResult<Self::All>;
@@ -73,13 +69,13 @@ macro_rules! vectors {
                 model: &Model,
                 state: Option<usize>,
             ) -> PyResult<Self::Read<S>> {
-                S::read(name, &batch::at(given, 1, state)?, &[model.$length()])
+                match state {
+                    None => S::read(name, given, &[model.$length()]),
+                    state => S::read(name, &batch::at(given, 1, state)?, &[model.$length()]),
+                }
             }
-            fn is_dual(given: &Self::Given) -> bool {
-                hyper_dual::within(given)
-            }
-            fn states(given: &Self::Given) -> PyResult<Option<usize>> {
-                batch::states(given, 1)
+            fn look(name: &str, given: &Self::Given, model: &Model) -> PyResult<Look> {
+                batch::look(name, given, &[model.$length()])
             }
             fn read_all(
                 name: &str,
@@ -118,11 +114,8 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
         let numbers = S::read::<Ix2>(name, &batch::at(given, 2, state)?, &[model.bodies().len(), 6])?;
         Ok(batch::forces(&numbers))
     }
-    fn is_dual(given: &Self::Given) -> bool {
-        given.is_some_and(hyper_dual::within)
-    }
-    fn states(given: &Self::Given) -> PyResult<Option<usize>> {
-        given.map_or(Ok(None), |given| batch::states(given, 2))
+    fn look(name: &str, given: &Self::Given, model: &Model) -> PyResult<Look> {
+        given.map_or(Ok(Look::default()), |given| batch::look(name, given, &[model.bodies().len(), 6]))
     }
     fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize, _: bool) -> PyResult<Self::All> {
         let Some(given) = given else { return Ok(Vec::new()) };
@@ -153,8 +146,8 @@ macro_rules! shared {
             ) -> PyResult<Self::Read<$S>> {
                 $body
             }
-            $(fn is_dual(given: &Self::Given) -> bool {
-                $is_dual(given)
+            $(fn look(_: &str, given: &Self::Given, _: &Model) -> PyResult<Look> {
+                Ok(Look { dual: $is_dual(given), states: None })
             })?
             fn read_all(_: &str, _: &Self::Given, _: &Model, _: usize, _: bool) -> PyResult<Self::All> {
                 unreachable!("{}: not an argument of what runs in lanes", stringify!($kind))
@@ -285,9 +278,10 @@ macro_rules! functions {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            let dual = [$(<kinds::$kind as Argument<'_, '_>>::is_dual(&$arg)),*].contains(&true);
-            let states = [$((stringify!($arg), <kinds::$kind as Argument<'_, '_>>::states(&$arg)?)),*];
-            let states = batch::agreed(&states)?;
+            let looks: &[(&str, batch::Look)] =
+                &[$((stringify!($arg), <kinds::$kind as Argument<'_, '_>>::look(stringify!($arg), &$arg, $model)?)),*];
+            let dual = looks.iter().any(|(_, look)| look.dual);
+            let states = batch::agreed(looks)?;
             $(if let (Some(states), false) = (states, dual) {
                 $check($model)?;
                 let copy = out.is_some();

@@ -24,6 +24,18 @@ impl Hyper {
     pub(crate) fn second(x: f64) -> Self {
         Self(HyperDual64::new(x, 0.0, 1.0, 0.0))
     }
+    /// A number that changes in both directions at some rates.
+    pub(crate) fn with(x: f64, [first, second]: [f64; 2]) -> Self {
+        Self(HyperDual64::new(x, first, second, 0.0))
+    }
+    /// The number itself.
+    pub(crate) fn value(self) -> f64 {
+        self.0.re
+    }
+    /// The second derivative by both directions.
+    pub(crate) fn curvature(self) -> f64 {
+        self.0.eps1eps2
+    }
     /// The derivatives in both directions.
     pub(crate) fn slopes(self) -> [f64; 2] {
         [self.0.eps1, self.0.eps2]

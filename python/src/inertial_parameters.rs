@@ -1,22 +1,32 @@
 //! The ten inertial parameters of a body as Python sees them: the module `condyle.inertial_parameters`.
 
-use crate::arrays::{Give, array, class, matrix, three};
+use crate::arrays::{Give, array, class, matrix, read_only, three};
 use crate::exceptions::NotPhysicalError;
-use condyle::{Inertia, Sym3, Vec3, inertial_parameters as rust};
+use condyle::{Inertia, Mat3, Sym3, Vec3, inertial_parameters as rust};
 use pyo3::prelude::*;
 
 /// An inertia as Python sees it.
-pub(crate) fn give_inertia<'py>(py: Python<'py>, I: Inertia<f64>) -> PyResult<Bound<'py, PyAny>> {
+fn give_inertia<'py>(py: Python<'py>, I: Inertia<f64>) -> PyResult<Bound<'py, PyAny>> {
+    inertia_of(py, I, |x| x.give(py, None), |X| X.give(py, None))
+}
+
+/// The inertia of a model's body, in arrays that nobody can write to.
+pub(crate) fn model_inertia<'py>(py: Python<'py>, I: Inertia<f64>) -> PyResult<Bound<'py, PyAny>> {
+    let instead = "with_inertias";
+    inertia_of(py, I, |x| read_only(py, &x, instead), |X| read_only(py, &X, instead))
+}
+
+fn inertia_of<'py>(
+    py: Python<'py>,
+    I: Inertia<f64>,
+    vector: impl Fn(Vec3<f64>) -> PyResult<Bound<'py, PyAny>>,
+    matrix: impl Fn(Mat3<f64>) -> PyResult<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
     let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
     // Ī = I_c − m [c]ₓ[c]ₓ, so I_c is what is left of Ī when that is taken away
     let point_mass = Inertia::from_com(I.mass, com, Sym3::zero());
     let about_com = I.rotational - point_mass.rotational;
-    class!(py, "Inertia")?.call1((
-        I.mass,
-        com.give(py, None)?,
-        about_com.full().give(py, None)?,
-        I.rotational.full().give(py, None)?,
-    ))
+    class!(py, "Inertia")?.call1((I.mass, vector(com)?, matrix(about_com.full())?, matrix(I.rotational.full())?))
 }
 
 /// An inertia that Python gives: mass, centre of mass, and the rotational inertia about the origin, of which the lower

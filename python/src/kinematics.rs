@@ -1,6 +1,8 @@
 //! Where bodies and frames are and how they move: the library's functions one to one.
 
 use crate::functions::functions;
+use condyle::Scalar;
+use nalgebra::DMatrix;
 use pyo3::prelude::*;
 
 /// Declarations of functions of a frame or of a body. Each calls the method of the same name of what a pass gives: the
@@ -57,7 +59,7 @@ fn frame_placement(model, data; q: Position, frame: FrameOf; out) {
 }
 }
 
-motions! {
+functions! {
 /// The Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 ///
 /// q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
@@ -67,8 +69,32 @@ motions! {
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
 /// (6, 7)
-fn frame_jacobian(frame: FrameOf) after forward_kinematics(q: Position) fills (J);
+fn frame_jacobian(model, data; q: Position, frame: FrameOf, reference: Reference = "local"; out) {
+    let mut J = DMatrix::from_element(6, model.nv(), Scalar::zero());
+    let _ = data; // only the joints between the frame and the world count
+    condyle::frame_jacobian(model, &q, frame, reference, &mut J);
+    J
+}
 
+/// The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
+///
+/// q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
+/// body's own frame.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q = condyle.Data(arm), [0.3] * 7
+/// >>> J = condyle.frame_jacobian(arm, data, q, "link7")
+/// >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
+/// True
+fn body_jacobian(model, data; q: Position, body: BodyOf, reference: Reference = "local"; out) {
+    let mut J = DMatrix::from_element(6, model.nv(), Scalar::zero());
+    let _ = data;
+    condyle::body_jacobian(model, &q, body, reference, &mut J);
+    J
+}
+}
+
+motions! {
 /// The velocity of a frame, 6 numbers: that of the body's point at the origin of the reference (m/s), then the angular
 /// velocity (rad/s); O(n).
 ///
@@ -108,18 +134,6 @@ fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: P
 /// acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
 /// frame.
 fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ);
-
-/// The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
-///
-/// q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
-/// body's own frame.
-///
-/// >>> arm = condyle.robots.arm7()
-/// >>> data, q = condyle.Data(arm), [0.3] * 7
-/// >>> J = condyle.frame_jacobian(arm, data, q, "link7")
-/// >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
-/// True
-fn body_jacobian(body: BodyOf) after forward_kinematics(q: Position) fills (J);
 
 /// The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
 ///

@@ -3,7 +3,8 @@
 //! No module uses one that stands after it here:
 //! - `exceptions`, `signals` and `arrays`: what the package raises, what ends a call that lasts, and NumPy arrays in and
 //!   out; `hyper_dual` numbers;
-//! - `joint`, `inertial_parameters`, `model`, `robots`, `builder`: robots, and how they are made;
+//! - `cached`, `joint`, `tree`, `inertial_parameters`, `model`, `robots`, `builder`: robots, what they show of themselves, and how
+//!   they are made;
 //! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
 //!   `regressors`, `simulation`: the library's functions and types, one to one;
@@ -17,6 +18,7 @@ mod algorithms;
 mod arrays;
 mod batch;
 mod builder;
+mod cached;
 mod casadi;
 mod centroidal;
 mod configuration;
@@ -36,6 +38,7 @@ mod regressors;
 mod robots;
 mod signals;
 mod simulation;
+mod tree;
 mod wholebody;
 
 use pyo3::exceptions::PyImportError;
@@ -101,8 +104,9 @@ mod _condyle {
     use model::{Model, model_from_bytes};
     #[pymodule_export]
     use optimal::{
-        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, Fddp, FreeDynamics,
-        FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, WrenchCone,
+        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, DifferentialAction, Fddp,
+        FreeDynamics, FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, Sweep, Unicycle,
+        WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

@@ -1,15 +1,18 @@
 //! A robot as Python sees it.
 
-use crate::arrays::{Give, class, three, vector};
+use crate::arrays::{class, read_only, three, type_name, vector};
+use crate::cached::{Attribute, Cached};
 use crate::exceptions::{ModelError, exception};
-use crate::inertial_parameters::{give_inertia, read_inertia};
+use crate::inertial_parameters::{model_inertia, read_inertia};
 use crate::joint::{Joint, kind, root};
+use crate::tree::tree;
 use condyle::{FrameKind, MjcfOptions, SdfOptions, UrdfOptions, inertial_parameters};
-use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyList, PyString};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 ///
@@ -22,9 +25,10 @@ use std::path::PathBuf;
 /// (7, 7, ['universe', 'joint1', 'joint2'])
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct Model {
-    pub(crate) inner: condyle::Model,
+    pub(crate) inner: Arc<condyle::Model>,
     /// A hash that is equal for models of the same bodies and joints, which can share a `Data`.
     structure: u64,
+    cached: Cached,
 }
 
 /// The models that something was made for: one, and all others of the same bodies and joints.
@@ -66,14 +70,14 @@ impl From<condyle::Model> for Model {
         for b in inner.bodies() {
             (&b.joint_name, b.parent, kind(b.joint), b.idx_q, b.idx_v, b.mimic.is_some()).hash(&mut hasher);
         }
-        Self { structure: hasher.finish(), inner }
+        Self { structure: hasher.finish(), inner: Arc::new(inner), cached: Cached::new() }
     }
 }
 
 /// The number of a frame that is given by name or by number.
 pub(crate) fn frame_index(model: &condyle::Model, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
-    if let Ok(name) = frame.extract::<&str>() {
-        return model.frame(name).map_err(exception);
+    if let Ok(name) = frame.cast::<PyString>() {
+        return model.frame(name.to_str()?).map_err(exception);
     }
     numbered("frame: expected a name", frame, 0, model.frames().len())
 }
@@ -85,21 +89,40 @@ pub(crate) fn body_index(
     body: &Bound<'_, PyAny>,
     least: usize,
 ) -> PyResult<usize> {
-    if let Ok(name) = body.extract::<&str>() {
-        return model.joint(name).map_err(exception);
+    if let Ok(name) = body.cast::<PyString>() {
+        return model.joint(name.to_str()?).map_err(exception);
     }
     numbered(expected, body, least, model.bodies().len())
 }
 
+/// The members of an argument that is a list of some things.
+pub(crate) fn members_of<'py>(
+    argument: &str,
+    what: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let wrong = |found: String| PyTypeError::new_err(format!("{argument}: expected a list of {what}, found {found}"));
+    // text is iterable, and so are named tuples such as a single constraint
+    if given.is_instance_of::<PyString>() || given.is_instance_of::<PyBytes>() || given.hasattr("_fields")? {
+        let found = given.repr()?;
+        return Err(wrong(format!("{found}; write [{found}]")));
+    }
+    let members = given.try_iter().map_err(|_| wrong(format!("a {}", type_name(given))))?;
+    members.collect()
+}
+
 /// An index from `least` to below `count`.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
-    let index: isize = given.extract()?;
-    let wrong = || match count {
-        _ if least < count => format!("{expected} or {least} to {}, found {index}", count - 1),
-        _ => format!("{expected}, found {index}: the model has none"),
+    let wrong = |found: String| match count {
+        _ if least < count => format!("{expected} or {least} to {}, found {found}", count - 1),
+        _ => format!("{expected}, found {found}: the model has none"),
     };
+    let index: isize = given.extract().map_err(|_| {
+        let found = if given.is_none() { "None".to_owned() } else { format!("a {}", type_name(given)) };
+        PyTypeError::new_err(wrong(found))
+    })?;
     let inside = usize::try_from(index).ok().filter(|i| (least..count).contains(i));
-    inside.ok_or_else(|| PyIndexError::new_err(wrong()))
+    inside.ok_or_else(|| PyIndexError::new_err(wrong(index.to_string())))
 }
 
 impl Model {
@@ -111,6 +134,17 @@ impl Model {
 
     fn of_bodies<T>(&self, get: impl FnMut(&condyle::Body) -> T) -> Vec<T> {
         self.inner.bodies().iter().map(get).collect()
+    }
+
+    /// Numbers of the model, in an array that nobody can write to.
+    fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        attribute: Attribute,
+        instead: &str,
+        numbers: impl FnOnce() -> Vec<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.cached.value(py, attribute, || read_only(py, &numbers()[..], instead))
     }
 }
 
@@ -261,81 +295,89 @@ impl Model {
 
     /// The names of the joints, one for each body; 'universe' for the world.
     #[getter]
-    fn names(&self) -> Vec<&str> {
-        self.inner.bodies().iter().map(|b| b.joint_name.as_str()).collect()
+    fn names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Names, || Ok(self.of_bodies(|b| b.joint_name.clone())))
     }
 
     /// The names of the links that the joints carry; 'universe' for the world.
     #[getter]
-    fn body_names(&self) -> Vec<&str> {
-        self.inner.bodies().iter().map(|b| b.name.as_str()).collect()
+    fn body_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::BodyNames, || Ok(self.of_bodies(|b| b.name.clone())))
     }
 
     /// The kind of each joint: 'revolute', 'continuous', 'prismatic', 'helical', 'spherical', 'planar',
     /// 'translation' or 'free_flyer'; 'universe' for the world.
     #[getter]
-    fn joint_types(&self) -> Vec<&str> {
-        let mut types = self.of_bodies(|b| kind(b.joint));
-        types[0] = "universe";
-        types
+    fn joint_types<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::JointTypes, || {
+            let mut types = self.of_bodies(|b| kind(b.joint));
+            types[0] = "universe";
+            Ok(types)
+        })
     }
 
     /// The joints, as `Joint`; None for the world.
     #[getter]
-    fn joints(&self) -> Vec<Option<Joint>> {
-        let bodies = self.inner.bodies().iter().enumerate();
-        bodies.map(|(i, b)| (i > 0).then_some(Joint(b.joint))).collect()
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Joints, || {
+            let bodies = self.inner.bodies().iter().enumerate();
+            Ok(bodies.map(|(i, b)| (i > 0).then_some(Joint(b.joint))).collect())
+        })
     }
 
     /// The body on which each joint sits; 0 is the world.
     #[getter]
-    fn parents(&self) -> Vec<usize> {
-        self.of_bodies(|b| b.parent)
+    fn parents<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Parents, || Ok(self.of_bodies(|b| b.parent)))
     }
 
     /// The index in q at which each joint's position begins; for a joint that mimics another, that of the other.
     #[getter]
-    fn idx_qs(&self) -> Vec<usize> {
-        self.of_bodies(|b| b.idx_q)
+    fn idx_qs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::IdxQs, || Ok(self.of_bodies(|b| b.idx_q)))
     }
 
     /// The index in v at which each joint's velocity begins; for a joint that mimics another, that of the other.
     #[getter]
-    fn idx_vs(&self) -> Vec<usize> {
-        self.of_bodies(|b| b.idx_v)
+    fn idx_vs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::IdxVs, || Ok(self.of_bodies(|b| b.idx_v)))
     }
 
     /// The number of coordinates that each joint has of its own: 0 if it mimics another joint, and 0 for the world.
     #[getter]
-    fn nqs(&self) -> Vec<usize> {
-        self.of_joints(|b| b.joint.nq())
+    fn nqs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Nqs, || Ok(self.of_joints(|b| b.joint.nq())))
     }
 
     /// The number of degrees of freedom that each joint has of its own: 0 if it mimics another joint, and 0 for the
     /// world.
     #[getter]
-    fn nvs(&self) -> Vec<usize> {
-        self.of_joints(|b| b.joint.nv())
+    fn nvs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Nvs, || Ok(self.of_joints(|b| b.joint.nv())))
     }
 
     /// The rule by which each joint follows another one, as `Mimic(ratio, offset)`; None for a joint that does not.
     #[getter]
-    fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
-        let class = class!(py, "Mimic")?;
-        let mimic = |b: &condyle::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
-        self.inner.bodies().iter().map(mimic).collect()
+    fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Mimics, || {
+            let class = class!(py, "Mimic")?;
+            let mimic = |b: &condyle::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
+            self.inner.bodies().iter().map(mimic).collect()
+        })
     }
 
     /// The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4).
     #[getter]
     fn joint_placements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.of_bodies(|b| b.placement).give(py, None)
+        self.cached.value(py, Attribute::JointPlacements, || read_only(py, &self.of_bodies(|b| b.placement)[..], ""))
     }
 
     /// The inertia of each body in the body's frame, with all that fixed joints merge into it, as `Inertia`.
     #[getter]
-    fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        self.inner.bodies().iter().map(|b| give_inertia(py, b.inertia)).collect()
+    fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Inertias, || {
+            self.inner.bodies().iter().map(|b| model_inertia(py, b.inertia)).collect()
+        })
     }
 
     /// The inertial parameters π, which regressors are multiplied with: ten numbers for each body but the world, 10
@@ -343,47 +385,45 @@ impl Model {
     /// inertia about the origin of the body's frame.
     #[getter]
     fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let bodies = self.inner.bodies()[1..].iter();
-        let pi: Vec<f64> = bodies.flat_map(|b| inertial_parameters::from_inertia(b.inertia)).collect();
-        pi.give(py, None)
+        let bodies = || self.inner.bodies()[1..].iter();
+        let pi = || bodies().flat_map(|b| inertial_parameters::from_inertia(b.inertia)).collect();
+        self.numbers(py, Attribute::InertialParameters, "with_inertias", pi)
     }
 
     /// The limits of position, velocity and effort, as `Limits`; infinite where there are none.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let limits = self.inner.limits();
-        class!(py, "Limits")?.call1((
-            limits.lower.give(py, None)?,
-            limits.upper.give(py, None)?,
-            limits.velocity.give(py, None)?,
-            limits.effort.give(py, None)?,
-        ))
+        self.cached.value(py, Attribute::Limits, || {
+            let condyle::Limits { lower, upper, velocity, effort } = self.inner.limits();
+            let give = |numbers: &[f64]| read_only(py, numbers, "with_limits");
+            class!(py, "Limits")?.call1((give(lower)?, give(upper)?, give(velocity)?, give(effort)?))
+        })
     }
 
     /// The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
     /// and where a `Simulation` is asked for it.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.inner.damping().give(py, None)
+        self.numbers(py, Attribute::Damping, "", || self.inner.damping().to_vec())
     }
 
     /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and where
     /// a `Simulation` is asked for it.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.inner.friction().give(py, None)
+        self.numbers(py, Attribute::Friction, "", || self.inner.friction().to_vec())
     }
 
     /// The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm.
     #[getter]
     fn armature<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.inner.armature().give(py, None)
+        self.numbers(py, Attribute::Armature, "with_armature", || self.inner.armature().to_vec())
     }
 
     /// The acceleration of free fall, in the world's frame (m/s²), 3 numbers.
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.inner.gravity().give(py, None)
+        self.numbers(py, Attribute::Gravity, "with_gravity", || self.inner.gravity().to_array().to_vec())
     }
 
     /// The mass of all bodies, with that of what is fixed to the world (kg).
@@ -395,17 +435,19 @@ impl Model {
     /// The frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the joint's
     /// and the link's.
     #[getter]
-    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        let class = class!(py, "Frame")?;
-        let frame = |f: &condyle::Frame| {
-            let kind = match f.kind {
-                FrameKind::Link => "link",
-                FrameKind::Joint => "joint",
-                FrameKind::User => "user",
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Frames, || {
+            let class = class!(py, "Frame")?;
+            let frame = |f: &condyle::Frame| {
+                let kind = match f.kind {
+                    FrameKind::Link => "link",
+                    FrameKind::Joint => "joint",
+                    FrameKind::User => "user",
+                };
+                class.call1((f.name.as_str(), kind, f.body, read_only(py, &f.placement, "")?))
             };
-            class.call1((f.name.as_str(), kind, f.body, f.placement.give(py, None)?))
-        };
-        self.inner.frames().iter().map(frame).collect()
+            self.inner.frames().iter().map(frame).collect()
+        })
     }
 
     /// The number of the frame with this name: a link's, else the user's, else a joint's.
@@ -427,7 +469,7 @@ impl Model {
     /// Raises `ModelError` if it is not finite.
     fn with_gravity(&self, gravity: &Bound<'_, PyAny>) -> PyResult<Self> {
         let gravity = three("gravity", gravity)?;
-        Ok(self.inner.clone().with_gravity(gravity).map_err(exception)?.into())
+        Ok((*self.inner).clone().with_gravity(gravity).map_err(exception)?.into())
     }
 
     /// The same robot with another armature, nv numbers (kg m², kg).
@@ -435,7 +477,37 @@ impl Model {
     /// Raises `ModelError` if one is negative or not finite.
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
         let armature = vector("armature", armature, self.inner.nv())?;
-        Ok(self.inner.clone().with_armature(&armature).map_err(exception)?.into())
+        Ok((*self.inner).clone().with_armature(&armature).map_err(exception)?.into())
+    }
+
+    /// The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
+    /// are, and infinite numbers are none.
+    ///
+    /// Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity or effort is negative.
+    ///
+    /// >>> arm = condyle.robots.arm7()
+    /// >>> arm.with_limits(effort=0.5 * arm.limits.effort).limits.effort[0].item()
+    /// 43.5
+    #[pyo3(signature = (lower=None, upper=None, velocity=None, effort=None))]
+    fn with_limits(
+        &self,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        effort: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let mut limits = self.inner.limits().clone();
+        for (name, given, limit) in [
+            ("lower", lower, &mut limits.lower),
+            ("upper", upper, &mut limits.upper),
+            ("velocity", velocity, &mut limits.velocity),
+            ("effort", effort, &mut limits.effort),
+        ] {
+            if let Some(given) = given {
+                *limit = vector(name, given, limit.len())?.to_vec();
+            }
+        }
+        Ok((*self.inner).clone().with_limits(limits).map_err(exception)?.into())
     }
 
     /// The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
@@ -448,7 +520,8 @@ impl Model {
     /// >>> heavier = arm.with_inertias(twice)
     /// >>> heavier.total_mass == 2.0 * arm.total_mass
     /// True
-    fn with_inertias(&self, inertias: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
+    fn with_inertias(&self, inertias: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let inertias = members_of("inertias", "`Inertia`s", inertias)?;
         let (expected, found) = (self.inner.bodies().len(), inertias.len());
         if found != expected {
             return Err(PyValueError::new_err(format!("inertias: expected {expected}, found {found}")));
@@ -469,13 +542,25 @@ impl Model {
     /// ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
     ///
     /// Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
-    fn lock(&self, joints: Vec<Bound<'_, PyAny>>, q: &Bound<'_, PyAny>) -> PyResult<Self> {
+    fn lock(&self, joints: &Bound<'_, PyAny>, q: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let joints = members_of("joints", "names or numbers of bodies", joints)?;
         let joints = joints
             .iter()
             .map(|joint| body_index("joints: expected names", &self.inner, joint, 1))
             .collect::<PyResult<Vec<_>>>()?;
         let q = vector("q", q, self.inner.nq())?;
         Ok(self.inner.lock(&joints, &q).map_err(exception)?.into())
+    }
+
+    /// The tree of bodies as text: each joint with its kind and where its coordinates stand in q and v, and the body that it
+    /// carries; frames: whether the names of other frames stand with the bodies.
+    ///
+    /// >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
+    /// universe
+    /// └─ root_joint: free_flyer, q[0:7], v[0:6] → trunk, 30.000 kg
+    #[pyo3(signature = (frames=false))]
+    fn tree(&self, frames: bool) -> String {
+        tree(&self.inner, frames)
     }
 
     /// The robot's name and size in one line.
@@ -503,7 +588,7 @@ impl Model {
     /// The parts of a pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let py = slf.py();
-        let bytes = postcard::to_extend(&slf.get().inner, MAGIC.as_bytes().to_vec())
+        let bytes = postcard::to_extend(&*slf.get().inner, MAGIC.as_bytes().to_vec())
             .map_err(|e| ModelError::new_err(format!("cannot be pickled: {e}")))?;
         let make = py.import("condyle._condyle")?.getattr("_model_from_bytes")?;
         Ok((make, (PyBytes::new(py, &bytes),)))

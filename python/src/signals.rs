@@ -1,7 +1,9 @@
 //! Signals that come while a call lasts, Ctrl-C above all: Python's handlers run within the call, and what they raise ends it.
 
+use crate::arrays::class;
 use condyle::optimal as rust;
 use pyo3::prelude::*;
+use pyo3::types::PyBool;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -73,19 +75,43 @@ impl Signals {
     }
 }
 
-/// What may end a solve: signals, and an error of what is written in Python.
+/// What may end a solve: signals, an error of what is written in Python, and who looks at its iterations.
 pub(crate) struct Interruptions<'a> {
     pub(crate) signals: Signals,
     /// Whether there is such an error.
     pub(crate) failed: &'a (dyn Fn() -> bool + Sync),
+    /// A function of each iteration, which ends the solve if it returns False.
+    pub(crate) observer: Option<Py<PyAny>>,
+    /// What it has raised.
+    pub(crate) raised: Option<PyErr>,
 }
 
 impl rust::Observer for &mut Interruptions<'_> {
-    fn iteration(&mut self, _: &rust::Iteration) -> ControlFlow<()> {
+    fn iteration(&mut self, now: &rust::Iteration) -> ControlFlow<()> {
+        if let Some(observer) = &self.observer {
+            let seen = Python::attach(|py| {
+                let result = observer.call1(py, (record(py, now)?,))?;
+                Ok(result.bind(py).is(PyBool::new(py, false).as_any()))
+            });
+            match seen {
+                Ok(false) => {}
+                Ok(true) => return ControlFlow::Break(()),
+                Err(error) => {
+                    self.raised = Some(error);
+                    return ControlFlow::Break(());
+                }
+            }
+        }
         self.go_on()
     }
 
     fn go_on(&mut self) -> ControlFlow<()> {
-        if (self.failed)() { ControlFlow::Break(()) } else { self.signals.go_on() }
+        if self.raised.is_some() || (self.failed)() { ControlFlow::Break(()) } else { self.signals.go_on() }
     }
+}
+
+/// An iteration as Python sees it.
+pub(crate) fn record<'py>(py: Python<'py>, i: &rust::Iteration) -> PyResult<Bound<'py, PyAny>> {
+    let iteration = class!(py, "Iteration")?;
+    iteration.call1((i.iteration, i.cost, i.gap, i.stop, i.step, i.regularisation, i.d1, i.d2, i.feasible, i.accepted))
 }

@@ -1,7 +1,7 @@
 //! Robots that move by themselves, as Python sees them: the module `condyle.simulation`.
 
 use crate::arrays::{Give, class, output};
-use crate::exceptions::wrong_word;
+use crate::exceptions::{exception, wrong_word};
 use crate::functions::{Argument, Forces, Position, Tangent, positive_speed, regular};
 use crate::model::Model;
 use crate::signals::{self, Signals};
@@ -97,6 +97,12 @@ impl Simulation {
         Ok(Self(owned))
     }
 
+    /// The robot's name and the time.
+    fn __repr__(&self) -> String {
+        let (name, time) = (self.0.borrow_owner().get().inner.name(), self.0.borrow_dependent().time());
+        format!("<condyle.simulation.Simulation of '{name}' at {time} s>")
+    }
+
     /// The position, nq numbers.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -116,9 +122,16 @@ impl Simulation {
     }
 
     /// Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
+    ///
+    /// Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+    /// `ValueError` if one of v is not finite.
     fn set_state(&mut self, q: &Bound<'_, PyAny>, v: &Bound<'_, PyAny>) -> PyResult<()> {
         let model = &self.0.borrow_owner().get().inner;
         let (q, v) = (Position::read("q", q, model)?, Tangent::read("v", v, model)?);
+        model.check_position(&q).map_err(exception)?;
+        if let Some((k, found)) = v.iter().enumerate().find(|(_, x)| !x.is_finite()) {
+            return Err(PyValueError::new_err(format!("v: expected finite numbers, found {found} at {k}")));
+        }
         self.0.with_dependent_mut(|_, simulation| simulation.set_state(&q, &v));
         Ok(())
     }

@@ -211,7 +211,7 @@ def test_inputs_of_other_dtypes_and_strides(quadruped: Robot) -> None:
     [
         ({"q": np.zeros(18)}, r"^q: expected shape \(19,\), found \(18,\)$"),
         ({"q": np.zeros((1, 1, 19))}, r"^q: expected shape \(19,\), found \(1, 1, 19\)$"),
-        ({"q": np.zeros((1, 18))}, r"^q: expected shape \(1, 19\), found \(1, 18\)$"),
+        ({"q": np.zeros((1, 18))}, r"^q: expected shape \(19,\), or \(N, 19\) for N states, found \(1, 18\)$"),
         ({"v": 0.0}, r"^v: expected shape \(18,\), found \(\)$"),
         ({"a": []}, r"^a: expected shape \(18,\), found \(0,\)$"),
         ({"a": np.zeros(19, np.float32)}, r"^a: expected shape \(18,\), found \(19,\)$"),

@@ -138,7 +138,10 @@ def test_errors(robot: Robot) -> None:
     model, data, q = robot.model, robot.data, argument("q", robot, N)
     with pytest.raises(ValueError, match=f"^v: expected {N} states, as many as q has, found 3$"):
         condyle.nonlinear_effects(model, data, q, np.zeros((3, model.nv)))
-    with pytest.raises(ValueError, match=rf"^q: expected shape \({N}, {model.nq}\), found \({N}, {model.nq + 1}\)$"):
+    with pytest.raises(
+        ValueError,
+        match=rf"^q: expected shape \({model.nq},\), or \(N, {model.nq}\) for N states, found \({N}, {model.nq + 1}\)$",
+    ):
         condyle.gravity(model, data, np.zeros((N, model.nq + 1)))
     with pytest.raises(ValueError, match="^q: expected at least one state, found none$"):
         condyle.gravity(model, data, np.zeros((0, model.nq)))

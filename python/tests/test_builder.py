@@ -155,7 +155,7 @@ def test_append() -> None:
     twins = ModelBuilder("same names")
     twins.append(WORLD, None, arm)
     twins.append(WORLD, None, arm)
-    with pytest.raises(condyle.ModelError, match="^two bodys are named `link1`$"):
+    with pytest.raises(condyle.ModelError, match="^two bodies are named `link1`$"):
         twins.build()
 
 

@@ -276,3 +276,53 @@ def test_swing_up_by_ipopt() -> None:
     for k in range(knots):
         acceleration = condyle.aba(model, data, q[:, k], v[:, k + 1], np.array([u[k], 0.0]))
         assert close(v[:, k] + dt * acceleration, v[:, k + 1], 1e-6)  # IPOPT's tolerance is 1e-8 of scaled rows
+
+
+def test_actions_of_expressions_are_those_that_are_written() -> None:
+    """A pendulum as expressions and as a function: iterates, derivatives, bounds."""
+    from condyle.optimal import Action, Fddp, Problem
+
+    def step(x, u, sin, cos):
+        v = x[1] + 0.1 * (u[0] - sin(x[0]))
+        return [x[0] + 0.1 * v, v], 1.0 - cos(x[0]) + 0.5 * x[1] ** 2 + 0.5 * u[0] ** 2 + 0.1 * x[0] * u[0]
+
+    def calc(t, x, u):
+        state, cost = step(x, u, np.sin, np.cos)
+        return np.array(state), cost
+
+    end = Action(2, 0, lambda t, x, u: (None, 5.0 * (x @ x)))
+    solutions, nodes = [], []
+    for kind in (casadi.SX, casadi.MX):
+        x, u = kind.sym("x", 2), kind.sym("u", 1)
+        state, cost = step(x, u, casadi.sin, casadi.cos)
+        knot = condyle.casadi.action(x, u, casadi.vertcat(*state), cost, lower=[-0.5], upper=[0.4])
+        last = condyle.casadi.action(x, None, None, 5.0 * casadi.sumsqr(x))
+        written = Action(2, 1, calc, lower=[-0.5], upper=[0.4])
+        start = np.zeros((21, 2)), np.zeros((20, 1))
+        for models in ((knot, last), (written, end)):
+            problem = Problem([1.0, 0.5], [models[0]], [0] * 20, models[1])
+            solutions.append(Fddp(problem).solve(*start))
+            nodes.append(problem.derivatives(np.full((21, 2), 0.3), np.full((20, 1), 0.2)))
+    for solution in solutions:
+        assert solution.status == "converged" and abs(solution.us).max() <= 0.5
+        np.testing.assert_allclose(solution.xs, solutions[0].xs, rtol=0, atol=ROUNDING)
+    for one in nodes:
+        for node, expected in zip(one, nodes[0], strict=True):
+            for a, b in zip(node, expected, strict=True):
+                np.testing.assert_allclose(a, b, rtol=0, atol=1e-12)
+
+
+def test_expressions_of_the_librarys_functions_make_an_action() -> None:
+    from condyle.optimal import FreeDynamics, Problem
+
+    arm = condyle.robots.arm7()
+    x, u = casadi.MX.sym("x", 14), casadi.MX.sym("u", 7)
+    v = x[7:] + 0.05 * condyle.casadi.aba(arm)(x[:7], x[7:], u)
+    knot = condyle.casadi.action(x, u, casadi.vertcat(x[:7] + 0.05 * v, v), casadi.sumsqr(u))
+    rng = np.random.default_rng(4)
+    xs, us = rng.normal(size=(3, 14)), rng.normal(size=(2, 7))
+    end = FreeDynamics(arm, None, [])
+    ours, expected = (Problem(xs[0], [k], [0, 0], end).derivatives(xs, us) for k in (knot, FreeDynamics(arm, 0.05, [])))
+    for a, b in zip(ours[:2], expected[:2], strict=True):
+        for name in ("A", "B", "f"):
+            np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0, atol=ROUNDING)

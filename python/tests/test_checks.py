@@ -109,7 +109,7 @@ def test_frames_travel_by_name() -> None:
     assert frame == {"name": "tool", "kind": "Link"}
     # a robot without it
     quadruped = condyle.robots.quadruped()
-    message = r"^cost `point`: unknown frame `tool`; nearest is `\w+`$"
+    message = r"^cost `point`: unknown frame `tool`; no frame has a similar name$"
     with pytest.raises(ProblemError, match=message):
         FreeDynamics(quadruped, 0.1, [point])
     with pytest.raises(ProblemError, match=message):
@@ -225,6 +225,15 @@ def test_steps_of_a_simulation_are_numbers() -> None:
             condyle.simulation.Simulation(ARM, dt=dt)
     with pytest.raises(ValueError, match="^tolerance: expected a finite number of at least 0, found NaN$"):
         condyle.simulation.Simulation(ARM, tolerance=np.nan)
+    quadruped = condyle.robots.quadruped()
+    simulation = condyle.simulation.Simulation(quadruped)
+    q, v = condyle.neutral(quadruped), np.zeros(18)
+    for bad, said in [(0.0, "its rotation, q.3..7., has the length 0"), (np.nan, "q.6. is NaN")]:
+        with pytest.raises(ModelError, match=f"^joint `root_joint`: {said}"):
+            simulation.set_state(np.where(np.arange(19) == 6, bad, q), v)
+    with pytest.raises(ValueError, match="^v: expected finite numbers, found NaN at 2$"):
+        simulation.set_state(q, np.where(np.arange(18) == 2, np.nan, v))
+    assert simulation.step(v) == "done"
 
 
 def test_states_are_states() -> None:

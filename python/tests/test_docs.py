@@ -29,7 +29,7 @@ def members() -> Iterator[tuple[str, Any]]:
         if callable(item):
             yield name, item
         if inspect.isclass(item):
-            yield from ((f"{name}.{k}", getattr(item, k)) for k in vars(item) if not k.startswith("_"))
+            yield from ((f"{name}.{k}", getattr(item, k)) for k in sorted(vars(item)) if not k.startswith("_"))
 
 
 @pytest.mark.parametrize(("name", "item"), list(members()))

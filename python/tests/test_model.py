@@ -273,7 +273,7 @@ def test_lock(robot: Robot) -> None:
     for wrong in (0, -1, model.nbodies):
         with pytest.raises(IndexError, match=rf"^joints: expected names or 1 to {last}, found {wrong}$"):
             model.lock([wrong], q)
-    with pytest.raises(condyle.ModelError, match="^unknown joint `nothing`; nearest is "):
+    with pytest.raises(condyle.ModelError, match="^unknown joint `nothing`; no joint has a similar name$"):
         model.lock(["nothing"], q)
     with pytest.raises(ValueError, match="^q: expected shape "):
         model.lock([1], [])

@@ -208,8 +208,8 @@ def test_what_no_file_can_hold() -> None:
         Problem(X0, [knot, own], [0, 1], last).to_json()
     with pytest.raises(ProblemError, match="terminal: expected the robot of the first model"):
         Problem(X0, [knot], [0], FreeDynamics(ARM.with_gravity([0.0, 0.0, -1.6]), None, [rest])).to_json()
-    with pytest.raises(ProblemError, match=r"models\[1\]: expected a knot with a duration"):
-        Problem(X0, [knot, last], [0, 1], last).to_json()
+    with pytest.raises(ProblemError, match=r"knot 1: models\[1\] has no next state"):
+        Problem(X0, [knot, last], [0, 1], last)
     text = Problem(X0, [knot], [0], last).to_json()
     with pytest.raises(ProblemError, match="no problem: missing field `stages`"):
         Problem.from_json(text.replace('"stages":[0],', ""))

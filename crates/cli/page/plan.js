@@ -24,11 +24,13 @@
 //                       capsule [radius, length of its straight part], axis z · segment [from (3), to (3), radius]
 //   scene.poses       [N + 1][B][7]: pose of each body in the world, px py pz qx qy qz qw
 //   scene.trail       [N + 1][3]: the end-effector in the world, or null
+//   contacts          { feet: [F] names, trails: [F][N + 1][3] (m), touches: [N][F], forces: [N][F] of [3] (N) or null where
+//                     the foot does not touch, weight: of the robot (N) }, or null, or left out; along the world's axes
 //   violations        [] of { what: "position" | "velocity" | "torque", joint (its name), at_knot, amount, limit }: the
 //                     worst knot of each joint and quantity that leaves its limits; amount beyond, limit that it crosses
 //   version, command  of the program that wrote the page; the command line, or null
 //
-// `#t=0.4` in the address opens the page at rest at 0.4 s.
+// `#t=0.4` in the address opens the page at rest at 0.4 s; the address follows the time while the player rests.
 
 const UNITS_NOTE = "Dashed lines are limits, in the colour of their joint; a limit far beyond the curves is left out.";
 
@@ -225,6 +227,29 @@ function violationTable(data, quantities, go) {
   }
 }
 
+/** The gait: when each foot touches, as bars over the time; returns what moves the line at the time of the playback. */
+function makeGait({ times, contacts }) {
+  if (!contacts) return { show() {} };
+  const host = $("gait"), start = times[0], span = times.at(-1) - start || 1;
+  const share = (t) => (100 * (t - start)) / span;
+  const cursors = contacts.feet.map((foot, f) => {
+    const strip = element("p");
+    for (let k = 0; k < contacts.touches.length; k++) {
+      if (!contacts.touches[k][f] || contacts.touches[k - 1]?.[f]) continue;
+      let end = k;
+      while (end < contacts.touches.length && contacts.touches[end][f]) end++;
+      strip.append(element("i", { style: `left: ${share(times[k])}%; width: ${share(times[end]) - share(times[k])}%`, title: `${foot} touches from ${times[k].toFixed(2)} to ${times[end].toFixed(2)} s` }));
+    }
+    const cursor = element("b");
+    strip.append(cursor);
+    host.append(element("div", {}, element("span", { title: foot }, foot), strip));
+    return cursor;
+  });
+  host.setAttribute("aria-label", `When each of ${contacts.feet.length} feet touches the ground`);
+  host.hidden = false;
+  return { show(t) { for (const cursor of cursors) cursor.style.left = `${share(t)}%`; } };
+}
+
 /** The clock: playing, holding still under the pointer, stepping. Every picture follows `show`. */
 function makePlayer(times, show) {
   const start = times[0], end = times.at(-1), scrub = $("scrub"), play = $("play");
@@ -238,6 +263,16 @@ function makePlayer(times, show) {
     scrub.setAttribute("aria-valuetext", `${t.toFixed(2)} seconds, knot ${k} of ${times.length - 1}`);
     $("clock").replaceChildren(element("b", {}, t.toFixed(2)), ` / ${end.toFixed(2)} s`, element("span", {}, ` · knot ${k}`));
     show(t);
+    if (!playing) remember();
+  }
+  // The address tells the time at which the player rests, so that it can be passed on.
+  let later = null;
+  function remember() {
+    clearTimeout(later);
+    later = setTimeout(() => {
+      const hash = `#t=${Number(t.toFixed(4))}`;
+      if (!playing && location.hash !== hash) history.replaceState(null, "", hash);
+    }, 150);
   }
   function frame(stamp) {
     if (!playing) return;
@@ -259,6 +294,7 @@ function makePlayer(times, show) {
       requestAnimationFrame(frame);
     }
     playing = yes;
+    if (!yes) remember();
     play.classList.toggle("playing", yes);
     play.setAttribute("aria-label", yes ? "Pause" : "Play");
   }
@@ -292,6 +328,7 @@ hues();
 
 $("key-target").hidden = !data.target;
 $("key-trail").hidden = !data.scene.trail;
+$("key-feet").hidden = $("key-forces").hidden = !data.contacts;
 let view = null;
 try {
   view = makeScene(data, $("view"));
@@ -306,11 +343,13 @@ try {
 const focus = (j) => { plots.focus(j); joints.mark(j); };
 const plots = makePlots(data, { seek: (t) => player.seek(t), hold: (yes) => player.hold(yes), focus });
 const joints = makeJoints(data, plots, focus);
+const gait = makeGait(data);
 const player = makePlayer(data.times, (t) => {
   const { k, s } = knotAt(data.times, t);
   view?.show(k, s);
   plots.show(t);
   joints.show(k);
+  gait.show(t);
 });
 violationTable(data, plots.quantities, (k, j) => {
   player.pause();
@@ -347,7 +386,13 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   joints.recolour();
 });
 
-const at = /[#&]t=([\d.]+)/.exec(location.hash);
+const timeOf = (hash) => /[#&]t=([\d.]+)/.exec(hash);
+addEventListener("hashchange", () => {
+  const asked = timeOf(location.hash);
+  if (asked) { player.pause(); player.seek(Number(asked[1])); }
+});
+addEventListener("beforeprint", () => view?.draw());
+const at = timeOf(location.hash);
 player.seek(at ? Number(at[1]) : data.times[0]);
 // The motion is shown once by itself, unless the reader's system asks for calm.
 if (!at && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.run(true);

@@ -102,6 +102,41 @@ function makeScene(data, host) {
     scene.add(tip);
   }
 
+  // --- feet: the way of each, and an arrow for the force that holds it; a robot's weight is a third of its size long
+  const contacts = data.contacts;
+  const arrows = (contacts?.trails ?? []).map((way) => {
+    const geometry = new THREE.LineGeometry().setPositions(way.flat());
+    const line = new THREE.LineMaterial({ linewidth: 2, transparent: true, opacity: 0.55 });
+    themed.push([line, "--accent"]);
+    if (way.length > 1) scene.add(new THREE.Line2(geometry, line));
+    // seen through the robot, whose leg stands where the force acts
+    const material = new THREE.MeshStandardMaterial({ roughness: 0.6, depthTest: false, transparent: true, opacity: 0.9 });
+    themed.push([material, "--force"]);
+    const shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.006 * size, 0.006 * size, 1, 16).translate(0, 0.5, 0), material);
+    const head = new THREE.Mesh(new THREE.CylinderGeometry(0, 0.016 * size, 0.045 * size, 20), material);
+    shaft.renderOrder = head.renderOrder = 5;
+    const arrow = new THREE.Group();
+    arrow.add(shaft, head);
+    scene.add(arrow);
+    return { arrow, shaft, head };
+  });
+  const upwards = new THREE.Vector3(0, 1, 0), foot = new THREE.Vector3(), force = new THREE.Vector3();
+  function showForces(k, s) {
+    arrows.forEach(({ arrow, shaft, head }, f) => {
+      const newtons = contacts.forces[Math.min(k, contacts.forces.length - 1)]?.[f];
+      arrow.visible = !!newtons;
+      if (!newtons) return;
+      const way = contacts.trails[f];
+      foot.fromArray(way[k]).lerp(force.fromArray(way[Math.min(k + 1, way.length - 1)]), s);
+      const long = (0.33 * size * force.fromArray(newtons).length()) / contacts.weight;
+      arrow.visible = long > 0.005 * size;
+      arrow.position.copy(foot);
+      arrow.quaternion.setFromUnitVectors(upwards, force.normalize());
+      shaft.scale.y = Math.max(long - 0.0225 * size, 1e-6);
+      head.position.y = long;
+    });
+  }
+
   // --- target: a dot in three rings, seen from every side
   if (data.target) {
     const material = new THREE.MeshBasicMaterial();
@@ -123,13 +158,14 @@ function makeScene(data, host) {
   function redraw() {
     if (asked) return;
     asked = true;
-    requestAnimationFrame(() => {
-      asked = false;
-      const distance = camera.position.distanceTo(controls.target);
-      scene.fog.near = distance + 0.3 * size;
-      scene.fog.far = distance + 2.6 * size;
-      renderer.render(scene, camera);
-    });
+    requestAnimationFrame(draw);
+  }
+  function draw() {
+    asked = false;
+    const distance = camera.position.distanceTo(controls.target);
+    scene.fog.near = distance + 0.3 * size;
+    scene.fog.far = distance + 2.6 * size;
+    renderer.render(scene, camera);
   }
 
   const q0 = new THREE.Quaternion(), q1 = new THREE.Quaternion(), p1 = new THREE.Vector3();
@@ -145,6 +181,7 @@ function makeScene(data, host) {
       tip.position.fromArray(trail[k]).lerp(p1.fromArray(trail[Math.min(k + 1, trail.length - 1)]), s);
       travelled.instanceCount = k; // segments
     }
+    showForces(k, s);
     redraw();
   }
 
@@ -212,7 +249,7 @@ function makeScene(data, host) {
 
   recolour();
   reset();
-  return { show, reset, recolour };
+  return { show, reset, recolour, draw };
 }
 
 /**

@@ -1,19 +1,36 @@
-//! The program `condyle`: plan a robot's motion, and see what it costs.
+//! What a robot is, whether its numbers are right, what they cost, and how it moves.
 
 #![allow(non_snake_case)] // the names of the literature
 
+mod budget;
+mod check;
+mod error;
+mod findings;
+mod gait;
+mod inspect;
+mod limits;
+mod lines;
+mod motion;
 mod page;
 mod plan;
 mod posture;
+mod reach;
+mod record;
 mod report;
+mod robot;
 mod scene;
+mod states;
+mod task;
+mod terminal;
+mod watch;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Rigid-body dynamics with exact derivatives, for MPC and DDP.
 #[derive(Parser)]
-#[command(version, about, arg_required_else_help = true)]
+#[command(version, arg_required_else_help = true, after_help = error::STATUSES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -21,16 +38,61 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Plan(plan::Arguments),
+    Inspect(inspect::Arguments),
+    Budget(budget::Arguments),
+    Check(check::Arguments),
+    Plan(Box<plan::Arguments>),
+    /// Write a shell's completions to standard output
+    #[command(after_help = "Example:\n  condyle completions bash > ~/.local/share/bash-completion/completions/condyle")]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
 }
 
 fn main() -> ExitCode {
-    let Command::Plan(arguments) = Arguments::parse().command;
-    match plan::run(&arguments) {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return refuse(&error),
+    };
+    let result = match arguments.command {
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Budget(arguments) => budget::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "condyle", &mut script);
+            terminal::say(&String::from_utf8_lossy(&script));
+            Ok(())
+        }
+    };
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::FAILURE
+            error.status()
+        }
+    }
+}
+
+/// Says in one line what is wrong with the flags, and which one may have been meant; or shows the help that was asked for.
+fn refuse(error: &clap::Error) -> ExitCode {
+    let text = error.render().to_string();
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            terminal::say(&text);
+            ExitCode::SUCCESS
+        }
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            eprint!("{text}");
+            ExitCode::from(2)
+        }
+        _ => {
+            let lines = text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
+            let said: Vec<&str> = lines.filter(|line| !line.is_empty() && !line.starts_with("For more")).collect();
+            eprintln!("{}", said.join("; ").replace("; tip: ", "; ").replace(":; ", ": "));
+            ExitCode::from(2)
         }
     }
 }

@@ -1,9 +1,10 @@
 //! The page that `condyle plan` writes: plots and playback in one file that needs no network.
 
-use crate::plan::Plan;
+use crate::budget::held;
+use crate::motion::Plan;
 use crate::report::{self, Budget, Violation};
 use crate::scene;
-use condyle::{Data, Joint, Model, forward_kinematics};
+use condyle::{ConstraintSet, ContactConstraint, Data, Joint, Model, constrained_dynamics, forward_kinematics};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -31,15 +32,60 @@ pub(crate) fn write(path: &Path, plan: &Plan, budget: &Budget, violations: &[Vio
     std::fs::write(path, page.replacen("/*{{data}}*/", &data, 1))
 }
 
-/// The joints that the page shows: those with one degree of freedom.
+/// The joints that the page shows: those with a degree of freedom of their own.
 fn shown(model: &Model) -> impl Iterator<Item = &condyle::Body> {
-    model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1)
+    model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none())
+}
+
+/// The knots that are shown: an impact takes no time, and the state before it is left out.
+fn with_time(plan: &Plan) -> Vec<usize> {
+    let times = &plan.times;
+    (0..times.len()).filter(|&t| t + 1 == times.len() || times[t + 1] > times[t]).collect()
+}
+
+/// Where the feet are at the knots, whether they touch between them, and what forces hold them then.
+fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::Error> {
+    let (model, nq) = (&plan.model, plan.model.nq());
+    let mut data = Data::new(model);
+    let (mut trails, mut touches, mut forces) = (vec![Vec::new(); plan.feet.len()], Vec::new(), Vec::new());
+    for (number, &t) in knots.iter().enumerate() {
+        let (q, v) = plan.solution.x(t).split_at(nq);
+        let placements = forward_kinematics(model, &mut data, q);
+        for (trail, &foot) in trails.iter_mut().zip(&plan.feet) {
+            trail.push(placements.frame(foot).translation.to_array());
+        }
+        if number + 1 == knots.len() {
+            break;
+        }
+        let touching: Vec<usize> = (0..plan.feet.len()).filter(|&foot| plan.touches[t][foot]).collect();
+        let held = |&foot: &usize| {
+            held(if plan.soles {
+                ContactConstraint::rigid(plan.feet[foot])
+            } else {
+                ContactConstraint::point(plan.feet[foot])
+            })
+        };
+        let constraints: Vec<_> = touching.iter().map(held).collect();
+        let mut set = ConstraintSet::new(model, &constraints)?;
+        let solved = constrained_dynamics(model, &mut data, &mut set, q, v, &plan.effort(t), &[]);
+        let rows = if plan.soles { 6 } else { 3 };
+        let mut of_knot = vec![Value::Null; plan.feet.len()];
+        for (k, &foot) in touching.iter().enumerate() {
+            of_knot[foot] = json!(solved.lambda[rows * k..rows * k + 3]); // along the world's axes
+        }
+        forces.push(of_knot);
+        touches.push(&plan.touches[t]);
+    }
+    let names: Vec<&str> = plan.feet.iter().map(|&foot| &*model.frames()[foot].name).collect();
+    let weight = model.total_mass() * model.gravity().norm_squared().sqrt();
+    Ok(json!({"feet": names, "trails": trails, "touches": touches, "forces": forces, "weight": weight}))
 }
 
 /// All that the page shows; the head of `plan.js` says what each entry is.
 fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
     let Plan { model, solution, .. } = plan;
-    let (nq, knots, limits) = (model.nq(), budget.knots, model.limits());
+    let (nq, limits) = (model.nq(), model.limits());
+    let knots = with_time(plan);
     let finite = |x: f64| x.is_finite().then_some(x);
     let joint = |b: &condyle::Body| {
         let range = |limit: &[f64]| if b.joint.nq() == 1 { finite(limit[b.idx_q]) } else { None };
@@ -52,40 +98,59 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
             "effort": finite(limits.effort[b.idx_v]).filter(|&e| e > 0.0),
         })
     };
-    let position = |t: usize, b: &condyle::Body| match b.joint {
-        Joint::Continuous { .. } => solution.x(t)[b.idx_q + 1].atan2(solution.x(t)[b.idx_q]),
-        _ => solution.x(t)[b.idx_q],
+    let position = |x: &[f64], b: &condyle::Body| match b.joint {
+        Joint::Continuous { .. } => x[b.idx_q + 1].atan2(x[b.idx_q]),
+        _ => x[b.idx_q],
     };
-    let series = |knots: usize, value: &dyn Fn(usize, &condyle::Body) -> f64| -> Vec<Vec<f64>> {
-        (0..knots).map(|t| shown(model).map(|b| value(t, b)).collect()).collect()
+    let series = |knots: &[usize], value: &dyn Fn(usize, &condyle::Body) -> f64| -> Vec<Vec<f64>> {
+        knots.iter().map(|&t| shown(model).map(|b| value(t, b)).collect()).collect()
     };
+    let goal = plan.goal.as_ref();
     let mut data = Data::new(model);
     let (mut poses, mut trail) = (Vec::new(), Vec::new());
-    for t in 0..=knots {
+    for &t in &knots {
         let placements = forward_kinematics(model, &mut data, &solution.x(t)[..nq]);
         poses.push((0..model.bodies().len()).map(|i| scene::pose(placements.body(i))).collect::<Vec<_>>());
-        trail.push(placements.frame(plan.frame).translation.to_array());
+        trail.extend(goal.map(|goal| placements.frame(goal.frame).translation.to_array()));
     }
+    let driven = &knots[..knots.len() - 1];
+    let efforts: Vec<Vec<f64>> = (0..plan.knots()).map(|t| plan.effort(t)).collect();
+    // A knot that is left out is shown by the next one.
+    let violations: Vec<Value> = violations
+        .iter()
+        .map(|v| {
+            let mut shown = json!(v);
+            shown["at_knot"] = json!(knots.partition_point(|&t| t < v.at_knot));
+            shown
+        })
+        .collect();
+    let ends: Vec<usize> = goal.map(|goal| goal.frame).into_iter().chain(plan.feet.iter().copied()).collect();
     json!({
         "robot": model.name(),
-        "title": format!("{} reaches for a point", model.name()),
+        "title": plan.title,
         "status": report::status(solution.status),
-        "frame": model.frames()[plan.frame].name,
-        "target": plan.target.to_array(),
-        "miss": plan.miss,
-        "tolerance": plan.tolerance,
+        "frame": goal.map(|goal| &model.frames()[goal.frame].name),
+        "target": goal.map(|goal| goal.target.to_array()),
+        "miss": goal.map(|goal| goal.miss),
+        "tolerance": goal.map(|goal| goal.tolerance),
         "dt": plan.dt,
-        "times": (0..=knots).map(|t| t as f64 * plan.dt).collect::<Vec<_>>(),
+        "times": knots.iter().map(|&t| plan.times[t]).collect::<Vec<_>>(),
         "joints": shown(model).map(joint).collect::<Vec<_>>(),
-        "q": series(knots + 1, &position),
-        "v": series(knots + 1, &|t, b| solution.x(t)[nq + b.idx_v]),
-        "tau": series(knots, &|t, b| solution.u(t)[b.idx_v]),
-        "iterations": solution.trace.iter().map(|i| json!({
+        "q": series(&knots, &|t, b| position(solution.x(t), b)),
+        "v": series(&knots, &|t, b| solution.x(t)[nq + b.idx_v]),
+        "tau": series(driven, &|t, b| efforts[t][b.idx_v]),
+        "iterations": plan.trace.iter().map(|i| json!({
             "iteration": i.iteration, "cost": i.cost, "gap": i.gap, "step": i.accepted.then_some(i.step),
             "regularisation": i.regularisation, "stop": i.stop,
         })).collect::<Vec<_>>(),
         "budget": budget,
-        "scene": { "bodies": scene::bodies(model, &plan.urdf, plan.frame), "poses": poses, "trail": trail },
+        "scene": {
+            "bodies": scene::bodies(model, &plan.robot, &ends),
+            "poses": poses,
+            "trail": (!trail.is_empty()).then_some(trail),
+        },
+        // A set of contacts that the solver took is one that can be made.
+        "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
         "violations": violations,
         "version": env!("CARGO_PKG_VERSION"),
         "command": std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word),

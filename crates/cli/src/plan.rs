@@ -1,20 +1,42 @@
-//! `condyle plan`: a reaching motion for an arm, by FDDP on forward dynamics and its derivatives.
+//! `condyle plan`: motions by FDDP. An arm reaches for a point; a robot with feet stands, steps and jumps.
 
-use crate::{page, posture, report};
-use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
-use condyle::optimal::{Fddp, Problem, Solution, Status};
-use condyle::{
-    Data, Model, UrdfOptions, Vec3, difference, forward_kinematics, gravity, integrate, neutral, rnea, robots,
-};
-use std::path::PathBuf;
+use crate::error::{Error, positive};
+use crate::gait::Gait;
+use crate::limits::{check_start, last_frame, start};
+use crate::motion::{Goal, Plan};
+use crate::robot::{self, ReadingOptions};
+use crate::task::{self, Task};
+use crate::terminal::say;
+use crate::watch::{self, Watch};
+use crate::{page, posture, reach, record, report};
+use condyle::optimal::{AugmentedLagrangian, Fddp, Problem, Solution, Status};
+use condyle::{Data, Model, Vec3, forward_kinematics};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Plan a motion that brings a frame of the robot to a point, and write it as a page to look at.
+/// Plan a motion: an arm that reaches for a point, or the gait of a task file; and write it as a page to look at
 #[derive(clap::Args)]
+#[command(after_help = "Examples:
+  condyle plan
+  condyle plan --robot panda.urdf --frame panda_hand_tcp --target 0.45,-0.2,0.4
+  condyle plan --example trot > trot.toml
+  condyle plan trot.toml --out trot.html --record trot.csv
+
+A task file is TOML; --example writes one that says what its entries mean. Limits of positions, speeds and efforts are
+held; where that is not possible the exit status is 1, as it is when the target is missed. Ctrl-C ends the solver, and the
+page and the record are written with the best motion so far.")]
 pub(crate) struct Arguments {
-    /// URDF of the robot, its root link fixed to the world; meshes are not needed. Default: the arm that comes along
-    #[arg(long, value_name = "FILE")]
-    robot: Option<PathBuf>,
+    /// A task file, in place of the flags for robot, frame and target
+    #[arg(value_name = "TASK.toml", conflicts_with_all = ["robot", "frame", "target", "q0", "knots", "tolerance"])]
+    task: Option<PathBuf>,
+    /// Write a task to standard output, to begin with: reach, trot, walk, jump, stand-up
+    #[arg(long, value_name = "NAME", exclusive = true)]
+    example: Option<String>,
+    /// URDF, MJCF or SDF of the robot, or one that comes along; meshes are not needed. Default: arm7
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<String>,
+    #[command(flatten)]
+    options: ReadingOptions,
     /// The frame that moves to the target: a link or joint of the URDF. Default: the last one that moves
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
@@ -27,21 +49,27 @@ pub(crate) struct Arguments {
     /// Knots of the horizon
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     knots: u32,
-    /// Seconds from knot to knot
-    #[arg(long, default_value_t = 0.01, value_name = "SECONDS", allow_negative_numbers = true)]
-    dt: f64,
+    /// Seconds from knot to knot. Default: 0.01, or what the task says
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    dt: Option<f64>,
     /// The time that one solver iteration may take (ms); going over is said, and no error
     #[arg(long, default_value_t = 10.0, value_name = "MS", allow_negative_numbers = true)]
     budget_ms: f64,
     /// How far from the target is still there (m)
     #[arg(long, default_value_t = 0.01, value_name = "METRES", allow_negative_numbers = true)]
     tolerance: f64,
-    /// Iterations after which the solver stops
+    /// Iterations after which the solver stops; where limits must be held, each of its solves
     #[arg(long, default_value_t = 200)]
     max_iterations: usize,
     /// Where the page goes
     #[arg(long, default_value = "out/plan.html", value_name = "FILE")]
     out: PathBuf,
+    /// Also write the trajectory: to a file that ends in .csv, .npz or .json
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Write a summary as JSON instead of text
+    #[arg(long)]
+    json: bool,
 }
 
 /// Numbers on the command line, with commas between them.
@@ -56,218 +84,288 @@ fn numbers(text: &str) -> Result<Numbers, String> {
     text.split(',').map(number).collect::<Result<_, _>>().map(Numbers)
 }
 
-/// Why there is no plan, or not the one asked for.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum Error {
-    #[error(transparent)]
-    Model(#[from] condyle::Error),
-    #[error(transparent)]
-    Problem(#[from] condyle::optimal::Error),
-    #[error("--{option}: {what}")]
-    Option { option: &'static str, what: String },
-    #[error("the robot has no joint that moves")]
-    Rigid,
-    #[error("`{frame}` ends {miss:.4} m from the target, more than --tolerance {tolerance} m: {hint}")]
-    Missed { frame: String, miss: f64, tolerance: f64, hint: &'static str },
-    #[error("{file}: {source}")]
-    Write { file: String, source: std::io::Error },
-}
-
-/// What was asked for, and what came out.
-pub(crate) struct Plan {
-    pub model: Arc<Model>,
-    /// The robot's URDF, of which the page draws the simple shapes.
-    pub urdf: String,
-    pub frame: usize,
-    pub target: Vec3<f64>,
-    /// How far the frame ends from the target (m).
-    pub miss: f64,
-    pub tolerance: f64,
-    pub dt: f64,
-    pub budget_ms: f64,
-    pub solution: Solution,
-}
-
 /// Where the frame of the arm that comes along goes, unless told otherwise.
 const DEFAULT_TARGET: [f64; 3] = [0.45, -0.25, 0.35];
+const DEFAULT_ROBOT: &str = "arm7";
 const DEFAULT_FRAME: &str = "tool";
-/// What an effort without a limit is weighed with, as if its limit were 100 N m or N.
-const WITHOUT_LIMIT: f64 = 1e-4;
+const DEFAULT_DT: f64 = 0.01;
+/// The costs of gaits are some hundreds: less than a millionth of them counts for nothing.
+const GAIT_TOLERANCE: f64 = 1e-4;
+/// How large an entry of the Lagrangian's gradient may be where limits are held: beside costs of 1 and of hundreds.
+const DUAL: [f64; 2] = [1e-4, 1e0];
+/// How far beyond a limit is still held: half of what is reported (rad, m, N m, N, and per s).
+const HELD: f64 = 5e-6;
+/// Inner solves in which the limits must come to hold.
+const SOLVES: usize = 15;
+/// A decrease of the cost by this part of it counts for nothing.
+const SETTLED: f64 = 1e-7;
 
 /// The whole of `condyle plan`.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
-    let option = |option, what: String| Err(Error::Option { option, what });
-    for (name, value) in [("dt", arguments.dt), ("budget-ms", arguments.budget_ms), ("tolerance", arguments.tolerance)]
-    {
-        if !(value > 0.0 && value.is_finite()) {
-            return option(name, format!("must be above 0, not {value}"));
+    if let Some(name) = &arguments.example {
+        let names = || task::EXAMPLES.iter().map(|example| example.0);
+        let Some((_, text)) = task::EXAMPLES.iter().find(|example| example.0 == name) else {
+            let what = format!("no example is called `{name}`{}", crate::error::nearest(name, names()));
+            return Err(Error::Option { option: "example", what });
+        };
+        say(text);
+        return Ok(());
+    }
+    for (name, value) in [("budget-ms", arguments.budget_ms), ("tolerance", arguments.tolerance)] {
+        positive(name, value)?;
+    }
+    arguments.dt.map_or(Ok(()), |dt| positive("dt", dt))?;
+    let record = arguments.record.as_deref().map(|path| Ok::<_, Error>((path, record::format(path)?))).transpose()?;
+    for (option, path) in [("out", Some(&*arguments.out)), ("record", arguments.record.as_deref())] {
+        if let Some(path) = path.filter(|path| path.is_dir()) {
+            return Err(Error::Option { option, what: format!("`{}` is a folder", path.display()) });
         }
     }
-    let (model, urdf) = match &arguments.robot {
-        None => (robots::arm7(), robots::ARM7.to_owned()),
-        Some(path) => {
-            let model = Model::from_urdf(path, &UrdfOptions::default())?;
-            let urdf = std::fs::read_to_string(path)
-                .map_err(|source| Error::Write { file: path.display().to_string(), source })?;
-            (model, urdf)
-        }
+    watch::catch_interrupts();
+    let task = arguments.task.as_deref().map(task::read).transpose()?;
+    let plan = match &task {
+        Some(task) if task.reach.is_none() => gait(arguments, task)?,
+        _ => point(arguments, task.as_ref())?,
     };
-    let model = Arc::new(model);
-    if model.nv() == 0 {
-        return Err(Error::Rigid);
-    }
-    let frame = match (&arguments.frame, &arguments.robot) {
-        (Some(name), _) => model.frame(name)?,
-        (None, None) => model.frame(DEFAULT_FRAME)?,
-        (None, Some(_)) => last_frame(&model),
-    };
-    let target = match (&arguments.target, &arguments.robot) {
-        (Some(Numbers(x)), _) if x.len() == 3 => Vec3::new(x[0], x[1], x[2]),
-        (Some(Numbers(x)), _) => return option("target", format!("expected 3 numbers, found {}", x.len())),
-        (None, None) => DEFAULT_TARGET.into(),
-        (None, Some(_)) => return option("target", "say where to go: a robot of yours has no default".to_owned()),
-    };
-    let q0 = match &arguments.q0 {
-        None => start(&model),
-        Some(Numbers(q)) if q.len() == model.nq() => q.clone(),
-        Some(Numbers(q)) => return option("q0", format!("expected {} numbers, found {}", model.nq(), q.len())),
-    };
+    finish(arguments, &plan, record)
+}
 
-    print!("{model}");
-    let name = &model.frames()[frame].name;
-    println!(
-        "`{name}` goes to ({}, {}, {}) m in {} knots of {} ms\n",
-        target.x,
-        target.y,
-        target.z,
-        arguments.knots,
-        1e3 * arguments.dt
-    );
-    let knots = arguments.knots as usize;
-    let (q_end, nearest) = posture::reaching(&model, frame, target, &q0);
-    let (mut problem, xs, us) = reach(&model, frame, target, (&q0, &q_end), knots, arguments.dt)?;
-    let mut solver = Fddp::new(&problem);
-    solver.settings.max_iterations = arguments.max_iterations;
-    report::iteration_header();
-    let solution = solver.solve_with(&mut problem, &xs, &us, report::iteration)?.clone();
-    let mut data = Data::new(&model);
-    let end = forward_kinematics(&model, &mut data, &solution.x(knots)[..model.nq()]).frame(frame).translation;
-    let plan = Plan {
-        miss: (end - target).norm_squared().sqrt(),
-        tolerance: arguments.tolerance,
-        dt: arguments.dt,
-        budget_ms: arguments.budget_ms,
-        model,
-        urdf,
-        frame,
-        target,
-        solution,
+/// Tells what came out, writes it, and says whether it is what was asked for.
+fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::Format)>) -> Result<(), Error> {
+    let budget = report::measure(plan);
+    let violations = report::violations(plan);
+    let written = |path: &Path, result: std::io::Result<()>| {
+        result.map_err(|source| Error::Write { file: path.display().to_string(), source })
     };
-    let budget = report::measure(&plan);
-    let violations = report::violations(&plan);
-    report::print(&plan, &budget, &violations);
-    page::write(&arguments.out, &plan, &budget, &violations)
-        .map_err(|source| Error::Write { file: arguments.out.display().to_string(), source })?;
-    println!("\nwrote {}", arguments.out.display());
-    if plan.miss > plan.tolerance || plan.miss.is_nan() {
+    written(&arguments.out, page::write(&arguments.out, plan, &budget, &violations))?;
+    if let Some((path, format)) = record {
+        written(path, record::write(path, format, plan))?;
+    }
+    if arguments.json {
+        crate::terminal::say_json(&report::summary(plan, &budget, &violations));
+    } else {
+        say(&report::text(plan, &budget, &violations));
+        let files: Vec<String> = std::iter::once(&*arguments.out)
+            .chain(record.map(|r| r.0))
+            .map(|path| path.display().to_string())
+            .collect();
+        say(&format!("\nwrote {}\n", files.join(" and ")));
+    }
+    if watch::interrupted() {
+        return Err(Error::Interrupted);
+    }
+    if let Some(Goal { frame, miss, tolerance, nearest, .. }) = &plan.goal
+        && (miss > tolerance || miss.is_nan())
+    {
         let hint = match plan.solution.status {
-            _ if nearest > plan.tolerance => "no posture within the joints' limits was found that reaches it",
+            _ if nearest > tolerance => "no posture within the joints' limits was found that reaches it",
             Status::Converged => "it may be too far for the time that there is; more --knots may help",
             _ => "the solver did not converge; more --knots, more --max-iterations or another --q0 may help",
         };
-        let frame = plan.model.frames()[frame].name.clone();
-        return Err(Error::Missed { frame, miss: plan.miss, tolerance: plan.tolerance, hint });
+        let frame = &plan.model.frames()[*frame].name;
+        let what = format!("`{frame}` ends {miss:.4} m from the target, more than --tolerance {tolerance} m: {hint}");
+        return Err(Error::No(what));
     }
-    Ok(())
-}
-
-/// The last frame on the body that is farthest from the root: the tip of an arm.
-fn last_frame(model: &Model) -> usize {
-    let depth = |mut body: usize| {
-        let mut depth = 0;
-        while body > 0 {
-            body = model.bodies()[body].parent;
-            depth += 1;
+    match violations.first() {
+        Some(v) => Err(Error::No(format!(
+            "the {} of `{}` is {:.2e} beyond its limit {} at knot {}: more knots, or more time, may help",
+            v.what, v.joint, v.amount, v.limit, v.at_knot
+        ))),
+        None if plan.goal.is_none() && plan.solution.status != Status::Converged => {
+            Err(Error::No(format!("the solver stopped: {}", report::status(plan.solution.status))))
         }
-        depth
-    };
-    (0..model.frames().len()).max_by_key(|&f| depth(model.frames()[f].body)).unwrap_or(0)
+        None => Ok(()),
+    }
 }
 
-/// Neutral, but mid-range for the coordinates whose limits exclude it.
-fn start(model: &Model) -> Vec<f64> {
-    let limits = model.limits();
-    let inside = |(k, q): (usize, f64)| {
-        let (lower, upper) = (limits.lower[k], limits.upper[k]);
-        if (lower..=upper).contains(&q) { q } else { 0.5 * (lower + upper) }
-    };
-    neutral(model).into_iter().enumerate().map(inside).collect()
-}
-
-/// A problem, and where the solver begins: states and efforts.
-type Posed = (Problem, Vec<f64>, Vec<f64>);
-
-/// The optimal control problem, and a warm start: on the straight way to a posture that reaches the target, with the
-/// efforts that inverse dynamics gives for it.
-///
-/// It weighs speed, the efforts beyond those that hold the start (each against its limit), and, as barriers, what lies
-/// outside of the limits of position, speed and effort; at the end, the distance to the target and the speed.
-fn reach(
-    model: &Arc<Model>,
-    frame: usize,
-    target: Vec3<f64>,
-    (q0, q_end): (&[f64], &[f64]),
-    knots: usize,
-    dt: f64,
-) -> Result<Posed, Error> {
-    let nv = model.nv();
-    let limits = model.limits();
-    let rest = |q: &[f64]| [q, &vec![0.0; nv]].concat();
-    let x0 = rest(q0);
-    let state = || Residual::State { reference: rest(&neutral(model)) };
-    let moving = |speed: f64| Activation::Weighted([vec![0.0; nv], vec![speed; nv]].concat());
-    // limits of joints with one coordinate, as bounds on the tangent vector from neutral
-    let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; 2 * nv], vec![f64::INFINITY; 2 * nv]);
-    for body in model.bodies()[1..].iter().filter(|b| b.joint.nq() == 1) {
-        (lower[body.idx_v], upper[body.idx_v]) = (limits.lower[body.idx_q], limits.upper[body.idx_q]);
+/// Reaching for a point.
+fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
+    let option = |option, what: String| Error::Option { option, what };
+    let own = task.is_none() && arguments.robot.is_none();
+    let name = task.map(|task| &*task.robot).or(arguments.robot.as_deref()).unwrap_or(DEFAULT_ROBOT);
+    let options = options(arguments, task);
+    let robot = robot::load(name, &options)?;
+    let model = Arc::new(robot.model.clone());
+    if model.nv() == 0 {
+        return Err(Error::Rigid);
     }
-    for (k, &speed) in limits.velocity.iter().enumerate().filter(|(_, v)| **v > 0.0) {
-        (lower[nv + k], upper[nv + k]) = (-speed, speed);
-    }
-    let within = || Activation::Barrier { lower: lower.clone(), upper: upper.clone() };
-    let bounds: Vec<f64> = limits.effort.iter().map(|&e| if e > 0.0 { e } else { f64::INFINITY }).collect();
-    let share = bounds.iter().map(|e| if e.is_finite() { e.powi(-2) } else { WITHOUT_LIMIT }).collect();
-    let efforts = Activation::Barrier { lower: bounds.iter().map(|e| -e).collect(), upper: bounds };
-    let hold = gravity(model, &mut Data::new(model), q0).to_vec();
-    let position = Residual::FrameTranslation { frame: (&model.frames()[frame]).into(), target };
-    let running = vec![
-        Cost::new("speed", 1e-1, state(), moving(1.0)),
-        Cost::new("effort", 1e0, Residual::Control { reference: hold }, Activation::Weighted(share)),
-        Cost::new("limits", 1e2, state(), within()),
-        Cost::new("effort limits", 1e1, Residual::Control { reference: vec![0.0; nv] }, efforts),
-    ];
-    let terminal = vec![
-        Cost::new("target", 1e4, position, Activation::Quadratic),
-        Cost::new("stop", 1e0, state(), moving(1.0)),
-        Cost::new("limits", 1e2, state(), within()),
-    ];
-    // the straight way with the least jerk: q0 ⊕ s(t) way, s = 10 r³ − 15 r⁴ + 6 r⁵, r = t/T
-    let (mut data, mut q, mut way) = (Data::new(model), q0.to_vec(), vec![0.0; nv]);
-    difference(model, q0, q_end, &mut way);
-    let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();
-    let duration = knots as f64 * dt;
-    let (mut xs, mut us) = (Vec::new(), Vec::new());
-    for t in 0..=knots {
-        let r = t as f64 / knots as f64;
-        let v = along(30.0 * r * r * (1.0 - r) * (1.0 - r) / duration);
-        let a = along(60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / (duration * duration));
-        integrate(model, q0, &along(r * r * r * (10.0 + r * (6.0 * r - 15.0))), &mut q);
-        if t < knots {
-            us.extend(rnea(model, &mut data, &q, &v, &a, &[]));
+    let reach = task.and_then(|task| task.reach.as_ref());
+    let frame = match (reach.and_then(|reach| reach.frame.as_ref()), &arguments.frame) {
+        (Some(frame), _) => {
+            let name = frame.get_ref();
+            model
+                .frame(name)
+                .map_err(|error| task.map_or(error.clone().into(), |t| t.place.wrong(name, error.to_string())))?
         }
-        xs.extend(q.iter().chain(&v));
+        (None, Some(name)) => model.frame(name)?,
+        (None, None) if own => model.frame(DEFAULT_FRAME)?,
+        (None, None) => last_frame(&model),
+    };
+    let target: Vec3<f64> = match (reach, &arguments.target) {
+        (Some(reach), _) => reach.target.into(),
+        (None, Some(Numbers(x))) if x.len() == 3 => Vec3::new(x[0], x[1], x[2]),
+        (None, Some(Numbers(x))) => return Err(option("target", format!("expected 3 numbers, found {}", x.len()))),
+        (None, None) if own => DEFAULT_TARGET.into(),
+        (None, None) => return Err(option("target", "say where to go: a robot of yours has no default".to_owned())),
+    };
+    let q0 = match (&arguments.q0, task) {
+        (Some(Numbers(q)), _) if q.len() == model.nq() => {
+            check_start(&model, q)?;
+            q.clone()
+        }
+        (Some(Numbers(q)), _) => {
+            return Err(option("q0", format!("expected {} numbers, found {}", model.nq(), q.len())));
+        }
+        (None, Some(task)) => crate::gait::posture(&model, task.start.as_ref().unwrap_or(&task.posture), task)?,
+        (None, None) => start(&model),
+    };
+    let knots = reach.and_then(|reach| reach.knots.as_ref()).map_or(arguments.knots, |n| *n.get_ref()) as usize;
+    let tolerance = reach.and_then(|reach| reach.tolerance.as_ref()).map_or(arguments.tolerance, |x| *x.get_ref());
+    let dt = arguments.dt.or(task.and_then(|task| task.dt)).unwrap_or(DEFAULT_DT);
+    let end = &model.frames()[frame].name;
+    introduce(
+        arguments,
+        &model,
+        &format!("`{end}` goes to ({}, {}, {}) m in {knots} knots of {} ms", target.x, target.y, target.z, 1e3 * dt),
+    );
+    let (q_end, nearest) = posture::reaching(&model, frame, target, &q0);
+    let mut watch = Watch::new(arguments.max_iterations);
+    let (mut problem, xs, us) = reach::problem(&model, frame, target, (&q0, &q_end), (knots, dt), false)?;
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = arguments.max_iterations;
+    heading(arguments);
+    let solution = solver.solve_with(&mut problem, &xs, &us, watch.quiet(arguments.json))?.clone();
+    let mut plan = Plan {
+        title: format!("{} reaches for a point", model.name()),
+        goal: Some(Goal { frame, target, miss: f64::INFINITY, tolerance, nearest }),
+        feet: vec![],
+        soles: false,
+        touches: vec![],
+        times: (0..=knots).map(|t| t as f64 * dt).collect(),
+        dt,
+        budget_ms: arguments.budget_ms,
+        robot,
+        model,
+        solution,
+        trace: vec![],
+    };
+    if must_hold(arguments, &plan) {
+        let (problem, ..) = reach::problem(&plan.model, frame, target, (&q0, &q_end), (knots, dt), true)?;
+        plan.solution = hold(arguments, &plan, problem, &mut watch, DUAL[0])?;
     }
-    let action = FreeDynamics::running(model.clone(), dt, running)?;
-    let end = FreeDynamics::terminal(model.clone(), terminal)?;
-    Ok((Problem::new(x0, vec![Box::new(action)], vec![0; knots], Box::new(end))?, xs, us))
+    plan.trace = watch.end();
+    let mut data = Data::new(&plan.model);
+    let q = &plan.solution.x(knots)[..plan.model.nq()];
+    let end = forward_kinematics(&plan.model, &mut data, q).frame(frame).translation;
+    if let Some(goal) = &mut plan.goal {
+        goal.miss = (end - target).norm_squared().sqrt();
+    }
+    Ok(plan)
+}
+
+/// The gait of a task.
+fn gait(arguments: &Arguments, task: &Task) -> Result<Plan, Error> {
+    let robot = robot::load(&task.robot, &options(arguments, Some(task)))?;
+    let model = Arc::new(robot.model.clone());
+    let dt = arguments.dt.or(task.dt).unwrap_or(DEFAULT_DT);
+    let posed = |held: bool| -> Result<_, Error> {
+        let mut gait = Gait::new(model.clone(), task, dt, held)?;
+        for (k, phase) in task.phases.iter().enumerate() {
+            gait.add(phase, task.phases.get(k + 1))?;
+        }
+        gait.pose()
+    };
+    let mut free = posed(false)?;
+    let what = format!(
+        "{} phases on {} feet, {} knots of {} ms",
+        task.phases.len(),
+        free.feet.len(),
+        free.times.len() - 1,
+        1e3 * dt
+    );
+    introduce(arguments, &model, &what);
+    let mut watch = Watch::new(arguments.max_iterations);
+    let mut solver = Fddp::new(&free.problem);
+    solver.settings.max_iterations = arguments.max_iterations;
+    solver.settings.tolerance = GAIT_TOLERANCE;
+    heading(arguments);
+    let solution = solver.solve_with(&mut free.problem, &free.xs, &free.us, watch.quiet(arguments.json))?.clone();
+    let stem = arguments.task.as_deref().and_then(Path::file_stem).and_then(|name| name.to_str()).unwrap_or("gait");
+    let mut plan = Plan {
+        title: format!("{}: {stem}", model.name()),
+        goal: None,
+        feet: free.feet,
+        soles: task.sole.is_some(),
+        touches: free.touches,
+        times: free.times,
+        dt,
+        budget_ms: arguments.budget_ms,
+        robot,
+        model: model.clone(),
+        solution,
+        trace: vec![],
+    };
+    if must_hold(arguments, &plan) {
+        plan.solution = hold(arguments, &plan, posed(true)?.problem, &mut watch, DUAL[1])?;
+    }
+    plan.trace = watch.end();
+    Ok(plan)
+}
+
+/// Whether a solution leaves limits that are still to be held.
+fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
+    let violations = report::violations(plan);
+    if violations.is_empty() || watch::interrupted() {
+        return false;
+    }
+    if !arguments.json {
+        let joints = if violations.len() == 1 { "limit is" } else { "limits are" };
+        say(&format!("{} {joints} exceeded: once more, with the limits as constraints\n", violations.len()));
+    }
+    true
+}
+
+/// Solves a problem with limits, from a solution that exceeds them.
+fn hold(
+    arguments: &Arguments,
+    plan: &Plan,
+    mut problem: Problem,
+    watch: &mut Watch,
+    dual: f64,
+) -> Result<Solution, Error> {
+    let mut solver = AugmentedLagrangian::new(&problem);
+    (solver.inner.max_iterations, solver.settings.max_solves) = (arguments.max_iterations, SOLVES);
+    (solver.settings.tolerance, solver.settings.tolerance_dual) = (HELD, dual);
+    let (xs, us) = (&plan.solution.xs, &plan.solution.us);
+    let mut solution = solver.solve_with(&mut problem, xs, us, watch.quiet(arguments.json))?.clone();
+    // Along many knots of an unstable motion the gradient of the Lagrangian is lost in rounding, and never falls below its
+    // tolerance: then cost and limits tell.
+    let settled = solution.trace.last().is_some_and(|last| last.feasible && last.stop < SETTLED * solution.cost.abs());
+    if solution.status == Status::MaxIterations && solver.outcome().primal <= HELD && settled {
+        solution.status = Status::Converged;
+    }
+    Ok(solution)
+}
+
+/// Shows the robot and the task.
+fn introduce(arguments: &Arguments, model: &Model, task: &str) {
+    if !arguments.json {
+        say(&format!("{model}{task}\n\n"));
+    }
+}
+
+fn heading(arguments: &Arguments) {
+    if !arguments.json {
+        say(report::ITERATION_HEADER);
+    }
+}
+
+/// How the robot's file is read: as the flags say, else as the task does.
+fn options(arguments: &Arguments, task: Option<&Task>) -> ReadingOptions {
+    let flags = &arguments.options;
+    ReadingOptions {
+        root: flags.root.or(task.and_then(|task| task.root)),
+        mimic: flags.mimic || task.is_some_and(|task| task.mimic),
+        packages: flags.packages.clone(),
+    }
 }

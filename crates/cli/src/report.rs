@@ -1,23 +1,23 @@
 //! What `condyle plan` prints: iterations, where the time went, what is beyond its limits.
 
-use crate::plan::Plan;
+use crate::motion::Plan;
+use crate::terminal::{Style, styled};
 use condyle::optimal::{Iteration, Status};
 use condyle::{Data, aba, aba_derivatives, rnea};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Beyond a limit by less than this share of the range is rounding, and not reported.
-const ROUNDING: f64 = 1e-6;
+/// Beyond a limit by less than this share of the range, or of 1, is the solver's tolerance, and not reported.
+const ROUNDING: f64 = 1e-5;
 /// How often a function is timed; the median counts.
 const REPETITIONS: usize = 11;
 
-pub(crate) fn iteration_header() {
-    println!("iteration           cost        gap    step  regularisation");
-}
+pub(crate) const ITERATION_HEADER: &str = "iteration           cost        gap    step  regularisation\n";
 
-pub(crate) fn iteration(i: &Iteration) {
+pub(crate) fn iteration(i: &Iteration) -> String {
     let step = if i.accepted { format!("{:.4}", i.step) } else { "none".to_owned() };
-    println!("{:9}  {:13.6}  {:9.2e}  {step:>6}  {:14.0e}", i.iteration, i.cost, i.gap, i.regularisation);
+    format!("{:9}  {:13.6}  {:9.2e}  {step:>6}  {:14.0e}\n", i.iteration, i.cost, i.gap, i.regularisation)
 }
 
 /// One line of the table of times.
@@ -60,17 +60,18 @@ fn median(knots: usize, mut f: impl FnMut(usize)) -> Duration {
 pub(crate) fn measure(plan: &Plan) -> Budget {
     let (model, solution) = (&plan.model, &plan.solution);
     let (nq, nv) = (model.nq(), model.nv());
-    let knots = solution.K.len();
+    let knots = plan.knots();
+    let efforts: Vec<Vec<f64>> = (0..knots).map(|t| plan.effort(t)).collect();
     let mut data = Data::new(model);
     let no_acceleration = vec![0.0; nv];
     let state = |t: usize| solution.x(t).split_at(nq);
     let aba_time = median(knots, |t| {
         let (q, v) = state(t);
-        aba(model, &mut data, q, v, solution.u(t), &[]);
+        aba(model, &mut data, q, v, &efforts[t], &[]);
     });
     let derivatives_time = median(knots, |t| {
         let (q, v) = state(t);
-        aba_derivatives(model, &mut data, q, v, solution.u(t), &[]);
+        aba_derivatives(model, &mut data, q, v, &efforts[t], &[]);
     });
     let rnea_time = median(knots, |t| {
         let (q, v) = state(t);
@@ -114,19 +115,20 @@ pub(crate) struct Violation {
 /// All quantities that are beyond their limits.
 pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
     let (model, solution) = (&plan.model, &plan.solution);
-    let (limits, knots) = (model.limits(), solution.K.len());
+    let (limits, knots) = (model.limits(), plan.knots());
+    let efforts: Vec<Vec<f64>> = (0..knots).map(|t| plan.effort(t)).collect();
     let mut found = Vec::new();
     let mut examine = |what, joint: &str, lower: f64, upper: f64, values: &mut dyn Iterator<Item = f64>| {
         let beyond = |x: f64| if x > upper { (x - upper, upper) } else { (lower - x, lower) };
         let worst = values.map(beyond).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let range = if (upper - lower).is_finite() { upper - lower } else { 1.0 };
         if let Some((at_knot, (amount, limit))) = worst
-            && amount > ROUNDING * range
+            && amount > ROUNDING * range.max(1.0)
         {
             found.push(Violation { what, joint: joint.to_owned(), at_knot, amount, limit });
         }
     };
-    for body in model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1) {
+    for body in model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none()) {
         let (iq, iv) = (body.idx_q, body.idx_v);
         if body.joint.nq() == 1 {
             let mut q = (0..=knots).map(|t| solution.x(t)[iq]);
@@ -136,7 +138,7 @@ pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
         if limits.velocity[iv] > 0.0 {
             examine("velocity", &body.joint_name, -limits.velocity[iv], limits.velocity[iv], &mut v);
         }
-        let mut tau = (0..knots).map(|t| solution.u(t)[iv]);
+        let mut tau = efforts.iter().map(|u| u[iv]);
         if limits.effort[iv] > 0.0 {
             examine("torque", &body.joint_name, -limits.effort[iv], limits.effort[iv], &mut tau);
         }
@@ -157,32 +159,55 @@ pub(crate) fn status(status: Status) -> &'static str {
 }
 
 /// Everything after the iterations.
-pub(crate) fn print(plan: &Plan, budget: &Budget, violations: &[Violation]) {
-    let iterations = plan.solution.trace.len();
-    println!("\n{} after {iterations} iterations, {:.1} ms", status(plan.solution.status), budget.solve_ms);
-    println!("`{}` ends {:.2} mm from the target\n", plan.model.frames()[plan.frame].name, 1e3 * plan.miss);
-    println!("{:<22}  µs per knot  ms per horizon of {}", "", budget.knots);
-    let line = |name: &str, row: &Row| println!("{name:<22}  {:11.2}  {:14.3}", row.us_per_knot, row.ms_per_horizon);
+pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> String {
+    let (model, iterations) = (&plan.model, plan.trace.len());
+    let converged = plan.solution.status == Status::Converged;
+    let ended = styled(if converged { Style::Good } else { Style::Bad }, status(plan.solution.status));
+    let mut text = format!("\n{ended} after {iterations} iterations, {:.1} ms\n", budget.solve_ms);
+    if let Some(goal) = &plan.goal {
+        text += &format!("`{}` ends {:.2} mm from the target\n", model.frames()[goal.frame].name, 1e3 * goal.miss);
+    }
+    if !plan.feet.is_empty() {
+        let (first, last) = (plan.solution.x(0), plan.solution.x(plan.knots()));
+        let [x, y] = [0, 1].map(|k| last[k] - first[k]);
+        let time = plan.times.last().copied().unwrap_or(0.0);
+        text += &format!("the base goes {x:.3} m ahead and {y:.3} m to the left in {time:.2} s\n");
+    }
+    text += &format!("\n{:<22}  µs per knot  ms per horizon of {}\n", "", budget.knots);
+    let mut line = |name: &str, row: &Row| {
+        text += &format!("{name:<22}  {:11.2}  {:14.3}\n", row.us_per_knot, row.ms_per_horizon);
+    };
     for row in &budget.alone {
         line(&format!("{}, alone", row.name), row);
     }
     for row in &budget.rows {
         line(row.name, row);
     }
-    let total = Row {
-        name: "One iteration",
-        us_per_knot: 1e3 * budget.total_ms / budget.knots as f64,
-        ms_per_horizon: budget.total_ms,
-    };
-    line(total.name, &total);
+    let us_per_knot = 1e3 * budget.total_ms / budget.knots as f64;
+    line("One iteration", &Row { name: "", us_per_knot, ms_per_horizon: budget.total_ms });
     let verdict = if budget.total_ms <= budget.budget_ms { "within" } else { "OVER" };
-    println!("one iteration is {verdict} the budget of {} ms", budget.budget_ms);
+    text += &format!("one iteration is {verdict} the budget of {} ms\n", budget.budget_ms);
     if violations.is_empty() {
-        println!("\nall positions, velocities and torques are within their limits");
+        text += "\nall positions, velocities and torques are within their limits\n";
     } else {
-        println!("\nbeyond its limit:");
+        text += &format!("\n{}\n", styled(Style::Bad, "beyond its limit:"));
     }
     for v in violations {
-        println!("  {} of `{}` by {:.3e} (limit {}) at knot {}", v.what, v.joint, v.amount, v.limit, v.at_knot);
+        text +=
+            &format!("  {} of `{}` by {:.3e} (limit {}) at knot {}\n", v.what, v.joint, v.amount, v.limit, v.at_knot);
     }
+    text
+}
+
+/// The same for programs.
+pub(crate) fn summary(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
+    let goal = plan.goal.as_ref().map(|goal| {
+        let frame = &plan.model.frames()[goal.frame].name;
+        json!({"frame": frame, "target": goal.target.to_array(), "miss": goal.miss, "tolerance": goal.tolerance})
+    });
+    json!({
+        "robot": plan.model.name(), "title": plan.title, "status": plan.solution.status, "cost": plan.solution.cost,
+        "iterations": plan.trace.len(), "knots": plan.knots(), "duration_s": plan.times.last(), "goal": goal,
+        "solve_ms": budget.solve_ms, "budget": budget, "violations": violations,
+    })
 }

@@ -1,5 +1,6 @@
 //! What the page draws: the simple shapes of a URDF, or bones between the joints where it has none.
 
+use crate::robot::{Format, Robot};
 use condyle::{Act, Data, Model, Quaternion, Se3, Vec3, forward_kinematics};
 use serde::Serialize;
 use std::collections::HashMap;
@@ -29,12 +30,12 @@ pub(crate) fn pose(placement: Se3<f64>) -> [f64; 7] {
 }
 
 /// All bodies, the world first.
-pub(crate) fn bodies(model: &Model, urdf: &str, frame: usize) -> Vec<Body> {
-    let mut shapes = primitives(model, urdf);
+pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize]) -> Vec<Body> {
+    let mut shapes = if robot.format == Format::Urdf { primitives(model, &robot.text) } else { HashMap::new() };
     // bones, unless most moving bodies have shapes of their own
     let drawn = (1..model.bodies().len()).filter(|b| shapes.contains_key(b)).count();
     if 2 * drawn < model.bodies().len() - 1 {
-        shapes = bones(model, frame);
+        shapes = bones(model, ends);
     }
     let body = |(i, b): (usize, &condyle::Body)| Body {
         name: b.name.clone(),
@@ -84,8 +85,8 @@ fn primitives(model: &Model, urdf: &str) -> HashMap<usize, Vec<Shape>> {
     shapes
 }
 
-/// A segment from each body to the joints that it carries, a sphere at each joint, and a segment to the frame.
-fn bones(model: &Model, frame: usize) -> HashMap<usize, Vec<Shape>> {
+/// A segment from each body to the joints that it carries, a sphere at each joint, and a segment to each end.
+fn bones(model: &Model, ends: &[usize]) -> HashMap<usize, Vec<Shape>> {
     let mut data = Data::new(model);
     let q = condyle::neutral(model);
     let placements = forward_kinematics(model, &mut data, &q);
@@ -106,7 +107,9 @@ fn bones(model: &Model, frame: usize) -> HashMap<usize, Vec<Shape>> {
     for (i, leaf) in is_leaf.iter().enumerate().skip(1) {
         shapes.entry(i).or_default().push(shape("sphere", vec![if *leaf { 0.7 * r } else { r }]));
     }
-    let tip = &model.frames()[frame];
-    shapes.entry(tip.body).or_default().push(segment(tip.placement.act(Vec3::zero()), 0.6 * r));
+    for &end in ends {
+        let tip = &model.frames()[end];
+        shapes.entry(tip.body).or_default().push(segment(tip.placement.act(Vec3::zero()), 0.6 * r));
+    }
     shapes
 }

@@ -1,5 +1,6 @@
 //! `condyle plan` as a user meets it: what it prints, what it writes, and how it ends.
 
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -23,6 +24,7 @@ fn complaint(test: &str, arguments: &[&str]) -> String {
     let output = plan(&folder(test), arguments);
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(matches!(output.status.code(), Some(1 | 2)), "{:?}: {error}", output.status);
+    assert_eq!(error.lines().count(), 1, "{error}");
     error
 }
 
@@ -91,6 +93,11 @@ fn what_is_wrong_is_named() {
         (&["--q0", "0,1"], "--q0: expected 7 numbers, found 2"),
         (&["--dt", "-1"], "--dt: must be above 0, not -1"),
         (&["--tolerance", "0"], "--tolerance: must be above 0"),
+        (&["--q0", "9,0,0,0,0,0,0"], "--q0: joint `joint1` is at 9, outside of its limits [-2.9, 2.9]"),
+        (&["--robot", "amr7", "--target", "0,0,1"], "no robot `amr7`; nearest is `arm7`"),
+        (&["--record", "x.cvs"], "--record: `x.cvs` does not end in .csv, .npz or .json; nearest is `csv`"),
+        (&["--example", "trto"], "--example"),
+        (&["nowhere.toml"], "nowhere.toml: No such file"),
     ] {
         let error = complaint("wrong_option", arguments);
         assert!(error.contains(words), "{arguments:?}: `{words}` is missing in\n{error}");
@@ -102,4 +109,201 @@ fn going_over_the_budget_is_no_error() {
     let output = plan(&folder("budget"), &["--budget-ms", "0.000001"]);
     assert!(output.status.success());
     assert!(String::from_utf8_lossy(&output.stdout).contains("OVER the budget"));
+}
+
+/// Runs a task from a text; the page, the record and the status.
+fn solve_task(test: &str, text: &str, record: &str) -> (Value, PathBuf, Option<i32>, String) {
+    let folder = folder(test);
+    let (task, record) = (folder.join("task.toml"), folder.join(record));
+    std::fs::write(&task, text).unwrap();
+    let output = plan(&folder, &[task.to_str().unwrap(), "--record", record.to_str().unwrap(), "--json"]);
+    let summary = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
+    (summary, record, output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+fn example(name: &str) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_condyle")).args(["plan", "--example", name]).output().unwrap();
+    assert!(output.status.success());
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Each example does what it says, and every number stays within the robot's limits.
+#[test]
+fn the_examples_hold_their_limits() {
+    for (name, robot, ahead) in [
+        ("reach", "arm7", None),
+        ("trot", "quadruped", Some(0.16)),
+        ("jump", "quadruped", Some(0.2)),
+        ("stand-up", "quadruped", Some(0.0)),
+        ("walk", "humanoid", Some(0.3)),
+    ] {
+        let (summary, record, status, error) = solve_task(&format!("example_{name}"), &example(name), "motion.json");
+        assert_eq!((status, summary["status"].as_str()), (Some(0), Some("converged")), "{name}: {error}");
+        assert_eq!(summary["violations"], serde_json::json!([]));
+        let motion: Value = serde_json::from_str(&std::fs::read_to_string(&record).unwrap()).unwrap();
+        let rows = |key: &str| -> Vec<Vec<f64>> { serde_json::from_value(motion[key].clone()).unwrap() };
+        let (q, v, tau) = (rows("q"), rows("v"), rows("tau"));
+        assert_eq!((q.len(), v.len(), tau.len()), (tau.len() + 1, tau.len() + 1, tau.len()));
+        let model = match robot {
+            "arm7" => condyle::robots::arm7(),
+            "quadruped" => condyle::robots::quadruped(),
+            _ => condyle::robots::humanoid(),
+        };
+        let (limits, room) = (model.limits(), 1e-4);
+        let within = |x: &[f64], lower: &dyn Fn(usize) -> f64, upper: &dyn Fn(usize) -> f64| {
+            x.iter().enumerate().all(|(k, x)| lower(k) - room <= *x && *x <= upper(k) + room)
+        };
+        assert!(q.iter().all(|q| within(q, &|k| limits.lower[k], &|k| limits.upper[k])), "{name}: positions");
+        assert!(v.iter().all(|v| within(v, &|k| -limits.velocity[k], &|k| limits.velocity[k])), "{name}: speeds");
+        assert!(tau.iter().all(|t| within(t, &|k| -limits.effort[k], &|k| limits.effort[k])), "{name}: efforts");
+        if let Some(ahead) = ahead {
+            let went = q[q.len() - 1][0] - q[0][0];
+            assert!((went - ahead).abs() < 0.03, "{name}: {went}");
+        }
+        if name == "stand-up" {
+            assert!(q[q.len() - 1][2] - q[0][2] > 0.1, "it rises");
+        }
+        if name == "jump" {
+            let airborne = motion["touches"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .filter(|t| t.as_array().unwrap().iter().all(|t| t == false));
+            assert_eq!(airborne.count(), 28);
+            let highest = q.iter().map(|q| q[2]).fold(0.0, f64::max);
+            assert!(highest > q[0][2] + 0.05, "it leaves the ground");
+        }
+    }
+}
+
+/// The forces on the page carry the robot: their mean over the gait, which begins and ends at rest, is its weight.
+#[test]
+fn contact_forces_carry_the_robot() {
+    let (_, record, ..) = solve_task("forces", &example("trot"), "motion.json");
+    let page = std::fs::read_to_string(record.with_file_name("plan.html")).unwrap();
+    let data = page.split("application/json").nth(1).and_then(|rest| rest.split_once('>')).unwrap().1;
+    let data: Value = serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();
+    let forces = data["contacts"]["forces"].as_array().unwrap();
+    let weight = data["contacts"]["weight"].as_f64().unwrap();
+    let of = |f: &Value| f.as_array().map_or(0.0, |f| f[2].as_f64().unwrap());
+    let sums: Vec<f64> = forces.iter().map(|feet| feet.as_array().unwrap().iter().map(of).sum()).collect();
+    let mean = sums.iter().sum::<f64>() / sums.len() as f64;
+    assert!((mean - weight).abs() < 0.15 * weight, "{mean} N of {weight} N; impacts carry the rest");
+    let last = sums[sums.len() - 1];
+    assert!((last - weight).abs() < 0.05 * weight, "{last} N at rest");
+    let (touches, times) = (data["contacts"]["touches"].as_array().unwrap(), data["times"].as_array().unwrap());
+    assert_eq!((touches.len(), forces.len()), (times.len() - 1, times.len() - 1));
+    for (touches, forces) in touches.iter().zip(forces) {
+        for (touches, force) in touches.as_array().unwrap().iter().zip(forces.as_array().unwrap()) {
+            assert_eq!(touches.as_bool().unwrap(), force.is_array());
+        }
+    }
+}
+
+#[test]
+fn the_record_is_named_after_the_joints() {
+    let (_, record, ..) = solve_task("csv", &example("trot"), "motion.csv");
+    let text = std::fs::read_to_string(record).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    for name in ["time", "q:root_joint.qw", "q:LF_HAA", "v:root_joint.wz", "tau:RH_KFE", "touches:LF_foot"] {
+        assert!(head.contains(&name), "{name}");
+    }
+    let rows: Vec<_> = lines.collect();
+    assert!(rows.len() == 85 && rows.iter().all(|row| row.len() == head.len()));
+    assert!(rows[..84].iter().flatten().all(|x| x.parse::<f64>().unwrap().is_finite()));
+    let (_, record, ..) = solve_task("npz", &example("reach"), "motion.npz");
+    let bytes = std::fs::read(record).unwrap();
+    assert!(
+        bytes.starts_with(b"PK")
+            && bytes.windows(6).any(|w| w == b"\x93NUMPY")
+            && bytes.windows(5).any(|w| w == b"q.npy")
+    );
+}
+
+/// A finger that begins on its limit, and that the solver would press through it to gain a little.
+#[test]
+fn a_joint_that_starts_on_its_limit_stays_within() {
+    let urdf = include_str!("../../model/models/arm7.urdf").replace(
+        "</robot>",
+        "<link name=\"finger\"><inertial><origin xyz=\"0 0 0.02\"/><mass value=\"0.1\"/><inertia ixx=\"1e-4\" ixy=\"0\" \
+         ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial></link><joint name=\"grip\" type=\"prismatic\">\
+         <parent link=\"link7\"/><child link=\"finger\"/><axis xyz=\"0 1 0\"/>\
+         <limit lower=\"0\" upper=\"0.04\" velocity=\"0.2\" effort=\"20\"/></joint></robot>",
+    );
+    let folder = folder("finger");
+    let robot = folder.join("robot.urdf");
+    std::fs::write(&robot, urdf).unwrap();
+    let record = folder.join("motion.json");
+    let flags =
+        ["--robot", robot.to_str().unwrap(), "--frame", "tool", "--target", "0.45,-0.25,0.35", "--json", "--record"];
+    let output = plan(&folder, &[&flags[..], &[record.to_str().unwrap()]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let motion: Value = serde_json::from_str(&std::fs::read_to_string(record).unwrap()).unwrap();
+    let column = motion["q_names"].as_array().unwrap().iter().position(|name| name == "grip").unwrap();
+    for q in motion["q"].as_array().unwrap() {
+        let x = q[column].as_f64().unwrap();
+        assert!((-1e-5..0.04 + 1e-5).contains(&x), "{x}");
+    }
+}
+
+#[test]
+fn what_is_wrong_in_a_task_is_named_with_its_line() {
+    let trot = example("trot");
+    let line = |text: &str, part: &str| text.lines().position(|line| line.contains(part)).unwrap() + 1;
+    for (from, to, words) in [
+        ("friction = 0.7", "frction = 0.7", "unknown field `frction`"),
+        ("friction = 0.7", "frction = 0.7", "nearest is `friction`"),
+        ("dt = 0.01", "dt = -0.01", "dt must be above 0, not -0.01"),
+        ("dt = 0.01", "dt = \"fast\"", "invalid type"),
+        ("dt = 0.01", "dt = = 1", "task.toml:"),
+        ("root = \"free\"", "root = \"fre\"", "no root joint is called `fre`; nearest is `free`"),
+        ("robot = \"quadruped\"", "robot = \"arm7\"", "unknown frame `LF_foot`"),
+        ("LF_KFE = -1.4", "LF_KFE = -9", "joint `LF_KFE` is at -9, outside of its limits [-2.7, 2.7]"),
+        ("LF_KFE = -1.4", "LF_KEF = -1.4", "unknown joint `LF_KEF`; nearest is `LF_KFE`"),
+        (
+            "kind = \"stand\"            # on all feet",
+            "kind = \"stan\"",
+            "no phase is called `stan`; nearest is `stand`",
+        ),
+        ("feet = [\"RF_foot\", \"LH_foot\"]", "feet = [\"RF_fot\"]", "[feet] has no `RF_fot`; nearest is `RF_foot`"),
+        ("knots = 5\n", "knots = 0\n", "knots must be from 1 to 100000, not 0"),
+    ] {
+        let text = trot.replacen(from, to, 1);
+        assert_ne!(text, trot, "{from}");
+        let (_, record, status, error) = solve_task("wrong_task", &text, "motion.csv");
+        assert_eq!(status, Some(2), "{to}: {error}");
+        assert!(error.contains(words) && error.lines().count() == 1, "{to}: `{words}` is missing in\n{error}");
+        let at = if to.contains("arm7") {
+            "task.toml:".to_owned()
+        } else {
+            format!("task.toml:{}: ", line(&text, to.trim()))
+        };
+        assert!(error.contains(&at), "{to}: `{at}` is missing in\n{error}");
+        assert!(!record.exists() && !record.with_file_name("plan.html").exists(), "{to}: something was written");
+    }
+}
+
+/// Ctrl-C ends the solver; what it has found by then is written.
+#[test]
+#[cfg(unix)]
+fn interrupted_it_leaves_the_best_iterate() {
+    use std::io::{BufRead, BufReader};
+    let folder = folder("interrupt");
+    let (page, record) = (folder.join("plan.html"), folder.join("motion.json"));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_condyle"))
+        .args(["plan", "--target", "0.4,0.4,0.4", "--knots", "20000", "--dt", "0.005", "--out", page.to_str().unwrap()])
+        .args(["--record", record.to_str().unwrap()])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    lines.find(|line| line.as_ref().unwrap().starts_with("iteration ")).unwrap().unwrap(); // the solver begins
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let rest: Vec<String> = lines.map(Result::unwrap).collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
+    assert!(rest.iter().any(|line| line.starts_with("interrupted after")), "{rest:?}");
+    let motion: Value = serde_json::from_str(&std::fs::read_to_string(record).unwrap()).unwrap();
+    assert_eq!((motion["status"].as_str(), motion["q"].as_array().unwrap().len()), (Some("interrupted"), 20001));
+    assert!(page.exists());
 }

@@ -43,7 +43,9 @@ pub use calls::forward_dynamics::{aba, forward_dynamics};
 pub use calls::impulse_dynamics::{Impulse, ImpulseDerivatives, impulse_dynamics, impulse_dynamics_derivatives};
 pub use calls::inertia::{crba, minv};
 pub use calls::inverse_dynamics::{coriolis_matrix, gravity, nonlinear_effects, rnea, static_torque};
-pub use calls::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
+pub use calls::kinematics::{
+    body_jacobian, forward_accelerations, forward_kinematics, forward_velocities, frame_jacobian,
+};
 pub use calls::parameter_derivatives::Input;
 pub use calls::regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
 pub use calls::second_derivatives::{

@@ -121,7 +121,7 @@ pub enum Error {
         warning: Warning,
     },
     /// Two bodies, joints or frames of one kind have the same name.
-    #[error("two {kind}s are named `{name}`")]
+    #[error("two {} are named `{name}`", plural(kind))]
     Duplicate {
         /// `body`, `joint` or `frame`.
         kind: &'static str,
@@ -129,19 +129,19 @@ pub enum Error {
         name: String,
     },
     /// No frame has this name.
-    #[error("unknown frame `{name}`; nearest is `{nearest}`")]
+    #[error("unknown frame `{name}`{}", near_or(nearest, "; no frame has a similar name"))]
     UnknownFrame {
         /// As asked for.
         name: String,
-        /// The most similar name there is.
+        /// The most similar name there is; empty if none is similar.
         nearest: String,
     },
     /// No joint has this name.
-    #[error("unknown joint `{name}`; nearest is `{nearest}`")]
+    #[error("unknown joint `{name}`{}", near_or(nearest, "; no joint has a similar name"))]
     UnknownJoint {
         /// As asked for.
         name: String,
-        /// The most similar name there is.
+        /// The most similar name there is; empty if none is similar.
         nearest: String,
     },
 }
@@ -203,7 +203,8 @@ fn where_looked(looked: &[String]) -> String {
 /// distance takes the product of the lengths.
 const COMPARED: [usize; 2] = [128, 1 << 22];
 
-/// The most similar of some names (optimal string alignment distance), as far as so many can be compared.
+/// The most similar of some names (optimal string alignment distance), as far as so many can be compared; empty if even that
+/// one differs in more than half of its characters.
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
     let [length, mut left] = COMPARED;
     let begin = |name: &str| name.chars().take(length).collect::<String>();
@@ -214,6 +215,24 @@ pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> S
         left = left.saturating_sub(pairs);
         enough
     };
-    let found = names.take_while(enough).min_by_key(|other| strsim::osa_distance(&begin(other), &name));
-    found.unwrap_or_default().to_owned()
+    let measured = names.take_while(enough).map(|other| (strsim::osa_distance(&begin(other), &name), other));
+    match measured.min_by_key(|(distance, _)| *distance) {
+        Some((distance, found)) if 2 * distance <= begin(found).chars().count().max(name.chars().count()) => {
+            found.to_owned()
+        }
+        _ => String::new(),
+    }
+}
+
+/// The end of a message about a name that is not there: the nearest one, if there is one.
+pub(crate) fn near(nearest: &str) -> String {
+    near_or(nearest, "")
+}
+
+fn near_or(nearest: &str, otherwise: &str) -> String {
+    if nearest.is_empty() { otherwise.to_owned() } else { format!("; nearest is `{nearest}`") }
+}
+
+fn plural(kind: &str) -> String {
+    kind.strip_suffix('y').map_or_else(|| format!("{kind}s"), |stem| format!("{stem}ies"))
 }

@@ -70,8 +70,9 @@ pub struct Mimic {
 const UNIT: f64 = 1e-15;
 
 impl Joint {
-    /// The kind's name.
-    pub(crate) fn kind(self) -> &'static str {
+    /// The kind's name: `revolute`, `continuous`, `prismatic`, `helical`, `spherical`, `planar`, `translation` or
+    /// `free-flyer`.
+    pub fn kind(self) -> &'static str {
         match self {
             Self::Revolute { .. } => "revolute",
             Self::Continuous { .. } => "continuous",

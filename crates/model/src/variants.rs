@@ -1,5 +1,6 @@
 //! The same robot with something changed.
 
+use crate::body::Limits;
 use crate::error::Error;
 use crate::limbs::Plan;
 use crate::magnitude::check_gravity;
@@ -34,6 +35,35 @@ impl Model {
     pub fn with_armature(mut self, armature: &[f64]) -> Result<Self, Error> {
         check("armature", armature.len(), self.nv());
         self.armature.copy_from_slice(armature);
+        self.validate()?;
+        Ok(self)
+    }
+
+    /// The same robot with other limits of position, velocity and effort.
+    ///
+    /// ```
+    /// let arm = condyle_model::robots::arm7();
+    /// let mut limits = arm.limits().clone();
+    /// limits.effort.iter_mut().for_each(|effort| *effort *= 0.5);
+    /// assert_eq!(arm.clone().with_limits(limits)?.limits().effort[0], 0.5 * arm.limits().effort[0]);
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are not as many as coordinates, nq of position and nv of the others; [`Error::Joint`] if a
+    /// lower limit is above an upper one, or one of velocity or effort is negative.
+    pub fn with_limits(mut self, limits: Limits) -> Result<Self, Error> {
+        for (name, found, expected) in [
+            ("limits.lower", limits.lower.len(), self.nq()),
+            ("limits.upper", limits.upper.len(), self.nq()),
+            ("limits.velocity", limits.velocity.len(), self.nv()),
+            ("limits.effort", limits.effort.len(), self.nv()),
+        ] {
+            if found != expected {
+                return Err(Error::Length { name, expected, found });
+            }
+        }
+        self.limits = limits;
         self.validate()?;
         Ok(self)
     }

@@ -129,11 +129,12 @@ fn long_texts() {
 /// The nearest name is looked for among long names, and among many.
 #[test]
 fn long_names() {
-    let (a, b) = ("a".repeat(100_000), "b".repeat(100_000));
+    let a = "a".repeat(100_000);
+    let b = format!("b{a}");
     let joint =
         |child: &str| format!("<joint name='j' type='fixed'><parent link='base'/><child link='{child}'/></joint>");
     let base = "<robot><link name='base'/>";
-    refused(urdf(&format!("{base}<link name='{a}'/>{}</robot>", joint(&b))), &format!("`{b}`; nearest is `base`"));
+    refused(urdf(&format!("{base}<link name='{a}'/>{}</robot>", joint(&b))), &format!("`{b}`; nearest is `{a}`"));
     let links: String = (0..100_000).map(|i| format!("<link name='{i}_{}'/>", &a[..100])).collect();
     refused(urdf(&format!("{base}{links}{}</robot>", joint("bas"))), "no link is named `bas`; nearest is `base`");
     let model = urdf(&format!("<robot><link name='{a}'/></robot>")).unwrap();

@@ -25,6 +25,28 @@ pub enum Error {
         models: usize,
     },
 
+    /// A model that is made for the end of a horizon serves a knot before it.
+    #[error(
+        "knot {knot}: models[{index}] has no next state, as an action of the end; a running one has a duration or an impact"
+    )]
+    NoNextState {
+        /// The knot.
+        knot: usize,
+        /// The index of the model.
+        index: usize,
+    },
+
+    /// The terminal model has controls, as only knots before the end have.
+    #[error("terminal: expected an action without controls (a robot's has no duration), found one of nu = {nu}")]
+    TerminalControls {
+        /// The number of its controls.
+        nu: usize,
+    },
+
+    /// A solver is to go on from a solution that it has not.
+    #[error("resume: there is no solution to go on from; call solve first")]
+    NothingToResume,
+
     /// A dimension of one knot's action model differs from what the problem or the solver needs.
     #[error("node {node}: expected {name} = {expected}, found {found}")]
     Dimension {

@@ -14,7 +14,7 @@
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
 //! - [`AugmentedLagrangian`] repeats that until general constraints hold, those of [`Constrained`] actions and a robot's
 //!   [`Limit`](robot::Limit)s.
-//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action.
+//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is what its name says.
 //! - [`AutoDiff`] makes an action of dynamics and a cost that are written for any scalar: exact derivatives by dual numbers.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
@@ -77,4 +77,4 @@ pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outc
 pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
-pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem};
+pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};

@@ -225,7 +225,10 @@ fn errors_name_the_thing_and_the_numbers() {
     let e = error(Problem::new(vec![0.0; 2], model(), vec![0], end()));
     assert_eq!(e, Error::Length { name: "x0", expected: 3, found: 2 });
     let e = error(Problem::new(vec![0.0; 3], model(), vec![0, 0], Box::new(Unicycle { nu: 2, lanes: 1 })));
-    assert_eq!(e.to_string(), "node 2: expected nu = 0, found 2");
+    assert_eq!(
+        e.to_string(),
+        "terminal: expected an action without controls (a robot's has no duration), found one of nu = 2"
+    );
     let e = error(Problem::new(vec![0.0; 3], vec![Box::new(Circle { nu: 1 })], vec![0], end()));
     assert_eq!(e.to_string(), "node 0: expected nx = 3, found 2");
 

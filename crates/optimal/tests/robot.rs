@@ -2,11 +2,11 @@
 #![allow(non_snake_case)] // the names of the literature
 
 use condyle_dynamics::{
-    Act, Data, FrameKind, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, forward_kinematics, integrate,
-    neutral, robots,
+    Act, Data, FrameKind, Model, ModelBuilder, Se3, UrdfOptions, Vec3, WORLD, forward_kinematics, integrate, neutral,
+    robots,
 };
 use condyle_optimal::robot::{Activation, Cost, Dynamics, FrameName, FreeDynamics, Knot, Limit, Residual};
-use condyle_optimal::{ActionModel, Error, LqNode, NumDiff, Sweep};
+use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Sweep};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -205,18 +205,14 @@ fn frames_travel_by_name() {
         unknown(read.build(&quadruped).map(|_| ()).unwrap_err());
     }
     // of two frames with one name the one of the wanted kind, else a link's
-    let mut builder = ModelBuilder::new("twice");
-    let body = builder.body("tip", WORLD, Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) }, Se3::identity(), rod());
-    builder.frame("tip", body, Se3 { translation: Vec3::new(0.0, 0.0, 2.0), ..Se3::identity() });
-    let twice = builder.build().unwrap();
+    let text = r#"<robot name="twice"><link name="base"/><link name="tip"/><joint name="tip" type="continuous">
+        <parent link="base"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>"#;
+    let twice = Model::from_urdf_str(text, &UrdfOptions::default()).unwrap();
     let named = |kind| FrameName { name: "tip".to_owned(), kind }.number(&twice).unwrap();
-    assert_eq!(twice.frames()[named(Some(FrameKind::User))].kind, FrameKind::User);
+    assert_eq!(twice.frames()[named(Some(FrameKind::Joint))].kind, FrameKind::Joint);
     assert_eq!(named(None), twice.frame("tip").unwrap());
-    assert_ne!(named(None), named(Some(FrameKind::User)));
-}
-
-fn rod() -> Inertia<f64> {
-    Inertia::from_com(1.0, Vec3::new(0.0, 0.0, 0.5), Sym3::diagonal(0.1))
+    assert_ne!(named(None), named(Some(FrameKind::Joint)));
+    assert_eq!(named(Some(FrameKind::User)), named(None)); // for want of one
 }
 
 #[test]
@@ -240,4 +236,75 @@ fn what_does_not_fit_is_refused_by_name() {
     let nowhere = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(f64::NAN, 0.0, 0.0) };
     assert_eq!(message(cost(nowhere, Activation::Quadratic)), "cost `reach`: its target holds a NaN");
     assert_eq!(message(FreeDynamics::running(arm.clone(), 0.0, vec![])), "a knot of 0 s: its duration must be above 0");
+}
+
+/// r = (v₁ u₁, sin q₂ + u₂² + t), of a robot whose position has `nq` numbers.
+struct OwnFunction {
+    nq: usize,
+    nv: usize,
+    /// The coordinates and controls that count.
+    place: [usize; 2],
+}
+
+impl condyle_optimal::robot::ResidualFunction for OwnFunction {
+    fn size(&self) -> usize {
+        2
+    }
+
+    fn calc(&self, t: usize, x: &[f64], u: &[f64], r: &mut [f64]) {
+        let [c, k] = self.place;
+        r[0] = x[self.nq + c] * u[k];
+        r[1] = x[self.nq - self.nv + c].sin() + u[k + 1] * u[k + 1] + t as f64;
+    }
+
+    fn calc_diff(&self, _: usize, x: &[f64], u: &[f64], by_x: &mut [f64], by_u: &mut [f64]) {
+        let ([c, k], nu) = (self.place, u.len());
+        by_x[self.nv + c] = u[k];
+        by_u[k] = x[self.nq + c];
+        by_x[2 * self.nv + c] = x[self.nq - self.nv + c].cos();
+        by_u[nu + k + 1] = 2.0 * u[k + 1];
+    }
+}
+
+/// The derivatives of a residual of one's own are those of differences, and the solver's iterates do not depend on the form
+/// of its knots.
+#[test]
+fn a_residual_of_ones_own_is_one_among_others() {
+    use condyle_dynamics::ContactConstraint;
+    use condyle_optimal::robot::{Contact, ContactDynamics, OwnResidual};
+    let model = Arc::new(robots::quadruped());
+    let (nq, nv) = (model.nq(), model.nv());
+    let mut q = condyle_dynamics::neutral(&model);
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4));
+    let x0 = [q, vec![0.0; nv]].concat();
+    let own = OwnResidual::new(OwnFunction { nq, nv, place: [8, 2] });
+    let costs = vec![
+        Cost::new("state", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic),
+        Cost::new("own", 0.3, Residual::Own(own.clone()), Activation::Smooth1 { epsilon: 0.5 }),
+        Cost::new("effort", 1e-2, Residual::Control { reference: vec![0.0; 12] }, Activation::Quadratic),
+    ];
+    let foot = |name: &str| Contact::new(name, ContactConstraint::point(model.frame(name).unwrap()));
+    let contacts = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"].map(foot);
+    let knot = ContactDynamics::running(model.clone(), &contacts, 0.02, costs).unwrap();
+    let end = || Box::new(FreeDynamics::terminal(model.clone(), vec![]).unwrap());
+    let mut problem = Problem::new(x0.clone(), vec![Box::new(knot.clone())], vec![0; 9], end()).unwrap();
+    let xs = x0.repeat(10);
+    let us = problem.quasi_static(&xs).unwrap();
+    let mut by_differences = knot.clone();
+    let (mut ours, mut theirs) = (LqNode::zeros(36, 12), LqNode::zeros(36, 12));
+    by_differences.calc_diff(3, &x0, &us[..12], &mut ours);
+    NumDiff(by_differences).calc_diff(3, &x0, &us[..12], &mut theirs);
+    assert!((&ours.q - &theirs.q).amax() < 1e-6 * (1.0 + theirs.q.amax()));
+    assert!((&ours.r - &theirs.r).amax() < 1e-6 * (1.0 + theirs.r.amax()));
+    let mut solve = |inverse_dynamics_form: bool| {
+        let mut solver = Fddp::new(&problem);
+        (solver.settings.inverse_dynamics_form, solver.settings.max_iterations) = (inverse_dynamics_form, 6);
+        solver.solve(&mut problem, &xs, &us).unwrap().clone()
+    };
+    let (one, other) = (solve(true), solve(false));
+    assert!(one.trace.len() > 2 && one.trace[0].accepted);
+    for (a, b) in one.trace.iter().zip(&other.trace) {
+        assert!((a.cost - b.cost).abs() < 1e-8 * b.cost.abs() && a.step == b.step, "{a:?} {b:?}");
+    }
+    assert!(serde_json::to_string(&Residual::Own(own)).is_err());
 }

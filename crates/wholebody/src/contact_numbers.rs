@@ -133,17 +133,16 @@ impl ContactNumbers {
 
     /// −Jᵀ f: subtracts what the force adds to the effort of each coordinate, from the columns of Eᵀ.
     pub(crate) fn add_effort(&self, support: &[usize], Et: &mut DMatrix<f64>) {
-        let rows = self.geometry.motion;
+        let (rows, stride, nv) = (self.geometry.motion, Et.nrows(), self.Jt.nrows());
+        let (J, Et) = (self.Jt.as_slice(), Et.as_mut_slice());
         for &i in support {
-            for j in 0..self.geometry.unknowns() {
-                Et[(self.column + j, i)] = if self.geometry.by_corners {
-                    -(rows
-                        .iter()
-                        .enumerate()
-                        .map(|(r, &row)| self.Jt[(i, r)] * self.geometry.wrench(row, j))
-                        .sum::<f64>())
+            let effort = &mut Et[i * stride + self.column..][..self.geometry.unknowns()];
+            for (j, effort) in effort.iter_mut().enumerate() {
+                *effort = if self.geometry.by_corners {
+                    let share = |(r, &row): (usize, &usize)| J[r * nv + i] * self.geometry.wrench(row, j);
+                    -rows.iter().enumerate().map(share).sum::<f64>()
                 } else {
-                    -self.Jt[(i, j)]
+                    -J[j * nv + i]
                 };
             }
         }
@@ -152,11 +151,11 @@ impl ContactNumbers {
     /// J q̈ = a* − J̇ v.
     pub(crate) fn add_equalities(&self, program: &mut ConeProgram) {
         let (n, nv) = (program.size.unknowns, self.Jt.nrows());
-        for r in 0..self.geometry.motion.len() {
+        for (r, J) in self.Jt.as_slice().chunks_exact(nv).enumerate() {
             let e = program.size.equalities;
-            let column = &mut program.At.column_mut(e);
-            column.rows_mut(0, nv).copy_from(&self.Jt.column(r));
-            column.rows_mut(nv, n - nv).fill(0.0);
+            let (motion, forces) = program.equality_mut(e)[..n].split_at_mut(nv);
+            motion.copy_from_slice(J);
+            forces.fill(0.0);
             program.b[e] = self.held[r];
             program.size.equalities += 1;
         }
@@ -200,7 +199,7 @@ impl ContactNumbers {
                     program.cones.push(3);
                     let n = program.size.unknowns;
                     for (i, (column, x)) in [(f + 2, mu), (f, 1.0), (f + 1, 1.0)].into_iter().enumerate() {
-                        program.Ft.column_mut(first + i).rows_mut(0, n).fill(0.0);
+                        program.cone_row_mut(first + i)[..n].fill(0.0);
                         program.Ft[(column, first + i)] = x; // s = (μ f_n, f₁, f₂)
                         program.h[first + i] = 0.0;
                     }
@@ -235,7 +234,7 @@ impl ContactNumbers {
 /// A row of zeros more.
 fn add_row(program: &mut ConeProgram, lower: f64, upper: f64) -> usize {
     let (row, n) = (program.size.rows, program.size.unknowns);
-    program.Gt.column_mut(row).rows_mut(0, n).fill(0.0);
+    program.row_mut(row)[..n].fill(0.0);
     (program.lower[row], program.upper[row]) = (lower, upper);
     program.size.rows += 1;
     row

@@ -91,9 +91,9 @@ impl Command {
 /// ```
 pub struct WholeBodyController {
     settings: Settings,
-    equations: Equations,
-    objective: Objective,
-    levels: Levels,
+    pub(crate) equations: Equations,
+    pub(crate) objective: Objective,
+    pub(crate) levels: Levels,
     safety: Safety,
     command: Command,
     /// Scratch: the state of a plan.
@@ -164,7 +164,7 @@ impl WholeBodyController {
         let Settings { damping, hold_ticks, .. } = settings;
         let safety = Safety::new(&kinematics, &neutral(model), settings.effort(model), damping, hold_ticks);
         let equations = Equations::new(kinematics, touching, &settings, held);
-        let levels = Levels::new(equations.program.capacity(), &rows, &settings);
+        let levels = Levels::new(equations.program.capacity(), equations.limited.len(), &rows, &settings);
         let planned = PlannedState { q: neutral(model), v: vec![0.0; model.nv()], a: vec![0.0; model.nv()] };
         Ok(Self { settings, equations, objective, levels, safety, command, planned })
     }
@@ -288,21 +288,32 @@ impl WholeBodyController {
         &self.command
     }
 
-    /// Fills in the command; `Err` if there is nothing that holds all constraints.
-    fn solve(&mut self, q: &[f64], v: &[f64], references: &References) -> Result<Status, Status> {
-        let Self { settings, equations, objective, levels, safety, command, .. } = self;
+    /// Computes constraints and tasks.
+    pub(crate) fn update(&mut self, q: &[f64], v: &[f64], references: &References) {
+        let Self { settings, equations, objective, .. } = self;
         equations.update(q, v, references, settings);
         let n = equations.program.size.unknowns;
         let Equations { kinematics, contacts, actuated, .. } = &*equations;
         objective.update(q, v, kinematics, contacts, references, settings, actuated, n);
+    }
 
-        let (mut outcome, mut done) = levels.solve(&mut equations.program, equations.limited.len(), &objective.levels);
+    /// Fills in the command; `Err` if there is nothing that holds all constraints.
+    fn solve(&mut self, q: &[f64], v: &[f64], references: &References) -> Result<Status, Status> {
+        self.update(q, v, references);
+        let Self { equations, objective, levels, safety, command, .. } = self;
+        let n = equations.program.size.unknowns;
+
+        let (mut outcome, mut done) = {
+            let (program, kinds) = equations.program();
+            levels.solve(program, kinds, &objective.levels)
+        };
         let failed = matches!(outcome.stopped, Some(Stopped::Infeasible | Stopped::NumericalError)) && done == 0;
         command.limits_relaxed = failed && !equations.bounds.bounds.is_empty();
         if command.limits_relaxed {
             equations.relax(&mut objective.levels[0], PULL);
             let iterations = outcome.iterations;
-            (outcome, done) = levels.solve(&mut equations.program, equations.limited.len(), &objective.levels);
+            let (program, kinds) = equations.program();
+            (outcome, done) = levels.solve(program, kinds, &objective.levels);
             outcome.iterations += iterations;
         }
         command.iterations = outcome.iterations;

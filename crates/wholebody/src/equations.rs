@@ -1,9 +1,10 @@
 //! The program's constraints at one state: each block beside its equation. x = (q̈, the forces of the active contacts).
 
+use crate::condense::RowKinds;
 use crate::cone_program::{ConeProgram, Size};
 use crate::contact_numbers::ContactNumbers;
 use crate::kinematics::Kinematics;
-use crate::least_squares::LeastSquares;
+use crate::least_squares::{LeastSquares, dot};
 use crate::limits::AccelerationBounds;
 use crate::references::References;
 use crate::settings::{Friction, Settings};
@@ -24,6 +25,8 @@ pub(crate) struct Equations {
     /// Coordinates with a limited motor, and the limit.
     pub limited: Vec<(usize, f64)>,
     pub bounds: AccelerationBounds,
+    /// The coordinates of its bounds.
+    bounded: Vec<usize>,
     /// Eᵀ of τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate.
     pub Et: DMatrix<f64>,
     /// Constraints of the whole program; P and c are the solver's affair.
@@ -43,6 +46,7 @@ impl Equations {
         let effort = settings.effort(model);
         let limited: Vec<_> = actuated.iter().map(|&i| (i, effort[i])).filter(|l| l.1.is_finite()).collect();
         let bounds = AccelerationBounds::new(model, settings.joint_limits.as_ref());
+        let bounded = bounds.bounds.iter().map(|bound| bound.0).collect();
         let unknowns = nv + contacts.iter().map(|c| c.geometry.unknowns()).sum::<usize>();
         let of_forces: usize = contacts.iter().map(|c| c.max_rows(settings.friction)).sum();
         let cones: usize = contacts.iter().map(|c| c.geometry.cones()).sum();
@@ -54,11 +58,16 @@ impl Equations {
         };
         let weight = kinematics.mass * model.gravity().norm_squared().sqrt();
         let (Et, program) = (DMatrix::zeros(unknowns, nv), ConeProgram::new(capacity));
-        Self { free, actuated, limited, bounds, Et, program, weight, contacts, kinematics }
+        Self { free, actuated, limited, bounds, bounded, Et, program, weight, contacts, kinematics }
     }
 
     pub(crate) fn model(&self) -> &Model {
         &self.kinematics.model
+    }
+
+    /// The program, and the order of its rows.
+    pub(crate) fn program(&mut self) -> (&mut ConeProgram, RowKinds<'_>) {
+        (&mut self.program, RowKinds { dense: self.limited.len(), single: &self.bounded })
     }
 
     /// Computes all constraints at (q, v).
@@ -78,17 +87,20 @@ impl Equations {
         program.size = Size { unknowns, equalities: 0, rows: 0, cone_rows: 0 };
         program.cones.clear();
 
-        for i in 0..nv {
-            Et.column_mut(i).rows_mut(0, nv).copy_from(&kinematics.M.column(i));
-            Et.column_mut(i).rows_mut(nv, unknowns - nv).fill(0.0);
+        let most = Et.nrows();
+        for (E, M) in Et.as_mut_slice().chunks_exact_mut(most).zip(kinematics.M.as_slice().chunks_exact(nv)) {
+            let (motion, forces) = E[..unknowns].split_at_mut(nv);
+            motion.copy_from_slice(M);
+            forces.fill(0.0);
         }
         for contact in contacts.iter().filter(|contact| contact.active) {
             contact.add_effort(&kinematics.frames[contact.frame].support, Et);
         }
 
+        let E = |i: usize| &Et.as_slice()[i * most..][..unknowns];
         for &i in &self.free {
             let e = program.size.equalities;
-            program.At.column_mut(e).rows_mut(0, unknowns).copy_from(&Et.column(i).rows(0, unknowns));
+            program.equality_mut(e)[..unknowns].copy_from_slice(E(i));
             program.b[e] = -kinematics.h[i]; // M q̈ − Jᵀ f = −h: no motor acts on the base
             program.size.equalities += 1;
         }
@@ -97,15 +109,16 @@ impl Equations {
         }
 
         for (row, &(i, limit)) in self.limited.iter().enumerate() {
-            program.Gt.column_mut(row).rows_mut(0, unknowns).copy_from(&Et.column(i).rows(0, unknowns));
+            program.row_mut(row)[..unknowns].copy_from_slice(E(i));
             let h = kinematics.h[i];
             (program.lower[row], program.upper[row]) = (-limit - h, limit - h); // −τ̄ ≤ E x + h ≤ τ̄
         }
         bounds.update(q, v);
         for (k, &(i, lower, upper)) in bounds.bounds.iter().enumerate() {
             let row = self.limited.len() + k;
-            program.Gt.column_mut(row).rows_mut(0, unknowns).fill(0.0);
-            program.Gt[(i, row)] = 1.0; // position and velocity, as bounds on q̈
+            let coefficients = program.row_mut(row);
+            coefficients[..unknowns].fill(0.0);
+            coefficients[i] = 1.0; // position and velocity, as bounds on q̈
             (program.lower[row], program.upper[row]) = (lower, upper);
         }
         program.size.rows = self.limited.len() + bounds.bounds.len();
@@ -117,7 +130,7 @@ impl Equations {
     /// τ = E x + h of the actuated coordinates.
     pub(crate) fn effort(&self, x: &[f64], tau: &mut [f64]) {
         for &i in &self.actuated {
-            tau[i] = self.kinematics.h[i] + dot(self.Et.column(i).as_slice(), x);
+            tau[i] = self.kinematics.h[i] + dot(&self.Et.as_slice()[i * self.Et.nrows()..], x);
         }
     }
 
@@ -156,17 +169,4 @@ impl Equations {
         }
         worst
     }
-}
-
-/// xᵀ y for the numbers of the shorter y, in eight sums side by side.
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let x = &x[..y.len()];
-    let ((xs, x), (ys, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());
-    let mut sums = [0.0; 8];
-    for (x, y) in xs.iter().zip(ys) {
-        for i in 0..8 {
-            sums[i] += x[i] * y[i];
-        }
-    }
-    sums.iter().sum::<f64>() + x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
 }

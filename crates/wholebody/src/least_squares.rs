@@ -83,3 +83,16 @@ impl LeastSquares {
         }
     }
 }
+
+/// xᵀ y for the numbers of the shorter y, in eight sums side by side.
+pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let x = &x[..y.len()];
+    let ((xs, x), (ys, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (x, y) in xs.iter().zip(ys) {
+        for i in 0..8 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    sums.iter().sum::<f64>() + x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
+}

@@ -33,6 +33,7 @@
 //! Nakamura (2015), the wrench of a sole.
 #![allow(non_snake_case)]
 
+mod basis;
 mod condense;
 mod cone_program;
 mod contact;
@@ -40,9 +41,12 @@ mod contact_numbers;
 mod controller;
 mod equations;
 mod error;
+#[doc(hidden)]
+pub mod inspection;
 mod kinematics;
 mod least_squares;
 mod levels;
+mod lifted;
 mod limits;
 mod objective;
 mod plan;

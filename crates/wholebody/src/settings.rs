@@ -31,9 +31,13 @@ pub enum Backend {
 /// In which unknowns the program is solved; the solution is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
+    /// What is fastest: condensed for our own solver, whose matrices are dense, and for robots of few joints; in full for
+    /// clarabel, which keeps zeros, on others.
+    Automatic,
     /// The rows of the base and of the contacts are eliminated first.
     Condensed,
-    /// All of (q̈, f), with equalities.
+    /// All of (q̈, f), with equalities; for clarabel with more unknowns, for limited torques and for what tasks miss, so that
+    /// its matrices have more zeros. Priorities after the first are condensed all the same.
     Full,
 }
 
@@ -126,7 +130,7 @@ impl Default for Settings {
             hold_ticks: 5,
             damping: 0.02,
             backend: Backend::InteriorPoint,
-            form: Form::Condensed,
+            form: Form::Automatic,
             warm_start: true,
             tolerance: 1e-9,
             max_iterations: 50,

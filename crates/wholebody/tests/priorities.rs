@@ -5,7 +5,11 @@ mod common;
 
 use common::*;
 use condyle_dynamics::{Vec3, robots};
-use condyle_wholebody::{Axes, Gains, Settings, Task, TaskKind, WholeBodyController};
+use condyle_wholebody::{Axes, Backend, Form, Gains, Settings, Task, TaskKind, WholeBodyController};
+
+/// Of q̈, relative to 1 and its largest number: a little more than the root of the tolerance, 1e-11, where only regularisation
+/// decides.
+const AGREEMENT: f64 = 1e-5;
 
 /// The trunk's height and the centre of mass cannot both have their will; the order decides, not the weights.
 #[test]
@@ -58,6 +62,48 @@ fn a_first_priority_at_its_limit() {
 
 fn references_without_frames(references: &condyle_wholebody::References) -> condyle_wholebody::References {
     condyle_wholebody::References { frames: Vec::new(), ..references.clone() }
+}
+
+/// Three priorities in each form and by each back end: one command.
+#[test]
+fn forms_agree_on_priorities() {
+    let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
+    let of_quadruped =
+        vec![Task::com(), Task { priority: 1, ..Task::orientation("trunk") }, Task { priority: 2, ..Task::posture() }];
+    let of_humanoid = vec![
+        Task { gains: Gains::critical(40.0), ..Task::com() },
+        Task { priority: 1, ..Task::orientation("pelvis") },
+        Task { priority: 1, ..Task::angular_momentum() },
+        Task { priority: 2, ..Task::posture() },
+    ];
+    for (model, contacts, tasks, centre, push) in [
+        (&quadruped, feet(0.7), of_quadruped, stance(), 0.5),
+        (&humanoid, soles(0.7), of_humanoid, squat(&humanoid), 0.3),
+    ] {
+        for seed in 0..3 {
+            let (q, v) = near(model, &centre, seed, 0.02, 0.1);
+            let command = |backend, form| {
+                let settings = Settings { form, backend, tolerance: 1e-11, ..Settings::default() };
+                let mut controller = WholeBodyController::new(model, &contacts, &tasks, settings).unwrap();
+                let mut references = controller.hold(&q);
+                references.com.acceleration.x = push;
+                let command = controller.step(&q, &v, &references).clone();
+                check(model, &contacts, &q, &v, &references, &command);
+                command
+            };
+            let reference = command(Backend::InteriorPoint, Form::Condensed);
+            for (backend, form) in [
+                (Backend::InteriorPoint, Form::Full),
+                (Backend::Clarabel, Form::Condensed),
+                (Backend::Clarabel, Form::Full),
+            ] {
+                let found = command(backend, form);
+                let apart = max_abs(found.a.iter().zip(&reference.a).map(|(a, b)| a - b));
+                let bound = AGREEMENT * (1.0 + max_abs(reference.a.iter().copied()));
+                assert!(apart < bound, "push {push}, seed {seed}, {backend:?}, {form:?}: {apart:.1e} of {bound:.1e}");
+            }
+        }
+    }
 }
 
 /// Along the hand's own axes, and only one of them.

@@ -13,7 +13,7 @@ fn every_set_of_contacts() {
     let (model, contacts) = (robots::quadruped(), feet(0.7));
     // The forces' small weight needs more than the default for torques to be compared.
     let make = |contacts: &[FrictionContact]| {
-        let settings = Settings { tolerance: 1e-12, ..Settings::default() };
+        let settings = Settings { tolerance: 1e-13, ..Settings::default() };
         WholeBodyController::new(&model, contacts, &tasks(), settings).unwrap()
     };
     let mut controller = make(&contacts);
@@ -33,7 +33,7 @@ fn every_set_of_contacts() {
         let touching = (0..4).filter(on).map(|k| references.contacts[k]).collect();
         let expected = own.step(&q, &v, &condyle_wholebody::References { contacts: touching, ..references });
         let apart = max_abs(expected.tau.iter().zip(&command.tau).map(|(a, b)| a - b));
-        assert!(apart < 1e-2, "set {set}: {apart:.1e} N m");
+        assert!(apart < 1e-4, "set {set}: {apart:.1e} N m");
     }
 }
 
@@ -91,8 +91,9 @@ fn fading_contacts_do_not_jerk() {
         before = Some(command.tau.clone());
         advance(&model, &mut q, &mut v, &command.a, dt);
     }
-    // A tick of the ramp is 4 N on levers of half a metre; the base turns with it, and the other joints.
-    assert!(largest < 4.5, "a torque jumps by {largest:.3} N m in a tick");
+    // A tick of the ramp is 4 N on the feet's distance of 0.4 m. In the last one, the friction that these 4 N allowed (2.7 N, of
+    // what accelerates the centre of mass) goes as well, to the other foot, on the hips' height of 0.9 m.
+    assert!(largest < 4.0, "a torque jumps by {largest:.3} N m in a tick");
 }
 
 fn advance(model: &Model, q: &mut Vec<f64>, v: &mut [f64], a: &[f64], dt: f64) {

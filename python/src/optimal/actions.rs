@@ -1,126 +1,22 @@
 //! Actions of robots.
 
 use super::costs::{Cost, Limit};
-use crate::arrays::{Give, bounds, matrix, vector};
+use super::robot_action::{Reduced, RobotAction};
+use crate::arrays::{bounds, matrix};
 use crate::constrained::constraint;
-use crate::exceptions::{problem_error, wrong_word};
+use crate::exceptions::wrong_word;
 use crate::model::Model;
 use condyle::optimal as rust;
 use nalgebra::DMatrix;
 use pyo3::exceptions::PyValueError;
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rust::ActionModel;
 use rust::robot::{self, Actuation, ControlBounds, Dynamics, Integrator, Knot};
-use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A robot's action as data, which can be put into a file.
-#[derive(Clone)]
-pub(super) struct Described {
-    pub robot: Arc<condyle::Model>,
-    pub knot: Knot,
-}
-
-/// A robot's action, ready to be computed and as data.
-pub(super) struct RobotAction<A> {
-    action: A,
-    described: Described,
-}
-
-impl<A: ActionModel + Clone> RobotAction<A> {
-    fn new(robot: &Bound<'_, Model>, knot: impl FnOnce(&condyle::Model) -> PyResult<Knot>) -> PyResult<Self> {
-        let robot = Arc::new(robot.get().inner.clone());
-        let described = Described { knot: knot(&robot)?, robot };
-        let action: Box<dyn Any> = described.build()?;
-        Ok(Self { action: *action.downcast().expect("the class asks for its own kind of knot"), described })
-    }
-
-    /// A copy for a problem.
-    pub(super) fn boxed(&self) -> Boxed {
-        Boxed { action: Box::new(self.action.clone()), described: Some(self.described.clone()) }
-    }
-
-    /// The controls that hold the robot still at the state x, from what computes them.
-    fn hold<'py>(
-        &self,
-        x: &Bound<'py, PyAny>,
-        quasi_static: impl FnOnce(&mut A, &[f64]) -> Vec<f64>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let model = &self.described.robot;
-        let state = vector("x", x, model.nq() + model.nv())?;
-        quasi_static(&mut self.action.clone(), &state).give(x.py(), None)
-    }
-}
-
-impl Described {
-    /// The action that the data describe.
-    pub(super) fn boxed(self) -> PyResult<Boxed> {
-        Ok(Boxed { action: self.build()?, described: Some(self) })
-    }
-
-    fn build(&self) -> PyResult<Box<dyn ActionModel>> {
-        self.knot.build(&self.robot).map_err(problem_error)
-    }
-
-    /// Changes the weights of the terms called `name`, which are checked.
-    pub(super) fn set_weight(&mut self, name: &str, weight: f64) {
-        let all = self.knot.costs.iter_mut().chain(self.knot.costs_at.values_mut().flatten());
-        all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
-    }
-
-    /// Moves the costs and limits of knot t to knot t − 1.
-    pub(super) fn shift(&mut self) {
-        fn moved<T>(at: &mut BTreeMap<usize, T>) {
-            *at = std::mem::take(at).into_iter().filter_map(|(t, own)| Some((t.checked_sub(1)?, own))).collect();
-        }
-        moved(&mut self.knot.costs_at);
-        moved(&mut self.knot.limits_at);
-    }
-}
-
-/// An action for a problem, and the same as data if it can be put into a file.
-pub(super) struct Boxed {
-    pub action: Box<dyn ActionModel>,
-    pub described: Option<Described>,
-}
-
-/// The action of type A that is model k of a problem, or the terminal model, or that stands inside of constraints
-/// there.
-pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
-    fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
-        match k {
-            Some(k) => problem.model_mut(k),
-            None => problem.terminal_mut(),
-        }
-    }
-    if find::<A>(problem, k).is_some() {
-        return find(problem, k);
-    }
-    let mut around = find::<rust::Constrained>(problem, k)?;
-    while around.action_mut::<A>().is_none() {
-        around = around.action_mut()?;
-    }
-    around.action_mut()
-}
-
-/// A change of a robot's action in a problem, see `inside`; none if the action is not of a robot.
-macro_rules! change {
-    ($problem:expr, $k:expr, |$knot:ident| $change:expr) => {
-        change!($problem, $k, |$knot| $change; FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics)
-    };
-    ($problem:expr, $k:expr, |$knot:ident| $change:expr; $($class:ident),*) => {
-        $(if let Some($knot) = $crate::optimal::actions::inside::<condyle::optimal::robot::$class>($problem, $k) {
-            Some($change)
-        } else)* {
-            None
-        }
-    };
-}
-pub(super) use change;
-
-fn integrator(name: &str) -> PyResult<Integrator> {
+pub(super) fn integrator(name: &str) -> PyResult<Integrator> {
     match name {
         "semi_implicit_euler" => Ok(Integrator::SemiImplicitEuler),
         "runge_kutta_2" => Ok(Integrator::RungeKutta2),
@@ -144,8 +40,8 @@ fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult
     Ok((Some(matrix("actuation", map, [model.nv(), nu])?.to_matrix()), nu))
 }
 
-pub(super) fn terms(costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
-    costs.iter().map(|cost| cost.to_inner()).collect()
+pub(super) fn terms(model: &Arc<condyle::Model>, costs: &[PyRef<'_, Cost>]) -> Vec<robot::Cost> {
+    costs.iter().map(|cost| cost.of(model)).collect()
 }
 
 /// Costs, or limits, of single knots.
@@ -154,8 +50,21 @@ type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
 /// Limits of all knots, if there are any.
 type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
 
-fn limits(limits: Limits<'_>) -> Vec<robot::Limit> {
-    limits.into_iter().flatten().map(|limit| limit.to_inner()).collect()
+/// The residuals that are written in Python.
+fn kept_at(
+    py: Python<'_>,
+    costs: &[PyRef<'_, Cost>],
+    costs_at: &At<'_, Cost>,
+    limits: &Limits<'_>,
+    limits_at: &At<'_, Limit>,
+) -> Vec<Py<PyAny>> {
+    let costs = costs.iter().chain(costs_at.iter().flat_map(|at| at.values().flatten()));
+    let limits = limits.iter().flatten().chain(limits_at.iter().flat_map(|at| at.values().flatten()));
+    costs.filter_map(|cost| cost.own(py)).chain(limits.filter_map(|limit| limit.own(py))).collect()
+}
+
+fn limits(model: &Arc<condyle::Model>, limits: Limits<'_>) -> Vec<robot::Limit> {
+    limits.into_iter().flatten().map(|limit| limit.of(model)).collect()
 }
 
 /// Contacts with the names that residuals call them by.
@@ -168,15 +77,17 @@ fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Ve
 
 /// A knot as data.
 fn knot(
+    model: &Arc<condyle::Model>,
     dynamics: Dynamics,
     (costs, costs_at): (&[PyRef<'_, Cost>], At<'_, Cost>),
     (all, limits_at): (Limits<'_>, At<'_, Limit>),
     bounds: Option<[Vec<f64>; 2]>,
 ) -> Knot {
-    let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(&costs))).collect();
-    let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(Some(those)))).collect();
+    let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(model, &costs))).collect();
+    let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(model, Some(those)))).collect();
     let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
-    Knot { dynamics, costs: terms(costs), costs_at, limits: limits(all), limits_at, bounds }
+    let (costs, limits) = (terms(model, costs), limits(model, all));
+    Knot { dynamics, costs, costs_at, limits, limits_at, bounds }
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.
@@ -218,20 +129,41 @@ impl FreeDynamics {
         limits_at: At<'_, Limit>,
     ) -> PyResult<Self> {
         let Some(dt) = dt else {
-            let end = Knot { limits: self::limits(limits), ..Knot::new(Dynamics::End, terms(&costs)) };
-            return Ok(Self(RobotAction::new(model, |_| Ok(end))?));
+            let kept = kept_at(model.py(), &costs, &None, &limits, &None);
+            let end = |model: &_| {
+                Ok(Knot { limits: self::limits(model, limits), ..Knot::new(Dynamics::End, terms(model, &costs)) })
+            };
+            return Ok(Self(RobotAction::new(model, kept, end)?));
         };
         let integrator = self::integrator(integrator)?;
-        Ok(Self(RobotAction::new(model, |model| {
+        let kept = kept_at(model.py(), &costs, &costs_at, &limits, &limits_at);
+        Ok(Self(RobotAction::new(model, kept, |model| {
             let (actuation, nu) = self::actuation(model, actuation)?;
             let dynamics = Dynamics::Free { actuation, integrator, dt };
-            Ok(knot(dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
+            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
     /// The efforts that hold the robot still at the state x, nu numbers.
     fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x, robot::FreeDynamics::quasi_static)
+        self.0.hold(x)
+    }
+
+    fn __repr__(&self) -> String {
+        self.0.repr("FreeDynamics")
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.0.traverse(&visit)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        slf.get().0.reduce(slf)
+    }
+
+    #[staticmethod]
+    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_json(model, text)?))
     }
 }
 
@@ -276,16 +208,34 @@ impl ContactDynamics {
         limits_at: At<'_, Limit>,
     ) -> PyResult<Self> {
         let integrator = self::integrator(integrator)?;
-        Ok(Self(RobotAction::new(model, |model| {
+        let kept = kept_at(model.py(), &costs, &costs_at, &limits, &limits_at);
+        Ok(Self(RobotAction::new(model, kept, |model| {
             let ((actuation, nu), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);
             let dynamics = Dynamics::Contact { contacts, damping, actuation, integrator, dt };
-            Ok(knot(dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
+            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
         })?))
     }
 
     /// The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers.
     fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x, robot::ContactDynamics::quasi_static)
+        self.0.hold(x)
+    }
+
+    fn __repr__(&self) -> String {
+        self.0.repr("ContactDynamics")
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.0.traverse(&visit)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        slf.get().0.reduce(slf)
+    }
+
+    #[staticmethod]
+    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_json(model, text)?))
     }
 }
 
@@ -316,11 +266,34 @@ impl ImpulseDynamics {
         damping: f64,
         limits: Limits<'_>,
     ) -> PyResult<Self> {
-        Ok(Self(RobotAction::new(model, |model| {
+        let kept = kept_at(model.py(), &costs, &None, &limits, &None);
+        Ok(Self(RobotAction::new(model, kept, |model| {
             let contacts = self::contacts(model, contacts)?;
             let dynamics = Dynamics::Impulse { contacts, restitution, damping };
-            Ok(knot(dynamics, (&costs, None), (limits, None), None))
+            Ok(knot(model, dynamics, (&costs, None), (limits, None), None))
         })?))
+    }
+
+    /// No controls: an impact has none.
+    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        self.0.hold(x)
+    }
+
+    fn __repr__(&self) -> String {
+        self.0.repr("ImpulseDynamics")
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.0.traverse(&visit)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        slf.get().0.reduce(slf)
+    }
+
+    #[staticmethod]
+    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_json(model, text)?))
     }
 }
 
@@ -349,9 +322,32 @@ impl InverseDynamics {
         limits: Limits<'_>,
     ) -> PyResult<Self> {
         let integrator = self::integrator(integrator)?;
-        Ok(Self(RobotAction::new(model, |model| {
+        let kept = kept_at(model.py(), &costs, &None, &limits, &None);
+        Ok(Self(RobotAction::new(model, kept, |model| {
             let bounds = bounds(model.nv(), lower, upper)?;
-            Ok(knot(Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds))
+            Ok(knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds))
         })?))
+    }
+
+    /// The accelerations that hold the robot still: nv zeros.
+    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        self.0.hold(x)
+    }
+
+    fn __repr__(&self) -> String {
+        self.0.repr("InverseDynamics")
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.0.traverse(&visit)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        slf.get().0.reduce(slf)
+    }
+
+    #[staticmethod]
+    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_json(model, text)?))
     }
 }

@@ -2,8 +2,11 @@
 
 use super::residuals::Residual;
 use crate::arrays::numbers;
+use crate::exceptions::ProblemError;
 use condyle::optimal::robot;
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use std::sync::Arc;
 
 /// The cost a(r) of a residual r.
 ///
@@ -59,6 +62,17 @@ impl Activation {
     fn __repr__(&self) -> String {
         format!("{:?}", self.0)
     }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let text = serde_json::to_string(&slf.get().0).expect("is made of numbers and words");
+        Ok((slf.get_type().getattr("_from_json")?, (text,)))
+    }
+
+    #[staticmethod]
+    fn _from_json(text: &str) -> PyResult<Self> {
+        let wrong = |error| ProblemError::new_err(format!("no activation: {error}"));
+        serde_json::from_str(text).map(Self).map_err(wrong)
+    }
 }
 
 /// A term of a cost: weight times an activation of a residual.
@@ -76,14 +90,19 @@ impl Activation {
 pub(crate) struct Cost {
     name: String,
     weight: f64,
-    residual: Residual,
+    residual: Py<Residual>,
     activation: robot::Activation,
 }
 
 impl Cost {
-    /// The library's own term.
-    pub(super) fn to_inner(&self) -> robot::Cost {
-        robot::Cost::new(&self.name, self.weight, self.residual.inner.clone(), self.activation.clone())
+    /// The term for a robot.
+    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Cost {
+        robot::Cost::new(&self.name, self.weight, self.residual.get().of(model), self.activation.clone())
+    }
+
+    /// The residual, if it is written in Python.
+    pub(super) fn own(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        self.residual.get().is_own().then(|| self.residual.clone_ref(py).into_any())
     }
 }
 
@@ -97,17 +116,27 @@ impl Cost {
         residual: &Bound<'_, Residual>,
         activation: Option<&Bound<'_, Activation>>,
     ) -> Self {
-        let residual = residual.get().clone();
-        let activation = match (activation, residual.bounds()) {
+        let activation = match (activation, residual.get().bounds()) {
             (Some(activation), _) => activation.get().0.clone(),
             (None, Some((lower, upper))) => robot::Activation::Barrier { lower, upper },
             (None, None) => robot::Activation::Quadratic,
         };
-        Self { name, weight, residual, activation }
+        Self { name, weight, residual: residual.clone().unbind(), activation }
     }
 
     fn __repr__(&self) -> String {
         format!("<condyle.optimal.Cost '{}', weight {}>", self.name, self.weight)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, Self { name, weight, residual, activation }) = (slf.py(), slf.get());
+        let activation = Bound::new(py, Activation(activation.clone()))?;
+        let arguments = (name.clone(), *weight, residual.clone_ref(py), activation);
+        Ok((slf.get_type(), arguments).into_pyobject(py)?.into_any())
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.residual)
     }
 }
 
@@ -126,15 +155,20 @@ impl Cost {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Limit {
     name: String,
-    residual: Residual,
+    residual: Py<Residual>,
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
 
 impl Limit {
-    /// The library's own limit.
-    pub(super) fn to_inner(&self) -> robot::Limit {
-        robot::Limit::new(&self.name, self.residual.inner.clone(), self.lower.clone(), self.upper.clone())
+    /// The limit for a robot.
+    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Limit {
+        robot::Limit::new(&self.name, self.residual.get().of(model), self.lower.clone(), self.upper.clone())
+    }
+
+    /// The residual, if it is written in Python.
+    pub(super) fn own(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        self.residual.get().is_own().then(|| self.residual.clone_ref(py).into_any())
     }
 }
 
@@ -148,19 +182,28 @@ impl Limit {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let residual = residual.get().clone();
         let lower = lower.map(|lower| numbers("lower", lower)).transpose()?;
         let upper = upper.map(|upper| numbers("upper", upper)).transpose()?;
         let (lower, upper) = match (lower, upper) {
             (Some(lower), Some(upper)) => (lower, upper),
             (Some(lower), None) => (lower.clone(), vec![f64::INFINITY; lower.len()]),
             (None, Some(upper)) => (vec![f64::NEG_INFINITY; upper.len()], upper),
-            (None, None) => residual.bounds().unwrap_or_default(), // without any: r = 0
+            (None, None) => residual.get().bounds().unwrap_or_default(), // without any: r = 0
         };
-        Ok(Self { name, residual, lower, upper })
+        Ok(Self { name, residual: residual.clone().unbind(), lower, upper })
     }
 
     fn __repr__(&self) -> String {
         format!("<condyle.optimal.Limit '{}'>", self.name)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, Self { name, residual, lower, upper }) = (slf.py(), slf.get());
+        let (lower, upper) = (!lower.is_empty()).then(|| (lower.clone(), upper.clone())).unzip(); // else r = 0
+        Ok((slf.get_type(), (name.clone(), residual.clone_ref(py), lower, upper)).into_pyobject(py)?.into_any())
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.residual)
     }
 }

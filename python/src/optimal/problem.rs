@@ -1,18 +1,23 @@
 //! Problems, made of actions of any kind.
 
-use super::actions::{
-    Boxed, ContactDynamics, Described, FreeDynamics, ImpulseDynamics, InverseDynamics, change, terms,
-};
+use super::actions::terms;
 use super::costs::Cost;
-use super::own::{Action, ConstrainedAction, Fault, Lqr};
+use super::evaluation::{by_knot, controls, evaluate, gaps};
+use super::models::{boxed, residuals};
+use super::own::{Fault, faults};
+use super::robot_action::{Boxed, Described, change};
+use super::sweep::give;
 use crate::arrays::{matrix, numbers, output, vector};
 use crate::exceptions::{ProblemError, problem_error};
+use crate::model::Model;
 use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
-use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyRuntimeError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use pyo3::types::PyList;
 use rust::Observer;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The value behind a lock; an error if another call holds it.
@@ -20,58 +25,13 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
     value.try_lock().map_err(|_| PyRuntimeError::new_err(format!("{name}: in use by another call")))
 }
 
-/// The number of controls of a knot, if all knots have the same.
-pub(super) fn common_nu(problem: &rust::Problem) -> Option<usize> {
-    let nu = problem.nu(0);
-    (0..problem.horizon()).all(|t| problem.nu(t) == nu).then_some(nu)
-}
-
-/// The controls of all knots, one after the other, from an array (N, nu) or a list of arrays.
-pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    if let Some(nu) = common_nu(problem) {
-        return Ok(matrix("us", us, [problem.horizon(), nu])?.to_vec());
-    }
-    let (found, expected) = (us.len()?, problem.horizon());
-    if found != expected {
-        return Err(PyValueError::new_err(format!("us: expected {expected} arrays, found {found}")));
-    }
-    let mut flat = Vec::new();
-    for t in 0..expected {
-        flat.extend_from_slice(&vector(&format!("us[{t}]"), &us.get_item(t)?, problem.nu(t))?);
-    }
-    Ok(flat)
-}
-
-/// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `fault`.
-fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> PyResult<Boxed> {
-    macro_rules! of_a_robot {
-        ($($class:ident),*) => {$(
-            if let Ok(action) = model.cast::<$class>() {
-                return Ok(action.get().0.boxed());
-            }
-        )*};
-    }
-    of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics);
-    let action: Box<dyn rust::ActionModel> = if let Ok(lqr) = model.cast::<Lqr>() {
-        Box::new(lqr.get().0.clone())
-    } else if let Ok(constrained) = model.cast::<ConstrainedAction>() {
-        let constrained = constrained.get();
-        constrained.boxed(boxed(constrained.action.bind(model.py()), terminal, fault)?.action, fault)
-    } else if let Ok(action) = model.cast::<Action>() {
-        action.get().boxed(terminal, fault)
-    } else {
-        let found = model.get_type().name()?;
-        return Err(PyTypeError::new_err(format!("models: expected an action, found '{found}'")));
-    };
-    Ok(Boxed { action, described: None })
-}
-
 /// An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 ///
 /// x0: the initial state, nx numbers.
-/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Lqr`, `Action`,
-///     `ConstrainedAction`.
-/// stages: for each knot the index of its model; consecutive knots of one model are computed as a group.
+/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Action`,
+///     `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+/// stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
+///     model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
 /// terminal: the model of the end, without controls.
 ///
 /// Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
@@ -81,11 +41,18 @@ fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> PyResult<Bo
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
     /// The models, the terminal one last, as data where they are a robot's.
-    described: Mutex<Vec<Option<Described>>>,
-    /// The actions that are written in Python: the problem's copies of them compute with their functions.
-    written: Vec<Py<PyAny>>,
-    /// Their first error.
+    described: Mutex<Vec<Option<Arc<Described>>>>,
+    /// The models, the terminal one last, as they were given where they are no robot's: the problem's copies of them compute
+    /// with their functions.
+    objects: Vec<Option<Py<PyAny>>>,
+    /// The residuals of robots that are written in Python, likewise.
+    written: Mutex<Vec<Py<PyAny>>>,
+    /// The first error of the actions.
     fault: Fault,
+    /// Those of the residuals.
+    faults: Mutex<Vec<Fault>>,
+    /// How often the horizon has moved on.
+    moved: AtomicUsize,
 }
 
 #[pymethods]
@@ -94,20 +61,26 @@ impl Problem {
     fn new(
         x0: &Bound<'_, PyAny>,
         models: Vec<Bound<'_, PyAny>>,
-        stages: Vec<usize>,
+        stages: Option<Vec<usize>>,
         terminal: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
+        let stages = stages.unwrap_or_else(|| (0..models.len()).collect());
         let fault = Fault::default();
         let ends = models.iter().map(|model| (model, false)).chain([(terminal, true)]);
         let all = ends.map(|(model, end)| boxed(model, end, &fault)).collect::<PyResult<Vec<_>>>()?;
-        let is_written =
-            |model: &&Bound<'_, PyAny>| model.cast::<Action>().is_ok() || model.cast::<ConstrainedAction>().is_ok();
-        let written = models.iter().chain([terminal]).filter(is_written).map(|model| model.clone().unbind());
-        Self::make(numbers("x0", x0)?, all, stages, written.collect(), fault)
+        let each = models.iter().chain([terminal]);
+        let objects = each.clone().zip(&all).map(|(model, boxed)| match boxed.described {
+            None => Some(model.clone().unbind()),
+            Some(_) => None,
+        });
+        let (objects, written) = (objects.collect(), each.flat_map(residuals).collect());
+        Self::make(numbers("x0", x0)?, all, stages, (objects, written), fault)
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.written.iter().try_for_each(|action| visit.call(action))
+        self.objects.iter().try_for_each(|object| visit.call(object))?;
+        let written = self.written.try_lock(); // nothing runs Python while it is held
+        written.map_or(Ok(()), |written| written.iter().try_for_each(|action| visit.call(action)))
     }
 
     /// A problem of a robot from the text that `to_json` gave.
@@ -119,12 +92,10 @@ impl Problem {
         let data: rust::robot::RobotProblem =
             serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("no problem: {error}")))?;
         let robot = Arc::new(data.model);
-        if data.knots.iter().any(|knot| knot.dynamics == rust::robot::Dynamics::End) {
-            return Err(problem_error(rust::Error::TimeStep { dt: 0.0 }));
-        }
         let knots = data.knots.into_iter().chain([data.terminal]);
         let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
-        Self::make(data.x0, all, data.stages, Vec::new(), Fault::default())
+        let objects = all.iter().map(|_| None).collect();
+        Self::make(data.x0, all, data.stages, (objects, vec![]), Fault::default())
     }
 
     /// The problem and its robot as JSON, with the present initial state, weights and stages. An infinite bound is
@@ -140,33 +111,70 @@ impl Problem {
             let name = if k < models { format!("models[{k}]") } else { "terminal".to_owned() };
             ProblemError::new_err(format!("{name}: {what}"))
         };
+        let bytes = |robot: &condyle::Model| {
+            postcard::to_allocvec(robot).map_err(|error| ProblemError::new_err(error.to_string()))
+        };
         let mut knots = Vec::new();
-        let mut first: Option<(&Arc<condyle::Model>, Vec<u8>)> = None;
+        let mut first: Option<&Arc<condyle::Model>> = None;
         for (k, described) in described.iter().enumerate() {
-            let Some(Described { robot, knot }) = described else {
+            let Some(Described { robot, knot }) = described.as_deref() else {
                 return Err(wrong(k, "expected an action of a robot, which alone can be JSON"));
             };
-            let bytes = postcard::to_allocvec(&**robot).map_err(|error| ProblemError::new_err(error.to_string()))?;
-            match &first {
-                None => first = Some((robot, bytes)),
-                Some((_, other)) if *other == bytes => {}
-                Some(_) => return Err(wrong(k, "expected the robot of the first model, found another one")),
-            }
-            if k < models && knot.dynamics == rust::robot::Dynamics::End {
-                return Err(wrong(k, "expected a knot with a duration"));
+            let other = first.get_or_insert(robot);
+            if !Arc::ptr_eq(other, robot) && bytes(other)? != bytes(robot)? {
+                return Err(wrong(k, "expected the robot of the first model, found another one"));
             }
             knots.push(knot.clone());
         }
         let terminal = knots.pop().expect("the terminal one is there");
-        let (model, _) = first.expect("the terminal one is there");
+        let model = first.expect("the terminal one is there");
         let (x0, stages) = (problem.x0().to_vec(), problem.stages().to_vec());
         let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, stages, terminal };
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 
-    /// The parts of a pickle, by way of JSON.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        Ok((slf.get_type().getattr("from_json")?, (slf.get().to_json()?,)))
+    /// The parts of a pickle: the knots of robots by way of JSON, others as they were given.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), slf.get());
+        let described = lock("problem", &this.described)?;
+        let mut robots: Vec<(&Arc<condyle::Model>, Bound<'py, Model>)> = Vec::new();
+        let mut parts = Vec::new();
+        for (object, described) in this.objects.iter().zip(&*described) {
+            let Some(Described { robot, knot }) = described.as_deref() else {
+                parts.push(object.as_ref().map_or_else(|| py.None(), |object| object.clone_ref(py)));
+                continue;
+            };
+            if !robots.iter().any(|(known, _)| Arc::ptr_eq(known, robot)) {
+                robots.push((robot, Bound::new(py, Model::from((**robot).clone()))?));
+            }
+            let model = robots.iter().find(|(known, _)| Arc::ptr_eq(known, robot)).map(|(_, model)| model.clone());
+            let text = serde_json::to_string(knot).map_err(|error| ProblemError::new_err(error.to_string()))?;
+            parts.push((model, text).into_pyobject(py)?.into_any().unbind());
+        }
+        let problem = lock("problem", &this.inner)?;
+        let arguments = (problem.x0().to_vec(), parts, problem.stages().to_vec());
+        Ok((slf.get_type().getattr("_from_parts")?, arguments).into_pyobject(py)?.into_any())
+    }
+
+    #[staticmethod]
+    fn _from_parts(x0: Vec<f64>, parts: Vec<Bound<'_, PyAny>>, stages: Vec<usize>) -> PyResult<Self> {
+        let (fault, last) = (Fault::default(), parts.len().saturating_sub(1));
+        let (mut all, mut objects) = (Vec::new(), Vec::new());
+        for (k, part) in parts.iter().enumerate() {
+            if let Ok((model, text)) = part.extract::<(Bound<'_, Model>, String)>() {
+                let wrong = |error| ProblemError::new_err(format!("no knot: {error}"));
+                let knot = serde_json::from_str(&text).map_err(wrong)?;
+                all.push(Described { robot: model.get().inner.clone(), knot }.boxed()?);
+                objects.push(None);
+            } else {
+                all.push(boxed(part, k == last, &fault)?);
+                objects.push(Some(part.clone().unbind()));
+            }
+        }
+        if all.is_empty() {
+            return Err(ProblemError::new_err("parts: expected at least a terminal model"));
+        }
+        Self::make(x0, all, stages, (objects, vec![]), fault)
     }
 
     /// The number of knots before the terminal one, N.
@@ -195,7 +203,7 @@ impl Problem {
             let set = change!(&mut problem, k, |knot| knot.set_weight(name, weight)).unwrap_or(Ok(false));
             found |= set.map_err(problem_error)?;
         }
-        described.iter_mut().flatten().for_each(|described| described.set_weight(name, weight));
+        described.iter_mut().flatten().for_each(|described| Arc::make_mut(described).set_weight(name, weight));
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
     }
 
@@ -205,7 +213,7 @@ impl Problem {
     /// costs: a list of `Cost`.
     ///
     /// Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
-    fn set_costs(&self, knot: usize, costs: Vec<PyRef<'_, Cost>>) -> PyResult<()> {
+    fn set_costs(&self, py: Python<'_>, knot: usize, costs: Vec<PyRef<'_, Cost>>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let horizon = problem.horizon();
         if knot > horizon {
@@ -215,15 +223,102 @@ impl Problem {
         let mut described = lock("problem", &self.described)?;
         let last = described.len() - 1;
         let described = &mut described[k.unwrap_or(last)];
-        let costs = terms(&costs);
+        let Some(model) = described.as_ref().map(|described| described.robot.clone()) else {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
+        };
+        let own: Vec<_> = costs.iter().filter_map(|cost| cost.own(py)).collect();
+        let costs = terms(&model, &costs);
         let Some(set) = change!(&mut problem, k, |action| action.set_costs(knot, costs.clone())) else {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
         };
         set.map_err(problem_error)?;
         if let Some(described) = described {
+            let described = Arc::make_mut(described);
             described.knot.costs_at.insert(knot, costs);
+            lock("problem", &self.faults)?.extend(faults(&described.knot));
         }
+        lock("problem", &self.written)?.extend(own);
         Ok(())
+    }
+
+    /// The controls of all knots that hold their states still, each by itself, as far as they can: (N, nu), or a list of N
+    /// arrays where knots differ in nu. A robot's come from statics, others from steps of Newton.
+    ///
+    /// xs: states, (N + 1, nx).
+    fn quasi_static<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let mut problem = lock("problem", &self.inner)?;
+        let xs = matrix("xs", xs, [problem.horizon() + 1, problem.nx()])?;
+        let us = problem.quasi_static(&xs).map_err(problem_error)?;
+        self.raise()?;
+        by_knot(py, &problem, &[], |t, out| out.copy_from_slice(&us[problem.control_range(t)]))
+    }
+
+    /// The cost of states and controls, and what the dynamics compute there, as an `Evaluation`.
+    ///
+    /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
+    /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        xs: &Bound<'_, PyAny>,
+        us: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut problem = lock("problem", &self.inner)?;
+        let xs = matrix("xs", xs, [problem.horizon() + 1, problem.nx()])?;
+        let us = controls(&problem, us)?;
+        let evaluation = evaluate(py, &mut problem, &xs, &us)?;
+        self.raise()?;
+        Ok(evaluation)
+    }
+
+    /// The evaluation of a solution, unless the horizon has moved on since.
+    fn _evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        xs: &Bound<'_, PyAny>,
+        us: &Bound<'_, PyAny>,
+        moved: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if moved != self.moved() {
+            let what =
+                "the horizon has moved on since this solution: ask for its forces, accelerations and efforts before";
+            return Err(ProblemError::new_err(what));
+        }
+        self.evaluate(py, xs, us)
+    }
+
+    /// The linear-quadratic problem around states and controls, a list of N + 1 `LqNode`s, which a `Sweep` solves.
+    ///
+    /// xs, us: as of `evaluate`.
+    fn derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        xs: &Bound<'_, PyAny>,
+        us: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyList>> {
+        let mut problem = lock("problem", &self.inner)?;
+        let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
+        let xs = matrix("xs", xs, [horizon + 1, nx])?;
+        let us = controls(&problem, us)?;
+        let (mut nodes, mut next, mut costs) = (problem.nodes(), vec![0.0; horizon * nx], vec![0.0; horizon + 1]);
+        problem.calc(&xs, &us, &mut next, &mut costs);
+        problem.calc_diff(&xs, &us, &mut nodes);
+        self.raise()?;
+        // the gap of a knot stands where its next state does
+        for (node, gap) in nodes.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
+            node.f.copy_from_slice(gap);
+        }
+        give(py, &nodes)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let problem = lock("problem", &self.inner)?;
+        let described = lock("problem", &self.described)?;
+        let (nx, ndx, models) = (problem.nx(), problem.ndx(), described.len() - 1);
+        let robot = described.iter().flatten().next().map(|described| format!(" of '{}'", described.robot.name()));
+        let robot = robot.unwrap_or_default();
+        let (horizon, plural) = (problem.horizon(), if models == 1 { "" } else { "s" });
+        Ok(format!("<condyle.optimal.Problem{robot}: {horizon} knots, {models} model{plural}, nx {nx}, ndx {ndx}>"))
     }
 
     /// The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
@@ -235,7 +330,8 @@ impl Problem {
         let mut problem = lock("problem", &self.inner)?;
         let us = controls(&problem, us)?;
         let failed = || self.has_failed();
-        let mut interruptions = Interruptions { signals: Signals::new(signals::SHORT), failed: &failed };
+        let signals = Signals::new(signals::SHORT);
+        let mut interruptions = Interruptions { signals, failed: &failed, observer: None, raised: None };
         let inner = &mut *problem;
         let xs = py.detach(|| inner.rollout_while(&us, || Observer::go_on(&mut &mut interruptions)));
         let raised = self.raise();
@@ -252,30 +348,52 @@ impl Problem {
         x0: Vec<f64>,
         all: Vec<Boxed>,
         stages: Vec<usize>,
-        written: Vec<Py<PyAny>>,
+        (objects, written): (Vec<Option<Py<PyAny>>>, Vec<Py<PyAny>>),
         fault: Fault,
     ) -> PyResult<Self> {
         let (mut actions, described): (Vec<_>, _) = all.into_iter().map(|b| (b.action, b.described)).unzip();
         let end = actions.pop().expect("the terminal one is there");
         let problem = rust::Problem::new(x0, actions, stages, end).map_err(problem_error)?;
-        Ok(Self { inner: Mutex::new(problem), described: Mutex::new(described), written, fault })
+        let described: Vec<Option<Arc<Described>>> = described;
+        let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
+        let (inner, described) = (Mutex::new(problem), Mutex::new(described));
+        let (written, faults) = (Mutex::new(written), Mutex::new(faults));
+        Ok(Self { inner, described, objects, written, fault, faults, moved: AtomicUsize::new(0) })
     }
 
     /// Moves the data of the models on by a knot.
     pub(super) fn describe_shift(&self) -> PyResult<()> {
         let mut described = lock("problem", &self.described)?;
         let models = described.len() - 1;
-        described[..models].iter_mut().flatten().for_each(Described::shift);
+        let all = described[..models].iter_mut().flatten().filter(|described| described.moves());
+        all.for_each(|described| Arc::make_mut(described).shift());
+        self.moved.fetch_add(1, Ordering::Relaxed);
         Ok(())
     }
 
-    /// Raises the error of an action that is written in Python, if there is one.
+    /// How often the horizon has moved on.
+    pub(super) fn moved(&self) -> usize {
+        self.moved.load(Ordering::Relaxed)
+    }
+
+    /// Calls a function with each place of an error.
+    fn each_fault<T>(&self, mut f: impl FnMut(&mut Option<PyErr>) -> Option<T>) -> Option<T> {
+        let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found = None;
+        for fault in std::iter::once(&self.fault).chain(&*faults) {
+            let this = f(&mut fault.lock().unwrap_or_else(PoisonError::into_inner));
+            found = found.or(this);
+        }
+        found
+    }
+
+    /// Raises the error of what is written in Python, if there is one.
     pub(super) fn raise(&self) -> PyResult<()> {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+        self.each_fault(Option::take).map_or(Ok(()), Err)
     }
 
     /// Whether there is such an error.
     pub(super) fn has_failed(&self) -> bool {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+        self.each_fault(|error| error.is_some().then_some(())).is_some()
     }
 }

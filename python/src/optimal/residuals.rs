@@ -1,12 +1,16 @@
 //! Residuals, and the cones that some of them look at.
 
+use super::own::{Fault, Functions, MOST_SIZE, OwnFunction, Space, Way};
 use crate::arrays::{Give, array, numbers, pose, rotation, three};
-use crate::exceptions::{problem_error, within};
+use crate::exceptions::{ProblemError, problem_error, within};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
 use condyle::{Force, Mat3, Motion};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 ///
@@ -20,13 +24,19 @@ use pyo3::prelude::*;
 /// <condyle.optimal.Residual {"center_of_mass":{"target":{"x":0.4,"y":0.2,"z":0.5}}}>
 #[pyclass(frozen, eq, module = "condyle.optimal")]
 #[derive(Clone, PartialEq)]
-pub(crate) struct Residual {
-    pub(super) inner: robot::Residual,
+pub(crate) struct Residual(Kind);
+
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
+enum Kind {
+    Given(robot::Residual),
+    /// A function, written in Python, with the number of its entries.
+    #[serde(skip)]
+    Own(usize, Functions),
 }
 
 impl From<robot::Residual> for Residual {
     fn from(inner: robot::Residual) -> Self {
-        Self { inner }
+        Self(Kind::Given(inner))
     }
 }
 
@@ -157,17 +167,89 @@ impl Residual {
         Self::from(robot::Residual::ImpulseCenterOfMass)
     }
 
+    /// A residual that is written in Python, r(t, x, u) of a knot t, size numbers.
+    ///
+    /// size: the number of entries, at most 4096.
+    /// calc: a function of (t, x, u) that returns them; x = (q, v), and at the end u is empty.
+    /// calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the tangent
+    ///     space of the state. Without it, those of calc, as for `Action`.
+    ///
+    /// >>> from condyle.optimal import Residual
+    /// >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
+    #[staticmethod]
+    #[pyo3(signature = (size, calc, calc_diff=None))]
+    fn own(size: usize, calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> PyResult<Self> {
+        Ok(Self(Kind::Own(within("size", size, 0, MOST_SIZE)?, Functions::new(calc, calc_diff))))
+    }
+
     /// The residual as the JSON of a problem has it.
     fn __repr__(&self) -> String {
-        let json = serde_json::to_string(&self.inner).expect("is made of numbers and words");
-        format!("<condyle.optimal.Residual {json}>")
+        match &self.0 {
+            Kind::Given(inner) => {
+                let json = serde_json::to_string(inner).expect("is made of numbers and words");
+                format!("<condyle.optimal.Residual {json}>")
+            }
+            Kind::Own(size, _) => format!("<condyle.optimal.Residual of one's own, {size} numbers>"),
+        }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, class) = (slf.py(), slf.get_type());
+        let make = |name: &str| class.getattr(name);
+        Ok(match &slf.get().0 {
+            Kind::Own(size, functions) => {
+                let [calc, calc_diff] = functions.clones(py);
+                (make("own")?, (*size, calc, calc_diff)).into_pyobject(py)?.into_any()
+            }
+            given => {
+                let text = serde_json::to_string(given).expect("is made of numbers and words");
+                (make("_from_json")?, (text,)).into_pyobject(py)?.into_any()
+            }
+        })
+    }
+
+    #[staticmethod]
+    fn _from_json(text: &str) -> PyResult<Self> {
+        let wrong = |error| ProblemError::new_err(format!("no residual: {error}"));
+        serde_json::from_str(text).map(Self).map_err(wrong)
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        match &self.0 {
+            Kind::Own(_, functions) => functions.traverse(&visit),
+            Kind::Given(_) => Ok(()),
+        }
+    }
+
+    fn __clear__(&self) {
+        if let Kind::Own(_, functions) = &self.0 {
+            functions.clear();
+        }
     }
 }
 
 impl Residual {
+    /// The residual for a robot.
+    pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Residual {
+        match &self.0 {
+            Kind::Given(inner) => inner.clone(),
+            Kind::Own(size, functions) => {
+                let (space, functions) = (Space::Robot(model.clone()), functions.clone());
+                let own = OwnFunction { size: *size, functions, space, way: Way::default(), fault: Fault::default() };
+                robot::Residual::Own(robot::OwnResidual::new(own))
+            }
+        }
+    }
+
+    /// Whether it is written in Python.
+    pub(super) fn is_own(&self) -> bool {
+        matches!(self.0, Kind::Own(..))
+    }
+
     /// The bounds that a residual has of its own: those of a cone, or of a centre of pressure.
     pub(super) fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
-        match &self.inner {
+        let Kind::Given(inner) = &self.0 else { return None };
+        match inner {
             robot::Residual::FrictionCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::WrenchCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::CenterOfPressure { .. } => Some((vec![f64::NEG_INFINITY; 4], vec![0.0; 4])),

@@ -1,14 +1,15 @@
 //! The solvers, and what they give back.
 
-use super::problem::{Problem, common_nu, controls, lock};
-use crate::arrays::{Array, Give, class, matrix, output};
+use super::evaluation::{controls, solution as give};
+use super::problem::{Problem, lock};
+use crate::arrays::{Give, class, matrix};
 use crate::exceptions::{problem_error, wrong_word};
 use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyTuple};
+use pyo3::types::PyDict;
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -50,12 +51,35 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     Ok(())
 }
 
+/// Who looks at the iterations of a solve.
+struct Observer<'py> {
+    callback: Option<Bound<'py, PyAny>>,
+    verbose: bool,
+    progress: bool,
+}
+
+impl Observer<'_> {
+    /// A function of each iteration, if there is anybody to look at them.
+    fn start(&self, py: Python<'_>) -> PyResult<Option<Py<PyAny>>> {
+        let Self { callback, verbose, progress } = self;
+        match (callback, verbose | progress) {
+            (None, false) => Ok(None),
+            (Some(callback), false) => Ok(Some(callback.clone().unbind())),
+            _ => {
+                let reporter = py.import("condyle._report")?.getattr("Reporter")?;
+                Ok(Some(reporter.call1((callback, *verbose, *progress))?.unbind()))
+            }
+        }
+    }
+}
+
 /// A solve, from a warm start (xs, us) if one is given. Other threads run meanwhile.
 fn run<'py, S: Send>(
     py: Python<'py>,
     problem: &Py<Problem>,
     solver: &Mutex<S>,
     warm_start: Option<[&Bound<'_, PyAny>; 2]>,
+    observer: Observer<'py>,
     solve: impl for<'a> FnOnce(
         &'a mut S,
         &mut rust::Problem,
@@ -71,14 +95,20 @@ fn run<'py, S: Send>(
         x = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
         u = controls(&inner, us)?;
     }
-    let (inner, solver) = (&mut *inner, &mut *solver);
+    let (inner, solver, closes) = (&mut *inner, &mut *solver, observer.verbose || observer.progress);
     let failed = || problem.get().has_failed();
-    let mut interruptions = Interruptions { signals: Signals::new(signals::LONG), failed: &failed };
+    let signals = Signals::new(signals::LONG);
+    let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
     let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions));
     let raised = problem.get().raise(); // and forgotten, whatever else there is to be raised
-    interruptions.signals.finish()?;
+    let Interruptions { signals, observer, raised: by_observer, .. } = interruptions;
+    if let Some(observer) = observer.filter(|_| closes) {
+        observer.call_method0(py, "close")?;
+    }
+    signals.finish()?;
     raised?;
-    give(py, inner, result.map_err(problem_error)?)
+    by_observer.map_or(Ok(()), Err)?;
+    give(py, problem, inner, result.map_err(problem_error)?)
 }
 
 /// A solver: the methods that both kinds have, beside those that make and show it.
@@ -89,6 +119,9 @@ macro_rules! solver {
         pub(crate) struct $class {
             problem: Py<Problem>,
             solver: Mutex<rust::$class>,
+            /// The settings that were given, also those of the inner solver.
+            settings: Py<PyDict>,
+            inner: Option<Py<PyDict>>,
         }
 
         #[pymethods]
@@ -103,24 +136,43 @@ macro_rules! solver {
             ///
             /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
             /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+            /// callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
+            ///     ("interrupted"). What it raises is raised here.
+            /// verbose: whether to print a line for each iteration.
+            /// progress: whether to show the progress, by tqdm where that is installed, else as lines.
             ///
             /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+            #[pyo3(signature = (xs, us, callback=None, verbose=false, progress=false))]
             fn solve<'py>(
                 &self,
                 py: Python<'py>,
-                xs: &Bound<'_, PyAny>,
-                us: &Bound<'_, PyAny>,
+                xs: &Bound<'py, PyAny>,
+                us: &Bound<'py, PyAny>,
+                callback: Option<Bound<'py, PyAny>>,
+                verbose: bool,
+                progress: bool,
             ) -> PyResult<Bound<'py, PyAny>> {
-                run(py, &self.problem, &self.solver, Some([xs, us]), |solver, problem, [xs, us], interruptions| {
+                let observer = Observer { callback, verbose, progress };
+                run(py, &self.problem, &self.solver, Some([xs, us]), observer, |solver, problem, [xs, us], interruptions| {
                     solver.solve_with(problem, xs, us, interruptions)
                 })
             }
 
             /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
             ///
-            /// Raises `ProblemError` as `solve`.
-            fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-                run(py, &self.problem, &self.solver, None, |solver, problem, _, interruptions| {
+            /// callback, verbose, progress: as of `solve`.
+            ///
+            /// Raises `ProblemError` as `solve`, and if there is no solution yet.
+            #[pyo3(signature = (callback=None, verbose=false, progress=false))]
+            fn resume<'py>(
+                &self,
+                py: Python<'py>,
+                callback: Option<Bound<'py, PyAny>>,
+                verbose: bool,
+                progress: bool,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                let observer = Observer { callback, verbose, progress };
+                run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| {
                     solver.resume_with(problem, interruptions)
                 })
             }
@@ -132,11 +184,41 @@ macro_rules! solver {
                 let problem = lock("problem", &self.problem.get().inner)?;
                 let solver = lock("solver", &self.solver)?;
                 let solution = solver.solution();
-                (!solution.timings.total.is_zero()).then(|| give(py, &problem, solution)).transpose()
+                (!solution.timings.total.is_zero()).then(|| give(py, &self.problem, &problem, solution)).transpose()
+            }
+
+            fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+                let mut text = format!("<condyle.optimal.{} of {}", stringify!($class), self.problem.bind(py).repr()?);
+                for (name, value) in self.settings.bind(py).iter() {
+                    text += &format!(", {name} {}", value.repr()?);
+                }
+                if let Some(inner) = &self.inner {
+                    text += &format!(", inner {}", inner.bind(py).repr()?);
+                }
+                Ok(text + ">")
+            }
+
+            /// The parts of a pickle: the problem and the settings, without a solution.
+            fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+                let (py, Self { problem, settings, inner, .. }) = (slf.py(), slf.get());
+                let inner = inner.as_ref().map(|inner| inner.clone_ref(py));
+                let arguments = (problem.clone_ref(py), inner, settings.clone_ref(py));
+                Ok((slf.get_type().getattr("_make")?, arguments).into_pyobject(py)?.into_any())
+            }
+
+            #[staticmethod]
+            fn _make(
+                problem: Bound<'_, Problem>,
+                inner: Option<&Bound<'_, PyDict>>,
+                settings: &Bound<'_, PyDict>,
+            ) -> PyResult<Self> {
+                Self::with(problem, inner, Some(settings))
             }
 
             fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-                visit.call(&self.problem)
+                visit.call(&self.problem)?;
+                visit.call(&self.settings)?;
+                visit.call(&self.inner)
             }
 
             /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
@@ -185,12 +267,29 @@ Fddp {
     #[new]
     #[pyo3(signature = (problem, **settings))]
     fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        Self::with(problem, None, settings)
+    }
+}
+}
+
+/// A copy of settings that were given.
+fn kept(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyDict>> {
+    Ok(settings.map_or_else(|| Ok(PyDict::new(py)), |settings| settings.copy())?.unbind())
+}
+
+impl Fddp {
+    fn with(
+        problem: Bound<'_, Problem>,
+        _inner: Option<&Bound<'_, PyDict>>,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let py = problem.py();
         let mut solver = rust::Fddp::new(&*lock("problem", &problem.get().inner)?);
         set(&mut solver.settings, settings)?;
         solver.settings.check().map_err(problem_error)?;
-        Ok(Self { problem: problem.unbind(), solver: Mutex::new(solver) })
+        let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);
+        Ok(Self { problem, solver, settings, inner: None })
     }
-}
 }
 
 solver! {
@@ -235,13 +334,7 @@ AugmentedLagrangian {
         inner: Option<&Bound<'_, PyDict>>,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let mut solver = rust::AugmentedLagrangian::new(&*lock("problem", &problem.get().inner)?);
-        set(&mut solver.inner, inner)?;
-        solver.inner.check().map_err(problem_error)?;
-        set!(solver.settings, settings, {
-            max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor
-        });
-        Ok(Self { problem: problem.unbind(), solver: Mutex::new(solver) })
+        Self::with(problem, inner, settings)
     }
 
     /// The state of the limits after the last solve, an `Outcome`.
@@ -255,67 +348,21 @@ AugmentedLagrangian {
 }
 }
 
-/// An array for all knots if they have the same number of controls, otherwise a list of arrays; `numbers` writes those
-/// of one knot.
-fn by_knot<'py>(
-    py: Python<'py>,
-    problem: &rust::Problem,
-    inner: &[usize],
-    numbers: impl Fn(usize, &mut [f64]),
-) -> PyResult<Bound<'py, PyAny>> {
-    let horizon = problem.horizon();
-    let shape = |nu: usize| [&[nu], inner].concat();
-    if let Some(nu) = common_nu(problem) {
-        let each = nu * inner.iter().product::<usize>();
-        return output(py, None, &[&[horizon], &shape(nu)[..]].concat(), |out| {
-            (0..horizon).for_each(|t| numbers(t, &mut out[t * each..(t + 1) * each]));
+impl AugmentedLagrangian {
+    fn with(
+        problem: Bound<'_, Problem>,
+        inner: Option<&Bound<'_, PyDict>>,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let py = problem.py();
+        let mut solver = rust::AugmentedLagrangian::new(&*lock("problem", &problem.get().inner)?);
+        set(&mut solver.inner, inner)?;
+        solver.inner.check().map_err(problem_error)?;
+        set!(solver.settings, settings, {
+            max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor
         });
+        let inner = inner.map(|inner| kept(py, Some(inner))).transpose()?;
+        let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);
+        Ok(Self { problem, solver, settings, inner })
     }
-    let arrays = (0..horizon).map(|t| output(py, None, &shape(problem.nu(t)), |out| numbers(t, out)));
-    Ok(PyList::new(py, arrays.collect::<PyResult<Vec<_>>>()?)?.into_any())
-}
-
-/// A solution as Python sees it.
-fn give<'py>(py: Python<'py>, problem: &rust::Problem, s: &rust::Solution) -> PyResult<Bound<'py, PyAny>> {
-    let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
-    let iteration = class!(py, "Iteration")?;
-    let record = |i: &rust::Iteration| {
-        iteration.call1((
-            i.iteration,
-            i.cost,
-            i.gap,
-            i.stop,
-            i.step,
-            i.regularisation,
-            i.d1,
-            i.d2,
-            i.feasible,
-            i.accepted,
-        ))
-    };
-    let trace = s.trace.iter().map(record).collect::<PyResult<Vec<_>>>()?;
-    let status = match s.status {
-        rust::Status::Converged => "converged",
-        rust::Status::MaxIterations => "max_iterations",
-        rust::Status::TimeLimit => "time_limit",
-        rust::Status::RegularisationLimit => "regularisation_limit",
-        rust::Status::Interrupted => "interrupted",
-        rust::Status::Infeasible => "infeasible",
-        _ => "not_finite",
-    };
-    let t = &s.timings;
-    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
-    let timings = class!(py, "Timings")?.call1(PyTuple::new(py, timings)?)?;
-    class!(py, "Solution")?.call1((
-        output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
-        by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.u(t)))?,
-        by_knot(py, problem, &[ndx], |t, out| s.K[t].write(out))?,
-        by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.k[t].as_slice()))?,
-        s.cost,
-        s.gap,
-        s.feasible,
-        status,
-        trace,
-        timings,
-    ))
 }

@@ -276,6 +276,30 @@ impl<'b, T: Real> Matrices<'b, T> {
         }
     }
 
+    /// Writes those of all states one after the other, each by rows: nv² numbers a state.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Batch, robots};
+    /// let arm = robots::arm7();
+    /// let (mut batch, q) = (Batch::new(&arm, 10, 1), vec![0.3; 70]);
+    /// let mut rows = vec![0.0; 10 * 7 * 7];
+    /// let M = batch.crba(&arm, &q);
+    /// M.write_rows(&mut rows);
+    /// assert_eq!(rows[9 * 49 + 7 + 2], M.at(9)[(1, 2)]);
+    /// ```
+    ///
+    /// # Panics
+    /// If `to` has not as many numbers.
+    pub fn write_rows(&self, to: &mut [T]) {
+        let n = if self.states == 0 { 0 } else { self.at(0).nrows() };
+        check("to", to.len(), self.states * n * n);
+        match self.of {
+            InLanes::Single(group) => group.write_rows(self.kind, to),
+            InLanes::Short(group) => group.write_rows(self.kind, to),
+            InLanes::Long(group) => group.write_rows(self.kind, to),
+        }
+    }
+
     /// The matrices of all states.
     pub fn iter(&self) -> impl Iterator<Item = StateMatrix<'b, T>> {
         let this = *self;

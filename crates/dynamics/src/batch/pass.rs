@@ -10,7 +10,7 @@ use crate::workspace::{filled, zero_matrix};
 use condyle_linalg::threads;
 use condyle_model::Model;
 use condyle_spatial::Force;
-use condyle_spatial::block::{Block, Real, flat, flat_mut, gather, lanes, scatter};
+use condyle_spatial::block::{Block, MOST, Real, Strided, flat, flat_mut, gather, lanes, scatter, scatter_matrix};
 use core::mem::swap;
 use nalgebra::{DMatrix, DMatrixView};
 
@@ -272,5 +272,23 @@ impl<S: Block> Group<S> {
         let n = matrix.nrows();
         let lane = lanes(matrix.as_slice()).get(k % S::LANES..).unwrap_or_default();
         DMatrixView::from_slice_with_strides(lane, n, n, S::LANES, S::LANES * n)
+    }
+
+    /// The matrices of the first states, as many as there is room for, each by rows.
+    pub(super) fn write_rows(&self, kind: usize, to: &mut [S::Number]) {
+        let n = self.matrices.first().map_or(0, |matrices| matrices[kind].nrows());
+        if n == 0 {
+            return;
+        }
+        for (matrices, to) in self.matrices.iter().zip(to.chunks_mut(S::LANES * n * n)) {
+            let (vectors, mut each) = (matrices[kind].as_slice(), <[&mut [S::Number]; MOST]>::default());
+            let mut states = 0;
+            for to in to.chunks_exact_mut(n * n) {
+                each[states] = to;
+                states += 1;
+            }
+            let matrix = Strided { vectors, strides: [1, n], shape: [n, n], negative: false };
+            scatter_matrix(&matrix, &mut each[..states], n);
+        }
     }
 }

@@ -2,11 +2,13 @@
 
 use super::limbs::spread;
 use crate::data::Data;
-use crate::passes::frames::{Accelerations, Placements, Velocities};
+use crate::passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities};
 use crate::passes::kinematics::{PlacementCache, accelerations, positions, velocities};
+use crate::passes::path_jacobian::path_jacobian;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Scalar};
+use condyle_spatial::{Constant, Scalar, Se3, Vec3};
+use nalgebra::DMatrix;
 
 impl<S: Scalar> Data<S> {
     /// The placements at the position of the last call on this data: they need not be computed again. There are none if it
@@ -58,6 +60,71 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq());
     positions(model, &mut data.world, q);
     Placements { model, world: &data.world }
+}
+
+/// The Jacobian J of one frame, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
+///
+/// q: nq numbers. It needs no `Data` and looks only at the joints between the frame and the world, in O(depth + nv); where
+/// several things are asked at one position, [`Placements::frame_jacobian`] has the same numbers, up to rounding. Allocates
+/// nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), example 4.1.
+///
+/// ```
+/// use condyle_dynamics::{Data, ReferenceFrame, forward_kinematics, frame_jacobian, robots};
+/// let (arm, q) = (robots::arm7(), [0.3; 7]);
+/// let (tool, axes) = (arm.frame("tool")?, ReferenceFrame::LocalWorldAligned);
+/// let [mut J, mut same] = [(); 2].map(|()| nalgebra::DMatrix::zeros(6, 7));
+/// frame_jacobian(&arm, &q, tool, axes, &mut J);
+/// forward_kinematics(&arm, &mut Data::new(&arm), &q).frame_jacobian(tool, axes, &mut same);
+/// assert!((J - same).amax() < 1e-15);
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, there is no such frame, or `J` is not 6 × nv.
+pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    q: &[S],
+    frame: usize,
+    reference: ReferenceFrame,
+    J: &mut DMatrix<S>,
+) {
+    let frame = &model.frames()[frame];
+    jacobian_on(model, q, frame.body, frame.placement, reference, J);
+}
+
+/// The Jacobian J of one body, 6 × nv: [`frame_jacobian`] of the frame that the URDF gives it.
+///
+/// ```
+/// use condyle_dynamics::{ReferenceFrame, body_jacobian, robots};
+/// let arm = robots::arm7();
+/// let mut J = nalgebra::DMatrix::zeros(6, 7);
+/// body_jacobian(&arm, &[0.3; 7], 1, ReferenceFrame::Local, &mut J);
+/// assert_eq!(J[(5, 0)], 1.0); // the first joint turns it about its own axis z
+/// ```
+///
+/// # Panics
+/// If `q` has not nq numbers, there is no such body, or `J` is not 6 × nv.
+pub fn body_jacobian<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    q: &[S],
+    body: usize,
+    reference: ReferenceFrame,
+    J: &mut DMatrix<S>,
+) {
+    jacobian_on(model, q, body, Se3::identity(), reference, J);
+}
+
+fn jacobian_on<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    q: &[S],
+    body: usize,
+    bXf: Se3<f64>,
+    reference: ReferenceFrame,
+    J: &mut DMatrix<S>,
+) {
+    check("q", q.len(), model.nq());
+    let zXb = Se3::new(model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
+    path_jacobian(model, q, body, (zXb * bXf).lift(), reference, J);
 }
 
 /// Places all bodies and gives their velocities: v_i = v_λ + S q̇, in O(n).

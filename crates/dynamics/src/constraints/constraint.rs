@@ -143,7 +143,7 @@ impl ContactConstraint {
             return wrong(format!("frames `{}` and `{other}` do not move relative to each other", frame.name));
         }
         if self.reference == ReferenceFrame::World {
-            return wrong("its reference frame must be Local or LocalWorldAligned, found World".to_owned());
+            return wrong("its reference must be `local` or `local_world_aligned`, found `world`".to_owned());
         }
         for (name, gain) in [("kp", self.kp), ("kd", self.kd)] {
             if !(gain.is_finite() && gain >= 0.0) {

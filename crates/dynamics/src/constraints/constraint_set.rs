@@ -100,6 +100,14 @@ impl<S: Scalar> ConstraintSet<S> {
         })
     }
 
+    /// Checks constraints of a model as [`new`](Self::new) does, and makes nothing.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn check_all<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<(), Error> {
+        constraints.iter().enumerate().try_for_each(|(i, one)| one.bodies(model, &constraints[..i]).map(drop))
+    }
+
     /// The number of constraints.
     pub fn len(&self) -> usize {
         self.plans.len()

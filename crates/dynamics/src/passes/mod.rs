@@ -15,6 +15,7 @@ pub(crate) mod frames;
 pub(crate) mod kinematics;
 pub(crate) mod minv;
 pub(crate) mod passive;
+pub(crate) mod path_jacobian;
 pub(crate) mod regressor;
 pub(crate) mod rnea;
 pub(crate) mod statics;

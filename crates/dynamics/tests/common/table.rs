@@ -8,13 +8,13 @@ use condyle_dynamics::simulation::{Integrator, Settings, Simulation};
 use condyle_dynamics::{
     Cholesky, ConstraintSet, ContactConstraint, Data, DifferenceArgument, Force, ForwardDynamicsMethod,
     IntegrateArgument, Ltdl, Model, Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, aba, aba_derivatives,
-    aba_hessian, centroidal_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, constrained_dynamics,
-    constrained_dynamics_derivatives, coriolis_derivatives, coriolis_matrix, crba, difference, difference_jacobian,
-    distance, energy_derivatives, forward_accelerations, forward_dynamics, forward_kinematics, forward_velocities,
-    gravity, impulse_dynamics, impulse_dynamics_derivatives, integrate, integrate_jacobian, interpolate,
-    joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects, normalize, passive_torque,
-    passive_torque_derivative, potential_energy_regressor, random_configuration, rnea, rnea_derivatives, rnea_hessian,
-    rnea_second_derivatives, static_torque, static_torque_derivative, transport,
+    aba_hessian, body_jacobian, centroidal_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms,
+    constrained_dynamics, constrained_dynamics_derivatives, coriolis_derivatives, coriolis_matrix, crba, difference,
+    difference_jacobian, distance, energy_derivatives, forward_accelerations, forward_dynamics, forward_kinematics,
+    forward_velocities, frame_jacobian, gravity, impulse_dynamics, impulse_dynamics_derivatives, integrate,
+    integrate_jacobian, interpolate, joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects,
+    normalize, passive_torque, passive_torque_derivative, potential_energy_regressor, random_configuration, rnea,
+    rnea_derivatives, rnea_hessian, rnea_second_derivatives, static_torque, static_torque_derivative, transport,
 };
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
@@ -198,7 +198,7 @@ pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
 
 /// Name and call of each function. A call allocates only if the function does.
 pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
-    let others: [(&'static str, Function<S>); 38] = [
+    let others: [(&'static str, Function<S>); 39] = [
         ("rnea_derivatives by all other inputs", |m, d, i, o| {
             let r = rnea_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
             other_inputs(m).into_iter().zip(&mut o.by_inputs).for_each(|(input, out)| r.with_respect_to(input, out));
@@ -256,6 +256,18 @@ pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
             for reference in [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned] {
                 for f in 0..m.frames().len() {
                     placements.frame_jacobian(f, reference, &mut o.six);
+                    o.numbers.extend_from_slice(o.six.as_slice());
+                }
+            }
+        }),
+        ("frame_jacobian_alone", |m, _, i, o| {
+            for reference in [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned] {
+                for f in 0..m.frames().len() {
+                    frame_jacobian(m, &i.q, f, reference, &mut o.six);
+                    o.numbers.extend_from_slice(o.six.as_slice());
+                }
+                for b in 0..m.bodies().len() {
+                    body_jacobian(m, &i.q, b, reference, &mut o.six);
                     o.numbers.extend_from_slice(o.six.as_slice());
                 }
             }

@@ -333,7 +333,7 @@ fn what_cannot_be_is_refused() {
         ),
         (
             refused(&[ContactConstraint { reference: ReferenceFrame::World, ..point }]),
-            "constraint 0: its reference frame must be Local or LocalWorldAligned, found World".to_owned(),
+            "constraint 0: its reference must be `local` or `local_world_aligned`, found `world`".to_owned(),
         ),
         (
             refused(&[ContactConstraint { kd: -1.0, ..point }]),

@@ -220,5 +220,7 @@ fn names() {
     let error = arm.frame("toll").unwrap_err();
     assert_eq!(error.to_string(), "unknown frame `toll`; nearest is `tool`");
     assert!(matches!(error, Error::UnknownFrame { .. }));
+    let error = arm.frame("gripper").unwrap_err();
+    assert_eq!(error.to_string(), "unknown frame `gripper`; no frame has a similar name");
     assert_eq!(arm.frames()[arm.frame("base").unwrap()].body, 0);
 }

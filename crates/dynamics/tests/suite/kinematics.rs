@@ -5,7 +5,7 @@ use crate::common;
 use common::{State, Worst, all_models, dual, eps, lift, moved, real, relative, rng, unit};
 use condyle_dynamics::{
     Act, Data, DifferenceArgument, Force, IntegrateArgument, Model, Motion, ReferenceFrame, Se3, Vec3, difference,
-    difference_jacobian, forward_kinematics, integrate_jacobian, neutral, random_configuration, rnea,
+    difference_jacobian, forward_kinematics, frame_jacobian, integrate_jacobian, neutral, random_configuration, rnea,
 };
 use nalgebra::DMatrix;
 use num_dual::Dual64;
@@ -47,6 +47,9 @@ fn frame_jacobians() {
                 (ReferenceFrame::LocalWorldAligned, at_origin.act(local)),
             ] {
                 placements.frame_jacobian(f, reference, &mut J);
+                worst.see(model, &times(&J, &v), &expected.to_array());
+                J.fill(f64::NAN);
+                frame_jacobian(model, &q, f, reference, &mut J); // by the joints on its way alone
                 worst.see(model, &times(&J, &v), &expected.to_array());
             }
         }

@@ -30,7 +30,7 @@ fn expect(pointer: &str, value: Value, message: &str) {
 fn mistakes_have_names() {
     expect("/bodies/3/parent", json!(5), "body `link3`: number 3 on body 5: bodies stand parents first, depth first");
     expect("/bodies/3/parent", json!(3), "body `link3`: number 3 on body 3");
-    expect("/bodies/3/name", json!("link2"), "two bodys are named `link2`");
+    expect("/bodies/3/name", json!("link2"), "two bodies are named `link2`");
     expect("/bodies/3/idx_v", json!(3), "body `link3`: begins at 2 in q and 3 in v, expected 2 and 2");
     expect("/bodies/3/inertia/mass", json!(-1.0), "body `link3`: mass is -1");
     expect("/bodies/3/placement/rotation/x/x", json!(0.5), "body `link3`: placement is no rotation");

@@ -43,6 +43,11 @@ fn files() {
     let error = Model::from_urdf("no/such.urdf", &UrdfOptions::default()).unwrap_err();
     assert!(matches!(error, Error::File { .. }));
     assert_eq!(error.to_string(), "no/such.urdf: No such file or directory (os error 2)");
+    let error = Model::from_urdf(GOOD, &UrdfOptions::default()).unwrap_err().to_string();
+    let reads = "is the text of a file, where its path is expected: the function whose name ends in `_str` reads it";
+    assert!(error.starts_with("`<") && error.ends_with(&format!("…`: {reads}")) && error.len() < 200, "{error}");
+    let reads = "this is a path: the function whose name does not end in `_str` reads the file";
+    expect("no/such.urdf", &format!("<string>:1: not well-formed XML: {reads}"));
     let path = std::env::temp_dir().join(format!("condyle-{}.urdf", std::process::id()));
     std::fs::write(&path, with(r#"<child link="arm"/>"#, "")).unwrap();
     let error = Model::from_urdf(&path, &UrdfOptions::default()).unwrap_err().to_string();
@@ -59,6 +64,20 @@ fn documents() {
     expect("<robot/>", "<string>:1: <robot>: has no links");
     let nested = format!("<robot>\n<link name='a'>{}{}</link></robot>", "<a>".repeat(1 << 16), "</a>".repeat(1 << 16));
     expect(&nested, "<string>:2: <a>: elements are nested 65538 levels deep, at most 256 are allowed");
+}
+
+/// Macros are in the way: without them there would be a robot, but another one.
+#[test]
+fn xacro() {
+    let expand = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
+    let open = GOOD.find('>').map(|end| GOOD[..end].to_owned()).unwrap();
+    let declared = with(&open, &format!("{open} xmlns:xacro='http://www.ros.org/wiki/xacro'"));
+    assert!(load(&declared, &UrdfOptions::default()).is_ok()); // expanded files often declare it still
+    let used = declared.replace("</robot>", "<xacro:wheel side='left'/>\n</robot>");
+    let error = load(&used, &UrdfOptions::default()).unwrap_err();
+    assert!(error.ends_with(&format!(": <wheel>: belongs to xacro: {expand}")), "{error}");
+    let error = load(&with(r#"<mass value="1"/>"#, r#"<mass value="${m}"/>"#), &UrdfOptions::default()).unwrap_err();
+    assert!(error.ends_with(&format!("`${{m}}` is an expression of xacro: {expand}")), "{error}");
 }
 
 #[test]
@@ -317,7 +336,7 @@ fn builders() {
     let find = |result: Result<(), String>| result.unwrap_err();
     assert_eq!(
         find(build(|m, a, _| _ = m.body("a", a, Joint::Planar, Se3::identity(), Inertia::zero()))),
-        "two bodys are named `a`"
+        "two bodies are named `a`"
     );
     assert_eq!(
         find(build(|m, a, _| _ =

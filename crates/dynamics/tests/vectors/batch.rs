@@ -6,6 +6,7 @@ use crate::counting::{allocations, bytes};
 use crate::{each_level, models};
 use condyle_dynamics::{
     Batch, Data, Force, Model, aba, aba_derivatives, crba, gravity, minv, nonlinear_effects, rnea, rnea_derivatives,
+    robots,
 };
 
 /// The arguments of many states, one after the other.
@@ -25,6 +26,23 @@ impl States {
         let (q, v, x) = (all(|i| &i.q), all(|i| &i.v), all(|i| &i.x));
         let f_ext = one.iter().flat_map(|i| &i.f_ext).copied().collect();
         Self { one, q, v, x, f_ext }
+    }
+}
+
+/// Matrices that are written by rows have the entries of those of each state, in groups that are full and one that is not.
+#[test]
+fn matrices_by_rows() {
+    let humanoid = robots::humanoid();
+    let (n, states) = (humanoid.nv(), 19);
+    let s = States::random(&humanoid, states, 5);
+    let mut batch = Batch::new(&humanoid, states, 2);
+    let d = batch.aba_derivatives(&humanoid, &s.q, &s.v, &s.x, &s.f_ext);
+    for matrices in [d.da_dq, d.da_dv, d.da_dtau] {
+        let mut rows = vec![f64::NAN; states * n * n];
+        matrices.write_rows(&mut rows);
+        for (M, rows) in matrices.iter().zip(rows.chunks_exact(n * n)) {
+            assert_eq!(M.transpose().as_slice(), rows);
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use super::packages;
 use super::xml::{self, Amount, Element};
 use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
-use crate::error::Error;
+use crate::error::{Error, near, nearest};
 use crate::joint::{Joint, Mimic};
 use crate::model::Model;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
@@ -131,8 +131,8 @@ impl<'a> Reader<'a> {
             let Edge { element, parent: on, child } = self.joints[name];
             for link in [on, child] {
                 if !self.links.contains_key(link) {
-                    let near = crate::error::nearest(link, links.iter().copied());
-                    return Err(element.wrong(format!("no link is named `{link}`; nearest is `{near}`")));
+                    let near = near(&nearest(link, links.iter().copied()));
+                    return Err(element.wrong(format!("no link is named `{link}`{near}")));
                 }
             }
             if let Some(other) = parent.insert(child, name) {

@@ -6,6 +6,7 @@
 use crate::error::Error;
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -49,6 +50,12 @@ impl Amount {
     /// The text of a file, unless it is no regular file or too large.
     pub(crate) fn read(&self, path: &Path) -> Result<String, Error> {
         let wrong = |what: String| Error::File { file: path.display().to_string(), what };
+        if let Some(text) = path.to_str().map(str::trim_start).filter(|text| text.starts_with('<')) {
+            let file = format!("`{}…`", text.chars().take_while(|c| *c != '\n').take(32).collect::<String>());
+            let what =
+                "is the text of a file, where its path is expected: the function whose name ends in `_str` reads it";
+            return Err(Error::File { file, what: what.to_owned() });
+        }
         let said = |e: std::io::Error| wrong(e.to_string());
         // before it is opened: to open a pipe is to wait for its writer
         let kind = std::fs::metadata(path).map_err(said)?;
@@ -122,10 +129,18 @@ impl Element {
         let document = Document::parse(text).map_err(|e| Error::Xml {
             file: file.to_owned(),
             line: e.pos().row,
-            what: e.to_string(),
+            what: if is_path(text) {
+                "this is a path: the function whose name does not end in `_str` reads the file".to_owned()
+            } else {
+                e.to_string()
+            },
         })?;
         let ends: Vec<usize> = text.match_indices('\n').map(|(i, _)| i).collect();
         let (file, root) = (file.into(), document.root_element());
+        let macros = |n: &Node| n.is_element() && n.tag_name().namespace().is_some_and(|space| space.contains("xacro"));
+        if let Some(node) = root.descendants().find(macros) {
+            return Err(Self::new(node, &ends, &file).wrong(format!("belongs to xacro: {EXPAND}")));
+        }
         match too_deep(root) {
             None => Ok(Self::with_children(root, &ends, &file)),
             Some((node, levels)) => {
@@ -210,10 +225,23 @@ fn too_deep<'a, 'input>(root: Node<'a, 'input>) -> Option<(Node<'a, 'input>, usi
     }
 }
 
+/// What to do with the macros of xacro, which no reader expands.
+const EXPAND: &str = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
+
+/// Whether a text that was given as that of a robot is a path.
+fn is_path(text: &str) -> bool {
+    let known = |extension: &OsStr| ["urdf", "xml", "mjcf", "sdf", "xacro"].iter().any(|known| extension == *known);
+    !text.contains('<') && Path::new(text.trim()).extension().is_some_and(known)
+}
+
 /// Finite numbers with spaces between them.
 pub(crate) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
-    text.split_whitespace().map(|w| number(w).ok_or_else(|| format!("`{w}` is no finite number"))).collect()
+    let wrong = |word: &str| match word.contains("${") {
+        false => format!("`{word}` is no finite number"),
+        true => format!("`{word}` is an expression of xacro: {EXPAND}"),
+    };
+    text.split_whitespace().map(|w| number(w).ok_or_else(|| wrong(w))).collect()
 }
 
 /// As many finite numbers as there must be.

@@ -115,6 +115,10 @@ impl ActionModel for Constrained {
         self.action.lanes()
     }
 
+    fn is_end(&self) -> bool {
+        self.action.is_end()
+    }
+
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         self.action.bounds(t)
     }
@@ -154,6 +158,18 @@ impl ActionModel for Constrained {
 
     fn shift(&mut self) {
         self.action.shift();
+    }
+
+    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        self.action.outputs(t, x, u, show);
+    }
+
+    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        self.action.hold(t, x)
+    }
+
+    fn reserve(&mut self) {
+        self.action.reserve();
     }
 
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {

@@ -90,6 +90,8 @@ pub struct Fddp {
     clock: Clock,
     /// Whether knots may come as equations of inverse dynamics.
     inverse_dynamics: bool,
+    /// Whether there is a trajectory to go on from.
+    started: bool,
 }
 
 /// The iterations for which there is room in the trace when a solve begins; with more it grows.
@@ -126,6 +128,7 @@ impl Fddp {
             best: Best::new(problem),
             clock: Clock::default(),
             inverse_dynamics: false,
+            started: false,
         }
     }
 
@@ -187,6 +190,9 @@ impl Fddp {
             }
             self.solution.xs.copy_from_slice(xs);
             self.solution.us.copy_from_slice(us);
+            self.started = true;
+        } else if !self.started {
+            return Err(Error::NothingToResume);
         }
         self.settings.check()?;
         self.solution.shape().check(problem.shape())?;

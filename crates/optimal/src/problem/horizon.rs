@@ -1,15 +1,13 @@
 //! The optimal control problem over a horizon of knots.
 
 use super::action::ActionModel;
-use super::shape::{MOST_ENTRIES, MOST_KNOTS, Shape};
+use super::models::{Models, check};
+use super::shape::Shape;
 use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
 use crate::lq::LqNode;
 use std::any::Any;
 use std::ops::{ControlFlow, Range};
-
-/// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
-const MOST_NUMBERS: usize = 1 << 28;
 
 /// An optimal control problem in discrete time, with N knots and a terminal one:
 ///
@@ -17,8 +15,9 @@ const MOST_NUMBERS: usize = 1 << 28;
 /// minimise   ℓ_N(x_N) + Σₜ ℓₜ(xₜ, uₜ)      subject to   x₀ = x̂₀,   xₜ₊₁ = φₜ(xₜ, uₜ),   t = 0 … N − 1
 /// ```
 ///
-/// It holds action models, and for each knot the index of its model; consecutive knots with the same model are asked
-/// as one group. All models share nx and ndx; nu may differ from model to model.
+/// It holds action models, and for each knot the index of its model. Consecutive knots with the same model are asked as one
+/// group; so are those of models of a robot that differ in costs, references and weights only, so that an action for each
+/// knot costs no more than one for all. All models share nx and ndx; nu may differ from model to model.
 ///
 /// Trajectories are flat: `xs` is x₀ … x_N one after the other, (N + 1)·nx numbers; `us` is u₀ … u_{N−1}, each with
 /// the nu of its knot.
@@ -53,11 +52,11 @@ const MOST_NUMBERS: usize = 1 << 28;
 /// ```
 pub struct Problem {
     x0: Vec<f64>,
-    models: Vec<Box<dyn ActionModel>>,
+    models: Models,
     stages: Vec<usize>,
     terminal: Box<dyn ActionModel>,
     shape: Shape,
-    /// Maximal runs of knots with one model: (model, knots).
+    /// Maximal runs of knots with one action: (action, knots).
     runs: Vec<(usize, Range<usize>)>,
     /// 0, 1, …, N: the knots of a group are a slice of it.
     knots: Vec<usize>,
@@ -72,45 +71,23 @@ impl Problem {
     ///
     /// # Errors
     /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has
-    /// controls, x̂₀ has a wrong length or an entry that is not finite or is no state, a state or the controls of a knot
-    /// have more than 4096 entries, or there are more than 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
+    /// controls, a model that has [no next state](ActionModel::is_end) serves a knot, x̂₀ has a wrong length or an entry that
+    /// is not finite or is no state, a state or the controls of a knot have more than 4096 entries, or there are more than
+    /// 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
         stages: Vec<usize>,
-        terminal: Box<dyn ActionModel>,
+        mut terminal: Box<dyn ActionModel>,
     ) -> Result<Self, Error> {
-        if stages.is_empty() {
-            return Err(Error::EmptyHorizon);
-        }
         let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
-        Error::check_size("knots", horizon, MOST_KNOTS)?;
-        for (name, found) in [("nx", nx), ("ndx", ndx)] {
-            Error::check_size(name, found, MOST_ENTRIES)?;
-        }
-        let mut numbers = 0;
-        for (knot, &index) in stages.iter().enumerate() {
-            let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
-            for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
-                if expected != found {
-                    return Err(Error::Dimension { node: knot, name, expected, found });
-                }
-            }
-            Error::check_size("nu", model.nu(), MOST_ENTRIES)?;
-            numbers += ndx * (ndx + model.nu());
-            Error::check_size("numbers in the matrices of all knots", numbers, MOST_NUMBERS)?;
-        }
-        if ndx == 0 {
-            return Err(Error::EmptyState);
-        }
-        if terminal.nu() != 0 {
-            return Err(Error::Dimension { node: horizon, name: "nu", expected: 0, found: terminal.nu() });
-        }
+        check(&models, &stages, &*terminal)?;
         Error::check("x0", &x0, nx)?;
         terminal.check_state(&x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
-        let (copies, unread) = (Copies::default(), vec![0.0; nx]);
+        let (models, copies, unread) = (Models::new(models), Copies::default(), vec![0.0; nx]);
+        terminal.reserve();
         let mut problem = Self { x0, models, stages, terminal, shape, runs, knots, copies, unread };
         problem.arrange();
         Ok(problem)
@@ -118,15 +95,18 @@ impl Problem {
 
     /// Finds from the stages where the controls lie and which knots make a run.
     fn arrange(&mut self) {
-        let Self { models, stages, shape: Shape { offsets, .. }, runs, .. } = self;
+        let Self { models, stages, shape: Shape { offsets, .. }, runs, copies, .. } = self;
         runs.clear();
         offsets.clear();
         offsets.push(0);
         for (knot, &index) in stages.iter().enumerate() {
-            offsets.push(offsets[knot] + models[index].nu());
+            let [action, own] = models.place(index);
+            models.actions[action].serve(knot, stages.len(), own);
+            copies.serve(action, knot, stages.len(), own);
+            offsets.push(offsets[knot] + models.actions[action].nu());
             match runs.last_mut() {
-                Some((last, knots)) if *last == index => knots.end = knot + 1,
-                _ => runs.push((index, knot..knot + 1)),
+                Some((last, knots)) if *last == action => knots.end = knot + 1,
+                _ => runs.push((action, knot..knot + 1)),
             }
         }
     }
@@ -138,17 +118,21 @@ impl Problem {
     /// The solver's trajectory moves along with [`Fddp::shift`](crate::Fddp::shift).
     ///
     /// # Errors
-    /// [`Error::UnknownModel`] if there is no such model; the problem then stays as it is.
+    /// [`Error::UnknownModel`] if there is no such model, [`Error::NoNextState`] if it is one of the end; the problem then stays
+    /// as it is.
     pub fn shift(&mut self, last: usize) -> Result<(), Error> {
         let horizon = self.horizon();
         if last >= self.models.len() {
             return Err(Error::UnknownModel { knot: horizon - 1, index: last, models: self.models.len() });
         }
+        if self.models.of(last).is_end() {
+            return Err(Error::NoNextState { knot: horizon - 1, index: last });
+        }
         self.stages.rotate_left(1);
         self.stages[horizon - 1] = last;
-        self.arrange();
-        self.models.iter_mut().for_each(|model| model.shift());
+        self.models.actions.iter_mut().for_each(|action| action.shift());
         self.copies.shift();
+        self.arrange();
         Ok(())
     }
 
@@ -207,11 +191,12 @@ impl Problem {
     }
 
     /// The action model `index`, if there is one and it is a `T`; to change a reference between solves. Its dimensions
-    /// must stay.
+    /// must stay. Where one action stands for several models, what is changed is this model's.
     pub fn model_mut<T: ActionModel>(&mut self, index: usize) -> Option<&mut T> {
-        self.copies.forget(index);
-        let model: &mut dyn Any = self.models.get_mut(index)?.as_mut();
-        model.downcast_mut()
+        if index < self.models.len() {
+            self.copies.forget(self.models.place(index)[0]);
+        }
+        self.models.chosen(index)
     }
 
     /// The terminal model, if it is a `T`.
@@ -244,7 +229,7 @@ impl Problem {
             }
             let (done, ahead) = xs.split_at_mut((t + 1) * self.shape.nx);
             let u = &us[self.shape.u(t)];
-            self.models[self.stages[t]].calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
+            self.models.of_mut(self.stages[t]).calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
         }
         Error::check("xs", &xs, xs.len())?;
         Ok(xs)
@@ -263,7 +248,7 @@ impl Problem {
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
             let (next, costs) = (&mut next[x.clone()], &mut costs[knots.clone()]);
-            self.models[*model].calc_group(&self.knots[knots.clone()], &xs[x], &us[u], next, costs);
+            self.models.actions[*model].calc_group(&self.knots[knots.clone()], &xs[x], &us[u], next, costs);
         }
         let x = &xs[self.shape.x(horizon)];
         self.terminal.calc_group(&self.knots[horizon..], x, &[], &mut self.unread, &mut costs[horizon..]);
@@ -279,7 +264,7 @@ impl Problem {
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
             let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);
-            self.models[*model].calc_diff_group(t, &xs[x], &us[u], nodes);
+            self.models.actions[*model].calc_diff_group(t, &xs[x], &us[u], nodes);
         }
         let x = &xs[self.shape.x(horizon)];
         self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
@@ -298,7 +283,7 @@ impl Problem {
         let Self { models, runs, copies, knots, shape, terminal, .. } = self;
         let (nodes, end) = nodes.split_at_mut(shape.horizon());
         let all = Knots { runs, knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
-        copies.calc_diff(threads, models, all, nodes, || {
+        copies.calc_diff(threads, &mut models.actions, all, nodes, || {
             let t = shape.horizon();
             terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
         });
@@ -306,7 +291,7 @@ impl Problem {
 
     /// Gives the copies of models, which threads have, the multipliers of their models.
     pub(crate) fn share_multipliers(&mut self) {
-        self.copies.share_multipliers(&mut self.models, &self.runs);
+        self.copies.share_multipliers(&mut self.models.actions, &self.runs);
     }
 
     /// Checks the lengths, and lets nothing be known of the forms of A and B: the action says if it is. Asks none for the
@@ -322,6 +307,43 @@ impl Problem {
         }
     }
 
+    /// The controls of all knots that hold their states still, each by itself, as far as that is possible: see
+    /// [`hold`](ActionModel::hold). Allocates.
+    ///
+    /// # Errors
+    /// [`Error`] if `xs` has not (N + 1)·nx numbers, or one that is not finite.
+    pub fn quasi_static(&mut self, xs: &[f64]) -> Result<Vec<f64>, Error> {
+        Error::check("xs", xs, (self.horizon() + 1) * self.nx())?;
+        let mut us = Vec::with_capacity(self.shape.offsets[self.horizon()]);
+        for t in 0..self.horizon() {
+            us.extend(self.models.of_mut(self.stages[t]).hold(t, &xs[self.shape.x(t)]));
+        }
+        Ok(us)
+    }
+
+    /// x₁ ⊖ x₀ of two states into `out` (ndx).
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        for (name, found, expected) in
+            [("x0", x0.len(), self.nx()), ("x1", x1.len(), self.nx()), ("out", out.len(), self.ndx())]
+        {
+            assert_length(name, found, expected);
+        }
+        self.terminal.difference(x0, x1, out);
+    }
+
+    /// Shows what the dynamics of knot t compute at (x, u) beside the next state: see [`outputs`](ActionModel::outputs).
+    ///
+    /// # Panics
+    /// If t > N or a length is wrong.
+    pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        assert_length("x", x.len(), self.nx());
+        assert_length("u", u.len(), self.nu(t));
+        self.action_mut(t).outputs(t, x, u, show);
+    }
+
     /// Nodes of zeros with the dimensions of the knots, the terminal one last.
     pub fn nodes(&self) -> Vec<LqNode> {
         (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
@@ -329,7 +351,7 @@ impl Problem {
 
     /// Makes room in nodes for the equations of inverse dynamics, wherever in the horizon their actions come to serve.
     pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) {
-        let sizes = self.models.iter().filter_map(|model| model.inverse_dynamics_form());
+        let sizes = self.models.actions.iter().filter_map(|model| model.inverse_dynamics_form());
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return };
         let (nv, horizon) = (self.ndx() / 2, self.horizon());
         for node in &mut nodes[..horizon] {
@@ -344,12 +366,12 @@ impl Problem {
 
     /// The model of knot t; the terminal one for t = N.
     pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
-        self.stages.get(t).map_or(&*self.terminal, |&stage| &*self.models[stage])
+        self.stages.get(t).map_or(&*self.terminal, |&stage| self.models.of(stage))
     }
 
     /// As [`action`](Self::action), to compute with.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
-        self.stages.get(t).map_or(&mut *self.terminal, |&stage| &mut *self.models[stage])
+        self.stages.get(t).map_or(&mut *self.terminal, |&stage| self.models.of_mut(stage))
     }
 
     /// Whether some knot's controls are bounded.
@@ -379,7 +401,7 @@ impl Problem {
 
     /// The largest number of lanes that one of the models uses.
     pub(crate) fn lanes(&self) -> usize {
-        self.models.iter().map(|model| model.lanes()).max().unwrap_or(1).max(1)
+        self.models.actions.iter().map(|action| action.lanes()).max().unwrap_or(1).max(1)
     }
 
     /// The places of the states and controls of a run of knots in flat trajectories.

@@ -43,6 +43,11 @@ impl Lqr {
         }
         Self(node)
     }
+
+    /// The node that it is.
+    pub fn node(&self) -> &LqNode {
+        &self.0
+    }
 }
 
 /// y += X z, for a matrix of as many columns as z has numbers.

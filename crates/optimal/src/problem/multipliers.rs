@@ -92,6 +92,11 @@ impl Multipliers {
         Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], measured: vec![] }
     }
 
+    /// The most constraints that a knot has.
+    pub(crate) fn size(&self) -> usize {
+        self.size
+    }
+
     /// Zeros at knot t of so many, and μ. Allocates at the first call.
     pub(crate) fn start(&mut self, t: usize, knots: usize, mu: f64) {
         self.mu = mu;

@@ -50,12 +50,24 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
         self.0.nu()
     }
 
+    fn is_end(&self) -> bool {
+        self.0.is_end()
+    }
+
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         self.0.bounds(t)
     }
 
     fn shift(&mut self) {
         self.0.shift();
+    }
+
+    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        self.0.outputs(t, x, u, show);
+    }
+
+    fn reserve(&mut self) {
+        self.0.reserve();
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {

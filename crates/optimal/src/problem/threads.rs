@@ -29,6 +29,13 @@ impl Copies {
         self.of.iter_mut().flatten().flatten().for_each(|copy| copy.shift());
     }
 
+    /// Lets a model that an action stands for serve knot t of so many.
+    pub(crate) fn serve(&mut self, action: usize, t: usize, horizon: usize, model: usize) {
+        for copy in self.of.iter_mut().filter_map(|copies| copies[action].as_mut()) {
+            copy.serve(t, horizon, model);
+        }
+    }
+
     /// Makes those that are missing of the models that can be copied, for `threads` threads in all.
     fn renew(&mut self, threads: usize, models: &[Box<dyn ActionModel>]) {
         self.of.resize_with(threads - 1, || models.iter().map(|_| None).collect());

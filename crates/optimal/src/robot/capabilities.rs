@@ -14,7 +14,7 @@ pub(crate) enum Output {
 }
 
 /// The outputs that the dynamics of a knot have, known when the knot is made.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Capabilities {
     pub nu: usize,
     /// Whether there are accelerations and efforts.

@@ -45,20 +45,32 @@ pub(super) fn constraint_set<S: Scalar>(
     contacts: &[Contact],
     damping: f64,
 ) -> Result<ConstraintSet<S>, Error> {
-    check(model, contacts, damping)?;
+    check_together(model, contacts, damping)?;
     let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
-    let mut set = ConstraintSet::new(model, &constraints).map_err(|error| match error {
-        condyle_dynamics::Error::Constraint { constraint, what } => {
-            Error::Contact { name: contacts[constraint].name.clone(), what }
-        }
-        other => Error::Contact { name: String::new(), what: other.to_string() },
-    })?;
+    let mut set = ConstraintSet::new(model, &constraints).map_err(|error| named(contacts, error))?;
     set.proximal = Proximal { mu: damping, iterations: 1 };
     Ok(set)
 }
 
+/// An error of the constraints of some contacts, with the contact's name.
+fn named(contacts: &[Contact], error: condyle_dynamics::Error) -> Error {
+    match error {
+        condyle_dynamics::Error::Constraint { constraint, what } => {
+            Error::Contact { name: contacts[constraint].name.clone(), what }
+        }
+        other => Error::Contact { name: String::new(), what: other.to_string() },
+    }
+}
+
+/// Refuses contacts of which there can be no set.
+pub(super) fn check_contacts(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
+    check_together(model, contacts, damping)?;
+    let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
+    ConstraintSet::<f64>::check_all(model, &constraints).map_err(|error| named(contacts, error))
+}
+
 /// Refuses contacts that are named twice or are singular together, and damping that is no number of at least 0.
-fn check(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
+fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     if !(damping >= 0.0 && damping.is_finite()) {
         return Err(Error::Contact { name: "damping".to_owned(), what: format!("μ is {damping}, not at least 0") });
     }

@@ -97,6 +97,44 @@ pub trait ContinuousModel: Send + 'static {
         None
     }
 
+    /// Shows, by their names, the vectors that the dynamics compute beside accelerations, for a state of the group that was
+    /// [prepared](Self::prepare): see [`ActionModel::outputs`](crate::ActionModel::outputs). By default accelerations alone.
+    fn outputs(&mut self, input: KnotInput<'_>, show: &mut dyn FnMut(&str, &[f64])) {
+        show("acceleration", self.calc(input).0);
+    }
+
+    /// The controls that hold a state still, from statics. `None` by default: then they are found by steps of Newton.
+    fn hold(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+        let _ = x;
+        None
+    }
+
+    /// As [`ActionModel::reserve`](crate::ActionModel::reserve).
+    #[doc(hidden)]
+    fn reserve(&mut self) {}
+
+    /// As [`ActionModel::merge`](crate::ActionModel::merge), for models of one type.
+    #[doc(hidden)]
+    fn merge(&mut self, other: &mut Self) -> bool
+    where
+        Self: Sized,
+    {
+        let _ = other;
+        false
+    }
+
+    /// As [`ActionModel::choose`](crate::ActionModel::choose).
+    #[doc(hidden)]
+    fn choose(&mut self, model: usize) {
+        let _ = model;
+    }
+
+    /// As [`ActionModel::serve`](crate::ActionModel::serve).
+    #[doc(hidden)]
+    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        let _ = (t, horizon, model);
+    }
+
     /// A copy that computes the same, for another thread: see [`ActionModel::fork`](crate::ActionModel::fork). `None` by
     /// default.
     fn fork(&self) -> Option<Self>

@@ -38,7 +38,7 @@ impl Cost {
 #[derive(Clone, Debug)]
 pub struct Costs {
     model: Arc<Model>,
-    capabilities: Capabilities,
+    capabilities: Arc<Capabilities>,
     pub(super) terms: Terms<Cost>,
 }
 
@@ -88,7 +88,7 @@ impl Objective<Cost> for WeightedActivations {
 
 impl Costs {
     /// The sum of some terms for a robot whose dynamics have some capabilities.
-    pub(super) fn new(model: Arc<Model>, capabilities: Capabilities, costs: Vec<Cost>) -> Result<Self, Error> {
+    pub(super) fn new(model: Arc<Model>, capabilities: Arc<Capabilities>, costs: Vec<Cost>) -> Result<Self, Error> {
         for (k, cost) in costs.iter().enumerate() {
             if costs[..k].iter().any(|other| other.name == cost.name) {
                 let what = "another term has this name".to_owned();

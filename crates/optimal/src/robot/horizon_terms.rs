@@ -5,6 +5,7 @@ use super::costs::{Cost, Costs, WeightedActivations, check_weight};
 use super::knot::{KnotState, Sensitivities};
 use super::limits::{Limit, Limits};
 use super::per_knot::PerKnot;
+use super::per_model::PerModel;
 use super::residuals::layout::KnotLayout;
 use super::residuals::terms::{KinematicTerms, KnotTerms};
 use super::residuals::view::{ResidualView, Scratch};
@@ -18,33 +19,35 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub(crate) struct HorizonTerms {
     model: Arc<Model>,
-    capabilities: Capabilities,
-    costs: PerKnot<Costs>,
+    capabilities: Arc<Capabilities>,
+    costs: PerModel<PerKnot<Costs>>,
     pub limits: Limits,
     /// The memory that costs of any knot take, and that limits do.
     layouts: [KnotLayout; 2],
-    scratch: Scratch,
+    /// Made when it is first needed, and forgotten when the layouts grow.
+    scratch: Option<Box<Scratch>>,
 }
 
 impl HorizonTerms {
     /// Terms of a horizon with the same costs at all knots, and no limits.
     pub(crate) fn new(model: Arc<Model>, capabilities: Capabilities, costs: Vec<Cost>) -> Result<Self, Error> {
+        let capabilities = Arc::new(capabilities);
         let costs = Costs::new(model.clone(), capabilities.clone(), costs)?;
         let layouts = [costs.terms.layout(), KnotLayout::default()];
-        let scratch = Scratch::new(&model, capabilities.nu, layouts[0]);
-        Ok(Self { costs: PerKnot::new(costs), limits: Limits::none(), layouts, scratch, capabilities, model })
+        let costs = PerModel::new(PerKnot::new(costs));
+        Ok(Self { costs, limits: Limits::none(), layouts, scratch: None, capabilities, model })
     }
 
     /// The costs of knot t, or those of all knots without costs of their own.
     pub(crate) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
-        self.costs.at_mut(t)
+        self.costs.chosen_mut().at_mut(t)
     }
 
     /// Changes the weights of the terms called `name`, of all knots; says whether there is one.
     pub(crate) fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
         check_weight(name, weight)?;
         let mut found = false;
-        for costs in self.costs.all_mut() {
+        for costs in self.costs.chosen_mut().all_mut() {
             found |= costs.set_weight(name, weight)?;
         }
         Ok(found)
@@ -53,8 +56,12 @@ impl HorizonTerms {
     /// Gives knot t costs of its own.
     pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         Error::check_size("knot", t, MOST_KNOTS)?;
-        self.costs.set(Some(t), Costs::new(self.model.clone(), self.capabilities.clone(), costs)?);
-        self.reserve();
+        let costs = Costs::new(self.model.clone(), self.capabilities.clone(), costs).map_err(|error| match error {
+            Error::Cost { name, what } => Error::Cost { name, what: format!("{what} (knot {t})") },
+            other => other,
+        })?;
+        self.costs.chosen_mut().set(Some(t), costs);
+        self.update_layouts();
         Ok(())
     }
 
@@ -62,19 +69,54 @@ impl HorizonTerms {
     pub(crate) fn set_limits(&mut self, t: Option<usize>, limits: Vec<Limit>) -> Result<(), Error> {
         Error::check_size("knot", t.unwrap_or(0), MOST_KNOTS)?;
         self.limits.set(&self.model, &self.capabilities, t, limits)?;
-        self.reserve();
+        self.update_layouts();
         Ok(())
     }
 
-    fn reserve(&mut self) {
-        let costs = self.costs.all().iter().fold(KnotLayout::default(), |most, costs| most.or(costs.terms.layout()));
-        self.layouts = [costs, self.limits.layout()];
-        self.scratch = Scratch::new(&self.model, self.capabilities.nu, self.layout());
+    fn update_layouts(&mut self) {
+        let all = self.costs.all().iter().flat_map(PerKnot::all);
+        let costs = all.fold(KnotLayout::default(), |most, costs| most.or(costs.terms.layout()));
+        self.set_layouts([costs, self.limits.layout()]);
+    }
+
+    /// Sets the layouts; the scratch is renewed where there was one.
+    fn set_layouts(&mut self, layouts: [KnotLayout; 2]) {
+        if self.layouts != layouts {
+            self.layouts = layouts;
+            if self.scratch.take().is_some() {
+                self.reserve();
+            }
+        }
+    }
+
+    /// Makes the scratch, unless it is there.
+    pub(crate) fn reserve(&mut self) {
+        let Self { model, capabilities, layouts, scratch, .. } = self;
+        scratch.get_or_insert_with(|| Box::new(Scratch::new(model, capabilities.nu, layouts[0] + layouts[1])));
+    }
+
+    /// Takes over the costs and limits of the models that another action with the same dynamics stands for.
+    pub(crate) fn append(&mut self, other: &mut Self) {
+        self.costs.append(&mut other.costs);
+        self.limits.append(&mut other.limits);
+        self.set_layouts([0, 1].map(|k| self.layouts[k].or(other.layouts[k])));
+    }
+
+    /// Chooses, of the models that this action stands for, the one that is to be changed.
+    pub(crate) fn choose(&mut self, model: usize) {
+        self.costs.choose(model);
+        self.limits.choose(model);
+    }
+
+    /// Lets one of the models that this action stands for serve knot t of so many.
+    pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        self.costs.serve(t, horizon, model);
+        self.limits.serve(t, horizon, model);
     }
 
     /// Moves the horizon on: knot t becomes knot t − 1.
     pub(crate) fn shift(&mut self) {
-        self.costs.shift();
+        self.costs.all_mut().iter_mut().for_each(PerKnot::shift);
         self.limits.shift();
     }
 
@@ -90,15 +132,16 @@ impl HorizonTerms {
 
     /// The costs of knot t, and the limits that count there.
     pub(crate) fn at(&self, t: usize) -> KnotTerms<'_> {
-        KnotTerms([&self.costs.at(t).terms, self.limits.at(t)])
+        KnotTerms([&self.costs.at(t).at(t).terms, self.limits.at(t)])
     }
 
     /// ℓ at knot t; writes the limits' term.
     pub(crate) fn calc(&mut self, t: usize, state: KnotState<'_>) -> f64 {
-        let Self { model, costs, limits, scratch, .. } = self;
+        self.reserve();
+        let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
         let [kinematics, others] = &state.data.residuals.kinematic;
-        let mut view = ResidualView { model, state, kinematics, scratch };
-        let cost = costs.at(t).terms.value(&mut view, &WeightedActivations(1.0));
+        let mut view = ResidualView { model, t, state, kinematics, scratch };
+        let cost = costs.at(t).at(t).terms.value(&mut view, &WeightedActivations(1.0));
         view.kinematics = others;
         if limits.active {
             let (terms, objective) = limits.objective(t);
@@ -116,7 +159,8 @@ impl HorizonTerms {
         scale: f64,
         node: &mut LqNode,
     ) {
-        let Self { model, costs, limits, scratch, .. } = self;
+        self.reserve();
+        let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
         let [first, second] = &state.data.residuals.kinematic;
         let active = limits.active;
         let (limits, mut objective) = limits.objective(t);
@@ -124,10 +168,10 @@ impl HorizonTerms {
             objective.multipliers.begin(t);
         }
         scratch.rows.clear();
-        let mut view = ResidualView { model, state, kinematics: first, scratch };
+        let mut view = ResidualView { model, t, state, kinematics: first, scratch };
         for diagonal in [false, true] {
             view.kinematics = first;
-            let costs = &costs.at(t).terms;
+            let costs = &costs.at(t).at(t).terms;
             costs.differentiate(&mut view, sensitivities, &mut WeightedActivations(scale), diagonal, node);
             view.kinematics = second;
             limits.differentiate(&mut view, sensitivities, &mut objective, diagonal, node);

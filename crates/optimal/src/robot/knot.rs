@@ -65,6 +65,9 @@ pub(crate) struct KnotState<'a> {
 pub(crate) trait Sensitivities {
     /// g += c · ∂y_row/∂(u, v, q) for entry `row` of an output y.
     fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>);
+
+    /// g += c · ∂u_k/∂(u, v, q) for a control, or for what stands in its place.
+    fn add_control(&self, k: usize, c: f64, g: &mut Row<'_>);
 }
 
 /// Adds a row of a matrix: g += c X[row, :], for as many columns as g has numbers.

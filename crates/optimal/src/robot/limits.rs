@@ -2,6 +2,7 @@
 
 use super::capabilities::Capabilities;
 use super::per_knot::PerKnot;
+use super::per_model::PerModel;
 use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
@@ -120,7 +121,7 @@ impl LimitSet {
 /// The limits of all knots that an action serves, with their multipliers.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    sets: PerKnot<LimitSet>,
+    sets: PerModel<PerKnot<LimitSet>>,
     /// No limits, where they do not count.
     none: Terms<Limit>,
     multipliers: Multipliers,
@@ -133,7 +134,7 @@ pub struct Limits {
 impl Limits {
     /// No limits.
     pub(super) fn none() -> Self {
-        let (sets, none) = (PerKnot::new(LimitSet::default()), Terms::default());
+        let (sets, none) = (PerModel::new(PerKnot::new(LimitSet::default())), Terms::default());
         Self { sets, none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
     }
 
@@ -145,37 +146,63 @@ impl Limits {
         t: Option<usize>,
         limits: Vec<Limit>,
     ) -> Result<(), Error> {
-        self.sets.set(t, LimitSet::new(model, capabilities, limits, t)?);
-        let most = self.sets.all().iter().map(|set| set.terms.len()).max().unwrap_or(0);
-        self.multipliers = Multipliers::new(most);
+        self.sets.chosen_mut().set(t, LimitSet::new(model, capabilities, limits, t)?);
+        self.multipliers = Multipliers::new(self.most());
         Ok(())
+    }
+
+    /// The sets of all knots of all models.
+    fn all(&self) -> impl Iterator<Item = &LimitSet> {
+        self.sets.all().iter().flat_map(PerKnot::all)
+    }
+
+    /// The most numbers that a knot's limits have.
+    fn most(&self) -> usize {
+        self.all().map(|set| set.terms.len()).max().unwrap_or(0)
+    }
+
+    /// Takes over the limits of the models that another action stands for. Forgets multipliers.
+    pub(super) fn append(&mut self, other: &mut Self) {
+        let most = self.multipliers.size().max(other.multipliers.size());
+        self.sets.append(&mut other.sets);
+        self.multipliers = Multipliers::new(most);
+    }
+
+    /// Chooses the model whose limits are to be changed.
+    pub(super) fn choose(&mut self, model: usize) {
+        self.sets.choose(model);
+    }
+
+    /// Lets a model serve knot t of so many.
+    pub(super) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        self.sets.serve(t, horizon, model);
     }
 
     /// Moves the horizon on: knot t becomes knot t − 1.
     pub(super) fn shift(&mut self) {
-        self.sets.shift();
+        self.sets.all_mut().iter_mut().for_each(PerKnot::shift);
     }
 
     /// The memory that the limits of any knot take.
     pub(super) fn layout(&self) -> KnotLayout {
-        self.sets.all().iter().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
+        self.all().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
     }
 
     /// The limits that count at knot t.
     pub(super) fn at(&self, t: usize) -> &Terms<Limit> {
-        if self.active { &self.sets.at(t).terms } else { &self.none }
+        if self.active { &self.sets.at(t).at(t).terms } else { &self.none }
     }
 
     /// The limits that count at knot t, and what they are worth.
     pub(super) fn objective(&mut self, t: usize) -> (&Terms<Limit>, LimitObjective<'_>) {
         let Self { sets, none, multipliers, active, .. } = self;
-        let terms = if *active { &sets.at(t).terms } else { none };
+        let terms = if *active { &sets.at(t).at(t).terms } else { none };
         (terms, LimitObjective { multipliers, t })
     }
 
     /// Shows the limits of knot t.
     pub(super) fn visit(&mut self, t: usize, visit: &mut Visit<'_>) {
-        let LimitSet { terms, lower, upper } = self.sets.at(t);
+        let LimitSet { terms, lower, upper } = self.sets.at(t).at(t);
         visit(Bounded { count: terms.len(), lower, upper, multipliers: &mut self.multipliers });
     }
 }

@@ -143,12 +143,9 @@ impl RobotProblem {
     /// The problem. Allocates.
     ///
     /// # Errors
-    /// Those of the knots' constructors and of [`Problem::new`]; [`Error::TimeStep`] for an end among the knots.
+    /// Those of the knots' constructors and of [`Problem::new`].
     pub fn build(&self) -> Result<Problem, Error> {
         let model = Arc::new(self.model.clone());
-        if self.knots.iter().any(|knot| knot.dynamics == Dynamics::End) {
-            return Err(Error::TimeStep { dt: 0.0 });
-        }
         let knots = self.knots.iter().map(|knot| knot.build(&model)).collect::<Result<_, _>>()?;
         Problem::new(self.x0.clone(), knots, self.stages.clone(), self.terminal.build(&model)?)
     }

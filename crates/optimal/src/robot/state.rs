@@ -27,8 +27,8 @@ pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut 
     }
 }
 
-/// The degrees of freedom of each joint whose group is not commutative: elsewhere the Jacobians of ⊕ and ⊖ are ±1.
-pub(super) fn groups(model: &Model) -> Vec<Range<usize>> {
+/// The coordinates of each joint of a robot whose positions are no vector space: elsewhere the Jacobians of ⊕ and ⊖ are ±1.
+pub fn groups(model: &Model) -> Vec<Range<usize>> {
     let group = |joint| matches!(joint, Joint::Spherical | Joint::Planar | Joint::FreeFlyer);
     model.bodies()[1..].iter().filter(|b| group(b.joint)).map(|b| b.idx_v..b.idx_v + b.joint.nv()).collect()
 }

@@ -107,8 +107,14 @@ fn what_is_wrong_in_a_file_is_said() {
         "`lower`: expected length 0, found 1"
     );
     assert!(built(&|data| data.stages[1] = 7).contains("there is no action model 7"));
-    assert_eq!(built(&|data| data.knots[0].dynamics = Dynamics::End), "a knot of 0 s: its duration must be above 0");
-    assert_eq!(built(&|data| data.terminal = data.knots[0].clone()), "node 6: expected nu = 0, found 3");
+    assert_eq!(
+        built(&|data| data.knots[0] = Knot::new(Dynamics::End, vec![])),
+        "knot 0: models[0] has no next state, as an action of the end; a running one has a duration or an impact"
+    );
+    assert_eq!(
+        built(&|data| data.terminal = data.knots[0].clone()),
+        "terminal: expected an action without controls (a robot's has no duration), found one of nu = 3"
+    );
     let landing = |data: &mut RobotProblem| data.terminal = data.knots[2].clone();
     let mut landed = data.clone();
     landing(&mut landed);

@@ -186,7 +186,7 @@ pub fn flat_mut<S>(forces: &mut [Force<S>]) -> &mut [S] {
 }
 
 /// More lanes than this no vector has.
-const MOST: usize = 16;
+pub const MOST: usize = 16;
 
 macro_rules! single {
     ($($float:ident),*) => {$(

@@ -2,45 +2,18 @@
 //!
 //! It wants A x + s = b with s in a product of cones, in sparse matrices whose pattern stays. For each shape of a program
 //! (sizes, and which bounds are finite or equal) a solver is built once and kept, so that contact sets that come back cost an
-//! update of numbers. Clarabel allocates once in each solve; a new shape allocates more.
+//! update of numbers. Its pattern holds all entries that were not zero so far: where one becomes so, as when a robot leaves a
+//! symmetric posture, the solver is built again. Clarabel allocates once in each solve; a new shape or pattern allocates more.
 
 use super::{ConeProgram, Multipliers, Outcome, Settings, Size, Solver, Start, Status};
 use ::clarabel::algebra::CscMatrix;
 use ::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
+/// What is added to diagonals before a factor is refined: clarabel's own 1e-8 asks for a refinement of each solve.
+const REGULARISATION: f64 = 1e-11;
+
 /// Shapes that are kept; the one not used for the longest time makes room.
 const KEPT: usize = 16;
-
-/// Which entries may differ from zero, in the indices of the capacity.
-pub(crate) trait Pattern {
-    /// Entry (i, j) of P, i ≥ j.
-    fn in_P(&self, i: usize, j: usize) -> bool;
-    /// The coefficient of unknown j in equality i.
-    fn in_A(&self, i: usize, j: usize) -> bool;
-    /// The coefficient of unknown j in row i.
-    fn in_G(&self, i: usize, j: usize) -> bool;
-    /// The coefficient of unknown j in cone row i.
-    fn in_F(&self, i: usize, j: usize) -> bool;
-}
-
-/// The pattern without zeros.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Dense;
-
-impl Pattern for Dense {
-    fn in_P(&self, _: usize, _: usize) -> bool {
-        true
-    }
-    fn in_A(&self, _: usize, _: usize) -> bool {
-        true
-    }
-    fn in_G(&self, _: usize, _: usize) -> bool {
-        true
-    }
-    fn in_F(&self, _: usize, _: usize) -> bool {
-        true
-    }
-}
 
 /// A row of clarabel's A x + s = b.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,13 +49,19 @@ impl Row {
         }
     }
 
-    fn present(self, pattern: &dyn Pattern, j: usize) -> bool {
-        match self {
-            Row::Equality(i) => pattern.in_A(i, j),
-            Row::Fixed(i) | Row::Lower(i) | Row::Upper(i) => pattern.in_G(i, j),
-            Row::Cone(i) => pattern.in_F(i, j),
-        }
+    /// How many of its coefficients are not zero.
+    fn count(self, program: &ConeProgram) -> usize {
+        let (matrix, i) = match self {
+            Row::Equality(i) => (&program.At, i),
+            Row::Fixed(i) | Row::Lower(i) | Row::Upper(i) => (&program.Gt, i),
+            Row::Cone(i) => (&program.Ft, i),
+        };
+        nonzeros(&matrix.as_slice()[i * matrix.nrows()..][..program.size.unknowns])
     }
+}
+
+fn nonzeros(x: &[f64]) -> usize {
+    x.iter().map(|&x| usize::from(x != 0.0)).sum()
 }
 
 /// Writes clarabel's rows of a program: those of the zero cone, of the orthant, of the second-order cones.
@@ -120,17 +99,22 @@ struct Shape {
 }
 
 impl Shape {
+    /// For the entries of a program that are not zero, and some more.
     fn new(
         program: &ConeProgram,
         rows: Vec<Row>,
         counts: [usize; 2],
-        pattern: &dyn Pattern,
+        more: [Vec<(usize, usize)>; 2],
         settings: &Settings,
     ) -> Self {
         let n = program.size.unknowns;
-        let in_P = (0..n).flat_map(|j| (0..=j).map(move |i| (i, j))).filter(|&(i, j)| i == j || pattern.in_P(j, i));
+        let kept = |k: usize, (i, j)| more[k].binary_search_by_key(&(j, i), |&(i, j)| (j, i)).is_ok();
+        let in_P = (0..n).flat_map(|j| (0..=j).map(move |i| (i, j)));
         let in_A = (0..n).flat_map(|j| (0..rows.len()).map(move |i| (i, j)));
-        let entries: [Vec<_>; 2] = [in_P.collect(), in_A.filter(|&(i, j)| rows[i].present(pattern, j)).collect()];
+        let entries = [
+            in_P.filter(|&(i, j)| i == j || program.P[(j, i)] != 0.0 || kept(0, (i, j))).collect(),
+            in_A.filter(|&(i, j)| rows[i].coefficient(program, j) != 0.0 || kept(1, (i, j))).collect(),
+        ];
         let values = gather(program, &rows, &entries);
         let right_side: Vec<f64> = rows.iter().map(|row| row.right_side(program)).collect();
         let csc = |m: usize, k: usize| {
@@ -153,6 +137,7 @@ impl Shape {
             // Refined as far as asked for: clarabel's own 1e-13 costs a sixth of the time.
             iterative_refinement_reltol: tolerance,
             iterative_refinement_abstol: tolerance,
+            static_regularization_constant: REGULARISATION,
             // Numbers can be replaced only where neither presolve nor the removal of zeros changed the pattern.
             presolve_enable: false,
             input_sparse_dropzeros: false,
@@ -166,12 +151,19 @@ impl Shape {
         Self { size, cones, rows, entries, values, linear, right_side, solver }
     }
 
-    fn update(&mut self, program: &ConeProgram) {
+    /// Whether all entries of a program that are not zero are in the pattern, whose numbers are taken then.
+    fn update(&mut self, program: &ConeProgram) -> bool {
         for (k, &(i, j)) in self.entries[0].iter().enumerate() {
             self.values[0][k] = program.P[(j, i)];
         }
         for (k, &(i, j)) in self.entries[1].iter().enumerate() {
             self.values[1][k] = self.rows[i].coefficient(program, j);
+        }
+        let n = program.size.unknowns;
+        let in_P = (0..n).map(|j| nonzeros(&program.P.as_slice()[j * program.P.nrows()..][j..n])).sum::<usize>();
+        let in_A = self.rows.iter().map(|row| row.count(program)).sum::<usize>();
+        if [in_P, in_A] != [0, 1].map(|k| nonzeros(&self.values[k])) {
+            return false;
         }
         for (b, row) in self.right_side.iter_mut().zip(&self.rows) {
             *b = row.right_side(program);
@@ -184,6 +176,7 @@ impl Shape {
             .and_then(|()| solver.update_A(&self.values[1]))
             .and_then(|()| solver.update_b(&self.right_side))
             .expect("patterns are fixed and presolve is off");
+        true
     }
 }
 
@@ -196,7 +189,6 @@ fn gather(program: &ConeProgram, rows: &[Row], entries: &[Vec<(usize, usize)>; 2
 
 /// The interior point method of clarabel.
 pub(crate) struct Clarabel {
-    pattern: Box<dyn Pattern + Send + Sync>,
     settings: Settings,
     capacity: Size,
     /// The last one used stands last.
@@ -210,11 +202,10 @@ pub(crate) struct Clarabel {
 }
 
 impl Clarabel {
-    /// A solver for programs with such a pattern.
-    pub(crate) fn new(capacity: Size, pattern: impl Pattern + Send + Sync + 'static, settings: Settings) -> Self {
+    /// A solver of programs with such a capacity.
+    pub(crate) fn new(capacity: Size, settings: Settings) -> Self {
         let Size { unknowns, equalities, rows, cone_rows } = capacity;
         Self {
-            pattern: Box::new(pattern),
             settings,
             capacity,
             shapes: Vec::with_capacity(KEPT),
@@ -234,18 +225,18 @@ impl Clarabel {
             .shapes
             .iter()
             .position(|shape| shape.size == program.size && shape.cones == program.cones && shape.rows == self.rows);
-        match found {
-            Some(k) => {
-                self.shapes[k..].rotate_left(1);
-                self.shapes.last_mut().expect("just found").update(program);
+        let mut more = [Vec::new(), Vec::new()];
+        if let Some(k) = found {
+            self.shapes[k..].rotate_left(1);
+            if self.shapes.last_mut().expect("just found").update(program) {
+                return;
             }
-            None => {
-                if self.shapes.len() == KEPT {
-                    self.shapes.remove(0);
-                }
-                self.shapes.push(Shape::new(program, self.rows.clone(), counts, &*self.pattern, &self.settings));
-            }
+            more = self.shapes.pop().expect("just found").entries;
         }
+        if self.shapes.len() == KEPT {
+            self.shapes.remove(0);
+        }
+        self.shapes.push(Shape::new(program, self.rows.clone(), counts, more, &self.settings));
     }
 }
 

@@ -16,7 +16,7 @@ mod program;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use self::clarabel::{Clarabel, Dense};
+pub(crate) use self::clarabel::Clarabel;
 pub(crate) use interior_point::InteriorPoint;
 pub(crate) use program::{ConeProgram, Size};
 
@@ -89,7 +89,6 @@ pub(crate) struct Outcome {
 
 /// The multipliers of the last solve, with the signs of the [module](self).
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(not(test), expect(dead_code, reason = "the tests check the conditions of optimality by them"))]
 pub(crate) struct Multipliers<'s> {
     /// y, of A x = b.
     pub equalities: &'s [f64],
@@ -111,6 +110,5 @@ pub(crate) trait Solver {
     fn x(&self) -> &[f64];
 
     /// The multipliers of the last solve.
-    #[cfg_attr(not(test), expect(dead_code, reason = "as of `Multipliers`"))]
     fn multipliers(&self) -> Multipliers<'_>;
 }

@@ -69,6 +69,47 @@ impl ConeProgram {
         Size { unknowns: self.c.len(), equalities: self.b.len(), rows: self.lower.len(), cone_rows: self.h.len() }
     }
 
+    /// The coefficients of an equality: a number for each unknown of the capacity.
+    pub(crate) fn equality_mut(&mut self, i: usize) -> &mut [f64] {
+        let most = self.c.len();
+        &mut self.At.as_mut_slice()[i * most..][..most]
+    }
+
+    /// The constraints of a program of the same capacity.
+    pub(crate) fn copy_constraints(&mut self, from: &Self) {
+        self.size = from.size;
+        self.cones.clear();
+        self.cones.extend_from_slice(&from.cones);
+        for (to, from) in [(&mut self.At, &from.At), (&mut self.Gt, &from.Gt), (&mut self.Ft, &from.Ft)] {
+            to.copy_from(from);
+        }
+        for (to, from) in [
+            (&mut self.b, &from.b),
+            (&mut self.lower, &from.lower),
+            (&mut self.upper, &from.upper),
+            (&mut self.h, &from.h),
+        ] {
+            to.copy_from_slice(from);
+        }
+    }
+
+    /// The coefficients of a row: a number for each unknown of the capacity.
+    pub(crate) fn row(&self, i: usize) -> &[f64] {
+        &self.Gt.as_slice()[i * self.c.len()..][..self.c.len()]
+    }
+
+    /// The same, to be written.
+    pub(crate) fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        let most = self.c.len();
+        &mut self.Gt.as_mut_slice()[i * most..][..most]
+    }
+
+    /// The coefficients of a row of a cone.
+    pub(crate) fn cone_row_mut(&mut self, i: usize) -> &mut [f64] {
+        let most = self.c.len();
+        &mut self.Ft.as_mut_slice()[i * most..][..most]
+    }
+
     /// That what a solver would read is finite but for bounds, and that the size in use fits.
     ///
     /// # Errors

@@ -128,8 +128,28 @@ pub fn max_abs(x: impl IntoIterator<Item = f64>) -> f64 {
     x.into_iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Dynamics, held contacts, momentum, cones, centre of pressure: what holds of every command, to [`EQUALITY`].
+/// Dynamics, held contacts, momentum, cones, centre of pressure: what holds of every command, to [`EQUALITY`], where contacts
+/// are held without gains.
 pub fn check(
+    model: &Model,
+    contacts: &[FrictionContact],
+    q: &[f64],
+    v: &[f64],
+    references: &References,
+    command: &Command,
+) {
+    assert_eq!(command.status, Status::Solved);
+    let (feet, _) = accelerations(model, contacts, q, v, &command.a);
+    for ((contact, a), target) in contacts.iter().zip(feet).zip(&references.contacts) {
+        if target.activation > 0.0 {
+            assert!(norm(a) < EQUALITY, "{} accelerates with {:.1e} m/s²", contact.frame, norm(a));
+        }
+    }
+    check_forces(model, contacts, q, v, references, command);
+}
+
+/// The same but for the acceleration of contacts.
+pub fn check_forces(
     model: &Model,
     contacts: &[FrictionContact],
     q: &[f64],
@@ -143,12 +163,7 @@ pub fn check(
     assert!(residual < EQUALITY, "M q̈ + h − Jᵀ f − τ = {residual:.1e}");
     assert_eq!(command.tau[..6], [0.0; 6]);
 
-    let (feet, com) = accelerations(model, contacts, q, v, &command.a);
-    for ((contact, a), target) in contacts.iter().zip(feet).zip(&references.contacts) {
-        if target.activation > 0.0 {
-            assert!(norm(a) < EQUALITY, "{} accelerates with {:.1e} m/s²", contact.frame, norm(a));
-        }
-    }
+    let (_, com) = accelerations(model, contacts, q, v, &command.a);
     assert!(norm(com - command.com_acceleration) < 1e-9 * (1.0 + norm(com)));
 
     let sum = command.forces.iter().fold(Vec3::zero(), |sum, &f| sum + f.linear);

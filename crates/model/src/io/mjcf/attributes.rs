@@ -1,6 +1,6 @@
 //! Attributes of MJCF elements, with the defaults of their classes, in SI units.
 
-use crate::error::{Error, nearest};
+use crate::error::{Error, near, nearest};
 use crate::io::xml::{self, Element};
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 use std::collections::HashMap;
@@ -68,8 +68,8 @@ impl<'a> Defaults<'a> {
         }
         let mut names: Vec<&str> = self.classes.keys().copied().collect();
         names.sort_unstable();
-        let near = nearest(name, names.into_iter());
-        Err(element.wrong(format!("no default class is named `{name}`; nearest is `{near}`")))
+        let near = near(&nearest(name, names.into_iter()));
+        Err(element.wrong(format!("no default class is named `{name}`{near}")))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The poses of links, joints and frames of an SDF, and the frames in which axes are given.
 
 use super::WORLD_LINK;
-use crate::error::{Error, nearest};
+use crate::error::{Error, near, nearest};
 use crate::io::from_rpy;
 use crate::io::xml::{self, Element};
 use condyle_spatial::{Quaternion, Se3, Vec3};
@@ -57,7 +57,7 @@ impl<'a> Poses<'a> {
             }
             let e = *self.elements.get(name).ok_or_else(|| {
                 let at = path.last().map_or(element, |p| p.1);
-                at.wrong(format!("no link, joint or frame is named `{name}`; nearest is `{}`", self.near(name, "")))
+                at.wrong(format!("no link, joint or frame is named `{name}`{}", self.near(name, "")))
             })?;
             if path.len() == self.elements.len() {
                 return Err(e.wrong("its pose depends on itself"));
@@ -76,7 +76,7 @@ impl<'a> Poses<'a> {
         let mut names: Vec<&str> =
             self.elements.iter().filter(|(_, e)| tag.is_empty() || e.tag == tag).map(|(n, _)| *n).collect();
         names.sort_unstable();
-        nearest(name, names.into_iter())
+        near(&nearest(name, names.into_iter()))
     }
 
     /// The pose in the model's frame.
@@ -110,7 +110,7 @@ impl<'a> Poses<'a> {
             Some(e) if e.tag == "frame" => self.attached(e, name)?,
             _ => None,
         };
-        link.ok_or_else(|| joint.wrong(format!("no link is named `{name}`; nearest is `{}`", self.near(name, "link"))))
+        link.ok_or_else(|| joint.wrong(format!("no link is named `{name}`{}", self.near(name, "link"))))
     }
 
     /// The link that a frame is attached to; none is the model itself.
@@ -123,7 +123,7 @@ impl<'a> Poses<'a> {
                 (None, Some(e)) => *e,
                 (None, None) => {
                     let near = self.near(at, "");
-                    return Err(frame.wrong(format!("attached to `{at}`, which is not there; nearest is `{near}`")));
+                    return Err(frame.wrong(format!("attached to `{at}`, which is not there{near}")));
                 }
             };
             if path.len() == self.elements.len() {
@@ -150,7 +150,7 @@ impl<'a> Poses<'a> {
         let Some(frame) = frame else { return Ok(v) };
         if !self.elements.contains_key(frame) && ![MODEL, WORLD_LINK].contains(&frame) {
             let near = self.near(frame, "");
-            return Err(joint.wrong(format!("{tag}: expressed in `{frame}`, which is not there; nearest is `{near}`")));
+            return Err(joint.wrong(format!("{tag}: expressed in `{frame}`, which is not there{near}")));
         }
         let mXj = self.of(reference(joint))?.rotation * pose(joint, joint)?.rotation;
         Ok(mXj.transpose_mul(self.of(frame)?.rotation * v))

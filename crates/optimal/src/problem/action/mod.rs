@@ -1,6 +1,7 @@
 //! One knot's dynamics and cost, asked for many knots at a time.
 
 pub(crate) mod differences;
+pub(crate) mod hold;
 
 use super::multipliers::Visit;
 use crate::error::assert_length;
@@ -70,6 +71,12 @@ pub trait ActionModel: Any + Send {
     /// The number of entries of a control u; zero at a terminal knot and at one that only jumps (an impact).
     fn nu(&self) -> usize;
 
+    /// Whether there is no next state, so that the action may only serve the end of a horizon. Not by default: one may serve
+    /// both.
+    fn is_end(&self) -> bool {
+        false
+    }
+
     /// The number of states that a group call computes at the price of one; 1 unless it uses vector lanes.
     ///
     /// A line search tries so many step lengths side by side.
@@ -95,6 +102,31 @@ pub trait ActionModel: Any + Send {
     #[doc(hidden)]
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         let _ = (t, visit);
+    }
+
+    /// Makes the memory in which the action computes, unless it is there: a problem asks for it when it is made.
+    #[doc(hidden)]
+    fn reserve(&mut self) {}
+
+    /// Takes over the knots of another action that differs in costs, references and weights only, and says whether it did:
+    /// then this action stands for the models of both, its own first, and the other is of no use. So the knots of a problem
+    /// that has an action for each of them are computed in groups.
+    #[doc(hidden)]
+    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
+        let _ = other;
+        false
+    }
+
+    /// Chooses, of the models that this action stands for, the one that is to be changed.
+    #[doc(hidden)]
+    fn choose(&mut self, model: usize) {
+        let _ = model;
+    }
+
+    /// Lets one of the models that this action stands for serve knot t of so many.
+    #[doc(hidden)]
+    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        let _ = (t, horizon, model);
     }
 
     /// x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
@@ -147,6 +179,20 @@ pub trait ActionModel: Any + Send {
         for (i, &t) in knots.iter().enumerate() {
             self.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
         }
+    }
+
+    /// Shows by their names the vectors that the dynamics of knot t compute beside the next state. None by default; those of a
+    /// robot are `acceleration`, `effort` of all joints, and `force/` with the name of each contact, in the axes of its rows,
+    /// which at an impact is an impulse.
+    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        let _ = (t, x, u, show);
+    }
+
+    /// The controls that hold the state x of knot t, where it may stand still: φ(x, u) = x, as near as controls come to it.
+    /// By default steps of Newton, u ← u − B⁺ (φ(x, u) ⊖ x), at most 100, as Crocoddyl's; a robot's come from statics.
+    /// Allocates.
+    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        hold::newton(self, t, x)
     }
 
     /// The horizon has [moved on](crate::Problem::shift) by a knot: what was said of knot t now holds of knot t − 1.

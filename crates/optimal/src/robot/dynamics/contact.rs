@@ -1,17 +1,14 @@
 //! Dynamics of a robot in contact with the world.
-#![allow(non_snake_case)] // J
 
-use super::batch::{Law, Pass};
+use super::batch::Law;
 use super::robot::RobotDynamics;
 use crate::Error;
-use crate::error::assert_length;
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::Capabilities;
 use crate::robot::contact::{Contact, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
-use condyle_dynamics::{Model, constrained_dynamics, gravity};
-use nalgebra::DMatrix;
+use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Forward dynamics of a robot in contact, and costs: q̈ and λ of M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0.
@@ -62,7 +59,8 @@ impl ContactAcceleration {
     ) -> Result<Self, Error> {
         let nu = actuation.nu();
         let capabilities = Capabilities { nu, effort: true, contacts: rows_of(contacts), ..Capabilities::default() };
-        RobotDynamics::new(model, actuation, capabilities, Law::Contact(contacts, damping), costs).map(Self)
+        let law = Law::Contact(contacts.to_vec(), damping);
+        RobotDynamics::new(model, actuation, capabilities, law, costs).map(Self)
     }
 }
 
@@ -83,15 +81,6 @@ impl ContactDynamics {
     /// # Panics
     /// If `x` has not nq + nv numbers.
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        let RobotDynamics { model, actuation, single, .. } = &mut self.inner_mut().0;
-        let (nq, nv) = (model.nq(), model.nv());
-        assert_length("x", x.len(), nq + nv);
-        let mut J = DMatrix::zeros(0, nv);
-        if let Pass::Contact(set, _) = &mut single.pass {
-            constrained_dynamics(model, &mut single.data, set, &x[..nq], &x[nq..], &vec![0.0; nv], &[]);
-            J = DMatrix::zeros(set.rows(), nv);
-            set.jacobian(&mut J);
-        }
-        actuation.hold(gravity(model, &mut single.data, &x[..nq]), &J)
+        self.inner_mut().0.hold(x)
     }
 }

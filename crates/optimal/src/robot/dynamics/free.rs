@@ -3,13 +3,11 @@
 use super::batch::Law;
 use super::robot::RobotDynamics;
 use crate::Error;
-use crate::error::assert_length;
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::Capabilities;
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
-use condyle_dynamics::{Model, gravity};
-use nalgebra::DMatrix;
+use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
@@ -77,8 +75,6 @@ impl FreeDynamics {
     /// # Panics
     /// If `x` has not nq + nv numbers.
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        let RobotDynamics { model, actuation, single, .. } = &mut self.inner_mut().0;
-        assert_length("x", x.len(), model.nq() + model.nv());
-        actuation.hold(gravity(model, &mut single.data, &x[..model.nq()]), &DMatrix::zeros(0, model.nv()))
+        self.inner_mut().0.hold(x)
     }
 }

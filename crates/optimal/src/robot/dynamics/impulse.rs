@@ -1,14 +1,14 @@
 //! Impacts: knots without time and controls, at which velocities jump.
 
 use super::batch::Law;
-use super::robot::{DynamicsSensitivities, RobotDynamics};
+use super::robot::{DynamicsSensitivities, RobotDynamics, Work};
 use crate::ActionModel;
 use crate::Error;
 use crate::lq::LqNode;
 use crate::problem::Visit;
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::{Capabilities, Output};
-use crate::robot::contact::{Contact, constraint_set, rows_of};
+use crate::robot::contact::{Contact, check_contacts, constraint_set, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::knot::{KnotData, KnotState};
 use crate::robot::state::{state_difference, state_integrate};
@@ -16,6 +16,7 @@ use condyle_dynamics::{
     ConstraintSet, Data, Model, centroidal_derivatives, forward_velocities, impulse_dynamics,
     impulse_dynamics_derivatives,
 };
+use std::any::Any;
 use std::sync::Arc;
 
 /// A knot at which contacts set in, with the restitution ε and the damping μ:
@@ -45,8 +46,11 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct ImpulseDynamics {
     pub(super) robot: RobotDynamics,
-    set: ConstraintSet<f64>,
+    contacts: Vec<Contact>,
     restitution: f64,
+    damping: f64,
+    /// The constraints, made when they are first needed.
+    set: Option<Box<ConstraintSet<f64>>>,
     /// Zeros. Shape: nv.
     zero: Vec<f64>,
 }
@@ -68,16 +72,19 @@ impl ImpulseDynamics {
             let what = format!("ε is {restitution}, not from 0 to 1");
             return Err(Error::Contact { name: "restitution".to_owned(), what });
         }
-        let (set, zero) = (constraint_set(&model, contacts, damping)?, vec![0.0; model.nv()]);
+        check_contacts(&model, contacts, damping)?;
         let capabilities = Capabilities { impulse: true, contacts: rows_of(contacts), ..Capabilities::default() };
-        let none = Actuation::none(&model);
-        Ok(Self { robot: RobotDynamics::new(model, none, capabilities, Law::None, costs)?, set, restitution, zero })
+        let (none, zero) = (Actuation::none(&model), vec![0.0; model.nv()]);
+        let robot = RobotDynamics::new(model, none, capabilities, Law::None, costs)?;
+        Ok(Self { robot, contacts: contacts.to_vec(), restitution, damping, set: None, zero })
     }
 
     /// Computes v⁺ − v and the impulses at a state, with their derivatives if these are asked for, and what the residuals
     /// see.
     fn evaluate(&mut self, t: usize, x: &[f64], slopes: bool) {
-        let Self { robot: RobotDynamics { model, terms, single, data, .. }, set, restitution, zero } = self;
+        self.reserve();
+        let Self { robot, set: Some(set), restitution, zero, .. } = self else { unreachable!("was just made") };
+        let (model, _, terms, Work { single, data, .. }) = robot.parts();
         let ((q, v), knot) = (x.split_at(model.nq()), &mut data[0]);
         knot.residuals.reserve(v.len(), terms.layouts());
         if slopes {
@@ -133,6 +140,33 @@ impl ActionModel for ImpulseDynamics {
         self.robot.terms.shift();
     }
 
+    fn reserve(&mut self) {
+        self.robot.reserve();
+        let Self { robot: RobotDynamics { model, .. }, contacts, damping, set, .. } = self;
+        set.get_or_insert_with(|| Box::new(constraint_set(model, contacts, *damping).expect("was checked when given")));
+    }
+
+    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
+        let other: &mut dyn Any = other;
+        let Some(other) = other.downcast_mut::<Self>() else { return false };
+        let same =
+            (&self.contacts, self.restitution, self.damping) == (&other.contacts, other.restitution, other.damping);
+        same && self.robot.merge(&mut other.robot)
+    }
+
+    fn choose(&mut self, model: usize) {
+        self.robot.terms.choose(model);
+    }
+
+    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        self.robot.terms.serve(t, horizon, model);
+    }
+
+    fn outputs(&mut self, t: usize, x: &[f64], _: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        self.evaluate(t, x, false);
+        self.robot.outputs(0, show);
+    }
+
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         self.robot.terms.limits.visit(t, visit);
     }
@@ -143,7 +177,7 @@ impl ActionModel for ImpulseDynamics {
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.evaluate(t, x, false);
-        let RobotDynamics { model, terms, data, .. } = &mut self.robot;
+        let (model, _, terms, Work { data, .. }) = self.robot.parts();
         let (nq, data) = (model.nq(), &data[0]);
         next.copy_from_slice(x);
         (0..model.nv()).for_each(|k| next[nq + k] += data.a[k]);
@@ -152,7 +186,7 @@ impl ActionModel for ImpulseDynamics {
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         self.evaluate(t, x, true);
-        let RobotDynamics { model, terms, data, actuation, .. } = &mut self.robot;
+        let (model, actuation, terms, Work { data, .. }) = self.robot.parts();
         let (nv, data) = (model.nv(), &data[0]);
         let sensitivities = DynamicsSensitivities { given: Output::Effort, data, actuation };
         terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, 1.0, node);

@@ -60,6 +60,8 @@ pub(crate) struct KktElimination {
     limbs: Vec<(usize, usize)>,
     /// The column that each row was solved for.
     pivots: Vec<usize>,
+    /// The rows that are solved here, and which of their blocks are not zero.
+    late: Vec<(usize, u64)>,
     /// The place of each column of δa and δf: its unknown, if it is one, or else the row that was solved for it.
     place: Vec<Place>,
     /// Runs of columns that are unknowns: the first column, the first unknown, how many.
@@ -91,6 +93,7 @@ impl KktElimination {
             preferred: preferred.collect(),
             limbs: limbs.solved().collect(),
             pivots: Vec::with_capacity(rows + passive),
+            late: Vec::with_capacity(rows + passive),
             place: vec![Place::Unknown(0); nv + rows],
             runs: Vec::with_capacity(nv + rows),
             forces: SparseRows::default(),
@@ -154,16 +157,23 @@ struct Run<'a> {
     done: &'a mut bool,
 }
 
-/// y −= a x on the blocks that are not zero in x, in whole registers.
+/// How many rows are subtracted at once.
+const TOGETHER: usize = 4;
+
+/// y −= Σ aᵢ xᵢ on the blocks that are not zero in all x, in whole registers.
 #[inline(always)]
-fn subtract<V: Vector>(y: &mut [f64], x: &[f64], a: f64, mut mask: u64) {
-    let (a, wide) = (V::splat(-a), block(y.len()));
+fn subtract<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N], mut mask: u64) {
+    let (n, wide) = (y.len(), block(y.len()));
+    let (x, a) = (x.map(|x| &x[..n]), a.map(|a| V::splat(-a)));
     while mask != 0 {
         let mut i = mask.trailing_zeros() as usize * wide;
-        let end = y.len().min(i + wide);
+        let end = n.min(i + wide);
         while i + V::N <= end {
-            let place = &mut y[i..][..V::N];
-            V::load(&x[i..]).mul_add(a, V::load(place)).store(place);
+            let mut sum = V::load(&y[i..][..V::N]);
+            for k in 0..N {
+                sum = V::load(&x[k][i..][..V::N]).mul_add(a[k], sum);
+            }
+            sum.store(&mut y[i..][..V::N]);
             i += V::N;
         }
         mask &= mask - 1;
@@ -175,7 +185,7 @@ impl Vectorized for Run<'_> {
     fn run<V: Vector>(self) {
         let Self { elimination: e, T, limbs, dt, form, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
-        let (solved, all) = (rows + e.passive, rows + nv);
+        let solved = rows + e.passive;
         let mut force_scale = 0.0_f64;
         for r in rows..solved {
             force_scale = force_scale.max(max_abs(&T[r * stride + nv..][..rows]));
@@ -186,6 +196,8 @@ impl Vectorized for Run<'_> {
         for &(r, k) in e.limbs.iter().filter(|_| limbs) {
             (e.place[k], e.pivots[r]) = (Place::Row(r), k);
         }
+        e.late.clear();
+        let (T, motion) = T.split_at_mut(solved * stride);
         for r in 0..solved {
             if e.pivots[r] != usize::MAX {
                 continue;
@@ -203,13 +215,34 @@ impl Vectorized for Run<'_> {
             }
             row[k] = 1.0;
             let mask = mask(row);
-            for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride).take(all - r - 1)) {
+            for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride)) {
                 let factor = other[k];
                 if factor != 0.0 {
-                    subtract::<V>(other, row, factor, mask);
+                    subtract::<V, 1>(other, [row], [factor], mask);
                     other[k] = 0.0;
                 }
             }
+            e.late.push((r, 0));
+        }
+        // what the rows were solved for goes out of the joints' rows, several at once
+        e.late.iter_mut().for_each(|(r, blocks)| *blocks = mask(&T[*r * stride..][..stride]));
+        for other in motion.chunks_exact_mut(stride).take(if e.late.is_empty() { 0 } else { nv }) {
+            let (mut x, mut a, mut blocks, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0, 0);
+            for &(r, mask) in &e.late {
+                let factor = other[e.pivots[r]];
+                if factor == 0.0 {
+                    continue;
+                }
+                (x[count], a[count], blocks, count) = (&T[r * stride..][..stride], factor, blocks | mask, count + 1);
+                if count == TOGETHER {
+                    subtract::<V, TOGETHER>(other, x, a, blocks);
+                    (a, blocks, count) = ([0.0; TOGETHER], 0, 0);
+                }
+            }
+            if count > 0 {
+                subtract::<V, TOGETHER>(other, x, a, blocks);
+            }
+            e.late.iter().for_each(|&(r, _)| other[e.pivots[r]] = 0.0);
         }
 
         // the columns that are left are the unknowns
@@ -234,7 +267,7 @@ impl Vectorized for Run<'_> {
 
         // U; the dependent steps D; the dependent forces
         form.efforts.resize(m, size);
-        for (row, to) in T[solved * stride..].chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
+        for (row, to) in motion.chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
             gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
         }
         form.dependent.clear();
@@ -300,6 +333,10 @@ impl Unknowns<'_> {
 }
 
 impl Sensitivities for Unknowns<'_> {
+    fn add_control(&self, k: usize, c: f64, g: &mut Row<'_>) {
+        self.add(&self.form.efforts, k, c, g); // each control drives one coordinate
+    }
+
     fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>) {
         let KktElimination { tableau, passive, place, forces, .. } = self.elimination;
         let per_step = c / self.dt; // δa = (y − δv) / Δt

@@ -157,6 +157,30 @@ macro_rules! robot_models {
                 Some(&mut self.0.terms.limits)
             }
 
+            fn outputs(&mut self, input: KnotInput<'_>, show: &mut dyn FnMut(&str, &[f64])) {
+                self.0.outputs(input.lane, show);
+            }
+
+            fn hold(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+                Some(self.0.hold(x))
+            }
+
+            fn reserve(&mut self) {
+                self.0.reserve();
+            }
+
+            fn merge(&mut self, other: &mut Self) -> bool {
+                self.0.merge(&mut other.0)
+            }
+
+            fn choose(&mut self, model: usize) {
+                self.0.terms.choose(model);
+            }
+
+            fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+                self.0.terms.serve(t, horizon, model);
+            }
+
             fn fork(&self) -> Option<Self> {
                 Some(self.clone())
             }

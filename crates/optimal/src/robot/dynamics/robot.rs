@@ -1,13 +1,15 @@
 //! Dynamics of a robot: what its knots of all kinds share.
+#![allow(non_snake_case)] // J
 
 use super::batch::{KnotBatch, Law, Pass};
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
 use crate::Error;
+use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::{Capabilities, Output};
-use crate::robot::contact::moved_by;
+use crate::robot::contact::{check_contacts, constraint_set, moved_by};
 use crate::robot::continuous::{Derivatives, KnotInput, Wanted};
 use crate::robot::costs::Cost;
 use crate::robot::horizon_terms::HorizonTerms;
@@ -15,7 +17,9 @@ use crate::robot::knot::{KnotData, KnotState, Sensitivities, add_matrix_row};
 use crate::robot::residuals::rows::Row;
 use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
-use condyle_dynamics::{IntegrateArgument, Model, aba_hessian, integrate_jacobian_groups};
+use condyle_dynamics::{
+    Data, IntegrateArgument, Model, aba_hessian, constrained_dynamics, gravity, integrate_jacobian_groups,
+};
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Real, Witness};
 use core::ops::Range;
@@ -41,17 +45,26 @@ pub(crate) struct RobotDynamics {
     pub model: Arc<Model>,
     pub actuation: Actuation,
     pub terms: HorizonTerms,
+    law: Law,
+    /// The output that the controls drive.
+    given: Output,
+    capabilities: Capabilities,
+    /// The coordinates of each group of positions that is no vector space.
+    pub groups: Vec<Range<usize>>,
+    /// Made when it is first needed, so that an action costs little to make, and to merge with others.
+    work: Option<Box<Work>>,
+}
+
+/// The memory in which the dynamics of knots are computed.
+#[derive(Clone, Debug)]
+pub(crate) struct Work {
     /// The dynamics of one knot.
     pub single: KnotBatch<f64>,
-    vectors: Option<Box<VectorBatches>>,
+    vectors: Option<VectorBatches>,
     /// The knots of the group that was prepared, and what was computed of them.
     pub data: Vec<KnotData>,
     prepared: Wanted,
-    /// The output that the controls drive.
-    given: Output,
     elimination: Option<KktElimination>,
-    /// The coordinates of each group of positions that is no vector space.
-    pub groups: Vec<Range<usize>>,
     group_hessian: GroupHessian,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
     da_du: Vec<f64>,
@@ -65,6 +78,77 @@ struct VectorBatches {
     long: Option<KnotBatch<Long>>,
 }
 
+/// The number of knots that are computed side by side.
+fn lanes(law: &Law) -> usize {
+    match (law, level()) {
+        (Law::None, _) | (_, Level::Baseline) => 1,
+        (_, Level::Neon | Level::Avx2) => Short::LANES,
+        (_, Level::Avx512) => Long::LANES,
+    }
+}
+
+impl Work {
+    #[inline(never)]
+    fn new(of: &RobotDynamics) -> Self {
+        let RobotDynamics { model, actuation, law, given, capabilities, groups, .. } = of;
+        let (nv, lanes) = (model.nv(), lanes(law));
+        let mut vectors = (lanes > 1).then(|| {
+            let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, law));
+            VectorBatches { short: KnotBatch::new(model, law), long }
+        });
+        let moved_by = match law {
+            Law::Free => Some(Vec::new()),
+            Law::Contact(contacts, _) => Some(moved_by(model, contacts)),
+            _ => None,
+        };
+        // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
+        let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
+        let mut data = KnotData::new(nv, capabilities, *given);
+        let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
+            let damped = matches!(law, Law::Contact(_, damping) if *damping != 0.0);
+            let limbs = Arc::new(LimbElimination::new(model, passive, &moved_by, damped));
+            let tableau = Tableau { nv, rows: capabilities.rows() };
+            data.equations.resize(tableau.len(), 0.0);
+            match &mut vectors.long {
+                Some(long) => long.reserve(tableau, &limbs), // derivatives take the widest
+                None => vectors.short.reserve(tableau, &limbs),
+            }
+            KktElimination::new(nv, passive, &moved_by, &limbs)
+        });
+        Self {
+            single: KnotBatch::new(model, law),
+            vectors,
+            data: vec![data; lanes],
+            prepared: Wanted::Motion,
+            elimination,
+            group_hessian: GroupHessian::new(nv, groups),
+            da_du: actuation.scratch(),
+        }
+    }
+
+    /// Writes a knot of Δt = `scale` seconds in inverse-dynamics form; says whether there is one.
+    fn write_inverse_dynamics_form(
+        &mut self,
+        terms: &mut HorizonTerms,
+        KnotInput { lane, t, x, u }: KnotInput<'_>,
+        scale: f64,
+        node: &mut LqNode,
+    ) -> bool {
+        let Self { data, elimination: Some(elimination), .. } = self else { return false };
+        let form = &mut node.inverse_dynamics;
+        let KnotData { equations, limbs_solved, .. } = &mut data[lane];
+        if !elimination.run(equations, *limbs_solved, scale, form) {
+            return false;
+        }
+        form.active = true;
+        let lent = form.lend();
+        let state = KnotState { x, u, data: &data[lane] };
+        terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, node);
+        node.inverse_dynamics.take_back(lent);
+        true
+    }
+}
+
 impl RobotDynamics {
     /// A robot with some drives whose accelerations obey a law.
     ///
@@ -75,10 +159,13 @@ impl RobotDynamics {
         model: Arc<Model>,
         actuation: Actuation,
         capabilities: Capabilities,
-        law: Law<'_>,
+        law: Law,
         costs: Vec<Cost>,
     ) -> Result<Self, Error> {
-        let (nv, single) = (model.nv(), KnotBatch::new(&model, law)?);
+        let nv = model.nv();
+        if let Law::Contact(contacts, damping) = &law {
+            check_contacts(&model, contacts, *damping)?;
+        }
         if actuation.nv() != nv {
             let what = format!("it drives {} coordinates, the robot has {nv}", actuation.nv());
             return Err(Error::Actuation { what });
@@ -91,68 +178,50 @@ impl RobotDynamics {
             let what = format!("{why} {}: their accelerations are undefined", names.join(", "));
             return Err(Error::Actuation { what });
         }
-        let (lanes, mut vectors) = match (law, level()) {
-            (Law::None, _) | (_, Level::Baseline) => (1, None),
-            (_, Level::Neon | Level::Avx2) => {
-                let short = KnotBatch::new(&model, law)?;
-                (Short::LANES, Some(Box::new(VectorBatches { short, long: None })))
-            }
-            (_, Level::Avx512) => {
-                let (short, long) = (KnotBatch::new(&model, law)?, Some(KnotBatch::new(&model, law)?));
-                (Long::LANES, Some(Box::new(VectorBatches { short, long })))
-            }
-        };
-        let moved_by = match law {
-            Law::Free => Some(Vec::new()),
-            Law::Contact(contacts, _) => Some(moved_by(&model, contacts)),
-            _ => None,
-        };
-        // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
-        let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
         let given = if matches!(law, Law::Inverse) { Output::Acceleration } else { Output::Effort };
-        let mut data = KnotData::new(nv, &capabilities, given);
-        let elimination = form.zip(vectors.as_deref_mut()).map(|((moved_by, passive), vectors)| {
-            let damped = matches!(law, Law::Contact(_, damping) if damping != 0.0);
-            let limbs = Arc::new(LimbElimination::new(&model, passive, &moved_by, damped));
-            let tableau = Tableau { nv, rows: capabilities.rows() };
-            data.equations.resize(tableau.len(), 0.0);
-            match &mut vectors.long {
-                Some(long) => long.reserve(tableau, &limbs), // derivatives take the widest
-                None => vectors.short.reserve(tableau, &limbs),
-            }
-            KktElimination::new(nv, passive, &moved_by, &limbs)
-        });
         let groups = groups(&model);
-        Ok(Self {
-            vectors,
-            data: vec![data; lanes],
-            prepared: Wanted::Motion,
-            group_hessian: GroupHessian::new(nv, &groups),
-            da_du: actuation.scratch(),
-            model,
-            actuation,
-            terms,
-            single,
-            given,
-            elimination,
-            groups,
-        })
+        Ok(Self { model, actuation, terms, law, given, capabilities, groups, work: None })
+    }
+
+    /// Makes the memory in which knots are computed, unless it is there.
+    pub(crate) fn reserve(&mut self) {
+        self.terms.reserve();
+        if self.work.is_none() {
+            self.work = Some(Box::new(Work::new(self)));
+        }
+    }
+
+    /// The robot, its drives, the terms of its knots, and the memory in which they are computed.
+    pub(crate) fn parts(&mut self) -> (&Arc<Model>, &Actuation, &mut HorizonTerms, &mut Work) {
+        self.reserve();
+        let Self { model, actuation, terms, work: Some(work), .. } = self else { unreachable!("was just made") };
+        (model, actuation, terms, work)
+    }
+
+    /// As [`ActionModel::merge`](crate::ActionModel::merge).
+    pub(crate) fn merge(&mut self, other: &mut Self) -> bool {
+        let same = Arc::ptr_eq(&self.model, &other.model)
+            && (&self.law, &self.actuation, &self.capabilities) == (&other.law, &other.actuation, &other.capabilities);
+        if same {
+            self.terms.append(&mut other.terms);
+        }
+        same
     }
 
     /// As [`ContinuousModel::lanes`](crate::robot::ContinuousModel::lanes).
     pub(crate) fn lanes(&self) -> usize {
-        self.data.len()
+        lanes(&self.law)
     }
 
     /// As [`ContinuousModel::prepare`](crate::robot::ContinuousModel::prepare): side by side where that is worthwhile.
     pub(crate) fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
-        let Self { model, actuation, terms, single, vectors, data, .. } = self;
+        let (model, actuation, terms, Work { single, vectors, data, prepared, .. }) = self.parts();
         let (nu, nx, count) = (actuation.nu(), model.nq() + model.nv(), knots.len());
         let data = &mut data[..count];
         for (k, data) in data.iter_mut().enumerate() {
             actuation.effort(&us[k * nu..][..nu], &mut data.tau); // τ = S u
         }
-        match vectors.as_deref_mut().filter(|_| count >= WORTHWHILE || wanted == Wanted::Equations) {
+        match vectors.as_mut().filter(|_| count >= WORTHWHILE || wanted == Wanted::Equations) {
             Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || wanted != Wanted::Motion => {
                 long.run(model, knots, xs, terms, wanted, data);
             }
@@ -167,25 +236,28 @@ impl RobotDynamics {
             let slopes = wanted != Wanted::Motion;
             single.run_residuals_at(model, knots[k], &xs[k * nx..][..nx], terms, slopes, data);
         }
-        self.prepared = wanted;
+        *prepared = wanted;
     }
 
     /// As [`ContinuousModel::calc`](crate::robot::ContinuousModel::calc).
     pub(crate) fn calc(&mut self, KnotInput { lane, t, x, u }: KnotInput<'_>) -> (&[f64], f64) {
-        let data = &self.data[lane];
-        (&data.a, self.terms.calc(t, KnotState { x, u, data }))
+        let (_, _, terms, Work { data, .. }) = self.parts();
+        let data = &data[lane];
+        (&data.a, terms.calc(t, KnotState { x, u, data }))
     }
 
     /// As [`ContinuousModel::calc_diff`](crate::robot::ContinuousModel::calc_diff).
     pub(crate) fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
-        let inverse = self.prepared == Wanted::Equations && self.write_inverse_dynamics_form(input, scale, node);
-        if self.prepared == Wanted::Equations && !inverse {
-            let Self { model, terms, single, data, .. } = self;
+        let given = self.given;
+        let (model, actuation, terms, work) = self.parts();
+        let in_equations = work.prepared == Wanted::Equations;
+        let inverse = in_equations && work.write_inverse_dynamics_form(terms, input, scale, node);
+        let Work { single, data, da_du, .. } = work;
+        if in_equations && !inverse {
             let data = &mut data[input.lane..=input.lane];
             single.run(model, &[input.t], input.x, terms, Wanted::Derivatives, data);
         }
-        let Self { terms, data, given, actuation, da_du, .. } = self;
-        let (KnotInput { lane, t, x, u }, given) = (input, *given);
+        let KnotInput { lane, t, x, u } = input;
         let data = &data[lane];
         let [da_dq, da_dv, da_dtau] = &data.da;
         if !inverse {
@@ -195,25 +267,46 @@ impl RobotDynamics {
         Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
     }
 
-    /// Writes a knot of Δt = `scale` seconds in inverse-dynamics form; says whether there is one.
-    fn write_inverse_dynamics_form(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> bool {
-        let Self { terms, data, elimination: Some(elimination), .. } = self else { return false };
-        let (KnotInput { lane, t, x, u }, form) = (input, &mut node.inverse_dynamics);
-        let KnotData { equations, limbs_solved, .. } = &mut data[lane];
-        if !elimination.run(equations, *limbs_solved, scale, form) {
-            return false;
-        }
-        form.active = true;
-        let lent = form.lend();
-        let state = KnotState { x, u, data: &data[lane] };
-        terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, node);
-        node.inverse_dynamics.take_back(lent);
-        true
-    }
-
     /// As [`ContinuousModel::inverse_dynamics_form`](crate::robot::ContinuousModel::inverse_dynamics_form).
     pub(crate) fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
-        Some([self.elimination.as_ref()?.most_dependent(), self.terms.layout().rows[0]])
+        Some([self.work.as_ref()?.elimination.as_ref()?.most_dependent(), self.terms.layout().rows[0]])
+    }
+
+    /// As [`ActionModel::outputs`](crate::ActionModel::outputs), of a knot that was prepared.
+    pub(crate) fn outputs(&mut self, lane: usize, show: &mut dyn FnMut(&str, &[f64])) {
+        self.reserve();
+        let Self { capabilities, work: Some(work), .. } = self else { unreachable!("was just made") };
+        let data = &work.data[lane];
+        if capabilities.effort {
+            show("acceleration", &data.a);
+            show("effort", &data.tau);
+        }
+        for (contact, rows) in &capabilities.contacts {
+            show(&format!("force/{contact}"), &data.lambda[rows.clone()]);
+        }
+    }
+
+    /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺ g(q).
+    pub(crate) fn hold(&mut self, x: &[f64]) -> Vec<f64> {
+        let (nq, nv) = (self.model.nq(), self.model.nv());
+        assert_length("x", x.len(), nq + nv);
+        if self.law == Law::Inverse {
+            return vec![0.0; nv]; // q̈ = u
+        }
+        // one state does not need the memory of many knots
+        let Self { model, actuation, law, work, .. } = self;
+        let (mut own, mut J) = (None, DMatrix::zeros(0, nv));
+        let data = match work {
+            Some(work) => &mut work.single.data,
+            None => own.insert(Data::new(model)),
+        };
+        if let Law::Contact(contacts, damping) = law {
+            let mut set = constraint_set(model, contacts, *damping).expect("was checked when it was given");
+            constrained_dynamics(model, data, &mut set, &x[..nq], &x[nq..], &vec![0.0; nv], &[]);
+            J = DMatrix::zeros(set.rows(), nv);
+            set.jacobian(&mut J);
+        }
+        actuation.hold(gravity(model, data, &x[..nq]), &J)
     }
 
     /// As [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
@@ -223,7 +316,8 @@ impl RobotDynamics {
         mu: &[f64],
         hessian: &mut Hessian,
     ) -> Option<Derivatives<'_>> {
-        let Self { model, actuation, single: KnotBatch { data, pass, .. }, data: knots, da_du, .. } = self;
+        let (model, actuation, _, work) = self.parts();
+        let Work { single: KnotBatch { data, pass, .. }, data: knots, da_du, .. } = work;
         let knot = &mut knots[0];
         match pass {
             Pass::Free => {
@@ -267,7 +361,9 @@ impl RobotDynamics {
 
     /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
     pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
-        self.group_hessian.run(&self.model, &self.groups, dq, lambda, hessian);
+        self.reserve();
+        let Self { model, groups, work: Some(work), .. } = self else { unreachable!("was just made") };
+        work.group_hessian.run(model, groups, dq, lambda, hessian);
     }
 }
 
@@ -290,5 +386,9 @@ impl Sensitivities for DynamicsSensitivities<'_> {
         add_matrix_row(by_q, row, c, g.q);
         add_matrix_row(by_v, row, c, g.v);
         self.actuation.add_product_row(by_given, row, c, g.u);
+    }
+
+    fn add_control(&self, k: usize, c: f64, g: &mut Row<'_>) {
+        g.u[k] += c;
     }
 }

@@ -10,11 +10,12 @@ use crate::ActionModel;
 use crate::Error;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
-use crate::problem::Visit;
+use crate::problem::{Visit, hold};
 use curvature::Curvature;
 use retraction::Retraction;
 use runge_kutta::RungeKutta;
 use serde::{Deserialize, Serialize};
+use std::any::Any;
 
 /// The rule by which a knot steps through its time.
 ///
@@ -43,18 +44,26 @@ pub struct Integrated<M> {
     method: Method,
     /// The least and the greatest controls.
     bounds: Option<[Vec<f64>; 2]>,
-    retraction: Retraction,
-    curvature: Curvature,
+    /// Made when it is first needed.
+    work: Option<Box<Work>>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Method {
     /// The end of a horizon, where time stands still.
     Still,
     /// A semi-implicit Euler step of Δt.
     Euler(f64),
-    /// A Runge–Kutta step of Δt.
-    RungeKutta(f64, Box<RungeKutta>),
+    /// A Runge–Kutta step of Δt, of so many stages.
+    RungeKutta(f64, usize),
+}
+
+/// The memory of a step.
+#[derive(Clone, Debug)]
+struct Work {
+    retraction: Retraction,
+    curvature: Curvature,
+    runge_kutta: Option<RungeKutta>,
 }
 
 impl<M: ContinuousModel> Integrated<M> {
@@ -66,14 +75,13 @@ impl<M: ContinuousModel> Integrated<M> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(Error::TimeStep { dt });
         }
-        let runge_kutta = |stages| Method::RungeKutta(dt, Box::new(RungeKutta::new(stages, &model)));
         let method = match integrator {
             Integrator::SemiImplicitEuler => Method::Euler(dt),
-            Integrator::RungeKutta2 => runge_kutta(2),
-            Integrator::RungeKutta3 => runge_kutta(3),
-            Integrator::RungeKutta4 => runge_kutta(4),
+            Integrator::RungeKutta2 => Method::RungeKutta(dt, 2),
+            Integrator::RungeKutta3 => Method::RungeKutta(dt, 3),
+            Integrator::RungeKutta4 => Method::RungeKutta(dt, 4),
         };
-        Ok(Self::with(model, method))
+        Ok(Self { inner: model, method, bounds: None, work: None })
     }
 
     /// The end of a horizon, for a model without controls.
@@ -82,12 +90,21 @@ impl<M: ContinuousModel> Integrated<M> {
     /// If the model has controls.
     pub fn end(model: M) -> Self {
         assert!(model.nu() == 0, "model: a terminal one has no controls, found {}", model.nu());
-        Self::with(model, Method::Still)
+        Self { inner: model, method: Method::Still, bounds: None, work: None }
     }
 
-    fn with(inner: M, method: Method) -> Self {
-        let (retraction, curvature) = (Retraction::new(inner.nv()), Curvature::new(&inner));
-        Self { inner, method, bounds: None, retraction, curvature }
+    /// The model, the rule of a step, and its memory.
+    fn parts(&mut self) -> (&mut M, Method, &mut Work) {
+        let Self { inner, method, work, .. } = self;
+        let work = work.get_or_insert_with(|| {
+            let runge_kutta = match *method {
+                Method::RungeKutta(_, stages) => Some(RungeKutta::new(stages, inner)),
+                _ => None,
+            };
+            let (retraction, curvature) = (Retraction::new(inner.nv()), Curvature::new(inner));
+            Box::new(Work { retraction, curvature, runge_kutta })
+        });
+        (inner, *method, work)
     }
 
     /// The same knot with bounds on the controls, infinite where there is none.
@@ -139,21 +156,23 @@ impl<M: ContinuousModel> Integrated<M> {
 
     /// Writes the next state of a prepared one; returns the cost.
     fn step(&mut self, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
-        let Self { inner, method, retraction, .. } = self;
-        match method {
-            Method::Still => inner.calc(input).1 + limit_term(inner),
-            Method::Euler(dt) => euler::calc(inner, input, *dt, retraction, next),
-            Method::RungeKutta(dt, method) => method.calc(inner, input, *dt, next),
+        match self.parts() {
+            (inner, Method::Euler(dt), work) => euler::calc(inner, input, dt, &mut work.retraction, next),
+            (inner, Method::RungeKutta(dt, _), Work { runge_kutta: Some(method), .. }) => {
+                method.calc(inner, input, dt, next)
+            }
+            (inner, ..) => inner.calc(input).1 + limit_term(inner),
         }
     }
 
     /// Writes the derivatives at a prepared state.
     fn differentiate(&mut self, input: KnotInput<'_>, node: &mut LqNode) {
-        let Self { inner, method, retraction, .. } = self;
-        match method {
-            Method::Still => _ = inner.calc_diff(input, 1.0, node),
-            Method::Euler(dt) => euler::calc_diff(inner, input, *dt, retraction, node),
-            Method::RungeKutta(dt, method) => method.calc_diff(inner, input, *dt, retraction, node),
+        match self.parts() {
+            (inner, Method::Euler(dt), work) => euler::calc_diff(inner, input, dt, &mut work.retraction, node),
+            (inner, Method::RungeKutta(dt, _), Work { runge_kutta: Some(method), retraction, .. }) => {
+                method.calc_diff(inner, input, dt, retraction, node);
+            }
+            (inner, ..) => _ = inner.calc_diff(input, 1.0, node),
         }
     }
 }
@@ -175,6 +194,10 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
+    fn is_end(&self) -> bool {
+        self.method == Method::Still
+    }
+
     fn lanes(&self) -> usize {
         if let Method::Euler(_) = self.method { self.inner.lanes() } else { 1 }
     }
@@ -183,15 +206,32 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.inner.shift();
     }
 
+    fn reserve(&mut self) {
+        self.inner.reserve();
+        self.parts();
+    }
+
+    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
+        let other: &mut dyn Any = other;
+        let Some(other) = other.downcast_mut::<Self>() else { return false };
+        (self.method, &self.bounds) == (other.method, &other.bounds) && self.inner.merge(&mut other.inner)
+    }
+
+    fn choose(&mut self, model: usize) {
+        self.inner.choose(model);
+    }
+
+    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        self.inner.serve(t, horizon, model);
+    }
+
     fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         if let Method::Euler(_) = self.method { self.inner.inverse_dynamics_form() } else { None }
     }
 
     fn fork(&self) -> Option<Box<dyn ActionModel>> {
-        let Self { inner, method, bounds, retraction, curvature } = self;
-        let (method, bounds, retraction, curvature) =
-            (method.clone(), bounds.clone(), retraction.clone(), curvature.clone());
-        Some(Box::new(Self { inner: inner.fork()?, method, bounds, retraction, curvature }))
+        let Self { inner, method, bounds, work } = self;
+        Some(Box::new(Self { inner: inner.fork()?, method: *method, bounds: bounds.clone(), work: work.clone() }))
     }
 
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
@@ -221,6 +261,17 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.each(&[t], x, u, Wanted::Derivatives, |knot, input, _| knot.differentiate(input, node));
     }
 
+    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        if self.method != Method::Still {
+            self.inner.prepare(&[t], x, u, Wanted::Motion);
+            self.inner.outputs(KnotInput { lane: 0, t, x, u }, show);
+        }
+    }
+
+    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        self.inner.hold(x).unwrap_or_else(|| hold::newton(self, t, x))
+    }
+
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         if let Some(limits) = self.inner.limits() {
             limits.visit(t, visit);
@@ -229,8 +280,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
 
     /// By semi-implicit Euler: see `curvature.rs`.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
-        let Self { inner, method: Method::Euler(dt), retraction, curvature, .. } = self else { return false };
-        curvature.run(inner, *dt, KnotInput { lane: 0, t, x, u }, lambda, retraction, hessian)
+        let (inner, Method::Euler(dt), Work { retraction, curvature, .. }) = self.parts() else { return false };
+        curvature.run(inner, dt, KnotInput { lane: 0, t, x, u }, lambda, retraction, hessian)
     }
 
     fn check_state(&self, x: &[f64]) -> Result<(), String> {

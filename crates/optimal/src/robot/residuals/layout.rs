@@ -53,6 +53,8 @@ pub(crate) struct KnotLayout {
     pub kinematic: usize,
     /// Whether a residual looks at forces.
     pub forces: bool,
+    /// Whether a residual is a user's own.
+    pub own: bool,
     pub requirements: Requirements,
 }
 
@@ -67,7 +69,8 @@ impl KnotLayout {
         let kinematic = usize::from(residual.is_kinematic());
         let forces = residual.output() == Some(Output::Force);
         let requirements = Requirements::of(residual, plan.in_contact);
-        Self { longest: plan.n, rows, kinematic, forces, requirements }
+        let own = matches!(residual, Residual::Own(_));
+        Self { longest: plan.n, rows, kinematic, forces, own, requirements }
     }
 
     /// The layout that serves both of two knots.
@@ -88,6 +91,7 @@ impl Add for KnotLayout {
             rows: sum(self.rows, other.rows),
             kinematic: self.kinematic + other.kinematic,
             forces: self.forces | other.forces,
+            own: self.own | other.own,
             requirements: self.requirements | other.requirements,
         }
     }

@@ -4,6 +4,7 @@ pub(super) mod cones;
 pub(super) mod frame_name;
 pub(super) mod kernel;
 pub(super) mod layout;
+pub(super) mod own;
 pub(super) mod residual;
 pub(super) mod rows;
 pub(super) mod surplus;

@@ -2,6 +2,7 @@
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use super::frame_name::FrameName;
+use super::own::OwnResidual;
 use crate::robot::capabilities::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -107,6 +108,9 @@ pub enum Residual {
     },
     /// J_c (v⁺ − v), 3 numbers in the world: by how much an impact changes the velocity of the centre of mass (m/s).
     ImpulseCenterOfMass,
+    /// A function of one's own. It cannot be put into a file.
+    #[serde(skip)]
+    Own(OwnResidual),
 }
 
 /// The part of the Hessian of a residual that has entries.
@@ -261,6 +265,7 @@ impl Residual {
                 return Err("only an impact changes velocities at once".to_owned());
             }
             Self::ImpulseCenterOfMass => 3,
+            Self::Own(own) => own.size(),
         };
         match self.output() {
             Some(Output::Effort) if !capabilities.effort => Err("there is no effort at this knot".to_owned()),

@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // D
 
 use super::layout::{KinematicData, KnotLayout, Plan};
+use super::own::OwnResidual;
 use super::residual::{Part, Residual};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
 use crate::lq::LqNode;
@@ -25,6 +26,8 @@ pub(crate) struct Scratch {
     D: DMatrix<f64>,
     /// The coordinates of each group of positions that is no vector space.
     groups: Vec<Range<usize>>,
+    /// ∂r/∂x and ∂r/∂u of a user's own residual, row after row.
+    own: [Vec<f64>; 2],
 }
 
 impl Scratch {
@@ -32,13 +35,16 @@ impl Scratch {
     pub(crate) fn new(model: &Model, nu: usize, layout: KnotLayout) -> Self {
         let (nv, numbers) = (model.nv(), || vec![0.0; layout.longest]);
         let (rows, D) = (Rows::new(nv, nu, layout.rows), DMatrix::zeros(nv, nv));
-        Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model) }
+        let own = [2 * nv, nu].map(|n| vec![0.0; if layout.own { layout.longest * n } else { 0 }]);
+        Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model), own }
     }
 }
 
 /// The residuals of a knot: those of its costs, or those of its limits.
 pub(crate) struct ResidualView<'a> {
     pub model: &'a Model,
+    /// The knot.
+    pub t: usize,
     pub state: KnotState<'a>,
     pub kinematics: &'a KinematicData,
     pub scratch: &'a mut Scratch,
@@ -47,7 +53,7 @@ pub(crate) struct ResidualView<'a> {
 impl ResidualView<'_> {
     /// Computes r of a residual, in the scratch.
     pub(crate) fn compute(&mut self, residual: &Residual, plan: &Plan) {
-        let Self { model, state: KnotState { x, u, data }, kinematics, scratch } = self;
+        let Self { model, t, state: KnotState { x, u, data }, kinematics, scratch } = self;
         let r = &mut scratch.r[..plan.n];
         let minus = |r: &mut [f64], a: &[f64], b: &[f64]| (0..r.len()).for_each(|i| r[i] = a[i] - b[i]);
         match residual {
@@ -62,6 +68,7 @@ impl ResidualView<'_> {
             Residual::JointEffort { reference } => minus(r, &data.tau, reference),
             Residual::JointAcceleration { reference } => minus(r, &data.a, reference),
             Residual::ImpulseCenterOfMass => r.copy_from_slice(&data.residuals.com_change),
+            Residual::Own(own) => own.calc(*t, x, u, r),
             Residual::ContactForce { target, .. } => minus(r, &data.lambda[plan.rows.clone()], &target.to_array()),
             Residual::FrictionCone { .. } | Residual::WrenchCone { .. } | Residual::CenterOfPressure { .. } => {
                 let f = &data.lambda[plan.rows.clone()];
@@ -94,9 +101,31 @@ impl ResidualView<'_> {
             }
             return;
         }
+        if let Residual::Own(own) = residual {
+            return self.push_own_rows(own, plan.n, sensitivities);
+        }
         for i in 0..plan.n {
             if active(&[self.scratch.d[i], self.scratch.dd[i]]) {
                 self.push_row(residual, plan, i, sensitivities);
+            }
+        }
+    }
+
+    /// Pushes the rows of a user's own residual of n numbers.
+    fn push_own_rows(&mut self, own: &OwnResidual, n: usize, sensitivities: &dyn Sensitivities) {
+        let Scratch { rows, d, dd, own: [by_x, by_u], .. } = &mut *self.scratch;
+        let (KnotState { x, u, .. }, nv) = (self.state, self.model.nv());
+        let (by_x, by_u) = (&mut by_x[..n * 2 * nv], &mut by_u[..n * u.len()]);
+        by_x.fill(0.0);
+        by_u.fill(0.0);
+        own.calc_diff(self.t, x, u, by_x, by_u);
+        for i in (0..n).filter(|&i| [d[i], dd[i]] != [0.0, 0.0]) {
+            let g = &mut rows.push([d[i], dd[i]]);
+            let (by_q, by_v) = by_x[i * 2 * nv..][..2 * nv].split_at(nv);
+            g.q.copy_from_slice(by_q);
+            g.v.copy_from_slice(by_v);
+            for (k, slope) in by_u[i * u.len()..][..u.len()].iter().enumerate() {
+                sensitivities.add_control(k, *slope, g);
             }
         }
     }

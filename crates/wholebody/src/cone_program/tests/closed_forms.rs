@@ -1,6 +1,6 @@
 //! Programs whose solutions are known.
 
-use crate::cone_program::{Clarabel, ConeProgram, Dense, InteriorPoint, Settings, Size, Solver, Start};
+use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start};
 
 /// Relative: the root of the gap that is left, where the objective is flat.
 const TOLERANCE: f64 = 1e-7;
@@ -8,10 +8,7 @@ const TOLERANCE: f64 = 1e-7;
 const SHARP: Settings = Settings { tolerance: 1e-13, max_iterations: 50, time_limit: f64::INFINITY };
 
 fn solvers(program: &ConeProgram) -> Vec<Box<dyn Solver>> {
-    vec![
-        Box::new(Clarabel::new(program.capacity(), Dense, SHARP)),
-        Box::new(InteriorPoint::new(program.capacity(), SHARP)),
-    ]
+    vec![Box::new(Clarabel::new(program.capacity(), SHARP)), Box::new(InteriorPoint::new(program.capacity(), SHARP))]
 }
 
 fn near(a: &[f64], b: &[f64]) {

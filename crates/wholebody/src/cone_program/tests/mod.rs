@@ -3,6 +3,7 @@
 mod allocations;
 mod closed_forms;
 mod kkt;
+mod patterns;
 mod properties;
 mod random;
 mod refusals;

@@ -2,7 +2,7 @@
 
 use super::kkt::Errors;
 use super::random::{Draw, Kind};
-use crate::cone_program::{Clarabel, ConeProgram, Dense, InteriorPoint, Settings, Size, Solver, Start};
+use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start};
 
 /// The solver's tolerance is 1e-9, relative to terms in its own units.
 const KKT_TOLERANCE: f64 = 1e-8;
@@ -52,13 +52,13 @@ fn random_programs_meet_the_conditions_of_optimality() {
 fn both_back_ends_find_the_same_optimum() {
     each(|kind, program, name| {
         let mut ours = InteriorPoint::new(program.capacity(), SHARP);
-        let mut clarabel = Clarabel::new(program.capacity(), Dense, SHARP);
+        let mut clarabel = Clarabel::new(program.capacity(), SHARP);
         assert_eq!(ours.solve(program, Start::Cold).stopped, None, "{name}");
         let reference = clarabel.solve(program, Start::Cold);
         let sharp = reference.stopped.is_none() && !reference.reduced;
         if !sharp {
             // 1e-12 is more than it can do here.
-            clarabel = Clarabel::new(program.capacity(), Dense, Settings::default());
+            clarabel = Clarabel::new(program.capacity(), Settings::default());
             assert_eq!(clarabel.solve(program, Start::Cold).stopped, None, "{name}");
         }
         let (a, b) = (program.objective(ours.x()), program.objective(clarabel.x()));

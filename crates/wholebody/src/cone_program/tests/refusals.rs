@@ -1,7 +1,7 @@
 //! Programs without a solution, and solves that end early.
 
 use super::random::{Draw, Kind};
-use crate::cone_program::{Clarabel, ConeProgram, Dense, InteriorPoint, Settings, Size, Solver, Start, Status};
+use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start, Status};
 
 /// Writes a number into a program.
 type Spoil = fn(&mut ConeProgram, f64);
@@ -44,7 +44,7 @@ fn constraints_that_exclude_each_other_are_proved_to() {
             let outcome = solver.solve(&program, Start::Cold);
             assert_eq!(outcome.stopped, Some(Status::Infeasible), "{name} {seed}: {outcome:?}");
             assert!(solver.x().iter().all(|x| x.is_finite()));
-            let mut clarabel = Clarabel::new(program.capacity(), Dense, Settings::default());
+            let mut clarabel = Clarabel::new(program.capacity(), Settings::default());
             assert_eq!(clarabel.solve(&program, Start::Cold).stopped, Some(Status::Infeasible), "clarabel: {name}");
         }
     }
@@ -63,7 +63,7 @@ fn an_objective_without_a_lower_bound_is_named() {
     let mut solver = ours(&program);
     let outcome = solver.solve(&program, Start::Cold);
     assert_eq!(outcome.stopped, Some(Status::Unbounded), "{outcome:?}");
-    let mut clarabel = Clarabel::new(program.capacity(), Dense, Settings::default());
+    let mut clarabel = Clarabel::new(program.capacity(), Settings::default());
     assert_eq!(clarabel.solve(&program, Start::Cold).stopped, Some(Status::Unbounded));
 }
 

@@ -1,152 +1,15 @@
-//! NumPy arrays in and out.
-//!
-//! In: a float64 C-contiguous array is read where it lies; other dtypes and strides are converted; a wrong shape is a
-//! `ValueError`. Out: a new array, or the caller's. Matrices are column-major in nalgebra and row-major here. Arrays of
-//! hyper-dual numbers are arrays of objects, see `hyper_dual.rs`.
+//! Arrays that Python gets.
 
-use condyle::{Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
+use super::Number;
+use super::input::{check_shape, tuple, type_name};
+use condyle::{Force, Inertia, Mat3, Motion, Se3, Vec3};
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
-use numpy::ndarray::Dimension;
-use numpy::{
-    Element, Ix1, Ix2, Ix3, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadwriteArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
-};
+use numpy::{PyArray, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyFloat;
-use std::fmt::Write;
-use std::ops::{Deref, Range};
-
-/// A number that functions of the library can be called with.
-pub(crate) trait Number: Scalar {
-    /// The numbers of an argument, in C order.
-    type Input<'py, D: Dimension>: Deref<Target = [Self]>;
-
-    /// Reads an argument of some shape.
-    fn read<'py, D: Dimension>(
-        argument: &str,
-        value: &Bound<'py, PyAny>,
-        shape: &[usize],
-    ) -> PyResult<Self::Input<'py, D>>;
-    /// Reads a number.
-    fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
-    /// Gives an array in C order, the caller's or a new one, when it is filled.
-    fn output<'py>(
-        py: Python<'py>,
-        out: Option<&Bound<'py, PyAny>>,
-        shape: &[usize],
-        fill: impl FnOnce(&mut [Self]),
-    ) -> PyResult<Bound<'py, PyAny>>;
-}
-
-impl Number for f64 {
-    type Input<'py, D: Dimension> = Input<'py, D>;
-
-    fn read<'py, D: Dimension>(
-        argument: &str,
-        value: &Bound<'py, PyAny>,
-        shape: &[usize],
-    ) -> PyResult<Self::Input<'py, D>> {
-        input(argument, value, shape)
-    }
-    fn read_one(_: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        value.extract()
-    }
-    fn output<'py>(
-        py: Python<'py>,
-        out: Option<&Bound<'py, PyAny>>,
-        shape: &[usize],
-        fill: impl FnOnce(&mut [Self]),
-    ) -> PyResult<Bound<'py, PyAny>> {
-        output(py, out, shape, fill)
-    }
-}
-
-/// The doubles of an argument, in C order.
-pub(crate) struct Input<'py, D: Dimension>(PyReadonlyArray<'py, f64, D>);
-
-impl<D: Dimension> Deref for Input<'_, D> {
-    type Target = [f64];
-    fn deref(&self) -> &[f64] {
-        self.0.as_slice().expect("was made contiguous and aligned")
-    }
-}
-
-impl Input<'_, Ix2> {
-    /// The matrix, column by column.
-    pub(crate) fn to_matrix(&self) -> DMatrix<f64> {
-        let &[rows, columns] = self.0.shape() else { unreachable!("has two dimensions") };
-        DMatrix::from_row_slice(rows, columns, self)
-    }
-}
-
-/// A vector argument of `length` numbers.
-pub(crate) fn vector<'py>(argument: &str, value: &Bound<'py, PyAny>, length: usize) -> PyResult<Input<'py, Ix1>> {
-    input(argument, value, &[length])
-}
-
-/// A matrix argument.
-pub(crate) fn matrix<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 2]) -> PyResult<Input<'py, Ix2>> {
-    input(argument, value, &shape)
-}
-
-/// An argument with three indices.
-pub(crate) fn tensor<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 3]) -> PyResult<Input<'py, Ix3>> {
-    input(argument, value, &shape)
-}
-
-fn input<'py, D: Dimension>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Input<'py, D>> {
-    if let Ok(array) = value.cast::<PyArray<f64, D>>()
-        && array.is_c_contiguous()
-        && array.is_aligned()
-    {
-        check_shape(argument, array.shape(), shape)?;
-        return Ok(Input(array.try_readonly()?));
-    }
-    let array = convert(argument, value, shape)?;
-    Ok(Input(array.cast_into::<PyArray<f64, D>>()?.try_readonly()?))
-}
-
-/// A new float64 C-contiguous array with the numbers of anything that NumPy understands as an array of them.
-#[cold]
-fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Bound<'py, PyAny>> {
-    let py = value.py();
-    let numpy = py.import("numpy")?;
-    let array = numpy.call_method1("asarray", (value,)).map_err(|error| {
-        if !error.is_instance_of::<PyValueError>(py) {
-            return error;
-        }
-        let named = PyValueError::new_err(format!("{argument}: {}", error.value(py)));
-        named.set_cause(py, Some(error));
-        named
-    })?;
-    let array = array.cast_into::<PyUntypedArray>()?;
-    let dtype = array.dtype();
-    let kind: char = dtype.getattr("kind")?.extract()?;
-    if !"biuf".contains(kind) && array.len() > 0 {
-        return Err(PyTypeError::new_err(format!("{argument}: expected real numbers, found dtype {dtype}")));
-    }
-    check_shape(argument, array.shape(), shape)?;
-    array.call_method1("astype", (f64::get_dtype(py), "C"))
-}
-
-pub(crate) fn check_shape(argument: &str, found: &[usize], expected: &[usize]) -> PyResult<()> {
-    if found == expected {
-        return Ok(());
-    }
-    let (expected, found) = (tuple(expected), tuple(found));
-    Err(PyValueError::new_err(format!("{argument}: expected shape {expected}, found {found}")))
-}
-
-/// A shape as Python writes it.
-fn tuple(shape: &[usize]) -> String {
-    let mut text = String::from("(");
-    for (i, n) in shape.iter().enumerate() {
-        let _ = write!(text, "{}{n}", if i == 0 { "" } else { ", " });
-    }
-    text.push_str(if shape.len() == 1 { ",)" } else { ")" });
-    text
-}
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyFloat, PyTuple, PyType};
+use std::ops::Range;
 
 /// Fills an array in C order, the caller's or a new one, and returns it.
 pub(crate) fn output<'py>(
@@ -156,10 +19,19 @@ pub(crate) fn output<'py>(
     fill: impl FnOnce(&mut [f64]),
 ) -> PyResult<Bound<'py, PyAny>> {
     let array = place(py, out, shape)?;
-    let mut numbers = writable(&array)?;
-    fill(numbers.as_slice_mut()?);
-    drop(numbers);
-    Ok(out.cloned().unwrap_or_else(|| array.into_any()))
+    match out {
+        Some(out) => {
+            fill(writable(&array)?.as_slice_mut()?);
+            Ok(out.clone())
+        }
+        None => {
+            // SAFETY: nobody else has the array yet.
+            #[allow(unsafe_code)]
+            let numbers = unsafe { array.as_slice_mut() };
+            fill(numbers.expect("was made contiguous"));
+            Ok(array.into_any())
+        }
+    }
 }
 
 /// So many numbers and more are asked of NumPy in a way that can fail.
@@ -195,10 +67,6 @@ pub(crate) fn writable<'py>(array: &Bound<'py, PyArrayDyn<f64>>) -> PyResult<PyR
     array.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))
 }
 
-fn type_name(value: &Bound<'_, PyAny>) -> String {
-    value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string())
-}
-
 /// An array, as Python will see it.
 pub(crate) trait Array {
     /// The type of its numbers.
@@ -207,6 +75,10 @@ pub(crate) trait Array {
     fn shape(&self) -> impl AsRef<[usize]>;
     /// Writes its numbers in C order.
     fn write(&self, x: &mut [Self::Number]);
+    /// Its numbers as they lie, if it is a vector.
+    fn vector(&self) -> Option<&[Self::Number]> {
+        None
+    }
 }
 
 impl<S: Number> Array for [S] {
@@ -217,6 +89,9 @@ impl<S: Number> Array for [S] {
     fn write(&self, x: &mut [S]) {
         x.copy_from_slice(self);
     }
+    fn vector(&self) -> Option<&[S]> {
+        Some(self)
+    }
 }
 
 /// A matrix: column-major in Rust, row-major in Python.
@@ -226,12 +101,65 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
         [self.nrows(), self.ncols()]
     }
     fn write(&self, x: &mut [N]) {
-        let columns = self.ncols();
+        let (rows, columns) = self.shape();
+        if self.strides() == (1, rows) && !self.is_empty() {
+            // SAFETY: by its strides the matrix is rows × columns numbers, one after the other.
+            #[allow(unsafe_code)]
+            let numbers = unsafe { core::slice::from_raw_parts(self.as_ptr(), rows * columns) };
+            return transpose(numbers, rows, columns, x);
+        }
         for (c, column) in self.column_iter().enumerate() {
             for (r, &number) in column.iter().enumerate() {
                 x[r * columns + c] = number;
             }
         }
+    }
+}
+
+/// Four numbers from a place on.
+#[inline(always)]
+fn four<N: Copy>(from: &[N], at: usize) -> [N; 4] {
+    *from[at..].first_chunk().expect("a matrix has as many")
+}
+
+/// Sets four numbers from a place on.
+#[inline(always)]
+fn set_four<N>(to: &mut [N], at: usize, numbers: [N; 4]) {
+    *to[at..].first_chunk_mut().expect("a row has as many") = numbers;
+}
+
+/// Writes a matrix, which is stored by columns, by rows: in tiles of 4 × 4, each of which is read and written with a few
+/// instructions. Number by number each would go to a line of memory of its own.
+fn transpose<N: Number>(from: &[N], rows: usize, columns: usize, to: &mut [N]) {
+    assert!(from.len() == rows * columns && to.len() == rows * columns, "as many numbers as a matrix has");
+    let mut r = 0;
+    while r + 4 <= rows {
+        let (first, others) = to[r * columns..(r + 4) * columns].split_at_mut(columns);
+        let (second, others) = others.split_at_mut(columns);
+        let (third, fourth) = others.split_at_mut(columns);
+        let mut c = 0;
+        while c + 4 <= columns {
+            let (a, b) = (four(from, c * rows + r), four(from, (c + 1) * rows + r));
+            let (d, e) = (four(from, (c + 2) * rows + r), four(from, (c + 3) * rows + r));
+            set_four(first, c, [a[0], b[0], d[0], e[0]]);
+            set_four(second, c, [a[1], b[1], d[1], e[1]]);
+            set_four(third, c, [a[2], b[2], d[2], e[2]]);
+            set_four(fourth, c, [a[3], b[3], d[3], e[3]]);
+            c += 4;
+        }
+        while c < columns {
+            let column = four(from, c * rows + r);
+            [first[c], second[c], third[c], fourth[c]] = column;
+            c += 1;
+        }
+        r += 4;
+    }
+    while r < rows {
+        let to = &mut to[r * columns..(r + 1) * columns];
+        for c in 0..columns {
+            to[c] = from[c * rows + r];
+        }
+        r += 1;
     }
 }
 
@@ -328,6 +256,11 @@ pub(crate) trait Give {
 
 impl<T: Array + ?Sized> Give for T {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        if let (None, Some(numbers)) = (out, self.vector())
+            && let Some(array) = T::Number::new_vector(py, numbers)
+        {
+            return Ok(array);
+        }
         T::Number::output(py, out, self.shape().as_ref(), |x| self.write(x))
     }
 }
@@ -359,12 +292,20 @@ macro_rules! class {
 }
 pub(crate) use class;
 
+/// A named tuple of a class, without a call of the class's own `__new__`, which is written in Python.
+pub(crate) fn named<'py>(class: &Bound<'py, PyType>, members: Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>> {
+    static NEW: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let py = class.py();
+    let new = NEW.get_or_try_init(py, || PyResult::Ok(py.get_type::<PyTuple>().getattr("__new__")?.unbind()))?;
+    new.bind(py).call1((class, members))
+}
+
 /// A named tuple of `condyle._types`, made of members that are given by name, in those of `out` if there is one.
 macro_rules! give_named {
     ($py:ident, $out:ident, $class:expr, { $($name:expr => $member:expr),* }) => {{
         let mut out = $crate::arrays::members($out, &[$($name),*])?.into_iter();
         let members = [$($member.give($py, out.next().flatten().as_ref())?),*];
-        $crate::arrays::class!($py, $class)?.call1(pyo3::types::PyTuple::new($py, members)?)
+        $crate::arrays::named($crate::arrays::class!($py, $class)?, pyo3::types::PyTuple::new($py, members)?)
     }};
 }
 pub(crate) use give_named;
@@ -412,51 +353,4 @@ fn memory(array: &Bound<'_, PyAny>) -> Range<usize> {
     let Ok(array) = array.cast::<PyArrayDyn<f64>>() else { return 0..0 };
     let start = array.data().addr();
     start..start + array.len() * size_of::<f64>()
-}
-
-/// A pose that is given as a homogeneous 4 × 4 matrix.
-pub(crate) fn pose(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Se3<f64>> {
-    let m = matrix(argument, value, [4, 4])?;
-    let column = |c: usize| [m[c], m[4 + c], m[8 + c]].into();
-    Ok(Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3)))
-}
-
-/// The numbers of a vector of length N.
-pub(crate) fn array<const N: usize>(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; N]> {
-    let x = vector(argument, value, N)?;
-    Ok(core::array::from_fn(|k| x[k]))
-}
-
-/// Three numbers.
-pub(crate) fn three(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3<f64>> {
-    Ok(array::<3>(argument, value)?.into())
-}
-
-/// A rotation that is given as a 3 × 3 matrix.
-pub(crate) fn rotation(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Mat3<f64>> {
-    let m = matrix(argument, value, [3, 3])?;
-    let column = |c: usize| [m[c], m[3 + c], m[6 + c]].into();
-    Ok(Mat3 { x: column(0), y: column(1), z: column(2) })
-}
-
-/// The numbers of a vector of any length.
-pub(crate) fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let length = value.len().map_err(|_| PyValueError::new_err(format!("{argument}: expected a list of numbers")))?;
-    Ok(vector(argument, value, length)?.to_vec())
-}
-
-/// Least and greatest values of some numbers, infinite where none is given; none if neither is given.
-pub(crate) fn bounds(
-    length: usize,
-    lower: Option<&Bound<'_, PyAny>>,
-    upper: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Option<[Vec<f64>; 2]>> {
-    if lower.is_none() && upper.is_none() {
-        return Ok(None);
-    }
-    let bound = |name, given: Option<&Bound<'_, PyAny>>, none| match given {
-        Some(numbers) => PyResult::Ok(vector(name, numbers, length)?.to_vec()),
-        None => Ok(vec![none; length]),
-    };
-    Ok(Some([bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?]))
 }

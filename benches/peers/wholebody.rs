@@ -1,0 +1,219 @@
+//! What a tick of whole-body control takes, over recorded ticks of robots that stand, walk and trot while they are pushed:
+//! see `wholebody.py`, which builds and runs this beside other solvers.
+//!
+//! ```text
+//! cargo bench --bench wholebody_peers -- [--ticks N] [--replays N] [--export FOLDER --window N] [ROBOT[=URDF] …]
+//! ```
+//!
+//! Each recording is replayed by a new controller, whose ticks start from the solutions of their own last ticks; of each tick
+//! the least of all replays counts. Prints a record a line. Run it on one core: `taskset -c 1`.
+
+#[path = "../../crates/wholebody/tests/common/workload.rs"]
+mod workload;
+
+use condyle_wholebody::inspection::Program;
+use condyle_wholebody::{Backend, Form, Friction, Settings, Status, WholeBodyController};
+use serde_json::json;
+use std::error::Error;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use workload::{Robot, Tick, record};
+
+/// The pyramid of comparisons: four faces within the cone.
+const PYRAMID: Friction = Friction::Pyramid { sides: 4, inscribed: true };
+
+struct Options {
+    ticks: usize,
+    replays: usize,
+    export: Option<PathBuf>,
+    window: usize,
+    robots: Vec<String>,
+}
+
+impl Options {
+    fn read() -> Result<Self, Box<dyn Error>> {
+        let mut options = Self { ticks: 10_000, replays: 5, export: None, window: 1000, robots: Vec::new() };
+        let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
+        while let Some(argument) = arguments.next() {
+            let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
+            match argument.as_str() {
+                "--ticks" => options.ticks = value()?.parse()?,
+                "--replays" => options.replays = value()?.parse()?,
+                "--window" => options.window = value()?.parse()?,
+                "--export" => options.export = Some(value()?.into()),
+                robot => options.robots.push(robot.to_owned()),
+            }
+        }
+        if options.robots.is_empty() {
+            options.robots = ["humanoid", "quadruped"].map(str::to_owned).to_vec();
+        }
+        Ok(options)
+    }
+}
+
+/// The entry below which such a part of the sorted numbers lies.
+fn quantile(sorted: &[f64], part: f64) -> f64 {
+    sorted[(part * (sorted.len() - 1) as f64).round() as usize]
+}
+
+/// The milliseconds of each tick in each replay, of `call` after `prepare` on controllers of their own.
+fn replay(
+    ticks: &[Tick],
+    replays: usize,
+    controller: impl Fn() -> WholeBodyController,
+    prepare: impl Fn(&mut WholeBodyController, &Tick),
+    mut call: impl FnMut(&mut WholeBodyController, &Tick),
+) -> Vec<Vec<f64>> {
+    (0..replays)
+        .map(|_| {
+            let mut controller = controller();
+            let timed = |tick: &Tick| {
+                prepare(&mut controller, tick);
+                let start = Instant::now();
+                call(&mut controller, tick);
+                1e3 * start.elapsed().as_secs_f64()
+            };
+            ticks.iter().map(timed).collect()
+        })
+        .collect()
+}
+
+/// p50, p99 and max of the least times, and the p99 of all.
+fn statistics(times: &[Vec<f64>]) -> serde_json::Value {
+    let mut least: Vec<f64> =
+        (0..times[0].len()).map(|k| times.iter().map(|t| t[k]).fold(f64::INFINITY, f64::min)).collect();
+    let mut raw: Vec<f64> = times.concat();
+    least.sort_by(f64::total_cmp);
+    raw.sort_by(f64::total_cmp);
+    json!({
+        "p50_ms": quantile(&least, 0.5),
+        "p99_ms": quantile(&least, 0.99),
+        "max_ms": least[least.len() - 1],
+        "raw_p99_ms": quantile(&raw, 0.99),
+    })
+}
+
+fn print(robot: &Robot, motion: &str, what: serde_json::Value, times: &[Vec<f64>]) {
+    let mut record = json!({
+        "robot": robot.name, "workload": motion, "ticks": times[0].len(), "replays": times.len(), "ours": true,
+    });
+    for part in [what, statistics(times)] {
+        let fields = part.as_object().expect("an object").clone();
+        record.as_object_mut().expect("an object").extend(fields);
+    }
+    println!("{record}");
+}
+
+/// Times of each back end on cones and on pyramids, and of the assembly of the condensed program alone.
+fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
+    for (friction, friction_name) in [(Friction::Cone, "cone"), (PYRAMID, "pyramid")] {
+        let settings = Settings { friction, ..Robot::settings() };
+        let assembly = replay(
+            ticks,
+            replays,
+            || robot.controller(settings.clone()),
+            |_, _| (),
+            |controller, Tick { q, v, references }| controller.assemble(q, v, references),
+        );
+        let what = json!({"backend": "none", "part": "assembly", "friction": friction_name, "form": "condensed"});
+        print(robot, motion, what, &assembly);
+        for (backend, form, name, form_name) in [
+            (Backend::InteriorPoint, Form::Condensed, "condyle", "condensed"),
+            (Backend::Clarabel, Form::Condensed, "clarabel", "condensed"),
+            (Backend::Clarabel, Form::Full, "clarabel", "full"),
+        ] {
+            let (mut iterations, mut unsolved) = (0, 0);
+            let settings = Settings { backend, form, ..settings.clone() };
+            let times = replay(
+                ticks,
+                replays,
+                || robot.controller(settings.clone()),
+                |_, _| (),
+                |controller, Tick { q, v, references }| {
+                    let command = controller.step(q, v, references);
+                    iterations += command.iterations;
+                    unsolved += usize::from(command.status != Status::Solved);
+                },
+            );
+            let solves = (ticks.len() * replays) as f64;
+            let what = json!({
+                "backend": name, "part": "tick", "friction": friction_name, "form": form_name,
+                "iterations": f64::from(iterations) / solves, "unsolved": unsolved / replays,
+            });
+            print(robot, motion, what, &times);
+        }
+    }
+}
+
+/// Times of our back ends without assembly, on pyramids, beside which those of other solvers stand.
+fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
+    for (backend, form, name, form_name) in [
+        (Backend::InteriorPoint, Form::Full, "condyle", "full"),
+        (Backend::InteriorPoint, Form::Condensed, "condyle", "condensed"),
+        (Backend::Clarabel, Form::Full, "clarabel", "full"),
+        (Backend::Clarabel, Form::Condensed, "clarabel", "condensed"),
+    ] {
+        let settings = Settings { friction: PYRAMID, backend, form, ..Robot::settings() };
+        let times = replay(
+            ticks,
+            replays,
+            || robot.controller(settings.clone()),
+            |controller, Tick { q, v, references }| controller.assemble(q, v, references),
+            |controller, _| controller.solve_assembled(),
+        );
+        let what = json!({"backend": name, "part": "solve", "friction": "pyramid", "form": form_name});
+        print(robot, motion, what, &times);
+    }
+}
+
+/// Writes the programs of consecutive ticks on pyramids, in both forms, with our optimum: sizes as JSON, a line for each
+/// tick, and the numbers as doubles in the order P, c, A, b, G, l, u (matrices by columns), of the full form and then of the
+/// condensed one, then our solutions of both.
+fn export(robot: &Robot, motion: &str, ticks: &[Tick], folder: &Path) -> Result<(), Box<dyn Error>> {
+    let settings = Settings { friction: PYRAMID, ..Robot::settings() };
+    let mut controller = robot.controller(settings);
+    let path = folder.join(format!("{}-{motion}", robot.name));
+    let mut sizes = BufWriter::new(File::create(path.with_extension("sizes"))?);
+    let mut numbers = BufWriter::new(File::create(path.with_extension("numbers"))?);
+    for Tick { q, v, references } in ticks {
+        controller.step(q, v, references).solved()?;
+        let optimum = controller.optimum();
+        let forms = [controller.program(q, v, references), controller.reduced_program(q, v, references)];
+        let size = |p: &Program| json!([p.c.len(), p.b.len(), p.lower.len()]);
+        writeln!(sizes, "{}", json!([size(&forms[0]), size(&forms[1])]))?;
+        for Program { P, c, A, b, G, lower, upper, .. } in &forms {
+            for part in [P.as_slice(), c.as_slice(), A.as_slice(), b.as_slice(), G.as_slice(), lower.as_slice()] {
+                part.iter().try_for_each(|x| numbers.write_all(&x.to_le_bytes()))?;
+            }
+            upper.iter().try_for_each(|x| numbers.write_all(&x.to_le_bytes()))?;
+        }
+        optimum.x.iter().chain(&optimum.z).try_for_each(|x| numbers.write_all(&x.to_le_bytes()))?;
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::read()?;
+    for robot in &options.robots {
+        let (name, urdf) = robot.split_once('=').map_or((robot.as_str(), None), |(name, path)| (name, Some(path)));
+        let robot = Robot::new(name, urdf)?;
+        for moves in [false, true] {
+            let motion = if moves { robot.gait() } else { "stand" };
+            let ticks = record(&robot, moves, options.ticks);
+            if options.replays > 0 {
+                time(&robot, motion, &ticks, options.replays);
+            }
+            if let Some(folder) = &options.export {
+                let count = options.window.min(ticks.len());
+                let window = &ticks[(ticks.len() - count) / 2..][..count];
+                if options.replays > 0 {
+                    time_solves(&robot, motion, window, options.replays);
+                }
+                export(&robot, motion, window, folder)?;
+            }
+        }
+    }
+    Ok(())
+}

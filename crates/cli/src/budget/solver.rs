@@ -1,0 +1,140 @@
+//! What an iteration of FDDP costs, as an MPC asks for it: from the last solution, with a new initial state.
+
+use super::clock::{Effort, Times, timed};
+use crate::error::Error;
+use crate::states::{normal, source};
+use condyle::optimal::robot::{
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FreeDynamics, FrictionCone, Integrated,
+    Integrator, Residual,
+};
+use condyle::optimal::{ActionModel, Fddp, Problem, Status};
+use condyle::{ConstraintKind, Model, integrate};
+use rayon::ThreadPool;
+use serde::Serialize;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// The times of an iteration.
+#[derive(Serialize)]
+pub(crate) struct Row {
+    /// `free` or `in contact`.
+    pub name: &'static str,
+    pub knots: usize,
+    /// On one thread.
+    pub one: Times,
+    /// Derivatives and sweep on all threads; none where there is one.
+    pub threads: Option<Times>,
+    /// Whether the solver could go on all the time.
+    pub finite: bool,
+}
+
+impl Row {
+    /// The faster way, by p99.
+    pub(crate) fn best(&self) -> Times {
+        match self.threads {
+            Some(threads) if threads.p99 < self.one.p99 => threads,
+            _ => self.one,
+        }
+    }
+}
+
+/// Seconds from knot to knot.
+const DT: f64 = 0.01;
+/// How far a new initial state is from the last one (rad, m, and per s).
+const DISTURBANCE: f64 = 1e-3;
+/// How fast a contact's slip decays (1/s).
+const HOLD: f64 = 40.0;
+/// μ where contacts say the same thing twice (1/kg).
+const DAMPING: f64 = 1e-6;
+const FRICTION: f64 = 0.7;
+
+/// What is timed: the robot, its posture, its contacts.
+pub(crate) struct Bench<'a> {
+    pub model: Arc<Model>,
+    pub q: Vec<f64>,
+    pub contacts: Vec<Contact>,
+    pub pool: &'a ThreadPool,
+    pub effort: Effort,
+}
+
+impl Bench<'_> {
+    /// An iteration of a horizon of so many knots.
+    pub(crate) fn iteration(&self, knots: usize, in_contact: bool) -> Result<Row, Error> {
+        let cores = self.pool.current_num_threads();
+        let mut damping = 0.0;
+        let mut one = self.times(knots, 1, in_contact, damping);
+        if in_contact && !matches!(one, Ok((_, true))) {
+            damping = DAMPING;
+            one = self.times(knots, 1, in_contact, damping);
+        }
+        let (one, finite) = one?;
+        let threads = match cores {
+            1 => None,
+            _ => Some(self.pool.install(|| self.times(knots, cores, in_contact, damping))?.0),
+        };
+        Ok(Row { name: if in_contact { "in contact" } else { "free" }, knots, one, threads, finite })
+    }
+
+    fn times(&self, knots: usize, threads: usize, in_contact: bool, damping: f64) -> Result<(Times, bool), Error> {
+        let (mut problem, us) = self.problem(knots, in_contact, damping)?;
+        let (x0, nq) = (problem.x0().to_vec(), self.model.nq());
+        let mut solver = Fddp::new(&problem);
+        solver.settings.tolerance = 0.0; // it makes all iterations that it may
+        (solver.settings.threads, solver.settings.segments) = (threads, threads);
+        solver.settings.max_iterations = 3;
+        solver.solve(&mut problem, &x0.repeat(knots + 1), &us)?;
+        solver.settings.max_iterations = 1;
+        let (mut random, mut finite, mut failed) = (source(1), true, None);
+        let times = timed(self.effort, || {
+            let mut x = x0.clone();
+            let mut push = || normal(&mut random, self.model.nv()).into_iter().map(|x| DISTURBANCE * x);
+            let dq: Vec<f64> = push().collect();
+            integrate(&self.model, &x0[..nq], &dq, &mut x[..nq]);
+            x[nq..].iter_mut().zip(push()).for_each(|(v, d)| *v += d);
+            let begin = Instant::now();
+            match problem.set_x0(&x).and_then(|()| solver.resume(&mut problem)) {
+                Ok(solution) => finite &= solution.status != Status::NotFinite,
+                Err(error) => failed = Some(error),
+            }
+            begin.elapsed()
+        });
+        failed.map_or(Ok((times, finite)), |error| Err(error.into()))
+    }
+
+    /// Stay where you are, with little effort; in contact, do not slip.
+    fn problem(&self, knots: usize, in_contact: bool, damping: f64) -> Result<(Problem, Vec<f64>), Error> {
+        let (model, nv) = (&self.model, self.model.nv());
+        let x0 = [&self.q[..], &vec![0.0; nv]].concat();
+        let state = || Residual::State { reference: x0.clone() };
+        let actuation = Actuation::joints(model);
+        let effort = Residual::Control { reference: vec![0.0; actuation.nu()] };
+        let mut costs = vec![
+            Cost::new("state", 1e0, state(), Activation::Quadratic),
+            Cost::new("effort", 1e-3, effort, Activation::Quadratic),
+        ];
+        let end = FreeDynamics::terminal(model.clone(), vec![Cost::new("state", 1e1, state(), Activation::Quadratic)])?;
+        let (knot, us): (Box<dyn ActionModel>, _) = if in_contact {
+            for contact in self.contacts.iter().filter(|c| c.constraint.kind == ConstraintKind::Point) {
+                let cone = FrictionCone::new(FRICTION);
+                let (lower, upper) = cone.bounds();
+                let residual = Residual::FrictionCone { contact: contact.name.clone(), cone };
+                let name = format!("{} grips", contact.name);
+                costs.push(Cost::new(&name, 1e-2, residual, Activation::Barrier { lower, upper }));
+            }
+            let law = ContactAcceleration::new(model.clone(), actuation, &self.contacts, damping, costs)?;
+            let mut knot: ContactDynamics = Integrated::new(law, Integrator::SemiImplicitEuler, DT)?;
+            let us = knot.quasi_static(&x0);
+            (Box::new(knot), us)
+        } else {
+            let mut knot = FreeDynamics::running(model.clone(), DT, costs)?;
+            let us = knot.quasi_static(&x0);
+            (Box::new(knot), us)
+        };
+        Ok((Problem::new(x0, vec![knot], vec![0; knots], Box::new(end))?, us.repeat(knots)))
+    }
+}
+
+/// The gains of a contact that is timed, and planned with.
+pub(crate) fn held(constraint: condyle::ContactConstraint) -> condyle::ContactConstraint {
+    condyle::ContactConstraint { kd: HOLD, reference: condyle::ReferenceFrame::LocalWorldAligned, ..constraint }
+}

@@ -1,0 +1,77 @@
+//! What the integrators make of the energy of a robot that nothing drives and nothing brakes.
+
+use super::ledger::Row;
+use crate::limits;
+use crate::states::{normal, source};
+use condyle::simulation::{Integrator, Settings, Simulation};
+use condyle::{Data, Model, forward_velocities};
+
+/// The longest steps that are tried, one after the other (s): light links swing faster than a long step can follow.
+const STEPS: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
+/// So many of them are made, and twice and four times as many of half and a quarter of the length.
+const COUNT: usize = 200;
+/// A drift below this is rounding and tells no order.
+const ROUNDING: f64 = 1e-13;
+/// How fast it begins (rad/s, m/s).
+const SPEED: f64 = 0.1;
+/// max |E(t) − E(0)|, relative to the greatest kinetic energy, that is allowed with the shortest step; and the order by
+/// which it may fall instead: light links swing faster than any step, and then only the order tells.
+const RULES: [(&str, Integrator, f64, f64); 3] = [
+    ("energy, RK4", Integrator::RungeKutta4, 1e-7, 3.0),
+    ("energy, variational", Integrator::Variational, 1e-3, 1.5),
+    ("energy, semi-implicit Euler", Integrator::SemiImplicitEuler, 1e-2, 0.7),
+];
+
+/// A row for each integrator.
+pub(super) fn check(model: &Model) -> Vec<Row> {
+    let q = limits::start(model);
+    let v: Vec<f64> = normal(&mut source(3), model.nv()).into_iter().map(|x| SPEED * x).collect();
+    let row = |(name, integrator, bound, order)| {
+        let mut row = Row::new(name, "E(t) = E(0) in free motion");
+        for dt in STEPS {
+            row = Row::new(row.name, row.equation);
+            let drifts = [1, 2, 4].map(|part| drift(model, integrator, dt / part as f64, COUNT * part, &q, &v));
+            let [_, Some(before), Some(last)] = drifts else {
+                row.see(f64::NAN, bound);
+                row.note = format!("a step of {} ms fails", 1e3 * dt);
+                continue;
+            };
+            row.see(last, bound);
+            row.note = format!("{} ms in steps of {} ms", 1e3 * dt * COUNT as f64, 0.25e3 * dt);
+            let found = (before / last).log2();
+            if last > ROUNDING {
+                row.note += &format!(", order {found:.1}");
+            }
+            if !row.pass && found >= order {
+                (row.pass, row.bound) = (true, f64::INFINITY);
+            }
+            if row.pass {
+                break;
+            }
+        }
+        row
+    };
+    RULES.into_iter().map(row).collect()
+}
+
+/// max |E(t) − E(0)| / max T; none where a step failed.
+fn drift(model: &Model, integrator: Integrator, dt: f64, count: usize, q: &[f64], v: &[f64]) -> Option<f64> {
+    let mut data = Data::new(model);
+    let mut energy = |q: &[f64], v: &[f64]| {
+        let velocities = forward_velocities(model, &mut data, q, v);
+        (velocities.mechanical_energy(), velocities.kinetic_energy())
+    };
+    let mut simulation = Simulation::new(model, Settings { integrator, dt, ..Settings::default() });
+    simulation.set_state(q, v);
+    let (start, mut kinetic) = energy(q, v);
+    let (efforts, mut error) = (vec![0.0; model.nv()], 0.0_f64);
+    for _ in 0..count {
+        if !simulation.step(&efforts, &[]).is_done() {
+            return None;
+        }
+        let (now, T) = energy(simulation.q(), simulation.v());
+        error = error.max((now - start).abs());
+        kinetic = kinetic.max(T);
+    }
+    Some(error / kinetic.max(f64::MIN_POSITIVE)).filter(|error| error.is_finite())
+}

@@ -1,0 +1,76 @@
+//! What a check has found: the worst case of each identity, beside what is allowed.
+
+use serde::Serialize;
+
+/// An identity, and the state in which it holds least.
+#[derive(Serialize)]
+pub(crate) struct Row {
+    /// What is checked.
+    pub name: &'static str,
+    /// The equation.
+    pub equation: &'static str,
+    /// The measured error, relative as the equation's file says; null is not a number.
+    pub error: f64,
+    /// The most that is allowed there.
+    pub bound: f64,
+    /// How often it was looked at.
+    pub cases: usize,
+    pub pass: bool,
+    /// What else there is to say.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub note: String,
+}
+
+impl Row {
+    pub(super) fn new(name: &'static str, equation: &'static str) -> Self {
+        Self { name, equation, error: 0.0, bound: 0.0, cases: 0, pass: true, note: String::new() }
+    }
+
+    /// Counts a case; the one that uses most of what it is allowed is kept.
+    pub(super) fn see(&mut self, error: f64, bound: f64) {
+        let (now, before) = (error / bound, if self.cases == 0 { -1.0 } else { self.error / self.bound });
+        // an error that is not a number stays
+        if !before.is_nan() && (now > before || now.is_nan()) {
+            (self.error, self.bound) = (error, bound);
+        }
+        self.cases += 1;
+        self.pass &= error <= bound;
+    }
+
+    /// Compares lists of numbers: max |x − y| relative to 1 + max |y| and to `scale`.
+    pub(super) fn compare(&mut self, found: &[f64], expected: &[f64], scale: f64, bound: f64) {
+        let largest = expected.iter().fold(1.0 + scale, |most: f64, y| most.max(1.0 + y.abs()));
+        // f64::max would lose what is not a number
+        let error =
+            found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, |a: f64, b| if a > b { a } else { b });
+        let error = if found.iter().chain(expected).all(|x| x.is_finite()) { error / largest } else { f64::NAN };
+        self.see(error, bound);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_case_is_kept() {
+        let mut row = Row::new("", "");
+        row.compare(&[1.0, 2.0], &[1.0, 2.0 + 3e-12], 0.0, 1e-10);
+        assert!(row.pass && row.error > 0.9e-12 && row.error < 1.1e-12);
+        row.see(1e-3, 1e-2); // uses more of what it is allowed
+        assert!(row.pass && row.error == 1e-3);
+        row.see(2e-10, 1e-10);
+        assert!(!row.pass && row.error == 2e-10 && row.cases == 3);
+    }
+
+    #[test]
+    fn what_is_no_number_fails_and_stays() {
+        let mut row = Row::new("", "");
+        row.compare(&[f64::NAN, 1.0], &[0.0, 1.0], 0.0, 1e-10);
+        row.compare(&[1.0], &[1.0], 0.0, 1e-10);
+        assert!(!row.pass && row.error.is_nan());
+        let mut row = Row::new("", "");
+        row.compare(&[1.0], &[f64::INFINITY], 0.0, 1e-10);
+        assert!(!row.pass);
+    }
+}

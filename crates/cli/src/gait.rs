@@ -1,0 +1,280 @@
+//! Gaits as optimal control problems: a robot stands, steps and jumps on its feet.
+
+use crate::budget::held;
+use crate::error::Error;
+use crate::limits::{efforts_of, inside, limits_of};
+use crate::task::{Phase, PhaseKind, Task};
+use condyle::optimal::robot::{
+    Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Limit, Residual,
+    WrenchCone,
+};
+use condyle::optimal::{ActionModel, Problem};
+use condyle::{ContactConstraint, Data, Joint, Mat3, Model, Se3, Vec3, forward_kinematics, neutral};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A gait in the making: its knots so far, and where feet and centre of mass are at their end.
+pub(crate) struct Gait {
+    model: Arc<Model>,
+    /// The state that it goes back to, and the one in which it begins.
+    rest: Vec<f64>,
+    x0: Vec<f64>,
+    dt: f64,
+    friction: f64,
+    sole: Option<[f64; 2]>,
+    feet: Vec<(usize, Vec3<f64>)>,
+    com: Vec3<f64>,
+    models: Vec<Box<dyn ActionModel>>,
+    stages: Vec<usize>,
+    us: Vec<f64>,
+    times: Vec<f64>,
+    touches: Vec<Vec<bool>>,
+    /// Of positions and speeds, and of efforts, where they are held.
+    limits: Vec<Limit>,
+    efforts: Vec<Limit>,
+}
+
+/// A gait that is ready to be solved.
+pub(crate) struct Posed {
+    pub problem: Problem,
+    pub xs: Vec<f64>,
+    pub us: Vec<f64>,
+    /// The time of each knot (s); an impact takes none.
+    pub times: Vec<f64>,
+    /// Whether each foot touches, knot by knot.
+    pub touches: Vec<Vec<bool>>,
+    pub feet: Vec<usize>,
+}
+
+impl Gait {
+    /// A robot in the posture of a task, with its feet at height 0 on average; `held` makes constraints of its limits.
+    pub(crate) fn new(model: Arc<Model>, task: &Task, dt: f64, held: bool) -> Result<Self, Error> {
+        let floats = model.bodies().get(1).is_some_and(|b| b.joint == Joint::FreeFlyer);
+        if !floats {
+            let what = "a robot with feet floats: say root = \"free\"".to_owned();
+            return Err(task.place.wrong("robot", what));
+        }
+        let mut frames = Vec::new();
+        for name in &task.feet {
+            frames.push(model.frame(name).map_err(|error| task.place.wrong(name, error.to_string()))?);
+        }
+        let rest = posture(&model, &task.posture, task)?;
+        let begin = match &task.start {
+            Some(start) => posture(&model, start, task)?,
+            None => rest.clone(),
+        };
+        // Posture and start are moved so that their feet are in the same place on average, at height 0.
+        let middle = |q: &[f64]| {
+            let feet = feet_at(&model, q, &frames);
+            feet.iter().fold(Vec3::zero(), |sum, foot| sum + foot.1).scale(1.0 / feet.len() as f64)
+        };
+        let ground = Vec3 { z: 0.0, ..middle(&rest) };
+        let placed = |q: &[f64]| {
+            let by = ground - middle(q);
+            let mut x = [q, &vec![0.0; model.nv()]].concat();
+            (x[0], x[1], x[2]) = (x[0] + by.x, x[1] + by.y, x[2] + by.z);
+            x
+        };
+        let (rest, x0) = (placed(&rest), placed(&begin));
+        let feet = feet_at(&model, &x0[..model.nq()], &frames);
+        let com = forward_kinematics(&model, &mut Data::new(&model), &rest[..model.nq()]).com();
+        let limits = if held { limits_of(&model, &rest[..model.nq()]) } else { Vec::new() };
+        let efforts = if held { efforts_of(&model, model.nv() - 6) } else { Vec::new() };
+        Ok(Self {
+            rest,
+            x0,
+            dt,
+            friction: task.friction,
+            sole: task.sole,
+            feet,
+            com,
+            models: Vec::new(),
+            stages: Vec::new(),
+            us: Vec::new(),
+            times: vec![0.0],
+            touches: Vec::new(),
+            limits,
+            efforts,
+            model,
+        })
+    }
+
+    fn name(&self, frame: usize) -> String {
+        self.model.frames()[frame].name.clone()
+    }
+
+    fn contacts(&self, frames: &[usize]) -> Vec<Contact> {
+        let make = if self.sole.is_some() { ContactConstraint::rigid } else { ContactConstraint::point };
+        frames.iter().map(|&frame| Contact::new(&self.name(frame), held(make(frame)))).collect()
+    }
+
+    /// Back to the posture, with weights of the trunk's position and rotation, the joints, and their velocities.
+    fn rest(&self, weights: [f64; 6]) -> Cost {
+        let counts = [3, 3, self.model.nv() - 6].repeat(2);
+        let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
+        Cost::new("rest", 1e1, Residual::State { reference: self.rest.clone() }, Activation::Weighted(w))
+    }
+
+    /// A foot should be at a point, a sole level too.
+    fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
+        let named = (&self.model.frames()[frame]).into();
+        let residual = match self.sole {
+            None => Residual::FrameTranslation { frame: named, target },
+            Some(_) => Residual::FramePlacement { frame: named, target: Se3::new(Mat3::identity(), target) },
+        };
+        Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
+    }
+
+    /// The costs of a knot on some feet, others on their way.
+    fn costs(&self, support: &[usize], moving: &[(usize, Vec3<f64>)], com: Option<Vec3<f64>>) -> Vec<Cost> {
+        let grip = |&frame: &usize| {
+            let (contact, friction) = (self.name(frame), FrictionCone::new(self.friction));
+            let (residual, (lower, upper)) = match self.sole {
+                None => (Residual::FrictionCone { contact, cone: friction.clone() }, friction.bounds()),
+                Some(size) => {
+                    let cone = WrenchCone { friction: FrictionCone { inner: true, ..friction }, size };
+                    let bounds = cone.bounds();
+                    (Residual::WrenchCone { contact, cone }, bounds)
+                }
+            };
+            Cost::new(&format!("{} grips", self.name(frame)), 1e1, residual, Activation::Barrier { lower, upper })
+        };
+        let mut costs: Vec<Cost> = support.iter().map(grip).collect();
+        costs.extend(moving.iter().map(|&(frame, target)| self.place(frame, target, 1e6)));
+        costs.extend(com.map(|target| Cost::new("com", 1e5, Residual::CenterOfMass { target }, Activation::Quadratic)));
+        costs.push(self.rest([0.0, 1e3, 1e-1, 1e1, 1e1, 1e0]));
+        let reference = vec![0.0; self.model.nv() - 6];
+        costs.push(Cost::new("effort", 1e-1, Residual::Control { reference }, Activation::Quadratic));
+        costs
+    }
+
+    /// Some knots on `support`; the k-th has the costs that `costs` gives. One action serves all.
+    fn knots(
+        &mut self,
+        support: &[usize],
+        count: usize,
+        costs: &dyn Fn(&Self, usize) -> Vec<Cost>,
+    ) -> Result<(), Error> {
+        let first = self.stages.len();
+        let limits = [self.limits.clone(), self.efforts.clone()].concat();
+        let (action, hold): (Box<dyn ActionModel>, Vec<f64>) = if support.is_empty() {
+            let mut action = FreeDynamics::running(self.model.clone(), self.dt, costs(self, 0))?.with_limits(limits)?;
+            for k in 0..count {
+                action.set_costs(first + k, costs(self, k))?;
+            }
+            (Box::new(action), vec![0.0; self.model.nv() - 6])
+        } else {
+            let contacts = self.contacts(support);
+            let action = ContactDynamics::running(self.model.clone(), &contacts, self.dt, costs(self, 0))?;
+            let mut action = action.with_limits(limits)?;
+            let hold = action.quasi_static(&self.x0);
+            for k in 0..count {
+                action.set_costs(first + k, costs(self, k))?;
+            }
+            (Box::new(action), hold)
+        };
+        self.us.extend(hold.repeat(count));
+        self.stages.extend(vec![self.models.len(); count]);
+        let touching: Vec<bool> = self.feet.iter().map(|foot| support.contains(&foot.0)).collect();
+        self.touches.extend(vec![touching; count]);
+        let last = self.times.last().copied().unwrap_or(0.0);
+        self.times.extend((1..=count).map(|k| last + k as f64 * self.dt));
+        self.models.push(action);
+        Ok(())
+    }
+
+    /// Feet set down where they are now.
+    fn land(&mut self, landing: &[usize]) -> Result<(), Error> {
+        let mut costs = vec![self.rest([1e0, 1e1, 1e0, 1e1, 1e1, 1e1])];
+        // only height counts for the trunk, which has gone ahead
+        if let Activation::Weighted(w) = &mut costs[0].activation {
+            w[..3].fill(0.0);
+        }
+        for &k in landing {
+            costs.push(self.place(self.feet[k].0, self.feet[k].1, 1e7));
+        }
+        let frames: Vec<usize> = landing.iter().map(|&k| self.feet[k].0).collect();
+        let contacts = self.contacts(&frames);
+        self.models.push(Box::new(ImpulseDynamics::new(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
+        self.stages.push(self.models.len() - 1);
+        let all = self.touches.last().cloned().unwrap_or_default();
+        self.touches.push(all.iter().enumerate().map(|(k, &touches)| touches || landing.contains(&k)).collect());
+        self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact takes no time
+        Ok(())
+    }
+
+    /// Adds a phase.
+    pub(crate) fn add(&mut self, phase: &Phase, next: Option<&Phase>) -> Result<(), Error> {
+        let all: Vec<usize> = (0..self.feet.len()).collect();
+        let swinging = match &phase.kind {
+            PhaseKind::Stand => {
+                let feet: Vec<_> = self.feet.iter().map(|foot| foot.0).collect();
+                // Who is about to jump is free to crouch.
+                let free = next.is_some_and(|next| next.kind == PhaseKind::Jump);
+                return self.knots(&feet, phase.knots, &|gait, _| gait.costs(&feet, &[], (!free).then_some(gait.com)));
+            }
+            PhaseKind::Step(swinging) => swinging,
+            PhaseKind::Jump => &all,
+        };
+        let jumps = phase.kind == PhaseKind::Jump;
+        let support: Vec<_> = all.iter().filter(|k| !swinging.contains(k)).map(|&k| self.feet[k].0).collect();
+        let share = swinging.len() as f64 / self.feet.len() as f64;
+        let Phase { knots, length, side, height, .. } = *phase;
+        let ahead = |s: f64| Vec3::new(length * s, side * s, 0.0);
+        self.knots(&support, knots, &|gait, k| {
+            let s = (k + 1) as f64 / knots as f64;
+            let lift = Vec3::new(0.0, 0.0, height * (core::f64::consts::PI * s).sin());
+            if jumps {
+                // the centre of mass on its parabola; the feet below it as they were
+                return gait.costs(&[], &[], Some(gait.com + ahead(s) + lift));
+            }
+            let moving: Vec<_> = swinging.iter().map(|&k| (gait.feet[k].0, gait.feet[k].1 + ahead(s) + lift)).collect();
+            gait.costs(&support, &moving, Some(gait.com + ahead(share * s)))
+        })?;
+        self.com += ahead(share);
+        for &k in swinging {
+            self.feet[k].1 += ahead(1.0);
+        }
+        let landing = swinging.clone();
+        self.land(&landing)
+    }
+
+    /// The whole as a problem, with a warm start: standing still.
+    pub(crate) fn pose(self) -> Result<Posed, Error> {
+        let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
+        let end = FreeDynamics::terminal(self.model.clone(), terminal)?.with_limits(self.limits.clone())?;
+        let xs = self.x0.repeat(self.stages.len() + 1);
+        let problem = Problem::new(self.x0, self.models, self.stages, Box::new(end))?;
+        let feet = self.feet.iter().map(|foot| foot.0).collect();
+        Ok(Posed { problem, xs, us: self.us, times: self.times, touches: self.touches, feet })
+    }
+}
+
+/// Frames at a position, and where they are.
+fn feet_at(model: &Model, q: &[f64], frames: &[usize]) -> Vec<(usize, Vec3<f64>)> {
+    let mut data = Data::new(model);
+    let placements = forward_kinematics(model, &mut data, q);
+    frames.iter().map(|&frame| (frame, placements.frame(frame).translation)).collect()
+}
+
+/// The position with these joints, the others neutral or mid-range.
+pub(crate) fn posture(model: &Model, joints: &BTreeMap<String, f64>, task: &Task) -> Result<Vec<f64>, Error> {
+    let mut q = inside(model, neutral(model));
+    for (name, &value) in joints {
+        let body = model.joint(name).map_err(|error| task.place.wrong(name, error.to_string()))?;
+        let body = &model.bodies()[body];
+        match body.joint {
+            Joint::Continuous { .. } => (q[body.idx_q], q[body.idx_q + 1]) = (value.cos(), value.sin()),
+            _ if body.joint.nq() == 1 => q[body.idx_q] = value,
+            _ => return Err(task.place.wrong(name, format!("joint `{name}` has several coordinates"))),
+        }
+        if body.joint.nq() == 1 {
+            let (lower, upper) = (model.limits().lower[body.idx_q], model.limits().upper[body.idx_q]);
+            if !(lower..=upper).contains(&value) {
+                let what = format!("joint `{name}` is at {value}, outside of its limits [{lower}, {upper}]");
+                return Err(task.place.wrong(name, what));
+            }
+        }
+    }
+    Ok(q)
+}

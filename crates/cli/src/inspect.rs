@@ -1,0 +1,346 @@
+//! `condyle inspect`: what a robot's file says, and what is odd about it.
+
+use crate::error::Error;
+use crate::findings::{self, Finding};
+use crate::lines::{Kind, Lines};
+use crate::robot::{self, Robot, RobotArguments};
+use crate::terminal::{Style, Table, heading, say, say_json, styled};
+use condyle::{Body, Data, FrameKind, Model, forward_kinematics, neutral};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Show what a robot's file says: tree, joints, limits, masses, and what is odd about it
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  condyle inspect robot.urdf
+  condyle inspect anymal.urdf --root free
+  condyle inspect scene.xml --json | jq '.warnings'
+  condyle inspect humanoid --strict        # status 1 if something is odd")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    robot: RobotArguments,
+    /// Write JSON instead of text
+    #[arg(long)]
+    json: bool,
+    /// End with status 1 if there is a warning
+    #[arg(long)]
+    strict: bool,
+}
+
+/// All that is told about a robot.
+#[derive(Serialize)]
+struct Report {
+    name: String,
+    source: String,
+    format: &'static str,
+    nq: usize,
+    nv: usize,
+    frames: usize,
+    /// Of all that moves (kg).
+    mass: f64,
+    /// Of what is fixed to the world (kg).
+    fixed_mass: f64,
+    /// The centre of mass of what moves, at the neutral position, in the world (m); none if nothing has mass.
+    com: Option<[f64; 3]>,
+    gravity: [f64; 3],
+    bodies: Vec<BodyReport>,
+    limbs: Limbs,
+    mimics: Vec<Follower>,
+    warnings: Vec<Finding>,
+}
+
+/// A body and its joint. Arrays of limits have a number for each coordinate; null is no limit.
+#[derive(Serialize)]
+struct BodyReport {
+    index: usize,
+    name: String,
+    joint: String,
+    kind: &'static str,
+    parent: usize,
+    line: Option<u32>,
+    axis: Option<[f64; 3]>,
+    idx_q: usize,
+    nq: usize,
+    idx_v: usize,
+    nv: usize,
+    lower: Vec<Option<f64>>,
+    upper: Vec<Option<f64>>,
+    velocity: Vec<Option<f64>>,
+    effort: Vec<Option<f64>>,
+    damping: Vec<f64>,
+    friction: Vec<f64>,
+    armature: Vec<f64>,
+    mass: f64,
+    com: [f64; 3],
+    /// Principal moments of inertia about the centre of mass, least first (kg m²).
+    moments: [f64; 3],
+    /// Links that fixed joints merge into this one.
+    merged: Vec<String>,
+}
+
+/// How a single call walks the tree.
+#[derive(Serialize)]
+struct Limbs {
+    /// Whether bodies of different limbs share the lanes of a vector register.
+    side_by_side: bool,
+    /// The steps from the root to the tips.
+    steps: usize,
+    /// The bodies that they compute.
+    bodies: usize,
+}
+
+/// A joint that follows another one.
+#[derive(Serialize)]
+struct Follower {
+    joint: String,
+    leader: String,
+    ratio: f64,
+    offset: f64,
+    line: Option<u32>,
+    /// Whether it does, or has a coordinate of its own because `--mimic` is not given.
+    follows: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
+    let robot = robot::load(&arguments.robot.robot, &arguments.robot.options)?;
+    let report = Report::new(&robot, arguments);
+    if arguments.json {
+        say_json(&report);
+    } else {
+        say(&report.text(&robot.model));
+    }
+    match report.warnings.len() {
+        n if n > 0 && arguments.strict => Err(Error::No(format!("{} has {n} warnings", robot.source))),
+        _ => Ok(()),
+    }
+}
+
+impl Report {
+    fn new(robot: &Robot, arguments: &Arguments) -> Self {
+        let (model, lines) = (&robot.model, Lines::new(&robot.text));
+        let fixed_mass = model.bodies()[0].inertia.mass;
+        let mass: f64 = model.bodies()[1..].iter().map(|b| b.inertia.mass).sum();
+        let com = forward_kinematics(model, &mut Data::new(model), &neutral(model)).com().to_array();
+        let plan = model.limbs();
+        Self {
+            name: model.name().to_owned(),
+            source: robot.source.clone(),
+            format: robot.format.name(),
+            nq: model.nq(),
+            nv: model.nv(),
+            frames: model.frames().len(),
+            mass,
+            fixed_mass,
+            com: (mass > 0.0).then_some(com),
+            gravity: model.gravity().to_array(),
+            bodies: (1..model.bodies().len()).map(|i| BodyReport::new(model, i, &lines)).collect(),
+            limbs: Limbs {
+                side_by_side: plan.is_some(),
+                steps: plan.map_or(model.bodies().len(), |plan| plan.steps.len()) - 1,
+                bodies: model.bodies().len() - 1,
+            },
+            mimics: followers(robot, arguments, &lines),
+            warnings: findings::of(model, &lines),
+        }
+    }
+
+    fn text(&self, model: &Model) -> String {
+        let mut text = String::new();
+        let out = &mut text;
+        // Writing to a string does not fail.
+        let _ = writeln!(out, "{}  ({}, {})", styled(Style::Bold, &self.name), self.source, self.format);
+        let _ = writeln!(
+            out,
+            "  {} moving bodies, nq = {}, nv = {}, {} frames",
+            self.bodies.len(),
+            self.nq,
+            self.nv,
+            self.frames
+        );
+        let fixed = if self.fixed_mass > 0.0 {
+            format!(" and {} kg fixed to the world", short(self.fixed_mass))
+        } else {
+            String::new()
+        };
+        let _ = writeln!(out, "  mass {} kg that moves{fixed}", short(self.mass));
+        if let Some([x, y, z]) = self.com {
+            let _ = writeln!(out, "  centre of mass ({x:.4}, {y:.4}, {z:.4}) m at the neutral position");
+        }
+        let Limbs { steps, bodies, .. } = self.limbs;
+        let _ = match self.limbs.side_by_side {
+            true => writeln!(
+                out,
+                "  a single call takes {steps} steps of lanes for {bodies} bodies, up to four side by side"
+            ),
+            false => writeln!(out, "  a single call takes {steps} steps, one for each body: too few limbs for lanes"),
+        };
+        *out += &heading("Tree");
+        *out += &self.tree();
+        *out += &heading("Joints");
+        *out += &self.joints(model);
+        *out += &heading("Bodies");
+        *out += &self.masses();
+        if !self.mimics.is_empty() {
+            *out += &heading("Joints that follow");
+            for f in &self.mimics {
+                let now = if f.follows { "" } else { "   (has a coordinate of its own; --mimic lets it follow)" };
+                let _ = writeln!(out, "  {} = {} · {} + {}{now}", f.joint, short(f.ratio), f.leader, short(f.offset));
+            }
+        }
+        *out += &heading("Warnings");
+        if self.warnings.is_empty() {
+            *out += &format!("  {}\n", styled(Style::Good, "none"));
+        }
+        for finding in &self.warnings {
+            let place = finding.line.map_or(String::new(), |line| format!("{}:{line}: ", self.source));
+            let _ = writeln!(out, "  {}{}", styled(Style::Warn, &place), finding.what);
+        }
+        text
+    }
+
+    /// The bodies under each other, with the joints that carry them.
+    fn tree(&self) -> String {
+        let mut children = vec![Vec::new(); self.bodies.len() + 1];
+        self.bodies.iter().for_each(|b| children[b.parent].push(b.index));
+        let mut text = "  world\n".to_owned();
+        // depth first: bodies that are still to be drawn, with what stands before them
+        let mut left: Vec<(usize, String, bool)> = Vec::new();
+        let push = |left: &mut Vec<(usize, String, bool)>, of: usize, before: &str| {
+            let last = children[of].last().copied();
+            left.extend(children[of].iter().rev().map(|&i| (i, before.to_owned(), Some(i) == last)));
+        };
+        push(&mut left, 0, "  ");
+        while let Some((i, before, last)) = left.pop() {
+            let b = &self.bodies[i - 1];
+            let merged = match b.merged.len() {
+                0 => String::new(),
+                1..=3 => format!("  + {}", b.merged.join(", ")),
+                n => format!("  + {} and {} more", b.merged[..2].join(", "), n - 2),
+            };
+            let branch = if last { "└─ " } else { "├─ " };
+            let joint = styled(Style::Faint, &format!("{} ({})", b.joint, b.kind));
+            text += &format!("{before}{branch}{} {}  {joint}{}\n", b.index, b.name, styled(Style::Faint, &merged));
+            push(&mut left, i, &format!("{before}{}", if last { "   " } else { "│  " }));
+        }
+        text
+    }
+
+    fn joints(&self, model: &Model) -> String {
+        let mut table =
+            Table::new(&["#", "joint", "kind", "q", "v", "lower", "upper", "speed", "effort", "damping", "armature"]);
+        for b in &self.bodies {
+            let one = |values: &[Option<f64>]| match values {
+                [value] => value.map_or("∞".to_owned(), short),
+                _ => String::new(),
+            };
+            let lower = if b.lower == [None] { "−∞".to_owned() } else { one(&b.lower) };
+            let least = |values: &[f64]| match values {
+                [value] if *value != 0.0 => short(*value),
+                _ => String::new(),
+            };
+            let follows = model.bodies()[b.index].mimic.is_some();
+            table.row(vec![
+                b.index.to_string(),
+                b.joint.clone(),
+                if follows { format!("{}, follows", b.kind) } else { b.kind.to_owned() },
+                range(b.idx_q, b.nq),
+                range(b.idx_v, b.nv),
+                if b.nq == 1 { lower } else { String::new() },
+                if b.nq == 1 { one(&b.upper) } else { String::new() },
+                one(&b.velocity),
+                one(&b.effort),
+                least(&b.damping),
+                least(&b.armature),
+            ]);
+        }
+        table.text()
+    }
+
+    fn masses(&self) -> String {
+        let mut table = Table::new(&["#", "body", "mass kg", "share", "com x", "y", "z m", "moments kg m²", "", ""]);
+        for b in &self.bodies {
+            let share = if self.mass > 0.0 { format!("{:.1} %", 100.0 * b.mass / self.mass) } else { String::new() };
+            let [x, y, z] = b.com.map(|x| format!("{x:.4}"));
+            let [i, j, k] = b.moments.map(|x| format!("{x:.2e}"));
+            table.row(vec![b.index.to_string(), b.name.clone(), short(b.mass), share, x, y, z, i, j, k]);
+        }
+        table.text()
+    }
+}
+
+impl BodyReport {
+    fn new(model: &Model, i: usize, lines: &Lines) -> Self {
+        let (b, limits): (&Body, _) = (&model.bodies()[i], model.limits());
+        let (q, v) = (b.idx_q..b.idx_q + b.joint.nq(), b.idx_v..b.idx_v + b.joint.nv());
+        let finite = |values: &[f64]| values.iter().map(|&x| x.is_finite().then_some(x)).collect();
+        let (com, moments) = findings::moments(b.inertia);
+        let merged = |f: &&condyle::Frame| f.body == i && f.kind == FrameKind::Link && f.name != b.name;
+        Self {
+            index: i,
+            name: b.name.clone(),
+            joint: b.joint_name.clone(),
+            kind: b.joint.kind(),
+            parent: b.parent,
+            line: lines.of(Kind::Joint, &b.joint_name).or_else(|| lines.of(Kind::Body, &b.name)),
+            axis: b.joint.axis().map(condyle::Vec3::to_array),
+            idx_q: b.idx_q,
+            nq: q.len(),
+            idx_v: b.idx_v,
+            nv: v.len(),
+            lower: finite(&limits.lower[q.clone()]),
+            upper: finite(&limits.upper[q]),
+            velocity: finite(&limits.velocity[v.clone()]),
+            effort: finite(&limits.effort[v.clone()]),
+            damping: model.damping()[v.clone()].to_vec(),
+            friction: model.friction()[v.clone()].to_vec(),
+            armature: model.armature()[v].to_vec(),
+            mass: b.inertia.mass,
+            com,
+            moments,
+            merged: model.frames().iter().filter(merged).map(|f| f.name.clone()).collect(),
+        }
+    }
+}
+
+/// The joints that follow others, or would with `--mimic`.
+fn followers(robot: &Robot, arguments: &Arguments, lines: &Lines) -> Vec<Follower> {
+    let follows = arguments.robot.options.mimic;
+    let following = robot::ReadingOptions { mimic: true, ..arguments.robot.options.clone() };
+    let again = if follows { None } else { robot::load(&robot.source, &following).ok() };
+    let model = again.as_ref().map_or(&robot.model, |robot| &robot.model);
+    let leader = |b: &Body| {
+        model.bodies()[1..].iter().find(|l| l.mimic.is_none() && l.idx_v == b.idx_v).map(|l| l.joint_name.clone())
+    };
+    let follower = |b: &Body| {
+        let mimic = b.mimic?;
+        let line = lines.of(Kind::Joint, &b.joint_name);
+        let (ratio, offset) = (mimic.ratio, mimic.offset);
+        Some(Follower { joint: b.joint_name.clone(), leader: leader(b)?, ratio, offset, line, follows })
+    };
+    model.bodies()[1..].iter().filter_map(follower).collect()
+}
+
+/// The places of n numbers from the first one on.
+fn range(first: usize, n: usize) -> String {
+    match n {
+        0 => String::new(),
+        1 => first.to_string(),
+        _ => format!("{first}–{}", first + n - 1),
+    }
+}
+
+/// A number in as few digits as tell it from its neighbours by a part in 10⁵.
+pub(crate) fn short(x: f64) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-4..1e6).contains(&x.abs()) {
+        return format!("{x:.2e}");
+    }
+    let digits = (4 - x.abs().log10().floor() as i32).clamp(0, 8) as usize;
+    let text = format!("{x:.digits$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}

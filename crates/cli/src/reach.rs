@@ -1,0 +1,85 @@
+//! Reaching for a point as an optimal control problem.
+
+use crate::error::Error;
+use crate::limits::{efforts_of, inside, limits_of};
+use condyle::optimal::Problem;
+use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle::{Data, Model, Vec3, difference, gravity, integrate, neutral, rnea};
+use std::sync::Arc;
+
+/// What an effort without a limit is weighed with, as if its limit were 100 N m or N.
+const WITHOUT_LIMIT: f64 = 1e-4;
+
+/// A problem, and where the solver begins: states and efforts.
+pub(crate) type Posed = (Problem, Vec<f64>, Vec<f64>);
+
+/// The optimal control problem, and a warm start: on the straight way to a posture that reaches the target, with the
+/// efforts that inverse dynamics gives for it.
+///
+/// It weighs speed, the efforts beyond those that hold the start (each against its limit), and, as barriers, what lies
+/// outside of the limits of position, speed and effort; at the end, the distance to the target and the speed. Where limits
+/// are to be held they are constraints as well.
+pub(crate) fn problem(
+    model: &Arc<Model>,
+    frame: usize,
+    target: Vec3<f64>,
+    (q0, q_end): (&[f64], &[f64]),
+    (knots, dt): (usize, f64),
+    held: bool,
+) -> Result<Posed, Error> {
+    let nv = model.nv();
+    let limits = model.limits();
+    let rest = |q: &[f64]| [q, &vec![0.0; nv]].concat();
+    let x0 = rest(q0);
+    let state = || Residual::State { reference: rest(&neutral(model)) };
+    let moving = |speed: f64| Activation::Weighted([vec![0.0; nv], vec![speed; nv]].concat());
+    // limits of joints with one coordinate, as bounds on the tangent vector from neutral
+    let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; 2 * nv], vec![f64::INFINITY; 2 * nv]);
+    for body in model.bodies()[1..].iter().filter(|b| b.joint.nq() == 1) {
+        (lower[body.idx_v], upper[body.idx_v]) = (limits.lower[body.idx_q], limits.upper[body.idx_q]);
+    }
+    for (k, &speed) in limits.velocity.iter().enumerate().filter(|(_, v)| **v > 0.0) {
+        (lower[nv + k], upper[nv + k]) = (-speed, speed);
+    }
+    let within = || Activation::Barrier { lower: lower.clone(), upper: upper.clone() };
+    let bounds: Vec<f64> = limits.effort.iter().map(|&e| if e > 0.0 { e } else { f64::INFINITY }).collect();
+    let share = bounds.iter().map(|e| if e.is_finite() { e.powi(-2) } else { WITHOUT_LIMIT }).collect();
+    let efforts = Activation::Barrier { lower: bounds.iter().map(|e| -e).collect(), upper: bounds };
+    let hold = gravity(model, &mut Data::new(model), q0).to_vec();
+    let position = Residual::FrameTranslation { frame: (&model.frames()[frame]).into(), target };
+    let running = vec![
+        Cost::new("speed", 1e-1, state(), moving(1.0)),
+        Cost::new("effort", 1e0, Residual::Control { reference: hold }, Activation::Weighted(share)),
+        Cost::new("limits", 1e2, state(), within()),
+        Cost::new("effort limits", 1e1, Residual::Control { reference: vec![0.0; nv] }, efforts),
+    ];
+    let terminal = vec![
+        Cost::new("target", 1e4, position, Activation::Quadratic),
+        Cost::new("stop", 1e0, state(), moving(1.0)),
+        Cost::new("limits", 1e2, state(), within()),
+    ];
+    // the straight way with the least jerk: q0 ⊕ s(t) way, s = 10 r³ − 15 r⁴ + 6 r⁵, r = t/T
+    let (mut data, mut q, mut way) = (Data::new(model), q0.to_vec(), vec![0.0; nv]);
+    difference(model, q0, q_end, &mut way);
+    let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();
+    let duration = knots as f64 * dt;
+    let (mut xs, mut us) = (Vec::new(), Vec::new());
+    for t in 0..=knots {
+        let r = t as f64 / knots as f64;
+        let v = along(30.0 * r * r * (1.0 - r) * (1.0 - r) / duration);
+        let a = along(60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / (duration * duration));
+        integrate(model, q0, &along(r * r * r * (10.0 + r * (6.0 * r - 15.0))), &mut q);
+        if t < knots {
+            us.extend(rnea(model, &mut data, &q, &v, &a, &[]));
+        }
+        xs.extend(q.iter().chain(&v));
+    }
+    let (mut action, mut end) =
+        (FreeDynamics::running(model.clone(), dt, running)?, FreeDynamics::terminal(model.clone(), terminal)?);
+    if held {
+        let state = limits_of(model, &inside(model, neutral(model)));
+        end = end.with_limits(state.clone())?;
+        action = action.with_limits([state, efforts_of(model, model.nv())].concat())?;
+    }
+    Ok((Problem::new(x0, vec![Box::new(action)], vec![0; knots], Box::new(end))?, xs, us))
+}

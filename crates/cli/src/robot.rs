@@ -1,0 +1,222 @@
+//! The robot of a command: a file of any kind, or one that comes along.
+
+use crate::error::{Error, nearest};
+use condyle::{Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, robots};
+use std::path::{Path, PathBuf};
+
+/// The robots that come along, by name.
+pub(crate) const EMBEDDED: [&str; 3] = ["arm7", "quadruped", "humanoid"];
+
+/// Which robot, and how its file is read.
+#[derive(clap::Args, Clone)]
+pub(crate) struct RobotArguments {
+    /// URDF, MJCF or SDF of the robot, or one that comes along: arm7, quadruped, humanoid
+    #[arg(value_name = "ROBOT")]
+    pub robot: String,
+    #[command(flatten)]
+    pub options: ReadingOptions,
+}
+
+/// How a robot's file is read.
+#[derive(clap::Args, Clone, Default)]
+pub(crate) struct ReadingOptions {
+    /// The joint between the world and the root link of a URDF or SDF. Default: fixed
+    #[arg(long, value_name = "JOINT", value_enum)]
+    pub root: Option<Root>,
+    /// Let joints with a <mimic> (MJCF: <equality>) follow another joint, instead of having a coordinate of their own
+    #[arg(long)]
+    pub mimic: bool,
+    /// A folder with packages in it, for package:// addresses; may be given several times
+    #[arg(long, value_name = "FOLDER")]
+    pub packages: Vec<PathBuf>,
+}
+
+/// The joint of a root link.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub(crate) enum Root {
+    Fixed,
+    Free,
+    Planar,
+    Spherical,
+    Translation,
+}
+
+impl Root {
+    fn joint(self) -> Option<Joint> {
+        match self {
+            Self::Fixed => None,
+            Self::Free => Some(Joint::FreeFlyer),
+            Self::Planar => Some(Joint::Planar),
+            Self::Spherical => Some(Joint::Spherical),
+            Self::Translation => Some(Joint::Translation),
+        }
+    }
+}
+
+/// A kind of file.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Format {
+    Urdf,
+    Mjcf,
+    Sdf,
+}
+
+impl Format {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Urdf => "URDF",
+            Self::Mjcf => "MJCF",
+            Self::Sdf => "SDF",
+        }
+    }
+}
+
+/// A robot, and where it comes from.
+pub(crate) struct Robot {
+    pub model: Model,
+    /// The path, or the name of one that comes along.
+    pub source: String,
+    pub format: Format,
+    /// The text of the file.
+    pub text: String,
+}
+
+/// Reads a robot.
+pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
+    let Some(path) = locate(name) else {
+        return embedded(name, options);
+    };
+    let (format, text) = sniff(&path)?;
+    let model = read(name, format, options)?;
+    Ok(Robot { model, source: name.to_owned(), format, text })
+}
+
+/// The file of that name, if the name is none of a robot that comes along. An address of a package is looked up later.
+fn locate(name: &str) -> Option<PathBuf> {
+    let path = Path::new(name);
+    let plain = !EMBEDDED.contains(&name) || path.is_file();
+    (plain && (path.exists() || name.starts_with("package://"))).then(|| path.to_owned())
+}
+
+/// Reads the model of a file of known kind.
+pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Result<Model, Error> {
+    let (root_joint, mimic) = (options.root.and_then(Root::joint), options.mimic);
+    Ok(match format {
+        Format::Urdf => {
+            let packages = options.packages.clone();
+            Model::from_urdf(path, &UrdfOptions { root_joint, mimic, packages, ..UrdfOptions::default() })?
+        }
+        Format::Sdf => Model::from_sdf(path, &SdfOptions { root_joint, mimic, ..SdfOptions::default() })?,
+        Format::Mjcf => {
+            if options.root.is_some() {
+                let what = "an MJCF says itself how its bodies are joined to the world".to_owned();
+                return Err(Error::Option { option: "root", what });
+            }
+            Model::from_mjcf(path, &MjcfOptions { mimic, ..MjcfOptions::default() })?
+        }
+    })
+}
+
+/// A robot that comes along, on its own root joint unless another one is asked for.
+fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
+    let (text, free) = match name {
+        "arm7" => (robots::ARM7, false),
+        "quadruped" => (robots::QUADRUPED, true),
+        "humanoid" => (robots::HUMANOID, true),
+        _ => return Err(unknown(name)),
+    };
+    let root_joint = match options.root {
+        Some(root) => root.joint(),
+        None => free.then_some(Joint::FreeFlyer),
+    };
+    let model =
+        Model::from_urdf_str(text, &UrdfOptions { root_joint, mimic: options.mimic, ..UrdfOptions::default() })?;
+    Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned() })
+}
+
+/// An error for a name that is neither a file's nor that of a robot that comes along; with what it could have meant.
+fn unknown(name: &str) -> Error {
+    let folder = Path::new(name).parent().map_or("", |parent| parent.to_str().unwrap_or_default());
+    let look_in = if folder.is_empty() { "." } else { folder };
+    let files = std::fs::read_dir(look_in).into_iter().flatten().flatten().filter_map(|entry| {
+        let file = entry.file_name().to_str()?.to_owned();
+        let kind = Path::new(&file).extension()?.to_str()?.to_lowercase();
+        let path = Path::new(folder).join(&file).to_str()?.to_owned();
+        matches!(&*kind, "urdf" | "xml" | "mjcf" | "sdf").then_some(path)
+    });
+    let files: Vec<String> = files.take(1000).collect();
+    let files = files.iter().map(|file| &**file);
+    if name.contains(['.', '/', '\\']) {
+        return Error::File { file: name.to_owned(), what: format!("No such file{}", nearest(name, files)) };
+    }
+    Error::Robot { name: name.to_owned(), nearest: nearest(name, EMBEDDED.into_iter().chain(files)) }
+}
+
+/// The most that is read of a file that is looked at beside the library's reader, which has the same limit (bytes).
+const LARGEST: u64 = 64 << 20;
+
+/// The text of a file, and by its first element the kind of it.
+fn sniff(path: &Path) -> Result<(Format, String), Error> {
+    let wrong = |what: String| Error::File { file: path.display().to_string(), what };
+    if path.to_str().is_some_and(|name| name.starts_with("package://")) {
+        return Ok((Format::Urdf, String::new()));
+    }
+    let about = std::fs::metadata(path).map_err(|error| wrong(error.to_string()))?;
+    if !about.is_file() {
+        return Err(wrong("is no regular file".to_owned()));
+    }
+    if about.len() > LARGEST {
+        return Err(wrong(format!("has {} bytes, at most {LARGEST} are read", about.len())));
+    }
+    let bytes = std::fs::read(path).map_err(|error| wrong(error.to_string()))?;
+    let text = String::from_utf8(bytes).map_err(|_| wrong("is no text in UTF-8".to_owned()))?;
+    let format = match first_tag(&text) {
+        Some("robot") => Format::Urdf,
+        Some("mujoco") => Format::Mjcf,
+        Some("sdf") => Format::Sdf,
+        Some(tag) => {
+            let near = nearest(tag, ["robot", "mujoco", "sdf"]);
+            return Err(wrong(format!("begins with <{tag}>, expected <robot> (URDF), <mujoco> (MJCF) or <sdf>{near}")));
+        }
+        None => return Err(wrong("has no XML element: expected a URDF, MJCF or SDF".to_owned())),
+    };
+    Ok((format, text))
+}
+
+/// The name of the first element of an XML text, behind its declaration and comments.
+fn first_tag(mut text: &str) -> Option<&str> {
+    loop {
+        let (_, rest) = text.split_once('<')?;
+        text = match rest.as_bytes().first()? {
+            b'?' => rest.split_once("?>")?.1,
+            b'!' if rest.starts_with("!--") => rest.split_once("-->")?.1,
+            b'!' => rest.split_once('>')?.1,
+            _ => {
+                return rest
+                    .split(|c: char| c.is_whitespace() || matches!(c, '>' | '/'))
+                    .next()
+                    .filter(|t| !t.is_empty());
+            }
+        };
+    }
+}
+
+/// Frames by name.
+pub(crate) fn frames(model: &Model, names: &[String]) -> Result<Vec<usize>, Error> {
+    names.iter().map(|name| Ok(model.frame(name)?)).collect()
+}
+
+/// The robot with enough armature (kg m², kg) on the joints that move nothing with inertia, so that forward dynamics has
+/// an answer; and their names.
+pub(crate) fn regular(model: Model, armature: f64) -> Result<(Model, Vec<String>), Error> {
+    let joints: Vec<String> = model.singular_joints().iter().map(|&i| model.bodies()[i].joint_name.clone()).collect();
+    if joints.is_empty() {
+        return Ok((model, joints));
+    }
+    let mut added = model.armature().to_vec();
+    for &i in model.singular_joints() {
+        let body = &model.bodies()[i];
+        (body.idx_v..body.idx_v + body.joint.nv()).for_each(|v| added[v] += armature);
+    }
+    Ok((model.with_armature(&added)?, joints))
+}

@@ -1,0 +1,82 @@
+//! Who looks at a solve: shows how it goes, and ends it at Ctrl-C.
+
+use crate::report;
+use crate::terminal::say;
+use condyle::optimal::{Iteration, Observer};
+use core::ops::ControlFlow;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether Ctrl-C was pressed.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// From now on the first Ctrl-C asks the solver to end with its best iterate, and the second ends the program.
+pub(crate) fn catch_interrupts() {
+    // A handler that is there already does the same; where signals cannot be caught they end the program, as ever.
+    let _ = ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::SeqCst) {
+            std::process::exit(130);
+        }
+    });
+}
+
+/// Whether Ctrl-C was pressed.
+pub(crate) fn interrupted() -> bool {
+    STOP.load(Ordering::SeqCst)
+}
+
+/// A bar on a terminal; nothing anywhere else.
+pub(crate) fn bar(length: u64, what: &str) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr_with_hz(10));
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {elapsed}");
+    if let Ok(style) = style {
+        bar.set_style(style.progress_chars("█▉ "));
+    }
+    bar.set_message(what.to_owned());
+    bar
+}
+
+/// The iterations of a solve, or of several after each other.
+pub(crate) struct Watch {
+    bar: ProgressBar,
+    pub trace: Vec<Iteration>,
+}
+
+impl Watch {
+    pub(crate) fn new(most: usize) -> Self {
+        Self { bar: bar(most as u64, "iterations"), trace: Vec::new() }
+    }
+
+    /// An observer of a solve, who says nothing if it is to be quiet.
+    pub(crate) fn quiet(&mut self, quiet: bool) -> Eye<'_> {
+        Eye { watch: self, quiet }
+    }
+
+    /// No more iterations.
+    pub(crate) fn end(self) -> Vec<Iteration> {
+        self.bar.finish_and_clear();
+        self.trace
+    }
+}
+
+/// The observer of one solve.
+pub(crate) struct Eye<'a> {
+    watch: &'a mut Watch,
+    quiet: bool,
+}
+
+impl Observer for Eye<'_> {
+    fn iteration(&mut self, now: &Iteration) -> ControlFlow<()> {
+        let numbered = Iteration { iteration: self.watch.trace.len(), ..*now };
+        if !self.quiet {
+            self.watch.bar.suspend(|| say(&report::iteration(&numbered)));
+        }
+        self.watch.bar.inc(1);
+        self.watch.trace.push(numbered);
+        self.go_on()
+    }
+
+    fn go_on(&mut self) -> ControlFlow<()> {
+        if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}

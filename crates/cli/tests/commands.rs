@@ -1,0 +1,250 @@
+//! `condyle inspect`, `budget`, `check` and the flags, as a user meets them. No test asserts a time.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const EMBEDDED: [(&str, usize, usize); 3] = [("arm7", 7, 7), ("quadruped", 19, 18), ("humanoid", 39, 38)];
+
+/// A folder of the test's own, empty.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("commands_{test}"));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn condyle(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_condyle")).args(arguments).output().unwrap()
+}
+
+/// What it prints; it must end with this status.
+fn said(arguments: &[&str], status: i32) -> String {
+    let output = condyle(arguments);
+    let (out, error) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert_eq!(output.status.code(), Some(status), "{arguments:?}\n{out}\n{error}");
+    out
+}
+
+fn json(arguments: &[&str], status: i32) -> Value {
+    serde_json::from_str(&said(arguments, status)).unwrap()
+}
+
+/// A URDF of a chain: a base, and links of these masses (kg) behind each other.
+fn chain(masses: &[f64]) -> String {
+    let mut urdf = "<robot name=\"chain\">\n<link name=\"base\"/>\n".to_owned();
+    for (k, m) in masses.iter().enumerate() {
+        let parent = if k == 0 { "base".to_owned() } else { format!("link{}", k - 1) };
+        let i = 0.01 * m;
+        urdf += &format!(
+            "<link name=\"link{k}\"><inertial><origin xyz=\"0 0 0.1\"/><mass value=\"{m}\"/><inertia ixx=\"{i}\" ixy=\"0\" \
+             ixz=\"0\" iyy=\"{i}\" iyz=\"0\" izz=\"{i}\"/></inertial></link>\n\
+             <joint name=\"joint{k}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"link{k}\"/>\
+             <axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"1\" velocity=\"2\" effort=\"3\"/></joint>\n"
+        );
+    }
+    urdf + "</robot>\n"
+}
+
+#[test]
+fn inspect_tells_what_the_model_is() {
+    for (robot, nq, nv) in EMBEDDED {
+        let report = json(&["inspect", robot, "--json"], 0);
+        assert_eq!((report["nq"].as_u64(), report["nv"].as_u64()), (Some(nq as u64), Some(nv as u64)), "{robot}");
+        let bodies = report["bodies"].as_array().unwrap();
+        let sum: f64 = bodies.iter().map(|b| b["mass"].as_f64().unwrap()).sum();
+        assert!((sum - report["mass"].as_f64().unwrap()).abs() < 1e-9);
+        assert!(bodies.iter().all(|b| b["line"].as_u64().is_some() || b["joint"] == "root_joint"));
+        let text = said(&["inspect", robot], 0);
+        for body in bodies {
+            assert!(text.contains(body["name"].as_str().unwrap()), "{robot}");
+        }
+        assert!(!text.contains('\x1b'), "no colours but on a terminal");
+    }
+    let report = json(&["inspect", "quadruped", "--json"], 0);
+    assert_eq!(report["limbs"]["steps"], 4);
+    assert!(report["bodies"][3]["merged"].as_array().unwrap().iter().any(|link| link == "LF_foot"));
+    let fixed = json(&["inspect", "quadruped", "--root", "fixed", "--json"], 0);
+    assert_eq!(fixed["nv"], 12);
+}
+
+#[test]
+fn inspect_finds_what_is_odd_and_says_the_line() {
+    let folder = folder("odd");
+    let file = folder.join("chain.urdf");
+    let urdf = chain(&[1.0, 1e-4, 0.0]).replacen("upper=\"1\"", "upper=\"-1\"", 1);
+    std::fs::write(&file, &urdf).unwrap();
+    let path = file.to_str().unwrap();
+    let report = json(&["inspect", path, "--json"], 0);
+    let line = |text: &str| urdf.lines().position(|line| line.contains(text)).unwrap() as u64 + 1;
+    let find = |kind: &str, name: &str| {
+        let found = report["warnings"].as_array().unwrap().iter();
+        found.filter(|w| w["kind"] == kind && w["name"] == name).map(|w| w["line"].as_u64()).next()
+    };
+    assert_eq!(find("mass_ratio", "link1"), Some(Some(line("<link name=\"link1\""))));
+    assert_eq!(find("massless", "link2"), Some(Some(line("<link name=\"link2\""))));
+    assert_eq!(find("singular", "joint2"), Some(Some(line("<joint name=\"joint2\""))));
+    assert_eq!(find("locked", "joint0"), Some(Some(line("<joint name=\"joint0\""))));
+    let text = said(&["inspect", path, "--strict"], 1);
+    assert!(text.contains(&format!("{path}:{}:", line("<link name=\"link1\""))), "{text}");
+    assert!(text.contains("at the tip of its limb"), "{text}");
+}
+
+#[test]
+fn inspect_reads_every_kind_of_file() {
+    let folder = folder("kinds");
+    let mjcf = "<!-- a <robot> in words -->\n<mujoco model=\"m\"><worldbody><body name=\"b\"><joint name=\"j\" axis=\"0 0 1\"/>\
+        <geom size=\"0.1\"/></body></worldbody></mujoco>";
+    let sdf = "<?xml version=\"1.0\"?>\n<sdf version=\"1.6\"><model name=\"m\"><link name=\"a\"/><link name=\"b\"/>\
+        <joint name=\"j\" type=\"revolute\"><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz></axis></joint></model></sdf>";
+    for (name, text, format) in [("m.xml", mjcf, "MJCF"), ("m.sdf", sdf, "SDF"), ("m.txt", &*chain(&[1.0]), "URDF")] {
+        let file = folder.join(name);
+        std::fs::write(&file, text).unwrap();
+        let report = json(&["inspect", file.to_str().unwrap(), "--json"], 0);
+        assert_eq!((report["format"].as_str(), report["nv"].as_u64()), (Some(format), Some(1)));
+        assert_eq!(report["bodies"][0]["line"], 2 + 2 * u64::from(format == "URDF"));
+    }
+}
+
+#[test]
+fn inspect_names_joints_that_follow() {
+    let folder = folder("mimic");
+    let file = folder.join("m.urdf");
+    let urdf = chain(&[1.0, 1.0]);
+    let (head, tail) = urdf.rsplit_once("</joint>").unwrap();
+    let mimic = "<mimic joint=\"joint0\" multiplier=\"-2\" offset=\"0.5\"/></joint>";
+    std::fs::write(&file, format!("{head}{mimic}{tail}")).unwrap();
+    let path = file.to_str().unwrap();
+    for (flags, nv) in [(&[][..], 2), (&["--mimic"], 1)] {
+        let report = json(&[&["inspect", path, "--json"], flags].concat(), 0);
+        assert_eq!(report["nv"], nv);
+        let follower = &report["mimics"][0];
+        assert_eq!((follower["joint"].as_str(), follower["leader"].as_str()), (Some("joint1"), Some("joint0")));
+        assert_eq!((follower["ratio"].as_f64(), follower["offset"].as_f64()), (Some(-2.0), Some(0.5)));
+        assert_eq!(follower["follows"], nv == 1);
+    }
+}
+
+#[test]
+fn all_checks_pass() {
+    for (robot, ..) in EMBEDDED {
+        let report = json(&["check", robot, "--states", "50", "--json"], 0);
+        assert_eq!(report["pass"], true);
+        let rows = report["rows"].as_array().unwrap();
+        assert!(rows.len() >= 34, "{robot}: {}", rows.len());
+        for row in rows {
+            assert!(row["cases"].as_u64().unwrap() > 0 && row["error"].as_f64().is_some(), "{row}");
+        }
+        for equation in ["rnea(q, v, aba(q, v, τ)) = τ", "Ṁ = C + Cᵀ, Ṁ by dual numbers", "Y π + armature a = τ"]
+        {
+            assert!(rows.iter().any(|row| row["equation"] == equation), "{equation}");
+        }
+    }
+    assert!(said(&["check", "arm7", "--states", "5"], 0).contains("34 of 34 checks pass"));
+}
+
+/// A tip without inertia has no forward dynamics: it is given armature, and that is said.
+#[test]
+fn massless_tips_are_given_armature() {
+    let file = folder("tip").join("chain.urdf");
+    std::fs::write(&file, chain(&[1.0, 0.5, 0.0])).unwrap();
+    let path = file.to_str().unwrap();
+    let report = json(&["check", path, "--states", "20", "--json"], 0);
+    assert_eq!(report["armature_added"], serde_json::json!(["joint2"]));
+    let report = json(&["budget", path, "--knots", "4", "--repetitions", "1", "--json"], 0);
+    assert_eq!(report["armature_added"], serde_json::json!(["joint2"]));
+}
+
+#[test]
+fn budget_measures_all_it_promises() {
+    let flags = ["--knots", "4,9", "--repetitions", "2", "--cores", "2", "--json"];
+    for (robot, contacts) in [
+        ("arm7", &["--contacts", "tool"][..]),
+        ("quadruped", &["--contacts", "LF_foot,RF_foot,LH_foot,RH_foot"]),
+        ("humanoid", &["--rigid-contacts", "left_sole,right_sole"]),
+    ] {
+        let report = json(&[&["budget", robot], &flags[..], contacts].concat(), 0);
+        let rows = |name: &str| report[name].as_array().unwrap().clone();
+        assert_eq!(rows("horizons").len(), 2);
+        assert_eq!(rows("algorithms").len(), 6);
+        let kinds: Vec<_> = rows("iterations").iter().map(|row| row["name"].as_str().unwrap().to_owned()).collect();
+        assert_eq!(kinds, ["free", "free", "in contact", "in contact"]);
+        for row in rows("horizons").iter().chain(&rows("algorithms")) {
+            for way in ["single", "lanes", "threads"] {
+                let [p50, p99] = ["p50_s", "p99_s"].map(|p| row[way][p].as_f64().unwrap());
+                assert!(0.0 < p50 && p50 <= p99, "{row}");
+            }
+        }
+        assert!(rows("iterations").iter().all(|row| row["finite"] == true), "{robot}");
+        assert!(rows("verdicts").iter().all(|v| v["name"] == "in contact" && v["fits"].is_null()));
+    }
+}
+
+/// A period of 100 s is enough for anything, one of a nanosecond for nothing.
+#[test]
+fn budget_ends_with_the_verdict() {
+    let folder = folder("budget");
+    let plot = folder.join("plot.svg");
+    let flags = ["budget", "arm7", "--knots", "6", "--repetitions", "2", "--rate"];
+    let report = json(&[&flags[..], &["0.01", "--json", "--plot", plot.to_str().unwrap()]].concat(), 0);
+    let verdict = &report["verdicts"][0];
+    assert_eq!((verdict["fits"].as_bool(), verdict["period_s"].as_f64()), (Some(true), Some(100.0)));
+    assert!(verdict["largest_knots"].as_u64().unwrap() > 6 && verdict["iterations_per_period"].as_u64().unwrap() > 1);
+    let svg = std::fs::read_to_string(plot).unwrap();
+    assert!(roxmltree::Document::parse(&svg).is_ok() && svg.contains("period") && !svg.contains("NaN"));
+    let report = json(&[&flags[..], &["1e9", "--json"]].concat(), 1);
+    assert_eq!(report["verdicts"][0]["fits"], false);
+    assert!(said(&[&flags[..], &["1e9"]].concat(), 1).contains("OVER"));
+}
+
+#[test]
+fn what_is_wrong_is_named_in_one_line() {
+    let folder = folder("wrong");
+    let write = |name: &str, text: &str| {
+        std::fs::write(folder.join(name), text).unwrap();
+        folder.join(name).to_str().unwrap().to_owned()
+    };
+    let (html, empty) = (write("page.urdf", "<html/>"), write("empty.urdf", ""));
+    let near = folder.join("pge.urdf").to_str().unwrap().to_owned();
+    let negative = write("negative.urdf", &chain(&[1.0, -1.0]));
+    let mjcf =
+        write("m.xml", "<mujoco><worldbody><body name=\"b\"><joint/><geom size=\"1\"/></body></worldbody></mujoco>");
+    for (arguments, words) in [
+        (&["inspect", "quadrupde"][..], "no robot `quadrupde`; nearest is `quadruped`"),
+        (&["inspect", &near], "page.urdf`"),
+        (&["inspect", &html], "page.urdf: begins with <html>, expected <robot> (URDF)"),
+        (&["check", &empty], "empty.urdf: has no XML element"),
+        (&["budget", &negative], "negative.urdf:"),
+        (&["inspect", folder.to_str().unwrap()], "is no regular file"),
+        (&["inspect", &mjcf, "--root", "free"], "--root: an MJCF says itself"),
+        (&["inspect", "arm7", "--root", "fre"], "'free'"),
+        (&["budget", "quadruped", "--contacts", "LF_fot"], "unknown frame `LF_fot`; nearest is `LF_foot`"),
+        (&["budget", "arm7", "--rate", "-5"], "--rate: must be above 0, not -5"),
+        (&["budget", "arm7", "--rate", "x"], "invalid value 'x' for '--rate <HZ>'"),
+        (&["budget", "arm7", "--knots", "0"], "0 is not in 1..=100000"),
+        (
+            &["check", "arm7", "--state", "5"],
+            "unexpected argument '--state' found; a similar argument exists: '--states'",
+        ),
+        (&["chek", "arm7"], "unrecognized subcommand 'chek'; a similar subcommand exists: 'check'"),
+        (&["inspect"], "<ROBOT>"),
+    ] {
+        let output = condyle(arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert!(error.contains(words) && error.lines().count() == 1, "{arguments:?}: `{words}` is missing in\n{error}");
+        assert!(output.stdout.is_empty());
+    }
+}
+
+#[test]
+fn help_and_completions() {
+    for command in ["inspect", "budget", "check", "plan"] {
+        let help = said(&[command, "--help"], 0);
+        assert!(help.contains(&format!("Examples:\n  condyle {command}")), "{help}");
+    }
+    assert!(said(&["--help"], 0).contains("Exit status:"));
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        assert!(said(&["completions", shell], 0).contains("budget"));
+    }
+}

@@ -1,0 +1,115 @@
+//! The actions of a problem: models that differ in costs, references and weights only are one action, so that their knots
+//! are computed in groups.
+
+use super::action::ActionModel;
+use super::shape::{MOST_ENTRIES, MOST_KNOTS};
+use crate::error::Error;
+use std::any::Any;
+
+/// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
+const MOST_NUMBERS: usize = 1 << 28;
+
+/// A model is compared with so many actions that came last, so that a horizon whose knots are all unlike is made in a time
+/// that grows with its length alone.
+const COMPARED: usize = 64;
+
+/// The actions of a problem, and which of them stands for each model.
+#[derive(Default)]
+pub(crate) struct Models {
+    pub(crate) actions: Vec<Box<dyn ActionModel>>,
+    /// Of each model the action that stands for it, and the model's number there.
+    places: Vec<[usize; 2]>,
+}
+
+impl Models {
+    /// Merges those models that differ in costs, references and weights only, and makes the memory of all.
+    pub(crate) fn new(models: Vec<Box<dyn ActionModel>>) -> Self {
+        let mut all = Self::default();
+        let mut counts: Vec<usize> = Vec::new();
+        for mut model in models {
+            let last = all.actions.len().saturating_sub(COMPARED);
+            let mut alike = all.actions.iter_mut().enumerate().skip(last).rev();
+            let place = match alike.find_map(|(k, action)| action.merge(&mut *model).then_some(k)) {
+                Some(k) => {
+                    counts[k] += 1;
+                    [k, counts[k] - 1]
+                }
+                None => {
+                    all.actions.push(model);
+                    counts.push(1);
+                    [counts.len() - 1, 0]
+                }
+            };
+            all.places.push(place);
+        }
+        all.actions.iter_mut().for_each(|action| action.reserve());
+        all
+    }
+
+    /// The number of models.
+    pub(crate) fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The action that stands for a model, and the model's number there.
+    pub(crate) fn place(&self, model: usize) -> [usize; 2] {
+        self.places[model]
+    }
+
+    /// The action that stands for a model.
+    pub(crate) fn of(&self, model: usize) -> &dyn ActionModel {
+        &*self.actions[self.places[model][0]]
+    }
+
+    /// As [`of`](Self::of), to compute with.
+    pub(crate) fn of_mut(&mut self, model: usize) -> &mut dyn ActionModel {
+        &mut *self.actions[self.places[model][0]]
+    }
+
+    /// The action that stands for a model, if it is a `T`; what is changed through it is that model's.
+    pub(crate) fn chosen<T: ActionModel>(&mut self, model: usize) -> Option<&mut T> {
+        let [action, own] = *self.places.get(model)?;
+        let action = &mut self.actions[action];
+        action.choose(own);
+        let action: &mut dyn Any = action.as_mut();
+        action.downcast_mut()
+    }
+}
+
+/// Refuses models that make no problem together.
+pub(crate) fn check(
+    models: &[Box<dyn ActionModel>],
+    stages: &[usize],
+    terminal: &dyn ActionModel,
+) -> Result<(), Error> {
+    if stages.is_empty() {
+        return Err(Error::EmptyHorizon);
+    }
+    let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
+    Error::check_size("knots", horizon, MOST_KNOTS)?;
+    for (name, found) in [("nx", nx), ("ndx", ndx)] {
+        Error::check_size(name, found, MOST_ENTRIES)?;
+    }
+    let mut numbers = 0;
+    for (knot, &index) in stages.iter().enumerate() {
+        let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
+        if model.is_end() {
+            return Err(Error::NoNextState { knot, index });
+        }
+        for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
+            if expected != found {
+                return Err(Error::Dimension { node: knot, name, expected, found });
+            }
+        }
+        Error::check_size("nu", model.nu(), MOST_ENTRIES)?;
+        numbers += ndx * (ndx + model.nu());
+        Error::check_size("numbers in the matrices of all knots", numbers, MOST_NUMBERS)?;
+    }
+    if ndx == 0 {
+        return Err(Error::EmptyState);
+    }
+    match terminal.nu() {
+        0 => Ok(()),
+        nu => Err(Error::TerminalControls { nu }),
+    }
+}

@@ -1,0 +1,351 @@
+//! Recorded ticks of robots that stand, walk and trot while they are pushed: what back ends are timed on and compared by.
+//!
+//! The loop is closed with our own constrained dynamics: feet that the references have on the ground are held there, also
+//! where the ground would have to pull. The controller sees velocities with noise, and nothing of the pushes. The same
+//! arguments give the same recording, on processors with the same vector instructions.
+#![allow(dead_code, unreachable_pub)] // each program uses its part
+
+use condyle_dynamics::{
+    ConstraintSet, ContactConstraint, Data, Force, Joint, Model, ReferenceFrame, UrdfOptions, Vec3,
+    constrained_dynamics, forward_velocities, impulse_dynamics, integrate, neutral, robots,
+};
+use condyle_wholebody::{FrictionContact, Gains, References, Settings, Task, WholeBodyController};
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+use std::f64::consts::PI;
+
+/// Seconds from tick to tick.
+const DT: f64 = 1e-3;
+/// Coefficient of friction.
+const FRICTION: f64 = 0.6;
+/// Length and width of a sole (m).
+const SOLE: [f64; 2] = [0.2, 0.1];
+/// Noise of velocities, at most (m/s, rad/s).
+const NOISE: f64 = 5e-3;
+/// How fast the velocity of a held foot decays (1/s).
+const HOLD: f64 = 50.0;
+/// A push begins at each multiple of the first and lasts for the second (s).
+const PUSHES: [f64; 2] = [0.5, 0.1];
+
+/// A step of a biped: the weight goes to a foot, the other one is unloaded, swings and is loaded (s).
+const SHIFT: f64 = 1.2;
+const FADE: f64 = 0.1;
+const SWING: f64 = 0.5;
+/// Its length and height (m).
+const STEP: [f64; 2] = [0.1, 0.05];
+/// The same of a trot, half a period of which is two fades and a swing, and its speed (m/s).
+const TROT_FADE: f64 = 0.03;
+const TROT_SWING: f64 = 0.2;
+const TROT_HEIGHT: f64 = 0.05;
+const TROT_SPEED: f64 = 0.25;
+/// How much further a foot is set for each m/s of the trunk that is not wanted (s): about √(h / g), half a metre high.
+const CAPTURE: f64 = 0.2;
+
+/// A robot on its feet.
+pub struct Robot {
+    pub name: String,
+    pub model: Model,
+    /// On level ground at height 0.
+    pub q: Vec<f64>,
+    pub contacts: Vec<FrictionContact>,
+    pub tasks: Vec<Task>,
+    /// What pushes it, as a part of its weight.
+    push: f64,
+}
+
+/// What is known of a robot by its name.
+struct Description {
+    name: &'static str,
+    trunk: &'static str,
+    feet: &'static [&'static str],
+    /// Joints whose names contain the text bend by so much.
+    bent: &'static [(&'static str, f64)],
+}
+
+const ROBOTS: [Description; 4] = [
+    Description {
+        name: "humanoid",
+        trunk: "pelvis",
+        feet: &["left_sole", "right_sole"],
+        bent: &[("hip_pitch", -0.4), ("knee", 0.8), ("ankle_pitch", -0.4)],
+    },
+    Description {
+        name: "talos",
+        trunk: "base_link",
+        feet: &["left_sole_link", "right_sole_link"],
+        bent: &[
+            ("leg_left_3", -0.45),
+            ("leg_left_4", 0.9),
+            ("leg_left_5", -0.45),
+            ("leg_right_3", -0.45),
+            ("leg_right_4", 0.9),
+            ("leg_right_5", -0.45),
+            ("arm_left_2", 0.2),
+            ("arm_right_2", -0.2),
+            ("arm_left_4", -0.5),
+            ("arm_right_4", -0.5),
+        ],
+    },
+    Description {
+        name: "quadruped",
+        trunk: "trunk",
+        feet: &["LF_foot", "RF_foot", "LH_foot", "RH_foot"],
+        bent: &[("F_HFE", 0.7), ("F_KFE", -1.4), ("H_HFE", -0.7), ("H_KFE", 1.4)],
+    },
+    Description {
+        name: "anymal",
+        trunk: "base",
+        feet: &["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"],
+        bent: &[("F_HFE", 0.7), ("F_KFE", -1.4), ("H_HFE", -0.7), ("H_KFE", 1.4)],
+    },
+];
+
+impl Robot {
+    /// An embedded robot, or a known one from its URDF.
+    pub fn new(name: &str, urdf: Option<&str>) -> Result<Self, Box<dyn std::error::Error>> {
+        let known = ROBOTS.iter().find(|robot| robot.name == name).ok_or_else(|| format!("no robot `{name}`"))?;
+        let options = UrdfOptions { root_joint: Some(Joint::FreeFlyer), ..UrdfOptions::default() };
+        let model = match (name, urdf) {
+            (_, Some(path)) => Model::from_urdf(path, &options)?,
+            ("humanoid", None) => robots::humanoid(),
+            ("quadruped", None) => robots::quadruped(),
+            _ => return Err(format!("`{name}` needs its URDF").into()),
+        };
+        let mut q = neutral(&model);
+        for body in model.bodies() {
+            if let Some((_, angle)) = known.bent.iter().find(|(part, _)| body.joint_name.contains(part)) {
+                q[body.idx_q] = *angle;
+            }
+        }
+        let biped = known.feet.len() == 2;
+        let contact = |foot: &&str| match biped {
+            true => FrictionContact::sole(foot, FRICTION, SOLE),
+            false => FrictionContact::point(foot, FRICTION),
+        };
+        let trunk = Task { gains: Gains::critical(60.0), ..Task::orientation(known.trunk) };
+        let mut tasks = vec![Task { gains: Gains::critical(40.0), ..Task::com() }, trunk, Task::posture()];
+        let gains = Gains::critical(900.0);
+        tasks.extend(known.feet.iter().map(|foot| match biped {
+            true => Task { weight: 100.0, gains, ..Task::pose(foot) },
+            false => Task { weight: 100.0, gains, ..Task::position(foot) },
+        }));
+        if biped {
+            tasks.push(Task { weight: 0.01, ..Task::angular_momentum() });
+        }
+        let contacts: Vec<_> = known.feet.iter().map(contact).collect();
+        let mut robot = Self { name: name.to_owned(), model, q, contacts, tasks, push: if biped { 0.05 } else { 0.1 } };
+        let ground = robot.controller(Settings::default()).hold(&robot.q).contacts[0].pose.translation.z;
+        robot.q[2] -= ground;
+        Ok(robot)
+    }
+
+    /// The settings with which it was recorded.
+    pub fn settings() -> Settings {
+        Settings { contact_gains: Gains { stiffness: 0.0, damping: 40.0 }, ..Settings::default() }
+    }
+
+    pub fn controller(&self, settings: Settings) -> WholeBodyController {
+        WholeBodyController::new(&self.model, &self.contacts, &self.tasks, settings).expect("a known robot")
+    }
+
+    pub fn is_biped(&self) -> bool {
+        self.contacts.len() == 2
+    }
+
+    /// The name of what it does when it moves.
+    pub fn gait(&self) -> &'static str {
+        if self.is_biped() { "walk" } else { "trot" }
+    }
+}
+
+/// What a controller is given at a tick.
+#[derive(Clone)]
+pub struct Tick {
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    pub references: References,
+}
+
+/// From 0 at s = 0 to 1 at s = 1, smoothly: value, slope and curvature.
+fn smooth(s: f64) -> [f64; 3] {
+    let s = s.clamp(0.0, 1.0);
+    let rest = s * (1.0 - s);
+    [s * s * s * (10.0 + s * (6.0 * s - 15.0)), 30.0 * rest * rest, 60.0 * rest * (1.0 - 2.0 * s)]
+}
+
+/// A robot and the ground.
+struct World<'m> {
+    model: &'m Model,
+    data: Data<f64>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    feet: Vec<ContactConstraint>,
+    touching: Vec<bool>,
+}
+
+impl World<'_> {
+    fn set(&self) -> ConstraintSet<f64> {
+        let held: Vec<_> = self.feet.iter().zip(&self.touching).filter(|(_, on)| **on).map(|(foot, _)| *foot).collect();
+        ConstraintSet::new(self.model, &held).expect("feet differ")
+    }
+
+    fn step(&mut self, tau: &[f64], f_ext: &[Force<f64>], touching: &[bool]) {
+        let lands = self.touching.iter().zip(touching).any(|(before, now)| *now && !before);
+        self.touching.copy_from_slice(touching);
+        let mut set = self.set();
+        if lands {
+            self.v = impulse_dynamics(self.model, &mut self.data, &mut set, &self.q, &self.v, 0.0).v.to_vec();
+        }
+        let a = constrained_dynamics(self.model, &mut self.data, &mut set, &self.q, &self.v, tau, f_ext).a.to_vec();
+        self.v.iter_mut().zip(&a).for_each(|(v, a)| *v += DT * a); // v⁺ = v + Δt q̈
+        let moved: Vec<f64> = self.v.iter().map(|v| DT * v).collect();
+        let mut next = self.q.clone();
+        integrate(self.model, &self.q, &moved, &mut next); // q⁺ = q ⊕ Δt v⁺
+        self.q = next;
+    }
+}
+
+/// The references of a gait.
+struct Gait<'r> {
+    robot: &'r Robot,
+    start: References,
+    /// Where each foot is held, or swings from.
+    feet: Vec<Vec3<f64>>,
+    /// Where the centre of mass is at the beginning of a step.
+    from: Vec3<f64>,
+    step: usize,
+}
+
+impl Gait<'_> {
+    /// The frames of the feet among the references' frames.
+    const FEET: usize = 1;
+
+    /// The references at a time, of a robot whose centre of mass moves like this.
+    fn write(&mut self, t: f64, com: [Vec3<f64>; 2], references: &mut References) {
+        if self.robot.is_biped() { self.walk(t, references) } else { self.trot(t, com, references) }
+    }
+
+    fn swing(&self, foot: usize, s: f64, [duration, height]: [f64; 2], target: Vec3<f64>, references: &mut References) {
+        let [along, rate, curvature] = smooth(s);
+        let (sin, cos) = (PI * s.clamp(0.0, 1.0)).sin_cos();
+        let way = target - self.feet[foot];
+        let frame = &mut references.frames[Self::FEET + foot];
+        frame.pose.translation = self.feet[foot] + way.scale(along);
+        frame.pose.translation.z += height * sin * sin;
+        frame.velocity.linear = way.scale(rate / duration);
+        frame.velocity.linear.z += height * 2.0 * PI / duration * sin * cos;
+        frame.acceleration.linear = way.scale(curvature / (duration * duration));
+        frame.acceleration.linear.z += height * 2.0 * (PI / duration).powi(2) * (cos * cos - sin * sin);
+    }
+
+    /// Quasi-static steps: the left foot carries first.
+    fn walk(&mut self, t: f64, references: &mut References) {
+        let duration = SHIFT + FADE + SWING + FADE;
+        let step = (t / duration) as usize;
+        let t = t - duration * step as f64;
+        let (carries, swings) = (step % 2, 1 - step % 2);
+        if step > self.step {
+            self.step = step;
+            self.feet[carries] = references.frames[Self::FEET + carries].pose.translation;
+            self.from = references.com.position;
+        }
+        let mut over = self.feet[carries];
+        over.z = self.start.com.position.z;
+        let [along, rate, curvature] = smooth(t / SHIFT);
+        let way = over - self.from;
+        references.com.position = self.from + way.scale(along);
+        references.com.velocity = way.scale(rate / SHIFT);
+        references.com.acceleration = way.scale(curvature / (SHIFT * SHIFT));
+        let mut target = self.feet[swings];
+        target.x = self.feet[carries].x + STEP[0];
+        self.swing(swings, (t - SHIFT - FADE) / SWING, [SWING, STEP[1]], target, references);
+        references.contacts[swings].activation = activation(t - SHIFT, FADE, SWING);
+    }
+
+    /// Diagonal feet, by turns.
+    fn trot(&mut self, t: f64, [com, velocity]: [Vec3<f64>; 2], references: &mut References) {
+        let duration = 2.0 * TROT_FADE + TROT_SWING;
+        let step = (t / duration) as usize;
+        let speed = Vec3::new(TROT_SPEED, 0.0, 0.0);
+        references.com.position = self.start.com.position + speed.scale(t);
+        references.com.velocity = speed;
+        let t = t - duration * step as f64;
+        let pair = if step.is_multiple_of(2) { [0, 3] } else { [1, 2] };
+        if step > self.step {
+            self.step = step;
+            for foot in 0..4 {
+                if !pair.contains(&foot) {
+                    self.feet[foot] = references.frames[Self::FEET + foot].pose.translation;
+                }
+            }
+        }
+        for foot in pair {
+            let offset = self.start.frames[Self::FEET + foot].pose.translation - self.start.com.position;
+            let mut target = com + offset + speed.scale(duration) + (velocity - speed).scale(CAPTURE);
+            target.z = 0.0;
+            self.swing(foot, (t - TROT_FADE) / TROT_SWING, [TROT_SWING, TROT_HEIGHT], target, references);
+            references.contacts[foot].activation = activation(t, TROT_FADE, TROT_SWING);
+        }
+    }
+}
+
+/// 1, then down to 0 within `fade`, 0 during the swing, and up to 1 within `fade`.
+fn activation(t: f64, fade: f64, swing: f64) -> f64 {
+    let (down, up) = (1.0 - t / fade, (t - fade - swing) / fade);
+    down.max(up).clamp(0.0, 1.0)
+}
+
+/// Ticks of a robot that is pushed while it stands, or moves.
+///
+/// # Panics
+/// If it falls.
+pub fn record(robot: &Robot, moves: bool, ticks: usize) -> Vec<Tick> {
+    let (model, nv) = (&robot.model, robot.model.nv());
+    let mut controller = robot.controller(Robot::settings());
+    let start = controller.hold(&robot.q);
+    let mut rng = StdRng::seed_from_u64(7);
+    let foot = |contact: &FrictionContact| {
+        let frame = model.frame(&contact.frame).expect("a foot");
+        let kind = if robot.is_biped() { ContactConstraint::rigid(frame) } else { ContactConstraint::point(frame) };
+        ContactConstraint { kd: HOLD, reference: ReferenceFrame::LocalWorldAligned, ..kind }
+    };
+    let mut world = World {
+        model,
+        data: Data::new(model),
+        q: robot.q.clone(),
+        v: vec![0.0; nv],
+        feet: robot.contacts.iter().map(foot).collect(),
+        touching: vec![true; robot.contacts.len()],
+    };
+    let feet = start.contacts.iter().map(|contact| contact.pose.translation).collect();
+    let mut gait = Gait { robot, from: start.com.position, feet, step: 0, start: start.clone() };
+    let weight = -model.total_mass() * model.gravity().z;
+    let mut f_ext = vec![Force::zero(); model.bodies().len()];
+    let mut push = Vec3::zero();
+    let mut references = start.clone();
+    let mut recorded = Vec::with_capacity(ticks);
+    for tick in 0..ticks {
+        let t = DT * tick as f64;
+        let velocities = forward_velocities(model, &mut world.data, &world.q, &world.v);
+        let velocity = velocities.com_velocity();
+        if moves {
+            let com = controller.hold(&world.q).com.position;
+            gait.write(t, [com, velocity], &mut references);
+        }
+        let (each, lasts) = ((PUSHES[0] / DT) as usize, (PUSHES[1] / DT) as usize);
+        if tick % each == each / 2 {
+            let (sin, cos) = (2.0 * PI * rng.random::<f64>()).sin_cos();
+            push = Vec3::new(cos, sin, 0.3 * (2.0 * rng.random::<f64>() - 1.0)).scale(robot.push * weight);
+        } else if tick % each == each / 2 + lasts {
+            push = Vec3::zero();
+        }
+        f_ext[1].linear = push; // along the trunk's axes, which hardly turn
+        let v: Vec<f64> = world.v.iter().map(|v| v + NOISE * (2.0 * rng.random::<f64>() - 1.0)).collect();
+        let command = controller.step(&world.q, &v, &references);
+        let (tau, height) = (command.tau.clone(), world.q[2] / robot.q[2]);
+        assert!((0.8..1.2).contains(&height), "{} falls at tick {tick}", robot.name);
+        recorded.push(Tick { q: world.q.clone(), v, references: references.clone() });
+        let touching: Vec<bool> = references.contacts.iter().map(|contact| contact.activation > 0.0).collect();
+        world.step(&tau, &f_ext, &touching);
+    }
+    recorded
+}

@@ -1,0 +1,146 @@
+//! Commands of recorded stands, walks and trots under pushes: each is the optimum, and back ends agree on it.
+#![allow(non_snake_case)]
+
+mod common;
+#[path = "common/workload.rs"]
+mod workload;
+
+use common::{check_forces, max_abs};
+use condyle_wholebody::inspection::{Optimum, Program};
+use condyle_wholebody::{Backend, Form, Friction, Settings};
+use nalgebra::{DMatrix, DVector};
+use workload::{Robot, Tick, record};
+
+/// So many ticks are recorded: a biped's first step, and the first one of the other foot; nine steps of a quadruped.
+const TICKS: usize = 2000;
+/// Every so many of them are looked at.
+const EACH: usize = 8;
+
+/// Of the conditions of optimality, relative to the terms that they are differences of. The solver's tolerance is 1e-9 where
+/// all is scaled to size one; here forces of 1000 N stand beside accelerations of 1 m/s².
+const OPTIMALITY: f64 = 1e-7;
+/// Of complementarity, relative to 1 and the terms of the objective: the solver's is relative to what remains of the objective
+/// after the elimination, from which constants are missing.
+const GAP: f64 = 1e-6;
+/// How far solutions of tolerances 1e-14 and 1e-13 are apart, in objective and q̈, relative to 1 and their size. An error of the
+/// objective, relative to some hundreds, is one of its root in q̈, times four where only the posture's weight of 0.1 decides.
+const AGREEMENT: f64 = 1e-6;
+
+/// The workloads, each with its robot.
+fn all(mut look: impl FnMut(&Robot, &str, &[Tick])) {
+    for name in ["quadruped", "humanoid"] {
+        let robot = Robot::new(name, None).unwrap();
+        for moves in [false, true] {
+            let what = format!("{name}, {}", if moves { robot.gait() } else { "stand" });
+            look(&robot, &what, &record(&robot, moves, TICKS));
+        }
+    }
+}
+
+/// The errors of stationarity, of primal and dual feasibility, and of complementarity.
+fn errors(program: &Program, optimum: &Optimum) -> [f64; 4] {
+    let Optimum { x, rows: z, cones: w, .. } = optimum;
+    let Program { P, c, A, b, G, lower, upper, F, h, cones } = program;
+    // P x + c = Aᵀ y + Gᵀ z + Fᵀ w for some y
+    let terms = [P * x, c.clone(), -G.transpose() * z, -F.transpose() * w];
+    let gradient = terms.iter().sum::<DVector<f64>>();
+    let size = 1.0 + terms.iter().map(DVector::amax).fold(0.0, f64::max);
+    let Q = A.transpose().qr().q(); // what of the gradient is not in the range of Aᵀ
+    let stationarity = (&gradient - &Q * Q.tr_mul(&gradient)).amax() / size;
+
+    let norm = |M: &DMatrix<f64>, i: usize| M.row(i).norm() * (1.0 + x.norm());
+    let (equalities, g, s) = (A * x - b, G * x, F * x + h);
+    let (mut primal, mut dual, mut gap) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for i in 0..b.len() {
+        primal = primal.max(equalities[i].abs() / norm(A, i));
+    }
+    for i in 0..g.len() {
+        let (below, above) = (g[i] - lower[i], upper[i] - g[i]);
+        primal = primal.max(f64::max(-below, -above) / norm(G, i));
+        // z⁺ belongs to the lower bound and z⁻ to the upper one, where there is one
+        for (z, slack) in [(z[i].max(0.0), below), ((-z[i]).max(0.0), above)] {
+            if z > 0.0 {
+                gap += z * slack;
+            }
+        }
+    }
+    let mut first = 0;
+    for &dim in cones {
+        let (s, w) = (s.rows(first, dim), w.rows(first, dim));
+        let margin = |x: &nalgebra::DVectorView<f64>| x.rows(1, dim - 1).norm() - x[0];
+        primal = primal.max(margin(&s) / norm(F, first));
+        dual = dual.max(margin(&w) / (1.0 + w[0].abs()));
+        gap += s.dot(&w);
+        first += dim;
+    }
+    let objective = 0.5 * x.dot(&(P * x)) + c.dot(x).abs();
+    [stationarity, primal, dual, gap.abs() / (1.0 + objective)]
+}
+
+/// Karush, Kuhn and Tucker's conditions of the program as it is assembled, before anything is eliminated or scaled; and what
+/// holds of forces and torques by formulas that the controller does not share: τ = RNEA, Σ f = m (c̈ − g), cones, centres of
+/// pressure.
+#[test]
+fn every_command_is_optimal() {
+    all(|robot, what, ticks| {
+        let mut controller = robot.controller(Robot::settings());
+        for (k, Tick { q, v, references }) in ticks.iter().enumerate() {
+            let command = controller.step(q, v, references).clone();
+            if k % EACH == 0 {
+                check_forces(&robot.model, &robot.contacts, q, v, references, &command);
+                assert!(!command.reduced_accuracy && !command.limits_relaxed, "{what}, tick {k}");
+                let optimum = controller.optimum();
+                let errors = errors(&controller.program(q, v, references), &optimum);
+                let allowed = [OPTIMALITY, OPTIMALITY, OPTIMALITY, GAP];
+                assert!(errors.iter().zip(allowed).all(|(e, most)| *e < most), "{what}, tick {k}: {errors:?}");
+            }
+        }
+    });
+}
+
+/// Our interior point on what is condensed, from the last solution; clarabel on the whole program, from nothing.
+#[test]
+fn back_ends_agree_on_every_command() {
+    all(|robot, what, ticks| {
+        let settings = |backend, form, tolerance| Settings { backend, form, tolerance, ..Robot::settings() };
+        let mut ours = robot.controller(settings(Backend::InteriorPoint, Form::Condensed, 1e-14));
+        let mut theirs = robot.controller(settings(Backend::Clarabel, Form::Full, 1e-13));
+        for (k, Tick { q, v, references }) in ticks.iter().enumerate() {
+            let a = ours.step(q, v, references).a.clone();
+            if k % EACH != 0 {
+                continue;
+            }
+            let expected = theirs.step(q, v, references).solved().unwrap().clone();
+            assert!(!expected.reduced_accuracy, "{what}, tick {k}");
+            let expected = expected.a;
+            let apart = max_abs(a.iter().zip(&expected).map(|(a, b)| a - b));
+            let bound = AGREEMENT * (1.0 + max_abs(expected.iter().copied()));
+            assert!(apart < bound, "{what}, tick {k}: q̈ by {apart:.1e} of {bound:.1e}");
+            let program = ours.program(q, v, references);
+            let [a, b] = [&ours, &theirs].map(|controller| program.objective(&controller.optimum().x));
+            assert!((a - b).abs() < AGREEMENT * (1.0 + b.abs()), "{what}, tick {k}: objectives {a} and {b}");
+        }
+    });
+}
+
+/// What a larger set of forces can only lower: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+#[test]
+fn optima_on_cones_lie_between_those_on_pyramids() {
+    let mut differ = 0;
+    all(|robot, what, ticks| {
+        let pyramid = |inscribed| Friction::Pyramid { sides: 4, inscribed };
+        let mut controllers = [pyramid(false), Friction::Cone, pyramid(true)]
+            .map(|friction| robot.controller(Settings { friction, ..Robot::settings() }));
+        for (k, Tick { q, v, references }) in ticks.iter().enumerate().step_by(EACH) {
+            let [outer, cone, inner] = controllers.each_mut().map(|controller| {
+                controller.step(q, v, references).solved().unwrap();
+                let x = controller.optimum().x;
+                controller.program(q, v, references).objective(&x)
+            });
+            let slack = OPTIMALITY * (1.0 + cone.abs());
+            assert!(outer < cone + slack && cone < inner + slack, "{what}, tick {k}: {outer} {cone} {inner}");
+            differ += usize::from(inner - outer > 10.0 * slack);
+        }
+    });
+    assert!(differ > 0, "friction never mattered");
+}

@@ -1,0 +1,50 @@
+"""What is shown of a solve while it goes on."""
+
+import importlib
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from ._types import Iteration
+
+_HEAD = "iter         cost         gap        stop        step  regularisation"
+
+
+class Reporter:
+    """A callback of a solver that prints its iterations, or shows them by tqdm."""
+
+    def __init__(self, callback: Callable[[Iteration], object] | None, verbose: bool, progress: bool) -> None:
+        self._callback, self._lines = callback, verbose
+        self._bar: Any = None
+        if progress:
+            self._bar = _bar()
+            self._lines = verbose or self._bar is None
+
+    def __call__(self, now: Iteration) -> object:
+        if self._lines:
+            if now.iteration == 0:
+                print(_HEAD)
+            step = now.step if now.accepted else 0.0
+            print(
+                f"{now.iteration:4d} {now.cost:12.6e} {now.gap:11.4e} {now.stop:11.4e} {step:11.6f} "
+                f"{now.regularisation:15.2e}"
+            )
+        if self._bar is not None:
+            self._bar.set_postfix(cost=f"{now.cost:.6g}", stop=f"{now.stop:.2g}", refresh=False)
+            self._bar.update()
+        return None if self._callback is None else self._callback(now)
+
+    def close(self) -> None:
+        """Ends the bar."""
+        sys.stdout.flush()
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _bar() -> Any:
+    """A bar of tqdm, or None where that is not installed."""
+    try:
+        tqdm: Any = importlib.import_module("tqdm.auto")
+    except ImportError:
+        return None
+    return tqdm.tqdm(desc="FDDP", unit=" iterations")

@@ -1,0 +1,204 @@
+//! Arrays that Python gives.
+
+use condyle::{Mat3, Se3, Vec3};
+use nalgebra::DMatrix;
+use numpy::ndarray::Dimension;
+use numpy::{Element, Ix1, Ix2, Ix3, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use std::fmt::{self, Display};
+use std::ops::Deref;
+
+/// The doubles of an argument, in C order. As long as it is there, NumPy's other users in Rust do not write to the array.
+pub(crate) struct Input<'py, D: Dimension>(PyReadonlyArray<'py, f64, D>);
+
+impl<D: Dimension> Deref for Input<'_, D> {
+    type Target = [f64];
+    fn deref(&self) -> &[f64] {
+        self.0.as_slice().expect("was made contiguous and aligned")
+    }
+}
+
+impl Input<'_, Ix2> {
+    /// The matrix, column by column.
+    pub(crate) fn to_matrix(&self) -> DMatrix<f64> {
+        let &[rows, columns] = self.0.shape() else { unreachable!("has two dimensions") };
+        DMatrix::from_row_slice(rows, columns, self)
+    }
+}
+
+/// The doubles of an argument, in C order, for calls that keep the interpreter's lock: nothing is noted about the array,
+/// which takes as long as a small robot's dynamics.
+pub(crate) struct InPlace<'py, D: Dimension>(Bound<'py, PyArray<f64, D>>);
+
+impl<'py, D: Dimension> InPlace<'py, D> {
+    pub(super) fn read(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Self> {
+        as_it_lies_or_converted(argument, value, shape).map(Self)
+    }
+}
+
+#[allow(unsafe_code)]
+impl<D: Dimension> Deref for InPlace<'_, D> {
+    type Target = [f64];
+    fn deref(&self) -> &[f64] {
+        // SAFETY: who looks at the numbers holds the interpreter's lock and calls no Python meanwhile, so nobody writes to
+        // the array or moves it.
+        unsafe { self.0.as_slice() }.expect("was made contiguous and aligned")
+    }
+}
+
+/// A vector argument of `length` numbers.
+pub(crate) fn vector<'py>(argument: &str, value: &Bound<'py, PyAny>, length: usize) -> PyResult<Input<'py, Ix1>> {
+    input(argument, value, &[length])
+}
+
+/// A matrix argument.
+pub(crate) fn matrix<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 2]) -> PyResult<Input<'py, Ix2>> {
+    input(argument, value, &shape)
+}
+
+/// An argument with three indices.
+pub(crate) fn tensor<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 3]) -> PyResult<Input<'py, Ix3>> {
+    input(argument, value, &shape)
+}
+
+fn input<'py, D: Dimension>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Input<'py, D>> {
+    Ok(Input(as_it_lies_or_converted(argument, value, shape)?.try_readonly()?))
+}
+
+/// The array itself, if it is one of doubles in C order, or a new one with its numbers.
+#[inline]
+fn as_it_lies_or_converted<'py, D: Dimension>(
+    argument: &str,
+    value: &Bound<'py, PyAny>,
+    shape: &[usize],
+) -> PyResult<Bound<'py, PyArray<f64, D>>> {
+    if let Ok(array) = value.cast::<PyArray<f64, D>>()
+        && array.is_c_contiguous()
+        && array.is_aligned()
+    {
+        check_shape(argument, array.shape(), shape)?;
+        return Ok(array.clone());
+    }
+    Ok(convert(argument, value, shape)?.cast_into::<PyArray<f64, D>>()?)
+}
+
+/// A new float64 C-contiguous array with the numbers of anything that NumPy understands as an array of them.
+#[cold]
+fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Bound<'py, PyAny>> {
+    let py = value.py();
+    if value.is_none() {
+        let shape = Expected::Shape(shape);
+        return Err(PyTypeError::new_err(format!("{argument}: expected real numbers of {shape}, found None")));
+    }
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (value,)).map_err(|error| {
+        if !error.is_instance_of::<PyValueError>(py) {
+            return error;
+        }
+        let named = PyValueError::new_err(format!("{argument}: {}", error.value(py)));
+        named.set_cause(py, Some(error));
+        named
+    })?;
+    let array = array.cast_into::<PyUntypedArray>()?;
+    let dtype = array.dtype();
+    let kind: char = dtype.getattr("kind")?.extract()?;
+    if !"biuf".contains(kind) && array.len() > 0 {
+        return Err(PyTypeError::new_err(format!("{argument}: expected real numbers, found dtype {dtype}")));
+    }
+    check_shape(argument, array.shape(), shape)?;
+    array.call_method1("astype", (f64::get_dtype(py), "C"))
+}
+
+/// The shape that an argument must have, as a message says it.
+pub(crate) enum Expected<'a> {
+    /// One shape.
+    Shape(&'a [usize]),
+    /// That of one state, or of many with one axis more in front.
+    States(&'a [usize]),
+}
+
+impl Display for Expected<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Shape(shape) => write!(f, "shape {}", tuple(shape)),
+            Self::States(shape) => write!(f, "shape {}, or (N, {}) for N states", tuple(shape), list(shape)),
+        }
+    }
+}
+
+impl Expected<'_> {
+    /// The error for another shape.
+    #[cold]
+    pub(crate) fn error(&self, argument: &str, found: &[usize]) -> PyErr {
+        let (Self::Shape(shape) | Self::States(shape)) = self;
+        let column = matches!((*shape, found), ([n], [rows, 1]) if rows == n);
+        let hint = if column { ", a column: give x.ravel()" } else { "" };
+        PyValueError::new_err(format!("{argument}: expected {self}, found {}{hint}", tuple(found)))
+    }
+}
+
+pub(crate) fn check_shape(argument: &str, found: &[usize], expected: &[usize]) -> PyResult<()> {
+    if found == expected { Ok(()) } else { Err(Expected::Shape(expected).error(argument, found)) }
+}
+
+/// A shape as Python writes it.
+pub(super) fn tuple(shape: &[usize]) -> String {
+    if let [n] = shape { format!("({n},)") } else { format!("({})", list(shape)) }
+}
+
+/// The numbers of a shape.
+fn list(shape: &[usize]) -> String {
+    shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// The name of a value's type.
+pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
+    value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string())
+}
+/// A pose that is given as a homogeneous 4 × 4 matrix.
+pub(crate) fn pose(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Se3<f64>> {
+    let m = matrix(argument, value, [4, 4])?;
+    let column = |c: usize| [m[c], m[4 + c], m[8 + c]].into();
+    Ok(Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3)))
+}
+
+/// The numbers of a vector of length N.
+pub(crate) fn array<const N: usize>(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; N]> {
+    let x = vector(argument, value, N)?;
+    Ok(core::array::from_fn(|k| x[k]))
+}
+
+/// Three numbers.
+pub(crate) fn three(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3<f64>> {
+    Ok(array::<3>(argument, value)?.into())
+}
+
+/// A rotation that is given as a 3 × 3 matrix.
+pub(crate) fn rotation(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Mat3<f64>> {
+    let m = matrix(argument, value, [3, 3])?;
+    let column = |c: usize| [m[c], m[3 + c], m[6 + c]].into();
+    Ok(Mat3 { x: column(0), y: column(1), z: column(2) })
+}
+
+/// The numbers of a vector of any length.
+pub(crate) fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let length = value.len().map_err(|_| PyValueError::new_err(format!("{argument}: expected a list of numbers")))?;
+    Ok(vector(argument, value, length)?.to_vec())
+}
+
+/// Least and greatest values of some numbers, infinite where none is given; none if neither is given.
+pub(crate) fn bounds(
+    length: usize,
+    lower: Option<&Bound<'_, PyAny>>,
+    upper: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<[Vec<f64>; 2]>> {
+    if lower.is_none() && upper.is_none() {
+        return Ok(None);
+    }
+    let bound = |name, given: Option<&Bound<'_, PyAny>>, none| match given {
+        Some(numbers) => PyResult::Ok(vector(name, numbers, length)?.to_vec()),
+        None => Ok(vec![none; length]),
+    };
+    Ok(Some([bound("lower", lower, f64::NEG_INFINITY)?, bound("upper", upper, f64::INFINITY)?]))
+}

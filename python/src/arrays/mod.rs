@@ -1,0 +1,74 @@
+//! NumPy arrays in and out.
+//!
+//! In (`input`): a float64 C-contiguous array is read where it lies; other dtypes and strides are converted; a wrong shape
+//! is a `ValueError`. Out (`output`): a new array, or the caller's. Matrices are column-major in nalgebra and row-major
+//! here. Arrays of hyper-dual numbers are arrays of objects, see `hyper_dual.rs`. What a model shows of itself is
+//! `read_only`.
+
+mod input;
+mod output;
+mod read_only;
+
+pub(crate) use input::{
+    Expected, Input, array, bounds, check_shape, matrix, numbers, pose, rotation, tensor, three, type_name, vector,
+};
+pub(crate) use output::{Array, Give, class, give_named, members, named, named_tuples, output, place, writable};
+pub(crate) use read_only::read_only;
+
+use condyle::Scalar;
+use numpy::PyArray1;
+use numpy::ndarray::Dimension;
+use pyo3::prelude::*;
+use std::ops::Deref;
+
+/// A number that functions of the library can be called with.
+pub(crate) trait Number: Scalar {
+    /// The numbers of an argument, in C order, for a call that keeps the interpreter's lock.
+    type Input<'py, D: Dimension>: Deref<Target = [Self]>;
+
+    /// Reads an argument of some shape.
+    fn read<'py, D: Dimension>(
+        argument: &str,
+        value: &Bound<'py, PyAny>,
+        shape: &[usize],
+    ) -> PyResult<Self::Input<'py, D>>;
+    /// Reads a number.
+    fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
+    /// Gives an array in C order, the caller's or a new one, when it is filled.
+    fn output<'py>(
+        py: Python<'py>,
+        out: Option<&Bound<'py, PyAny>>,
+        shape: &[usize],
+        fill: impl FnOnce(&mut [Self]),
+    ) -> PyResult<Bound<'py, PyAny>>;
+    /// A new vector of these numbers, where there is a faster way than `output`.
+    fn new_vector<'py>(_: Python<'py>, _: &[Self]) -> Option<Bound<'py, PyAny>> {
+        None
+    }
+}
+
+impl Number for f64 {
+    type Input<'py, D: Dimension> = input::InPlace<'py, D>;
+
+    fn read<'py, D: Dimension>(
+        argument: &str,
+        value: &Bound<'py, PyAny>,
+        shape: &[usize],
+    ) -> PyResult<Self::Input<'py, D>> {
+        input::InPlace::read(argument, value, shape)
+    }
+    fn read_one(_: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        value.extract()
+    }
+    fn output<'py>(
+        py: Python<'py>,
+        out: Option<&Bound<'py, PyAny>>,
+        shape: &[usize],
+        fill: impl FnOnce(&mut [Self]),
+    ) -> PyResult<Bound<'py, PyAny>> {
+        output(py, out, shape, fill)
+    }
+    fn new_vector<'py>(py: Python<'py>, numbers: &[Self]) -> Option<Bound<'py, PyAny>> {
+        Some(PyArray1::from_slice(py, numbers).into_any())
+    }
+}

@@ -1,0 +1,143 @@
+//! What a problem computes along states and controls, as Python sees it.
+
+use super::problem::Problem;
+use crate::arrays::{Array, Give, class, matrix, output, vector};
+use crate::signals;
+use condyle::optimal as rust;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyTuple};
+
+/// The number of controls of a knot, if all knots have the same.
+fn common_nu(problem: &rust::Problem) -> Option<usize> {
+    let nu = problem.nu(0);
+    (0..problem.horizon()).all(|t| problem.nu(t) == nu).then_some(nu)
+}
+
+/// The controls of all knots, one after the other, from an array (N, nu) or a list of arrays.
+pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    if let Some(nu) = common_nu(problem) {
+        return Ok(matrix("us", us, [problem.horizon(), nu])?.to_vec());
+    }
+    let (found, expected) = (us.len()?, problem.horizon());
+    if found != expected {
+        return Err(PyValueError::new_err(format!("us: expected {expected} arrays, found {found}")));
+    }
+    let mut flat = Vec::new();
+    for t in 0..expected {
+        flat.extend_from_slice(&vector(&format!("us[{t}]"), &us.get_item(t)?, problem.nu(t))?);
+    }
+    Ok(flat)
+}
+
+/// An array for all knots if they have the same number of controls, otherwise a list of arrays; `numbers` writes those
+/// of one knot.
+pub(super) fn by_knot<'py>(
+    py: Python<'py>,
+    problem: &rust::Problem,
+    inner: &[usize],
+    numbers: impl Fn(usize, &mut [f64]),
+) -> PyResult<Bound<'py, PyAny>> {
+    let horizon = problem.horizon();
+    let shape = |nu: usize| [&[nu], inner].concat();
+    if let Some(nu) = common_nu(problem) {
+        let each = nu * inner.iter().product::<usize>();
+        return output(py, None, &[&[horizon], &shape(nu)[..]].concat(), |out| {
+            (0..horizon).for_each(|t| numbers(t, &mut out[t * each..(t + 1) * each]));
+        });
+    }
+    let arrays = (0..horizon).map(|t| output(py, None, &shape(problem.nu(t)), |out| numbers(t, out)));
+    Ok(PyList::new(py, arrays.collect::<PyResult<Vec<_>>>()?)?.into_any())
+}
+
+/// An `Evaluation` at a trajectory.
+pub(super) fn evaluate<'py>(
+    py: Python<'py>,
+    problem: &mut rust::Problem,
+    xs: &[f64],
+    us: &[f64],
+) -> PyResult<Bound<'py, PyAny>> {
+    let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
+    let (mut next, mut costs) = (vec![0.0; horizon * nx], vec![0.0; horizon + 1]);
+    problem.calc(xs, us, &mut next, &mut costs);
+    let gaps = self::gaps(problem, xs, &next);
+    let lists = [PyList::empty(py), PyList::empty(py), PyList::empty(py)];
+    for t in 0..horizon {
+        let (mut accelerations, mut efforts, mut forces) = (vec![], vec![], vec![]);
+        let (x, u) = (&xs[t * nx..][..nx], &us[problem.control_range(t)]);
+        problem.outputs(t, x, u, &mut |name, numbers| match name {
+            "acceleration" => accelerations.extend_from_slice(numbers),
+            "effort" => efforts.extend_from_slice(numbers),
+            name => {
+                let contact = name.strip_prefix("force/").unwrap_or(name);
+                forces.push((contact.to_owned(), numbers.to_vec()));
+            }
+        });
+        let by_name = PyDict::new(py);
+        for (contact, force) in forces {
+            by_name.set_item(contact, force.give(py, None)?)?;
+        }
+        lists[0].append(accelerations.give(py, None)?)?;
+        lists[1].append(efforts.give(py, None)?)?;
+        lists[2].append(by_name)?;
+    }
+    let [accelerations, efforts, forces] = lists;
+    class!(py, "Evaluation")?.call1((
+        costs.iter().sum::<f64>(),
+        costs.give(py, None)?,
+        output(py, None, &[horizon, nx], |out| out.copy_from_slice(&next))?,
+        output(py, None, &[horizon + 1, ndx], |out| out.copy_from_slice(&gaps))?,
+        accelerations,
+        efforts,
+        forces,
+    ))
+}
+
+/// x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁; `next` are the φ.
+pub(super) fn gaps(problem: &rust::Problem, xs: &[f64], next: &[f64]) -> Vec<f64> {
+    let (nx, ndx) = (problem.nx(), problem.ndx());
+    let mut gaps = vec![0.0; (problem.horizon() + 1) * ndx];
+    let predicted = std::iter::once(problem.x0()).chain(next.chunks_exact(nx));
+    for ((gap, x), predicted) in gaps.chunks_exact_mut(ndx).zip(xs.chunks_exact(nx)).zip(predicted) {
+        problem.difference(x, predicted, gap);
+    }
+    gaps
+}
+
+/// A solution as Python sees it.
+pub(super) fn solution<'py>(
+    py: Python<'py>,
+    of: &Py<Problem>,
+    problem: &rust::Problem,
+    s: &rust::Solution,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
+    let trace = s.trace.iter().map(|i| signals::record(py, i)).collect::<PyResult<Vec<_>>>()?;
+    let status = match s.status {
+        rust::Status::Converged => "converged",
+        rust::Status::MaxIterations => "max_iterations",
+        rust::Status::TimeLimit => "time_limit",
+        rust::Status::RegularisationLimit => "regularisation_limit",
+        rust::Status::Interrupted => "interrupted",
+        rust::Status::Infeasible => "infeasible",
+        _ => "not_finite",
+    };
+    let t = &s.timings;
+    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
+    let timings = class!(py, "Timings")?.call1(PyTuple::new(py, timings)?)?;
+    let solution = class!(py, "Solution")?.call1((
+        output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
+        by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.u(t)))?,
+        by_knot(py, problem, &[ndx], |t, out| s.K[t].write(out))?,
+        by_knot(py, problem, &[], |t, out| out.copy_from_slice(s.k[t].as_slice()))?,
+        s.cost,
+        s.gap,
+        s.feasible,
+        status,
+        trace,
+        timings,
+    ))?;
+    // from which it computes accelerations, efforts and forces when it is asked for them
+    solution.setattr("_source", (of.clone_ref(py), of.get().moved()))?;
+    Ok(solution)
+}

@@ -1,0 +1,322 @@
+//! Actions that are written in Python.
+
+use super::MOST_SIZE;
+use super::automatic::{Differentiated, Way, next_and_cost};
+use super::functions::{Fault, Functions, unless_failed};
+use super::lqr::write;
+use super::space::Space;
+use crate::arrays::{bounds, matrix, vector};
+use crate::exceptions::within;
+use condyle::optimal as rust;
+use numpy::PyArray1;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use rust::{ActionModel, LqNode};
+use std::any::Any;
+use std::sync::Arc;
+
+/// An action written in Python.
+///
+/// nx, nu: the numbers of a state and of a control, at most 4096; nu is 0 at a terminal knot.
+/// calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
+///     state may be None.
+/// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
+///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it calc is called with arrays of numbers
+///     that know their derivatives, exact ones; once for all knots, if it leaves t alone and takes no branch that differs
+///     from knot to knot. So make its results of its arguments (`np.array([...])`, `np.concatenate`), and do not write
+///     them into arrays of floats. What cannot be called so is differentiated by hyper-dual numbers, else by differences.
+/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
+/// space: where states live: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate, difference), where
+///     integrate(x, dx) is x ⊕ dx, difference(x0, x1) the dx with x0 ⊕ dx = x1, and dx has ndx numbers. Derivatives are taken
+///     by dx.
+/// batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and arrays with N rows
+///     as results.
+///
+/// >>> from condyle.optimal import Action, Fddp, Problem
+/// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
+/// >>> end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+/// >>> problem = Problem([1.0], [knot], [0] * 30, end)
+/// >>> round(Fddp(problem).solve(np.zeros((31, 1)), np.zeros((30, 1))).cost, 6)
+/// 0.809017
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Action(Written);
+
+/// What an `Action` and its copies in problems are made of.
+#[derive(Clone)]
+struct Written {
+    space: Space,
+    nu: usize,
+    functions: Functions,
+    bounds: Option<[Vec<f64>; 2]>,
+    batch: bool,
+    way: Way,
+}
+
+#[pymethods]
+impl Action {
+    #[new]
+    #[pyo3(signature = (nx, nu, calc, calc_diff=None, lower=None, upper=None, space=None, batch=false))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        nx: usize,
+        nu: usize,
+        calc: Py<PyAny>,
+        calc_diff: Option<Py<PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+        space: Option<&Bound<'_, PyAny>>,
+        batch: bool,
+    ) -> PyResult<Self> {
+        let (nx, nu) = (within("nx", nx, 0, MOST_SIZE)?, within("nu", nu, 0, MOST_SIZE)?);
+        let (space, functions) = (Space::new(nx, space)?, Functions::new(calc, calc_diff));
+        Ok(Self(Written { space, nu, functions, bounds: bounds(nu, lower, upper)?, batch, way: Way::default() }))
+    }
+
+    fn __repr__(&self) -> String {
+        let Written { space, nu, functions, batch, .. } = &self.0;
+        let space = match space {
+            Space::Vector(_) => String::new(),
+            _ => format!(", ndx {}", space.ndx()),
+        };
+        let batch = if *batch { ", all knots at once" } else { "" };
+        let written = if functions.has(1) { "calc_diff" } else { "derivatives of calc" };
+        format!("<condyle.optimal.Action nx {}{space}, nu {nu}, {written}{batch}>", self.0.space.nx())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, Written { space, nu, functions, bounds, batch, .. }) = (slf.py(), &slf.get().0);
+        let [calc, calc_diff] = functions.clones(py);
+        let (lower, upper) = bounds.clone().map(|[lower, upper]| (lower, upper)).unzip();
+        let arguments = (space.nx(), *nu, calc, calc_diff, lower, upper, space.argument(py)?, *batch);
+        Ok((slf.get_type(), arguments).into_pyobject(py)?.into_any())
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.0.functions.traverse(&visit)?;
+        self.0.space.functions().map_or(Ok(()), |functions| functions.traverse(&visit))
+    }
+
+    fn __clear__(&self) {
+        self.0.functions.clear();
+        if let Some(functions) = self.0.space.functions() {
+            functions.clear();
+        }
+    }
+}
+
+impl Action {
+    /// A copy for a problem, at the end of the horizon or before it, whose errors go to `fault`.
+    pub(in crate::optimal) fn boxed(&self, terminal: bool, fault: &Fault) -> Box<dyn ActionModel> {
+        Box::new(Own { written: self.0.clone(), terminal, fault: fault.clone() })
+    }
+}
+
+/// An `Action` as the solver calls it. An error becomes a cost that is not a number, and is raised after the solve.
+#[derive(Clone)]
+struct Own {
+    written: Written,
+    /// Whether it serves the end, after which there is no state.
+    terminal: bool,
+    fault: Fault,
+}
+
+/// Puts the function, and the knot, before the message of an error of a result that has a wrong type or size.
+pub(super) fn named(py: Python<'_>, function: &str, knots: &[usize], error: PyErr) -> PyErr {
+    let knot = match knots {
+        [t] => format!("knot {t}"),
+        [first, .., last] => format!("knots {first} to {last}"),
+        [] => String::new(),
+    };
+    let text = format!("{function} of {knot}: {}", error.value(py));
+    let named = if error.is_instance_of::<PyTypeError>(py) {
+        PyTypeError::new_err(text)
+    } else if error.is_instance_of::<PyValueError>(py) {
+        PyValueError::new_err(text)
+    } else {
+        return error;
+    };
+    named.set_cause(py, Some(error));
+    named
+}
+
+impl Own {
+    /// The arguments at some knots.
+    fn arguments<'py>(&self, py: Python<'py>, knots: &[usize], [xs, us]: [&[f64]; 2]) -> PyResult<Bound<'py, PyTuple>> {
+        let (x, u) = (PyArray1::from_slice(py, xs), PyArray1::from_slice(py, us));
+        if !self.written.batch {
+            return (knots[0], x, u).into_pyobject(py);
+        }
+        let t = PyArray1::from_iter(py, knots.iter().map(|t| *t as i64));
+        let rows = knots.len();
+        let shaped = |of: Bound<'py, PyArray1<f64>>, columns: usize| of.call_method1("reshape", (rows, columns));
+        (t, shaped(x, self.written.space.nx())?, shaped(u, self.written.nu)?).into_pyobject(py)
+    }
+
+    fn try_calc(
+        &self,
+        py: Python<'_>,
+        knots: &[usize],
+        at: [&[f64]; 2],
+        next: &mut [f64],
+        costs: &mut [f64],
+    ) -> PyResult<()> {
+        let result = self.written.functions.call(py, 0, self.arguments(py, knots, at)?)?;
+        let mut read = || {
+            let (state, cost) = next_and_cost(&result)?;
+            let (nx, rows) = (self.written.space.nx(), knots.len());
+            match state.is_none() {
+                false if self.written.batch => {
+                    next.copy_from_slice(&matrix("the next states", &state, [rows, nx])?);
+                }
+                false => next.copy_from_slice(&vector("the next state", &state, nx)?),
+                true if self.terminal => {}
+                true => {
+                    return Err(PyValueError::new_err(format!("the next state: expected {nx} numbers, found None")));
+                }
+            }
+            if self.written.batch {
+                costs.copy_from_slice(&vector("the costs", &cost, rows)?);
+            } else {
+                costs[0] = cost.extract().map_err(|_| {
+                    let found = cost.get_type();
+                    PyTypeError::new_err(format!("the cost: expected a number, found {found}"))
+                })?;
+            }
+            Ok(())
+        };
+        read().map_err(|error| named(py, "calc", knots, error))
+    }
+
+    fn try_calc_diff(&self, py: Python<'_>, knots: &[usize], at: [&[f64]; 2], nodes: &mut [LqNode]) -> PyResult<()> {
+        let result = self.written.functions.call(py, 1, self.arguments(py, knots, at)?)?;
+        let mut read = || {
+            let given = result.cast::<PyDict>().map_err(|_| {
+                let found = result.get_type();
+                PyTypeError::new_err(format!("expected a dict, found {found}"))
+            })?;
+            for (name, entry) in given.iter() {
+                let name: String = name.extract()?;
+                if !["A", "B", "Q", "S", "R", "q", "r"].contains(&name.as_str()) {
+                    return Err(PyValueError::new_err(format!("expected A, B, Q, S, R, q or r, found '{name}'")));
+                }
+                for (k, node) in nodes.iter_mut().enumerate() {
+                    let entry = if self.written.batch { &entry.get_item(k)? } else { &entry };
+                    write(node, &name, entry)?;
+                }
+            }
+            Ok(())
+        };
+        read().map_err(|error| named(py, "calc_diff", knots, error))
+    }
+
+    /// Writes the derivatives at some knots, if there are any but differences.
+    fn try_derivatives(
+        &self,
+        py: Python<'_>,
+        knots: &[usize],
+        [xs, us]: [&[f64]; 2],
+        nodes: &mut [LqNode],
+    ) -> PyResult<bool> {
+        let Written { space, nu, functions, batch, way, .. } = &self.written;
+        if !functions.has(1) {
+            let all = Differentiated { functions, space, nu: *nu, batch: *batch, terminal: self.terminal };
+            return all.action(py, way, knots, [xs, us], nodes);
+        }
+        if *batch {
+            return self.try_calc_diff(py, knots, [xs, us], nodes).map(|()| true);
+        }
+        let nx = space.nx();
+        for (k, t) in knots.iter().enumerate() {
+            let at = [&xs[k * nx..][..nx], &us[k * nu..][..*nu]];
+            self.try_calc_diff(py, &[*t], at, &mut nodes[k..=k])?;
+        }
+        Ok(true)
+    }
+}
+
+impl ActionModel for Own {
+    fn nx(&self) -> usize {
+        self.written.space.nx()
+    }
+
+    fn ndx(&self) -> usize {
+        self.written.space.ndx()
+    }
+
+    fn nu(&self) -> usize {
+        self.written.nu
+    }
+
+    fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
+        self.written.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
+    }
+
+    /// The same object, given several times.
+    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
+        let other: &mut dyn Any = other;
+        let same = |other: &mut Self| {
+            self.written.functions.are(&other.written.functions)
+                && self.written.space.is(&other.written.space)
+                && Arc::ptr_eq(&self.fault, &other.fault)
+        };
+        other.downcast_mut::<Self>().is_some_and(same)
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let mut cost = [0.0];
+        let done = unless_failed(&self.fault, |py| self.try_calc(py, &[t], [x, u], next, &mut cost));
+        done.map_or(f64::NAN, |()| cost[0])
+    }
+
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        if self.written.batch {
+            let done = unless_failed(&self.fault, |py| self.try_calc(py, knots, [xs, us], next, costs));
+            if done.is_none() {
+                costs.fill(f64::NAN);
+            }
+            return;
+        }
+        let (nx, nu) = (self.nx(), self.nu());
+        for (i, &t) in knots.iter().enumerate() {
+            costs[i] = self.calc(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut next[i * nx..][..nx]);
+        }
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.calc_diff_group(&[t], x, u, std::slice::from_mut(node));
+    }
+
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        for node in nodes.iter_mut() {
+            for field in [&mut node.A, &mut node.B, &mut node.Q, &mut node.S, &mut node.R] {
+                field.fill(0.0);
+            }
+            node.q.fill(0.0);
+            node.r.fill(0.0);
+        }
+        match unless_failed(&self.fault, |py| self.try_derivatives(py, knots, [xs, us], nodes)) {
+            Some(true) => {}
+            Some(false) => {
+                let (nx, nu, mut by_differences) = (self.nx(), self.nu(), rust::NumDiff(self.clone()));
+                for (i, &t) in knots.iter().enumerate() {
+                    by_differences.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
+                }
+            }
+            None => nodes.iter_mut().for_each(|node| node.q.fill(f64::NAN)),
+        }
+    }
+
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        self.written.space.check(x)
+    }
+
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        self.written.space.integrate(x, dx, out, &self.fault);
+    }
+
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        self.written.space.difference(x0, x1, out, &self.fault);
+    }
+}

@@ -1,0 +1,97 @@
+//! Functions that are written in Python, and the errors that they raise during a solve.
+
+use numpy::PyArray1;
+use pyo3::call::PyCallArgs;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// The first error that the actions and constraints of a problem which are written in Python raised during a solve. From
+/// then on none of them is called.
+pub(in crate::optimal) type Fault = Arc<Mutex<Option<PyErr>>>;
+
+/// Two functions that are written in Python, mostly `calc` and `calc_diff`. Their object and its copies in problems share
+/// them, and only the object shows them to Python's collector of garbage: a problem shows its objects.
+#[derive(Clone)]
+pub(in crate::optimal) struct Functions(Arc<Mutex<[Option<Py<PyAny>>; 2]>>);
+
+/// Two are equal if they are the same.
+impl PartialEq for Functions {
+    fn eq(&self, other: &Self) -> bool {
+        self.are(other)
+    }
+}
+
+impl Functions {
+    pub(in crate::optimal) fn new(first: Py<PyAny>, second: Option<Py<PyAny>>) -> Self {
+        Self(Arc::new(Mutex::new([Some(first), second])))
+    }
+
+    /// Whether these are the same.
+    pub(in crate::optimal) fn are(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// References to them.
+    pub(in crate::optimal) fn clones(&self, py: Python<'_>) -> [Option<Py<PyAny>>; 2] {
+        self.both().each_ref().map(|function| function.as_ref().map(|function| function.clone_ref(py)))
+    }
+
+    /// The functions; the lock is never held while Python runs.
+    fn both(&self) -> MutexGuard<'_, [Option<Py<PyAny>>; 2]> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn has(&self, k: usize) -> bool {
+        self.both()[k].is_some()
+    }
+
+    /// The result of function k.
+    pub(super) fn call<'py>(
+        &self,
+        py: Python<'py>,
+        k: usize,
+        arguments: impl PyCallArgs<'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let function = self.both()[k].as_ref().map(|f| f.clone_ref(py));
+        let gone = || PyRuntimeError::new_err("the action's functions have been collected as garbage");
+        function.ok_or_else(gone)?.bind(py).call1(arguments)
+    }
+
+    /// The result of function k at (t, x, u).
+    pub(super) fn at<'py>(
+        &self,
+        py: Python<'py>,
+        k: usize,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.call(py, k, (t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, u)))
+    }
+
+    pub(in crate::optimal) fn traverse(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.both().iter().try_for_each(|function| visit.call(function))
+    }
+
+    pub(in crate::optimal) fn clear(&self) {
+        let functions = std::mem::take(&mut *self.both());
+        drop(functions); // what they call on their way out must not find the lock held
+    }
+}
+
+/// What a Python function gives, unless it raises an error, which is kept, or one of the problem's has before.
+pub(super) fn unless_failed<T>(fault: &Fault, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> Option<T> {
+    let kept = || fault.lock().unwrap_or_else(PoisonError::into_inner);
+    if kept().is_some() {
+        return None;
+    }
+    Python::attach(|py| match call(py) {
+        Ok(value) => Some(value),
+        Err(error) => {
+            kept().get_or_insert(error);
+            None
+        }
+    })
+}

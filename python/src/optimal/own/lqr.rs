@@ -1,0 +1,122 @@
+//! Actions that are given by numbers: matrices, or a unicycle's.
+
+use super::MOST_SIZE;
+use crate::arrays::{Array, matrix, output, vector};
+use crate::exceptions::{problem_error, within};
+use condyle::optimal as rust;
+use nalgebra::DMatrix;
+use pyo3::prelude::*;
+use rust::{ActionModel, LqNode};
+
+/// An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
+/// u ≤ upper.
+///
+/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
+/// bound; without R and B it has no controls, as at a terminal knot. nx and nu are at most 4096.
+///
+/// >>> from condyle.optimal import Lqr
+/// >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Lqr(pub(in crate::optimal) rust::Lqr);
+
+#[pymethods]
+impl Lqr {
+    #[new]
+    #[pyo3(signature = (A, B=None, f=None, Q=None, S=None, R=None, q=None, r=None, lower=None, upper=None))]
+    #[allow(non_snake_case, clippy::too_many_arguments)]
+    fn new(
+        A: &Bound<'_, PyAny>,
+        B: Option<&Bound<'_, PyAny>>,
+        f: Option<&Bound<'_, PyAny>>,
+        Q: Option<&Bound<'_, PyAny>>,
+        S: Option<&Bound<'_, PyAny>>,
+        R: Option<&Bound<'_, PyAny>>,
+        q: Option<&Bound<'_, PyAny>>,
+        r: Option<&Bound<'_, PyAny>>,
+        lower: Option<&Bound<'_, PyAny>>,
+        upper: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let nx = within("A, rows", A.len()?, 0, MOST_SIZE)?;
+        let nu = match (R, B) {
+            (Some(R), _) => R.len()?,
+            (None, Some(B)) if nx > 0 => B.get_item(0)?.len()?,
+            _ => 0,
+        };
+        within("R, rows, or B, columns", nu, 0, MOST_SIZE)?;
+        let mut node = LqNode::zeros(nx, nu);
+        let parts = [("B", B), ("f", f), ("Q", Q), ("S", S), ("R", R), ("q", q), ("r", r)];
+        for (name, given) in [("A", Some(A)), ("lower", lower), ("upper", upper)].into_iter().chain(parts) {
+            given.map_or(Ok(()), |given| write(&mut node, name, given))?;
+        }
+        Ok(Self(rust::Lqr::new(node)))
+    }
+
+    fn __repr__(&self) -> String {
+        let node = self.0.node();
+        format!("<condyle.optimal.Lqr nx {}, nu {}>", node.ndx(), node.nu())
+    }
+
+    #[allow(non_snake_case)]
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, node) = (slf.py(), slf.get().0.node());
+        let array = |of: &DMatrix<f64>| output(py, None, &[of.nrows(), of.ncols()], |out| of.write(out));
+        let (A, B, Q, S, R) = (array(&node.A)?, array(&node.B)?, array(&node.Q)?, array(&node.S)?, array(&node.R)?);
+        let vector = |of: &[f64]| of.to_vec();
+        let (f, q, r) = (vector(node.f.as_slice()), vector(node.q.as_slice()), vector(node.r.as_slice()));
+        let (lower, upper) = (vector(node.lower.as_slice()), vector(node.upper.as_slice()));
+        Ok((slf.get_type(), (A, B, f, Q, S, R, q, r, lower, upper)).into_pyobject(py)?.into_any())
+    }
+}
+
+/// The action of a unicycle: x = (x, y, θ), u = (v, ω), x⁺ = x + Δt (v cos θ, v sin θ, ω).
+///
+/// The cost is ½ (w₁² ‖x‖² + w₂² ‖u‖²); these are the rules of Crocoddyl's `ActionModelUnicycle`.
+///
+/// dt: Δt (s), above 0.
+/// weights: w₁ and w₂.
+/// terminal: whether it is an action of the end, without controls.
+///
+/// >>> from condyle.optimal import Fddp, Problem, Unicycle
+/// >>> problem = Problem([-1.0, -1.0, 1.0], [Unicycle()], [0] * 20, Unicycle(terminal=True))
+/// >>> Fddp(problem).solve(np.zeros((21, 3)), np.zeros((20, 2))).status
+/// 'converged'
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Unicycle(pub(in crate::optimal) rust::Unicycle);
+
+#[pymethods]
+impl Unicycle {
+    #[new]
+    #[pyo3(signature = (dt=0.1, weights=[10.0, 1.0], terminal=false))]
+    fn new(dt: f64, weights: [f64; 2], terminal: bool) -> PyResult<Self> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(problem_error(rust::Error::TimeStep { dt }));
+        }
+        let action = rust::Unicycle::new(dt, weights);
+        Ok(Self(if terminal { action.at_the_end() } else { action }))
+    }
+
+    fn __repr__(&self) -> String {
+        let (dt, [x, u]) = (self.0.dt, self.0.weights);
+        let end = if self.0.is_end() { ", the end" } else { "" };
+        format!("<condyle.optimal.Unicycle {dt} s, weights {x} {u}{end}>")
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let action = &slf.get().0;
+        Ok((slf.get_type(), (action.dt, action.weights, action.is_end())).into_pyobject(slf.py())?.into_any())
+    }
+}
+
+/// Writes the part of a node that has this name.
+pub(in crate::optimal) fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
+    let LqNode { A, B, Q, S, R, f, q, r, lower, upper, .. } = node;
+    let vectors = [("f", f), ("q", q), ("r", r), ("lower", lower), ("upper", upper)];
+    let matrices = [("A", A), ("B", B), ("Q", Q), ("S", S), ("R", R)];
+    if let Some((_, to)) = vectors.into_iter().find(|(known, _)| *known == name) {
+        let length = to.len();
+        to.copy_from_slice(&vector(name, given, length)?);
+    } else if let Some((_, to)) = matrices.into_iter().find(|(known, _)| *known == name) {
+        to.copy_from(&matrix(name, given, to.shape().into())?.to_matrix());
+    }
+    Ok(())
+}

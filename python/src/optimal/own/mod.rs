@@ -1,0 +1,24 @@
+//! Actions of one's own: given as matrices, or written in Python.
+
+mod action;
+mod automatic;
+mod constrained;
+mod differential;
+mod expansion;
+mod functions;
+mod lqr;
+mod residual;
+mod space;
+
+pub(crate) use action::Action;
+pub(super) use automatic::Way;
+pub(crate) use constrained::ConstrainedAction;
+pub(crate) use differential::DifferentialAction;
+pub(super) use functions::{Fault, Functions};
+pub(super) use lqr::write;
+pub(crate) use lqr::{Lqr, Unicycle};
+pub(super) use residual::{OwnFunction, faults};
+pub(super) use space::Space;
+
+/// The most numbers of a state, a control or a constraint: of their matrices there is one for each knot.
+pub(super) const MOST_SIZE: usize = condyle::optimal::LqNode::MOST_SIZE;

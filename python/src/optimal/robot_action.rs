@@ -1,0 +1,179 @@
+//! A robot's action, and the same as data.
+
+use crate::arrays::{Give, vector};
+use crate::exceptions::{ProblemError, problem_error};
+use crate::model::Model;
+use condyle::optimal as rust;
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use rust::ActionModel;
+use rust::robot::{Dynamics, Knot};
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A robot's action as data, which can be put into a file.
+#[derive(Clone)]
+pub(super) struct Described {
+    pub robot: Arc<condyle::Model>,
+    pub knot: Knot,
+}
+
+/// A robot's action, ready to be computed and as data. Neither has the memory that computing takes: a problem makes that,
+/// once for all actions that differ in their costs only.
+pub(super) struct RobotAction<A> {
+    action: A,
+    pub(super) described: Arc<Described>,
+    model: Py<Model>,
+    /// The residuals that are written in Python, of which Python's collector of garbage must know.
+    kept: Vec<Py<PyAny>>,
+}
+
+impl<A: ActionModel + Clone> RobotAction<A> {
+    pub(super) fn new(
+        model: &Bound<'_, Model>,
+        kept: Vec<Py<PyAny>>,
+        knot: impl FnOnce(&Arc<condyle::Model>) -> PyResult<Knot>,
+    ) -> PyResult<Self> {
+        let robot = model.get().inner.clone();
+        let described = Arc::new(Described { knot: knot(&robot)?, robot });
+        let action: Box<dyn Any> = described.build()?;
+        let action = *action.downcast().expect("the class asks for its own kind of knot");
+        Ok(Self { action, described, model: model.clone().unbind(), kept })
+    }
+
+    /// A copy for a problem.
+    pub(super) fn boxed(&self) -> Boxed {
+        Boxed { action: Box::new(self.action.clone()), described: Some(self.described.clone()) }
+    }
+
+    /// The controls that hold the robot still at the state x.
+    pub(super) fn hold<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let model = &self.described.robot;
+        let state = vector("x", x, model.nq() + model.nv())?;
+        self.action.clone().hold(0, &state).give(x.py(), None)
+    }
+
+    /// The residuals that are written in Python.
+    pub(super) fn kept(&self, py: Python<'_>) -> impl Iterator<Item = Py<PyAny>> {
+        self.kept.iter().map(move |residual| residual.clone_ref(py))
+    }
+
+    pub(super) fn traverse(&self, visit: &PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.kept.iter().try_for_each(|residual| visit.call(residual))
+    }
+
+    /// The action in a few words.
+    pub(super) fn repr(&self, class: &str) -> String {
+        let Knot { dynamics, costs, limits, .. } = &self.described.knot;
+        let duration = match dynamics {
+            Dynamics::Free { dt, .. } | Dynamics::Contact { dt, .. } | Dynamics::Inverse { dt, .. } => {
+                format!("{dt} s")
+            }
+            Dynamics::Impulse { .. } => "an impact".to_owned(),
+            Dynamics::End => "the end".to_owned(),
+        };
+        let contacts: Vec<_> = match dynamics {
+            Dynamics::Contact { contacts, .. } | Dynamics::Impulse { contacts, .. } => {
+                contacts.iter().map(|contact| contact.name.as_str()).collect()
+            }
+            _ => vec![],
+        };
+        let list = |what: &str, names: Vec<&str>| match names.is_empty() {
+            true => String::new(),
+            false => format!(", {what} {}", names.join(" ")),
+        };
+        let (contacts, costs) = (list("contacts", contacts), list("costs", costs.iter().map(|c| &*c.name).collect()));
+        let limits = list("limits", limits.iter().map(|limit| &*limit.name).collect());
+        let robot = self.described.robot.name();
+        format!("<condyle.optimal.{class} of '{robot}', {duration}, nu {}{contacts}{costs}{limits}>", self.action.nu())
+    }
+
+    /// The parts of a pickle: the robot, and the knot as JSON.
+    pub(super) fn reduce<'py>(&self, object: &Bound<'py, PyAny>) -> PyResult<Reduced<'py>> {
+        let text = serde_json::to_string(&self.described.knot)
+            .map_err(|error| ProblemError::new_err(format!("this action cannot be pickled: {error}")))?;
+        let class = object.get_type();
+        Ok((class.getattr("_from_json")?, (self.model.clone_ref(object.py()), text)))
+    }
+
+    /// The action of a pickle's parts.
+    pub(super) fn from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
+        let knot = serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("no action: {error}")))?;
+        Self::new(model, vec![], |_| Ok(knot))
+    }
+}
+
+/// A function that makes an object, and its arguments.
+pub(super) type Reduced<'py> = (Bound<'py, PyAny>, (Py<Model>, String));
+
+impl Described {
+    /// The action that the data describe.
+    pub(super) fn boxed(self) -> PyResult<Boxed> {
+        Ok(Boxed { action: self.build()?, described: Some(Arc::new(self)) })
+    }
+
+    fn build(&self) -> PyResult<Box<dyn ActionModel>> {
+        self.knot.build(&self.robot).map_err(problem_error)
+    }
+
+    /// Changes the weights of the terms called `name`, which are checked.
+    pub(super) fn set_weight(&mut self, name: &str, weight: f64) {
+        let all = self.knot.costs.iter_mut().chain(self.knot.costs_at.values_mut().flatten());
+        all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
+    }
+
+    /// Moves the costs and limits of knot t to knot t − 1.
+    pub(super) fn shift(&mut self) {
+        fn moved<T>(at: &mut BTreeMap<usize, T>) {
+            *at = std::mem::take(at).into_iter().filter_map(|(t, own)| Some((t.checked_sub(1)?, own))).collect();
+        }
+        moved(&mut self.knot.costs_at);
+        moved(&mut self.knot.limits_at);
+    }
+
+    /// Whether a shift changes anything.
+    pub(super) fn moves(&self) -> bool {
+        !(self.knot.costs_at.is_empty() && self.knot.limits_at.is_empty())
+    }
+}
+
+/// An action for a problem, and the same as data if it can be put into a file.
+pub(super) struct Boxed {
+    pub action: Box<dyn ActionModel>,
+    pub described: Option<Arc<Described>>,
+}
+
+/// The action of type A that is model k of a problem, or the terminal model, or that stands inside of constraints
+/// there.
+pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
+    fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
+        match k {
+            Some(k) => problem.model_mut(k),
+            None => problem.terminal_mut(),
+        }
+    }
+    if find::<A>(problem, k).is_some() {
+        return find(problem, k);
+    }
+    let mut around = find::<rust::Constrained>(problem, k)?;
+    while around.action_mut::<A>().is_none() {
+        around = around.action_mut()?;
+    }
+    around.action_mut()
+}
+
+/// A change of a robot's action in a problem, see `inside`; none if the action is not of a robot.
+macro_rules! change {
+    ($problem:expr, $k:expr, |$knot:ident| $change:expr) => {
+        change!($problem, $k, |$knot| $change; FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics)
+    };
+    ($problem:expr, $k:expr, |$knot:ident| $change:expr; $($class:ident),*) => {
+        $(if let Some($knot) = $crate::optimal::robot_action::inside::<condyle::optimal::robot::$class>($problem, $k) {
+            Some($change)
+        } else)* {
+            None
+        }
+    };
+}
+pub(super) use change;

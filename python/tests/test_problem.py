@@ -1,0 +1,424 @@
+"""Problems and solvers: an action for each knot, evaluation, callbacks, what is shown, values that pickle."""
+
+import pickle
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.optimal import (
+    Action,
+    Activation,
+    AugmentedLagrangian,
+    ConstrainedAction,
+    ContactDynamics,
+    Cost,
+    DifferentialAction,
+    Fddp,
+    FreeDynamics,
+    FrictionCone,
+    ImpulseDynamics,
+    InverseDynamics,
+    Iteration,
+    Limit,
+    LqNode,
+    Lqr,
+    Problem,
+    ProblemError,
+    Residual,
+    Sweep,
+    Unicycle,
+)
+
+ARM = condyle.robots.arm7()
+QUADRUPED = condyle.robots.quadruped()
+X0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+STANDING = np.r_[condyle.neutral(QUADRUPED), np.zeros(18)]
+STANDING[8:19] = np.tile([0.7, -1.4, 0.0], 4)[:11]
+FEET = ("LF_foot", "RF_foot", "LH_foot", "RH_foot")
+KNOTS = 11
+# The same sums in another order.
+ROUNDING = 1e-9
+
+
+def costs(t: int) -> list[Cost]:
+    terms = [
+        Cost("state", 1e-1, Residual.state(STANDING)),
+        Cost("effort", 1e-3 * (1.0 + t), Residual.control(np.zeros(12))),
+        Cost("com", 1e1, Residual.center_of_mass([0.01 * t, 0.0, 0.35])),
+    ]
+    if t % 3 == 0:
+        terms.append(Cost("foot", 1e2, Residual.frame_translation(QUADRUPED, "RF_foot", [0.2 + 0.01 * t, -0.1, 0.1])))
+    return terms
+
+
+def contacts(feet: tuple[str, ...] = FEET) -> dict[str, condyle.ContactConstraint]:
+    return {foot: condyle.ContactConstraint(foot, "point", kd=20.0) for foot in feet}
+
+
+def end() -> FreeDynamics:
+    return FreeDynamics(QUADRUPED, None, [Cost("state", 1.0, Residual.state(STANDING))])
+
+
+def gait() -> Problem:
+    return Problem(
+        STANDING, [ContactDynamics(QUADRUPED, contacts(), 0.02, costs(t)) for t in range(KNOTS)], None, end()
+    )
+
+
+def start(problem: Problem) -> Any:
+    xs = np.tile(STANDING, (problem.horizon + 1, 1))
+    return xs, problem.quasi_static(xs)
+
+
+def reach() -> Any:
+    rest = Cost("rest", 1e-1, Residual.state(X0))
+    running = FreeDynamics(ARM, 0.05, [rest, Cost("effort", 1e-4, Residual.control(np.zeros(7)))])
+    goal = Cost("reach", 1e3, Residual.frame_translation(ARM, "tool", [0.4, 0.2, 0.5]))
+    problem = Problem(X0, [running], [0] * KNOTS, FreeDynamics(ARM, None, [rest, goal]))
+    return problem, np.tile(X0, (KNOTS + 1, 1)), np.tile(running.quasi_static(X0), (KNOTS, 1))
+
+
+def test_an_action_for_each_knot_gives_the_bits_of_one_for_all() -> None:
+    apart = gait()
+    knot = ContactDynamics(QUADRUPED, contacts(), 0.02, costs(0), costs_at={t: costs(t) for t in range(KNOTS)})
+    shared = Problem(STANDING, [knot], [0] * KNOTS, end())
+    xs, us = start(apart)
+    np.testing.assert_array_equal(us, shared.quasi_static(xs))
+    np.testing.assert_allclose(us[0], knot.quasi_static(STANDING), rtol=0, atol=1e-9)
+    one, other = (Fddp(problem, max_iterations=6).solve(xs, us) for problem in (apart, shared))
+    assert one.trace[0].accepted and [i.cost for i in one.trace] == [i.cost for i in other.trace]
+    np.testing.assert_array_equal(one.xs, other.xs)
+    # what is changed later is the knot's own
+    for problem in (apart, shared):
+        problem.set_costs(4, costs(7))
+        problem.set_weight("com", 5.0)
+    one, other = (Fddp(problem, max_iterations=6).solve(xs, us) for problem in (apart, shared))
+    np.testing.assert_array_equal(one.xs, other.xs)
+    again = Problem.from_json(apart.to_json())
+    np.testing.assert_array_equal(Fddp(again, max_iterations=6).solve(xs, us).xs, one.xs)
+
+
+def test_an_action_of_each_knot_moves_on_with_it() -> None:
+    moving = gait()
+    solver = Fddp(moving, max_iterations=3)
+    solver.solve(*start(moving))
+    solver.shift(7)
+    knots = [*range(1, KNOTS), 7]
+    fresh = Problem(STANDING, [ContactDynamics(QUADRUPED, contacts(), 0.02, costs(t)) for t in knots], None, end())
+    xs, us = start(fresh)
+    one, other = (Fddp(problem, max_iterations=3).solve(xs, us) for problem in (moving, fresh))
+    np.testing.assert_array_equal(one.xs, other.xs)
+
+
+def test_an_evaluation_is_what_the_solver_sees() -> None:
+    problem, xs, us = reach()
+    solution = Fddp(problem).solve(xs, us)
+    found = problem.evaluate(solution.xs, solution.us)
+    assert found.cost == pytest.approx(solution.cost, rel=ROUNDING)
+    assert found.costs.shape == (KNOTS + 1,) and abs(found.gaps).max() < 1e-9
+    np.testing.assert_allclose(found.next_states, solution.xs[1:], rtol=0, atol=1e-9)
+    xs = np.array(solution.xs)
+    xs[3, 2] += 0.1
+    found = problem.evaluate(xs, solution.us)
+    np.testing.assert_allclose(found.gaps[3], -0.1 * np.eye(14)[2], rtol=0, atol=1e-9)
+    with pytest.raises(ValueError, match=r"xs: expected shape \(12, 14\)"):
+        problem.evaluate(xs[1:], solution.us)
+
+
+def test_accelerations_efforts_and_forces_of_a_solution() -> None:
+    problem = gait()
+    xs, us = start(problem)
+    solver = Fddp(problem, max_iterations=4)
+    solution = solver.solve(xs, us)
+    data = condyle.Data(QUADRUPED)
+    held = condyle.ConstraintSet(QUADRUPED, list(contacts().values()))
+    for t in (0, 5):
+        q, v = solution.xs[t, :19], solution.xs[t, 19:]
+        tau = np.r_[np.zeros(6), solution.us[t]]
+        expected = condyle.constrained_dynamics(QUADRUPED, data, held, q, v, tau)
+        np.testing.assert_array_equal(solution.efforts[t], tau)
+        np.testing.assert_allclose(solution.accelerations[t], expected.a, rtol=0, atol=1e-8)
+        forces = np.concatenate([solution.forces[t][foot] for foot in FEET])
+        np.testing.assert_allclose(forces, expected.lambda_, rtol=0, atol=1e-7)
+    copy = pickle.loads(pickle.dumps(solution))
+    np.testing.assert_array_equal(copy.xs, solution.xs)
+    with pytest.raises(AttributeError, match="call Problem.evaluate"):
+        _ = copy.forces
+    late = solver.resume()
+    solver.shift(0)
+    with pytest.raises(ProblemError, match="the horizon has moved on since this solution"):
+        _ = late.forces
+    assert solution.forces[0].keys() == set(FEET)  # known before
+    jump = ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), [])
+    falling = np.array(STANDING)
+    falling[21] = -1.0
+    found = Problem(falling, [jump], [0], end()).evaluate(np.tile(falling, (2, 1)), [np.zeros(0)])
+    assert found.forces[0]["LF_foot"].shape == (3,) and found.accelerations[0].shape == (0,)
+    own = Problem([1.0], [Action(1, 1, lambda t, x, u: (x + u, 0.5))], [0], Lqr([[1.0]]))
+    assert own.evaluate([[1.0], [1.0]], [[0.5]]).forces == [{}]
+
+
+def test_a_callback_sees_iterations_and_ends_a_solve() -> None:
+    problem, xs, us = reach()
+    seen: list[Iteration] = []
+    solution = Fddp(problem).solve(xs, us, callback=seen.append)
+    assert seen == solution.trace and solution.status == "converged"
+    solver = Fddp(problem)
+    solution = solver.solve(xs, us, lambda now: now.iteration < 1)
+    assert solution.status == "interrupted" and len(solution.trace) == 2
+    assert solver.resume(callback=lambda now: None).status == "converged"
+
+    def fail(now: Iteration) -> None:
+        raise RuntimeError("seen enough")
+
+    with pytest.raises(RuntimeError, match="seen enough"):
+        solver.solve(xs, us, callback=fail)
+    last = solver.solution
+    assert last is not None and last.status == "interrupted"
+    limited = AugmentedLagrangian(problem)
+    assert limited.solve(xs, us, callback=lambda now: False).status == "interrupted"
+
+
+def test_what_is_shown(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, xs, us = reach()
+    seen: list[Iteration] = []
+    solution = Fddp(problem).solve(xs, us, seen.append, verbose=True)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["iter", "cost", "gap", "stop", "step", "regularisation"]
+    assert len(lines) == 1 + len(solution.trace) and len(seen) == len(solution.trace)
+    assert float(lines[-1].split()[1]) == pytest.approx(solution.cost, rel=1e-5)
+    monkeypatch.setitem(sys.modules, "tqdm", None)
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    Fddp(problem).solve(xs, us, progress=True)
+    assert capsys.readouterr().out.splitlines() == lines
+
+    class Bar:
+        updates, closed, shown = 0, False, ""
+
+        def __init__(self, **_: Any) -> None:
+            type(self).updates, type(self).closed = 0, False
+
+        def set_postfix(self, **numbers: Any) -> None:
+            type(self).shown = numbers["cost"]
+
+        def update(self) -> None:
+            type(self).updates += 1
+
+        def close(self) -> None:
+            type(self).closed = True
+
+    fake: Any = type(sys)("tqdm.auto")
+    fake.tqdm = Bar
+    monkeypatch.setitem(sys.modules, "tqdm", type(sys)("tqdm"))
+    monkeypatch.setitem(sys.modules, "tqdm.auto", fake)
+    Fddp(problem).solve(xs, us, progress=True)
+    assert (Bar.updates, Bar.closed, capsys.readouterr().out) == (len(solution.trace), True, "")
+    assert float(Bar.shown) == pytest.approx(solution.cost, rel=1e-5)
+
+
+def test_nothing_to_resume() -> None:
+    problem, xs, us = reach()
+    for solver in (Fddp(problem), AugmentedLagrangian(problem)):
+        with pytest.raises(ProblemError, match="resume: there is no solution to go on from; call solve first"):
+            solver.resume()
+        assert solver.solution is None
+        solver.solve(xs, us)
+        assert solver.resume().status == "converged"
+
+
+def test_actions_in_the_wrong_place() -> None:
+    last = FreeDynamics(ARM, None, [])
+    knot = FreeDynamics(ARM, 0.1, [])
+    with pytest.raises(ProblemError, match=r"knot 1: models\[1\] has no next state, as an action of the end"):
+        Problem(X0, [knot, last], None, last)
+    with pytest.raises(ProblemError, match="terminal: expected an action without controls"):
+        Problem(X0, [knot], [0], knot)
+    wrapped = ConstrainedAction(last, 1, lambda t, x, u: x[:1])
+    with pytest.raises(ProblemError, match=r"knot 0: models\[0\] has no next state"):
+        Problem(X0, [wrapped], [0], last)
+
+
+@pytest.mark.parametrize("residual", [
+    lambda: Residual.frame_rotation(ARM, "tool", 2.0 * np.eye(3)),
+    lambda: Residual.frame_placement(ARM, "tool", np.diag([1.0, 1.0, -1.0, 1.0])),
+])  # fmt: skip
+def test_targets_that_are_no_rotations(residual: Any) -> None:
+    with pytest.raises((ProblemError, ValueError), match="rotation"):
+        FreeDynamics(ARM, 0.1, [Cost("turn", 1.0, residual())])
+    with pytest.raises((ProblemError, ValueError), match="rotation"):
+        reach()[0].set_costs(3, [Cost("turn", 1.0, residual())])
+
+
+def test_a_sweep_is_the_solvers() -> None:
+    problem, xs, us = reach()
+    nodes = problem.derivatives(xs, us)
+    assert len(nodes) == KNOTS + 1 and isinstance(nodes[0], LqNode)
+    assert np.shape(nodes[0].B) == (14, 7) and np.shape(nodes[-1].B) == (14, 0)
+    found = Sweep(nodes).run(1e-9)
+    solution = Fddp(problem, max_iterations=1, inverse_dynamics_form=False).solve(xs, us)
+    for t in range(KNOTS):
+        np.testing.assert_allclose(found.K[t], solution.K[t], rtol=0, atol=1e-6 * abs(solution.K[t]).max())
+    # the first step of a linear-quadratic problem is its optimum: u + k + K dx, by hand
+    dx, cost = np.zeros(14) + np.array(nodes[0].f) * 0.0, 0.0
+    for node, K, k in zip(nodes, found.K, found.k, strict=False):
+        A, B, f, Q, S, R, q, r = (np.array(part) for part in node)
+        du = k + K @ dx
+        cost += 0.5 * dx @ Q @ dx + dx @ S @ du + 0.5 * du @ R @ du + q @ dx + r @ du
+        dx = A @ dx + B @ du + f
+    cost += 0.5 * dx @ np.array(nodes[-1].Q) @ dx + np.array(nodes[-1].q) @ dx
+    assert cost < 0.0 and found.Vxx.shape == (KNOTS + 1, 14, 14) and found.Vx.shape == (KNOTS + 1, 14)
+    with pytest.raises(ProblemError, match=r"nodes\[0\]: expected no controls at the end, found 7"):
+        Sweep(nodes[:1])
+    with pytest.raises(ProblemError, match="nodes: expected at least one"):
+        Sweep([])
+    with pytest.raises(ProblemError, match=r"nodes\[0\]: expected ndx = 1, found 14"):
+        Sweep(
+            [nodes[0], LqNode([[1.0]], np.zeros((1, 0)), [0.0], [[1.0]], np.zeros((1, 0)), np.zeros((0, 0)), [0], [])]
+        )
+
+
+def power(t: Any, x: Any, u: Any) -> Any:
+    return x[25:37] * u if len(u) else 0.1 * x[25:37]
+
+
+def power_diff(t: Any, x: Any, u: Any) -> Any:
+    by_x = np.zeros((12, 36))
+    by_x[:, 24:] = np.diag(u) if len(u) else 0.1 * np.eye(12)
+    return by_x, np.diag(x[25:37]) if len(u) else np.zeros((12, 0))
+
+
+def plain(t: Any, x: Any, u: Any) -> Any:
+    return np.asarray(power(t, x, u), dtype=float)
+
+
+@pytest.mark.parametrize("calc", [power, plain])
+def test_residuals_of_ones_own(calc: Any) -> None:
+    def problem(residual: Residual) -> Problem:
+        knots = [
+            ContactDynamics(QUADRUPED, contacts(), 0.02, [*costs(t), Cost("power", 3.0 + t, residual)])
+            for t in range(KNOTS)
+        ]
+        last = FreeDynamics(QUADRUPED, None, [Cost("power", 1.0, residual)])
+        return Problem(STANDING, knots, None, last)
+
+    ours, expected = problem(Residual.own(12, calc)), problem(Residual.own(12, calc, power_diff))
+    xs, us = start(ours)
+    assert ours.evaluate(xs + 0.1, us).cost > gait().evaluate(xs + 0.1, us).cost
+    for form in (True, False):
+        one, other = (Fddp(p, max_iterations=5, inverse_dynamics_form=form).solve(xs, us) for p in (ours, expected))
+        assert one.trace[1].accepted
+        np.testing.assert_allclose([i.cost for i in one.trace], [i.cost for i in other.trace], rtol=1e-6)
+    threaded = Fddp(expected, max_iterations=5, inverse_dynamics_form=False, threads=3).solve(xs, us)
+    np.testing.assert_array_equal(threaded.xs, other.xs)
+    with pytest.raises(ProblemError, match="cannot be serialized"):
+        ours.to_json()
+
+
+def test_errors_of_residuals_of_ones_own_are_raised() -> None:
+    def fail(t: Any, x: Any, u: Any) -> Any:
+        raise ZeroDivisionError("here")
+
+    for calc, error in ((fail, ZeroDivisionError), (lambda t, x, u: x[:2], ValueError)):
+        knot = FreeDynamics(ARM, 0.1, [Cost("own", 1.0, Residual.own(3, calc))])
+        problem = Problem(X0, [knot], [0] * 3, FreeDynamics(ARM, None, []))
+        for _ in range(2):
+            with pytest.raises(error):
+                Fddp(problem).solve(np.tile(X0, (4, 1)), np.zeros((3, 7)))
+    good = FreeDynamics(ARM, 0.1, [])
+    problem = Problem(X0, [good], [0] * 3, FreeDynamics(ARM, None, []))
+    problem.set_costs(1, [Cost("own", 1.0, Residual.own(3, fail))])
+    with pytest.raises(ZeroDivisionError):
+        Fddp(problem).solve(np.tile(X0, (4, 1)), np.zeros((3, 7)))
+
+
+def test_a_limit_of_ones_own_holds() -> None:
+    slow = Limit("slow", Residual.own(1, lambda t, x, u: np.array([x[7:] @ x[7:]])), upper=[0.3])
+    rest = Cost("rest", 1e-1, Residual.state(X0))
+    knot = FreeDynamics(ARM, 0.05, [rest, Cost("effort", 1e-4, Residual.control(np.zeros(7)))], limits=[slow])
+    goal = Cost("reach", 1e2, Residual.frame_translation(ARM, "tool", [0.4, 0.2, 0.5]))
+    problem = Problem(X0, [knot], [0] * KNOTS, FreeDynamics(ARM, None, [rest, goal]))
+    solver = AugmentedLagrangian(problem)
+    solution = solver.solve(np.tile(X0, (KNOTS + 1, 1)), np.tile(knot.quasi_static(X0), (KNOTS, 1)))
+    speeds = (solution.xs[:KNOTS, 7:] ** 2).sum(axis=1)
+    assert solver.outcome.primal < 1e-4 and speeds.max() == pytest.approx(0.3, abs=1e-3)
+
+
+def test_quasi_static_of_every_kind() -> None:
+    assert InverseDynamics(ARM, 0.1, []).quasi_static(X0).tolist() == [0.0] * 7
+    assert ImpulseDynamics(QUADRUPED, contacts(), []).quasi_static(STANDING).shape == (0,)
+    robot = FreeDynamics(ARM, 0.1, [])
+    data = condyle.Data(ARM)
+
+    def calc(t: Any, x: Any, u: Any) -> Any:
+        return condyle.aba(ARM, data, x[:7], x[7:], u), 0.0
+
+    own = DifferentialAction(7, 7, calc, 0.1, model=ARM)
+    problem = Problem(X0, [own, robot], None, FreeDynamics(ARM, None, []))
+    us = problem.quasi_static(np.tile(X0, (3, 1)))
+    np.testing.assert_allclose(us[0], us[1], rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(us[1], robot.quasi_static(X0))
+    linear = Problem([2.0], [Lqr([[0.5]], B=[[2.0]], R=[[1.0]])], [0], Lqr([[1.0]]))
+    np.testing.assert_allclose(linear.quasi_static([[2.0], [2.0]]), [[0.5]])
+
+
+KINDS: dict[str, Any] = {
+    "FreeDynamics": lambda: FreeDynamics(ARM, 0.1, [Cost("rest", 1.0, Residual.state(X0))]),
+    "end": lambda: FreeDynamics(ARM, None, []),
+    "InverseDynamics": lambda: InverseDynamics(ARM, 0.1, [], lower=np.full(7, -3.0)),
+    "ContactDynamics": lambda: ContactDynamics(QUADRUPED, contacts(), 0.02, costs(3)),
+    "ImpulseDynamics": lambda: ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), []),
+    "Lqr": lambda: Lqr([[1.0]], B=[[2.0]], R=[[1.0]], lower=[-1.0]),
+    "Lqr, end": lambda: Lqr([[1.0]]),
+    "ConstrainedAction": lambda: ConstrainedAction(Lqr([[1.0]]), 12, power),
+    "DifferentialAction": lambda: DifferentialAction(1, 1, power, 0.1, integrator="runge_kutta_3", upper=[1.0]),
+    "DifferentialAction of a robot": lambda: DifferentialAction(7, 7, power, 0.1, model=ARM),
+    "Unicycle": lambda: Unicycle(0.2, (3.0, 1.0)),
+    "Unicycle, end": lambda: Unicycle(terminal=True),
+    "Cost": lambda: Cost("a", 2.0, Residual.frame_velocity(ARM, "tool"), Activation.smooth2(0.5)),
+    "Cost of one's own": lambda: Cost("a", 2.0, Residual.own(12, power, power_diff)),
+    "Cost of a cone": lambda: Cost("a", 2.0, Residual.friction_cone("foot", FrictionCone(0.7))),
+    "Limit": lambda: Limit("a", Residual.control([0.0]), lower=[-1.0]),
+    "Limit, equality": lambda: Limit("a", Residual.control([0.0])),
+    "Activation": lambda: Activation.barrier([-np.inf], [1.0]),
+    "Residual": lambda: Residual.frame_translation(ARM, "tool", [1.0, 2.0, 3.0]),
+    "Problem": gait,
+    "Problem of all kinds": lambda: reach()[0],
+    "Fddp": lambda: Fddp(reach()[0], max_iterations=7, method="ddp"),
+    "AugmentedLagrangian": lambda: AugmentedLagrangian(reach()[0], inner={"threads": 2}, tolerance=1e-5),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_have_a_repr_and_pickle(kind: str) -> None:
+    made = KINDS[kind]()
+    again = pickle.loads(pickle.dumps(made))
+    assert type(again) is type(made)
+    assert repr(again) == repr(made)
+    assert " at 0x" not in repr(made) and len(repr(made)) < 250
+    if isinstance(made, Residual):
+        assert again == made
+
+
+def test_solvers_that_were_pickled_go_their_way() -> None:
+    problem, xs, us = reach()
+    solver = Fddp(problem, max_iterations=2)
+    assert repr(solver) == f"<condyle.optimal.Fddp of {problem!r}, max_iterations 2>"
+    one, other = solver.solve(xs, us), pickle.loads(pickle.dumps(solver)).solve(xs, us)
+    assert len(other.trace) == 2
+    np.testing.assert_array_equal(one.xs, other.xs)
+
+
+def test_a_problem_of_actions_of_ones_own_pickles() -> None:
+    robot = FreeDynamics(ARM, 0.1, [Cost("rest", 1.0, Residual.state(X0))])
+    mixed = Problem(X0, [robot, DifferentialAction(7, 7, falling, 0.1, model=ARM)], [0, 1, 0], Lqr(np.eye(14)))
+    mixed.set_weight("rest", 5.0)
+    again = pickle.loads(pickle.dumps(mixed))
+    xs, us = np.tile(X0, (4, 1)), np.zeros((3, 7))
+    assert mixed.evaluate(xs + 0.1, us).cost == again.evaluate(xs + 0.1, us).cost > 0.0
+
+
+def falling(t: Any, x: Any, u: Any) -> Any:
+    return u - x[7:], 0.5 * (u @ u)

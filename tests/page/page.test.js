@@ -1,0 +1,122 @@
+// The pages of two plans in headless Chromium: an arm that reaches, a quadruped that trots. PAGES names their folder.
+//
+// Looks at what a reader meets: no request, no error, a robot that moves with slider, player and keys, a gait, dark mode,
+// small windows, paper, and a link to a time. Pictures are left in PAGES.
+import assert from "node:assert/strict";
+import { existsSync } from "node:fs";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { pathToFileURL } from "node:url";
+import puppeteer from "puppeteer-core";
+
+const folder = process.env.PAGES;
+let browser;
+
+before(async () => {
+  const own = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
+  const executablePath = process.env.CHROMIUM ?? own ?? (await (await import("@sparticuz/chromium")).default.executablePath());
+  browser = await puppeteer.launch({
+    executablePath, headless: "shell", env: { ...process.env, LC_ALL: "en_US.UTF-8", LANG: "en_US.UTF-8", LANGUAGE: "en" },
+    args: ["--no-sandbox", "--lang=en-US", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
+  });
+});
+after(() => browser?.close());
+
+/** Opens a page; what it complains of and asks for is collected. */
+async function open(name, { hash = "#t=0", width = 900, height = 640, dark = false } = {}) {
+  const page = await browser.newPage();
+  const wrong = [];
+  page.on("console", (message) => { if (["error", "warn", "warning"].includes(message.type()) && !/GPU stall|GL Driver/.test(message.text())) wrong.push(message.text()); });
+  page.on("pageerror", (error) => wrong.push(error.message));
+  page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) wrong.push(request.url()); });
+  await page.setViewport({ width, height });
+  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: dark ? "dark" : "light" }]);
+  await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + hash, { waitUntil: "load" });
+  await settled(page);
+  return { page, wrong };
+}
+/** Two frames later: what was asked to be drawn is. */
+const settled = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+const picture = async (page) => Buffer.from(await (await page.$("#view canvas")).screenshot()).toString("base64");
+const clock = (page) => page.$eval("#clock b", (b) => Number(b.textContent));
+
+for (const name of ["reach", "trot"]) {
+  test(`${name}: nothing is asked for, nothing goes wrong, the slider moves the robot`, async () => {
+    const { page, wrong } = await open(name);
+    const start = await picture(page);
+    await page.$eval("#scrub", (scrub) => { scrub.value = 0.4; scrub.dispatchEvent(new Event("input")); });
+    await settled(page);
+    assert.ok(Math.abs((await clock(page)) - 0.4) < 0.006);
+    assert.notEqual(await picture(page), start);
+    await page.screenshot({ path: join(folder, `${name}.png`) });
+    assert.deepEqual(wrong, []);
+    await page.close();
+  });
+
+  test(`${name}: play, pause and keys`, async () => {
+    const { page, wrong } = await open(name);
+    await page.select("#speed", "0.1"); // so that it is not at its end before it is paused
+    await page.click("#play");
+    await page.waitForFunction(() => Number(document.querySelector("#clock b").textContent) > 0.02);
+    await page.click("#play");
+    const paused = await clock(page);
+    await settled(page);
+    assert.equal(await clock(page), paused);
+    await page.evaluate(() => document.activeElement.blur());
+    await page.keyboard.press("ArrowRight");
+    assert.ok((await clock(page)) > paused);
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => document.querySelector("#play").classList.contains("playing"));
+    assert.deepEqual(wrong, []);
+    await page.close();
+  });
+
+  test(`${name}: a link opens it at a time, and the address follows`, async () => {
+    const { page, wrong } = await open(name, { hash: "#t=0.3" });
+    assert.equal(await clock(page), 0.3);
+    await page.evaluate(() => document.activeElement.blur());
+    await page.keyboard.press("ArrowRight");
+    await page.waitForFunction(() => /^#t=0\.3[01]/.test(location.hash) && location.hash !== "#t=0.3");
+    await page.evaluate(() => { location.hash = "#t=0.5"; });
+    await page.waitForFunction(() => document.querySelector("#clock b").textContent === "0.50");
+    assert.deepEqual(wrong, []);
+    await page.close();
+  });
+
+  test(`${name}: any window, dark mode, paper`, async () => {
+    const { page, wrong } = await open(name, { dark: true });
+    const colour = (page) => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+    const dark = await colour(page);
+    const wide = await page.$eval("#view canvas", (canvas) => canvas.clientWidth);
+    await page.screenshot({ path: join(folder, `${name}_dark.png`) });
+    await page.setViewport({ width: 360, height: 640 });
+    await page.waitForFunction((wide) => document.querySelector("#view canvas").clientWidth !== wide, {}, wide);
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "nothing sticks out");
+    await page.screenshot({ path: join(folder, `${name}_narrow.png`) });
+    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
+    assert.notEqual(await colour(page), dark);
+    assert.ok((await page.pdf({ path: join(folder, `${name}.pdf`) })).length > 10_000);
+    assert.deepEqual(wrong, []);
+    await page.close();
+  });
+}
+
+test("the trot has a gait: a row for each foot, a line that moves, arrows while feet touch", async () => {
+  const { page } = await open("trot");
+  assert.equal(await page.$$eval("#gait > div", (rows) => rows.length), 4);
+  const bars = await page.$$eval("#gait p", (rows) => rows.map((row) => row.querySelectorAll("i").length));
+  assert.deepEqual(bars, [2, 3, 3, 2]); // each leg leaves the ground once or twice
+  const cursor = () => page.$eval("#gait b", (line) => parseFloat(line.style.left));
+  const before = await cursor();
+  await page.$eval("#scrub", (scrub) => { scrub.value = 0.4; scrub.dispatchEvent(new Event("input")); });
+  assert.ok((await cursor()) > before + 10);
+  assert.equal(await page.$eval("#key-forces", (key) => key.hidden), false);
+  await page.close();
+});
+
+test("the tables of iterations and of the budget are full", async () => {
+  const { page } = await open("reach");
+  assert.ok((await page.$$eval("#iterations tbody tr", (rows) => rows.length)) > 3);
+  assert.equal(await page.$$eval("#budget tbody tr", (rows) => rows.length), 3);
+  await page.close();
+});

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Tests the page of `condyle plan` in headless Chromium. Needs Node.js with npm, which installs the browser and what drives
+# it into .venv/page; left out, with a word, where there is no Node.js or nothing can be installed. CHROMIUM names a browser
+# of your own. Pictures are left in .venv/page/pages.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+if ! command -v npm >/dev/null; then
+    echo "there is no npm: the page is not tested in a browser"
+    exit
+fi
+program=${CONDYLE_PROGRAM:-${CARGO_TARGET_DIR:-target}/debug/condyle}
+[ -x "$program" ] || cargo build --locked -p condyle-cli
+folder=$PWD/.venv/page
+mkdir -p "$folder/pages"
+cp tests/page/package.json tests/page/package-lock.json tests/page/page.test.js "$folder"
+if ! cmp -s "$folder/package-lock.json" "$folder/installed"; then
+    if ! (cd "$folder" && npm ci --ignore-scripts --silent); then
+        echo "npm could install no browser: the page is not tested in one"
+        exit
+    fi
+    cp "$folder/package-lock.json" "$folder/installed"
+fi
+"$program" plan --out "$folder/pages/reach.html" >/dev/null
+"$program" plan --example trot >"$folder/pages/trot.toml"
+"$program" plan "$folder/pages/trot.toml" --out "$folder/pages/trot.html" >/dev/null
+cd "$folder" && PAGES="$folder/pages" npm test --silent

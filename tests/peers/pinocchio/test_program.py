@@ -1,0 +1,150 @@
+"""The program on all robots of example-robot-data: what `inspect` says against Pinocchio, `check`, `budget`.
+
+It is looked for where cargo builds it (`cargo test` does), or where CONDYLE_PROGRAM says.
+"""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from example_robot_data.robots_loader import ROBOTS
+from test_cassie import path as cassie_path
+from test_robots import NO_URDF, root_joint, urdf_path
+
+ROOT = Path(__file__).resolve().parents[3]
+ROUNDING = 1e-10
+
+
+def find_program() -> str | None:
+    if given := os.environ.get("CONDYLE_PROGRAM"):
+        return given
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    built = [target / kind / "condyle" for kind in ("release", "debug") if (target / kind / "condyle").is_file()]
+    return str(max(built, key=lambda path: path.stat().st_mtime)) if built else None
+
+
+PROGRAM = find_program()
+pytestmark = pytest.mark.skipif(PROGRAM is None, reason="the program is not built: cargo build -p condyle-cli")
+
+
+QUADRUPEDS = {
+    "anymal": ("FOOT", ["LF", "RF", "LH", "RH"], "{}_HFE", "{}_KFE", (0.7, -1.0), True),
+    "solo12": ("FOOT", ["FL", "FR", "HL", "HR"], "{}_HFE", "{}_KFE", (0.7, -1.4), True),
+    "a1": ("foot", ["FL", "FR", "RL", "RR"], "{}_thigh_joint", "{}_calf_joint", (0.8, -1.6), False),
+    "go1": ("foot", ["FL", "FR", "RL", "RR"], "{}_thigh_joint", "{}_calf_joint", (0.8, -1.6), False),
+    "hyq": ("foot", ["lf", "rf", "lh", "rh"], "{}_hfe_joint", "{}_kfe_joint", (0.7, -1.4), True),
+}
+"""Ends of the feet's names, legs, joints of thigh and shank, their angles, and whether the hind knees bend forwards."""
+
+
+def phase(kind: str, knots: int, **numbers: object) -> str:
+    lines = [f"{key} = {json.dumps(value)}" for key, value in {"kind": kind, "knots": knots, **numbers}.items()]
+    return "\n".join(["[[phase]]", *lines, ""])
+
+
+def gait(name: str, feet: str, posture: dict[str, float], phases: list[str], dt: float) -> str:
+    joints = "\n".join(f"{json.dumps(joint)} = {angle}" for joint, angle in posture.items())
+    head = f"robot = {json.dumps(urdf_path(name))}\nroot = 'free'\ndt = {dt}\n[feet]\n{feet}\n[posture]\n{joints}\n"
+    return head + "".join(phases)
+
+
+def plan(task: str, folder: Path) -> dict:
+    (folder / "task.toml").write_text(task)
+    files = ["--out", str(folder / "plan.html"), "--record", str(folder / "motion.npz")]
+    line = [str(PROGRAM), "plan", str(folder / "task.toml"), *files, "--json"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return dict(np.load(folder / "motion.npz"))
+
+
+def check_motion(name: str, motion: dict, ahead: float) -> None:
+    """It goes where it should, within Pinocchio's limits, and its states are q ⊕ v Δt."""
+    model = pin.buildModelFromUrdf(urdf_path(name), pin.JointModelFreeFlyer())
+    q, v, tau = motion["q"], motion["v"], motion["tau"]
+    assert abs(q[-1, 0] - q[0, 0] - ahead) < 0.03
+    room = 1e-4
+    assert (q[:, 7:] >= model.lowerPositionLimit[7:] - room).all()
+    assert (q[:, 7:] <= model.upperPositionLimit[7:] + room).all()
+    assert (np.abs(v[:, 6:]) <= model.velocityLimit[6:] + room).all()
+    assert (np.abs(tau[:, 6:]) <= model.effortLimit[6:] + room).all()
+    for k, dt in enumerate(np.diff(motion["times"])):
+        assert np.abs(pin.difference(model, q[k], q[k + 1]) - dt * v[k + 1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", list(QUADRUPEDS))
+@pytest.mark.parametrize("kind", ["trot", "jump"])
+def test_gaits(name: str, kind: str, tmp_path: Path) -> None:
+    end, legs, thigh, shank, angles, forwards = QUADRUPEDS[name]
+    feet = [f"{leg}_{end}" for leg in legs]
+    posture = {}
+    for number, leg in enumerate(legs):
+        sign = -1 if forwards and number >= 2 else 1
+        posture |= {thigh.format(leg): sign * angles[0], shank.format(leg): sign * angles[1]}
+    ahead = 0.06
+    if kind == "trot":
+        one, other = [feet[1], feet[2]], [feet[0], feet[3]]
+        step = {"length": ahead / 2, "height": 0.04}
+        phases = [phase("stand", 10), phase("step", 25, feet=one, **step), phase("stand", 5)]
+        phases += [phase("step", 25, feet=other, length=ahead, height=0.04), phase("stand", 5)]
+        phases += [phase("step", 25, feet=one, **step), phase("stand", 15)]
+    else:
+        phases = [phase("stand", 30), phase("jump", 26, length=ahead, height=0.08), phase("stand", 40)]
+    check_motion(name, plan(gait(name, f"points = {json.dumps(feet)}", posture, phases, 0.01), tmp_path), ahead)
+
+
+def test_walk(tmp_path: Path) -> None:
+    feet = ["left_sole_link", "right_sole_link"]
+    angles = {3: -0.4, 4: 0.8, 5: -0.4}
+    posture = {f"leg_{side}_{k}_joint": angle for side in ("left", "right") for k, angle in angles.items()}
+    phases = [phase("stand", 10)]
+    for foot, length in ((feet[1], 0.15), (feet[0], 0.3), (feet[1], 0.15)):
+        phases += [phase("step", 20, feet=[foot], length=length, height=0.06), phase("stand", 9)]
+    soles = f"soles = {json.dumps(feet)}\nsize = [0.2, 0.1]"
+    check_motion("talos", plan(gait("talos", soles, posture, phases, 0.03), tmp_path), 0.3)
+
+
+def run(command: str, name: str, *flags: str) -> dict:
+    path = cassie_path() if name in NO_URDF else urdf_path(name)
+    root = ["--root", "free"] if root_joint(name) else []
+    line = [str(PROGRAM), command, path, *root, "--json", *flags]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, (name, done.stderr)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in NO_URDF])
+def test_inspect(name: str) -> None:
+    root = [pin.JointModelFreeFlyer()] if root_joint(name) else []
+    model = pin.buildModelFromUrdf(urdf_path(name), *root)
+    report = run("inspect", name)
+    assert (report["nq"], report["nv"]) == (model.nq, model.nv)
+    assert [body["joint"] for body in report["bodies"]] == list(model.names)[1:]
+    masses = np.array([body["mass"] for body in report["bodies"]])
+    theirs = np.array([inertia.mass for inertia in list(model.inertias)[1:]])
+    assert np.abs(masses - theirs).max() < ROUNDING
+    assert abs(report["mass"] - theirs.sum()) < ROUNDING * (1 + theirs.sum())
+    for body, inertia in zip(report["bodies"], list(model.inertias)[1:], strict=True):
+        if inertia.mass > 0:
+            assert np.abs(np.array(body["com"]) - inertia.lever).max() < ROUNDING
+            moments = np.sort(np.linalg.eigvalsh(inertia.inertia))
+            assert np.abs(np.array(body["moments"]) - moments).max() < ROUNDING
+    com = pin.centerOfMass(model, model.createData(), pin.neutral(model))
+    assert np.abs(np.array(report["com"]) - com).max() < ROUNDING
+
+
+@pytest.mark.parametrize("name", list(ROBOTS))
+def test_check(name: str) -> None:
+    report = run("check", name, "--states", "20")
+    assert report["pass"]
+    assert len(report["rows"]) >= 32
+
+
+@pytest.mark.parametrize("name", list(ROBOTS))
+def test_budget(name: str) -> None:
+    report = run("budget", name, "--knots", "4", "--repetitions", "1", "--cores", "2")
+    assert len(report["algorithms"]) == 6
+    assert all(row["finite"] for row in report["iterations"])
