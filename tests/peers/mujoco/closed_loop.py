@@ -124,9 +124,8 @@ def main() -> None:
     for name in chosen:
         made = tables[name]()
         print(made, flush=True)
-        text = re.sub(
-            rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", lambda m, made=made: m[1] + made + m[2], text, flags=re.S
-        )
+        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
+        text = re.sub(pattern, lambda m, made=made: f"{m[1]}{made}\n{m[2]}", text, flags=re.S)
     if "--write" in sys.argv:
         DOCUMENT.write_text(text, encoding="utf-8")
 
