@@ -63,7 +63,7 @@ for (const name of ["reach", "trot"]) {
     await settled(page);
     assert.equal(await clock(page), paused);
     await page.evaluate(() => document.activeElement.blur());
-    await page.keyboard.press("ArrowRight");
+    for (let k = 0; k < 2; k++) await page.keyboard.press("ArrowRight"); // the first may go less than what the clock shows
     assert.ok((await clock(page)) > paused);
     await page.keyboard.press("Space");
     await page.waitForFunction(() => document.querySelector("#play").classList.contains("playing"));
