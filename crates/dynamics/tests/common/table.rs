@@ -129,13 +129,14 @@ fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
 }
 
 /// The functions that need no `Data`, or bring their own.
-const WITHOUT_DATA: [&str; 9] = [
+const WITHOUT_DATA: [&str; 10] = [
     "integrate",
     "difference",
     "interpolate",
     "distance",
     "normalize",
     "transport",
+    "frame_jacobian_alone",
     "passive_torque",
     "log-Cholesky",
     "simulation",
