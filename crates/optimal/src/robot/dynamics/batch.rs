@@ -20,7 +20,7 @@ use condyle_dynamics::{
     constrained_dynamics_equations, rnea, rnea_derivatives,
 };
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, gather_rows};
+use condyle_spatial::block::{Block, gather_rows, scatter};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -278,7 +278,7 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
         let Self { size, limbs, tableau, before, inverses } = self;
         let (mut regular, mut each) = (S::zero(), [0.0; WIDEST]);
         invert_limbs(limbs, *size, tableau, inverses, &mut regular);
-        regular.store(&mut each);
+        scatter(core::slice::from_ref(&regular), to.len(), &mut each);
         for (to, regular) in to.iter_mut().zip(each) {
             to.limbs_solved = regular == 1.0;
         }
