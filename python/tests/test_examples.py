@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-SHARED = {"ground"}  # what examples have in common
+SHARED = {"gait", "ground"}  # what examples have in common
 FOLDER = Path(__file__).parents[1] / "examples"
 EXAMPLES = sorted(path for path in FOLDER.glob("*.py") if path.stem not in SHARED)
 
