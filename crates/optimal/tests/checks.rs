@@ -145,7 +145,7 @@ fn weights_that_make_no_sense_are_refused_between_solves() {
     for bad in [NAN, f64::INFINITY, -1.0] {
         let message = format!("cost `rest`: its weight is {bad}, expected a finite number of at least 0");
         let wrong = Cost::new("rest", bad, Residual::ControlGravity, Activation::Quadratic);
-        assert_eq!(knot.set_costs(1, vec![wrong]).unwrap_err().to_string(), message);
+        assert_eq!(knot.set_costs(1, vec![wrong]).unwrap_err().to_string(), format!("{message} (knot 1)"));
         assert_eq!(knot.set_weight("rest", bad).unwrap_err().to_string(), message);
         assert_eq!(knot.costs_mut().set_weight("rest", bad).unwrap_err().to_string(), message);
         assert_eq!(knot.costs_mut().terms()[0].weight, 1.0);

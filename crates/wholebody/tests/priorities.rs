@@ -83,7 +83,7 @@ fn forms_agree_on_priorities() {
         for seed in 0..3 {
             let (q, v) = near(model, &centre, seed, 0.02, 0.1);
             let command = |backend, form| {
-                let settings = Settings { form, backend, tolerance: 1e-11, ..Settings::default() };
+                let settings = Settings { form, backend, tolerance: 1e-11, force_weight: 1e-5, ..Settings::default() };
                 let mut controller = WholeBodyController::new(model, &contacts, &tasks, settings).unwrap();
                 let mut references = controller.hold(&q);
                 references.com.acceleration.x = push;

@@ -13,7 +13,7 @@ fn every_set_of_contacts() {
     let (model, contacts) = (robots::quadruped(), feet(0.7));
     // The forces' small weight needs more than the default for torques to be compared.
     let make = |contacts: &[FrictionContact]| {
-        let settings = Settings { tolerance: 1e-13, ..Settings::default() };
+        let settings = Settings { tolerance: 1e-13, force_weight: 1e-5, ..Settings::default() };
         WholeBodyController::new(&model, contacts, &tasks(), settings).unwrap()
     };
     let mut controller = make(&contacts);

@@ -140,7 +140,9 @@ impl Robot {
 
     /// The settings with which it was recorded.
     pub fn settings() -> Settings {
-        Settings { contact_gains: Gains { stiffness: 0.0, damping: 40.0 }, ..Settings::default() }
+        let contact_gains = Gains { stiffness: 0.0, damping: 40.0 };
+        // so that how the feet share the load is decided well above rounding
+        Settings { contact_gains, force_weight: 1e-5, ..Settings::default() }
     }
 
     pub fn controller(&self, settings: Settings) -> WholeBodyController {
