@@ -70,10 +70,10 @@ impl Model {
 
     /// The same robot with constants of another type, its inertias given by a function of (body, inertia).
     ///
-    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters. [`Body::inertia`] has
-    /// their real parts, by which the robot is checked: [`warnings`](Self::warnings) and
-    /// [`singular_joints`](Self::singular_joints) are those of the new inertias. Inertias of several lanes are not looked
-    /// at: the model keeps what was found of the plain ones.
+    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters.
+    /// [`Body::inertia`](crate::Body::inertia) has their real parts, by which the robot is checked:
+    /// [`warnings`](Self::warnings) and [`singular_joints`](Self::singular_joints) are those of the new inertias. Inertias of
+    /// several lanes are not looked at: the model keeps what was found of the plain ones.
     ///
     /// ```
     /// use condyle_model::{Inertia, robots};
