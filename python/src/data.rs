@@ -3,7 +3,8 @@
 use crate::batch;
 use crate::exceptions::within;
 use crate::hyper_dual::Hyper;
-use crate::model::{MadeFor, Model};
+use crate::made_for::MadeFor;
+use crate::model::Model;
 use pyo3::PyClass;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

@@ -3,7 +3,8 @@
 use crate::arrays::{Give, class, matrix, vector};
 use crate::exceptions::within;
 use crate::functions::{Argument, Forces, Position, Tangent, regular, rows};
-use crate::model::{MadeFor, Model};
+use crate::made_for::MadeFor;
+use crate::model::Model;
 use crate::signals::{self, Signals};
 use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};

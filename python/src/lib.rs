@@ -32,6 +32,7 @@ mod hyper_dual;
 mod inertial_parameters;
 mod joint;
 mod kinematics;
+mod made_for;
 mod model;
 mod optimal;
 mod regressors;

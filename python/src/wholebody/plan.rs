@@ -2,7 +2,8 @@
 
 use crate::arrays::{Input, matrix, numbers, output, tensor, vector};
 use crate::exceptions::controller_error;
-use crate::model::{MadeFor, Model};
+use crate::made_for::MadeFor;
+use crate::model::Model;
 use condyle::Joint;
 use condyle::wholebody as rust;
 use numpy::ndarray::Dimension;

@@ -127,14 +127,20 @@ pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
 pub(super) fn coordinates_of(model: &Model, frames: impl IntoIterator<Item = usize>) -> Vec<usize> {
     let mut coordinates = Vec::new();
     for frame in frames {
-        let mut body = model.frames()[frame].body;
-        while body > 0 {
-            let joint = &model.bodies()[body];
-            coordinates.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
-            body = joint.parent;
-        }
+        coordinates.extend(path(model, model.frames()[frame].body));
     }
     coordinates.sort_unstable();
     coordinates.dedup();
     coordinates
+}
+
+/// The coordinates of a body's joint and of those before it, up to the world.
+pub(super) fn path(model: &Model, body: usize) -> Vec<usize> {
+    let (mut path, mut body) = (Vec::new(), body);
+    while body > 0 {
+        let joint = &model.bodies()[body];
+        path.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
+        body = joint.parent;
+    }
+    path
 }

@@ -7,7 +7,7 @@
 
 use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
-    LimbElimination, invert_limbs, put_back, solve_limbs, write_drift, write_jacobian, write_motion,
+    LimbElimination, invert_limbs, restore, solve_limbs, write_drift, write_jacobian, write_motion,
 };
 use crate::robot::contact::{Contact, constraint_set};
 use crate::robot::continuous::Wanted;
@@ -288,7 +288,7 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
         }
         solve_limbs(limbs, *size, tableau, inverses);
         if !all {
-            put_back(regular, before, tableau);
+            restore(regular, before, tableau);
         }
         unpack(tableau, to, |to| &mut to.equations);
     }

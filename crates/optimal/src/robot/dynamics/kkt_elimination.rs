@@ -76,16 +76,20 @@ enum Place {
     Row(usize),
 }
 
+/// The driven coordinates that move a contact's row r and no other contact's.
+pub(super) fn own_coordinates(moved_by: &[Vec<usize>], r: usize, passive: usize) -> Vec<usize> {
+    let alone = |k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
+    moved_by[r].iter().copied().filter(|k| *k >= passive && alone(k)).collect()
+}
+
 impl KktElimination {
     /// The elimination for contacts whose rows are moved by some coordinates each, of a robot whose first `passive`
     /// coordinates are not driven.
     pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>], limbs: &LimbElimination) -> Self {
         let rows = moved_by.len();
-        let driven = |k: &usize| *k >= passive;
-        let alone = |r: usize, k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
         let preferred = (0..rows).map(|r| {
-            let own: Vec<_> = moved_by[r].iter().copied().filter(|k| driven(k) && alone(r, k)).collect();
-            if own.is_empty() { moved_by[r].iter().copied().filter(driven).collect() } else { own }
+            let own = own_coordinates(moved_by, r, passive);
+            if own.is_empty() { moved_by[r].iter().copied().filter(|k| *k >= passive).collect() } else { own }
         });
         Self {
             tableau: Tableau { nv, rows },

@@ -14,7 +14,8 @@
 //! its pivots are chosen one by one.
 #![allow(non_snake_case)] // B, J, M, T, Y
 
-use super::kkt_elimination::{PREFERENCE, Tableau};
+use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
+use crate::robot::contact::path;
 use condyle_dynamics::Model;
 use condyle_spatial::{Scalar, kernel};
 use core::ops::Range;
@@ -68,9 +69,8 @@ impl LimbElimination {
         while first < rows {
             let moved = &moved_by[first];
             let count = moved_by[first..].iter().take_while(|other| *other == moved).count();
-            let alone = |k: &usize| moved_by.iter().all(|other| other == moved || !other.contains(k));
             let twins = moved_by.iter().filter(|other| *other == moved).count();
-            let solved: Vec<_> = moved.iter().copied().filter(|k| *k >= passive && alone(k)).collect();
+            let solved = own_coordinates(moved_by, first, passive);
             if solved.len() == count && twins == count && SIZES.contains(&count) {
                 let range = first..first + count;
                 let held = moved.iter().copied().filter(|k| !solved.contains(k));
@@ -100,13 +100,8 @@ impl LimbElimination {
 fn coupled(model: &Model) -> Vec<bool> {
     let nv = model.nv();
     let mut coupled = vec![false; nv * nv];
-    for leaf in 1..model.bodies().len() {
-        let (mut path, mut body) = (Vec::new(), leaf);
-        while body > 0 {
-            let joint = &model.bodies()[body];
-            path.extend(joint.idx_v..joint.idx_v + joint.joint.nv());
-            body = joint.parent;
-        }
+    for body in 1..model.bodies().len() {
+        let path = path(model, body);
         for &i in &path {
             path.iter().for_each(|&j| coupled[i * nv + j] = true);
         }
@@ -241,8 +236,8 @@ kernel! {
 }
 
 kernel! {
-    /// Puts a tableau back for the knots that are not regular.
-    pub(crate) fn put_back<S>(regular: S, before: &[S], T: &mut [S]) {
+    /// Restores the tableau of the knots that are not regular.
+    pub(crate) fn restore<S>(regular: S, before: &[S], T: &mut [S]) {
         let keep = S::zero().lt(regular);
         for (to, before) in T.iter_mut().zip(before) {
             *to = S::select(keep, *to, *before);
