@@ -1,6 +1,7 @@
 //! What the page draws: the simple shapes of a URDF, or bones between the joints where it has none.
 
 use crate::robot::{Format, Robot};
+use crate::visuals::{self, Geometry};
 use condyle::{Act, Data, Model, Quaternion, Se3, Vec3, forward_kinematics};
 use serde::Serialize;
 use std::collections::HashMap;
@@ -48,39 +49,27 @@ pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize]) -> Vec<Body> 
 /// Boxes, cylinders, spheres and capsules of the URDF's visuals, by body.
 fn primitives(model: &Model, urdf: &str) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
-    // A visual that urdf-rs cannot read is no reason not to plan: then there are bones.
-    let Ok(robot) = urdf_rs::read_from_string(urdf) else { return shapes };
-    for link in &robot.links {
-        let Ok(frame) = model.frame(&link.name) else { continue };
+    for visual in visuals::read(urdf) {
+        let Ok(frame) = model.frame(&visual.link) else { continue };
         let frame = &model.frames()[frame];
-        for visual in &link.visual {
-            let (kind, size) = match &visual.geometry {
-                urdf_rs::Geometry::Box { size } => ("box", size.0.to_vec()),
-                urdf_rs::Geometry::Cylinder { radius, length } => ("cylinder", vec![*radius, *length]),
-                urdf_rs::Geometry::Capsule { radius, length } => ("capsule", vec![*radius, *length]),
-                urdf_rs::Geometry::Sphere { radius } => ("sphere", vec![*radius]),
-                urdf_rs::Geometry::Mesh { .. } => continue,
-            };
-            let material = visual.material.as_ref();
-            let color = material.and_then(|m| {
-                let global = robot.materials.iter().find(|g| g.name == m.name).and_then(|g| g.color.as_ref());
-                m.color.as_ref().or(global).map(|c| {
-                    let byte = |x: f64| (255.0 * x.clamp(0.0, 1.0)).round() as u8;
-                    format!("#{:02x}{:02x}{:02x}", byte(c.rgba.0[0]), byte(c.rgba.0[1]), byte(c.rgba.0[2]))
-                })
-            });
-            let [roll, pitch, yaw] = visual.origin.rpy.0;
-            let rotation = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
-            let origin = nalgebra::Isometry3::from_parts(visual.origin.xyz.0.into(), rotation);
-            let pose = pose(frame.placement * Se3::from(origin));
-            shapes.entry(frame.body).or_default().push(Shape {
-                kind,
-                size,
-                position: [pose[0], pose[1], pose[2]],
-                quaternion: [pose[3], pose[4], pose[5], pose[6]],
-                color,
-            });
-        }
+        let (kind, size) = match visual.geometry {
+            Geometry::Box(size) => ("box", size.to_vec()),
+            Geometry::Cylinder { radius, length } => ("cylinder", vec![radius, length]),
+            Geometry::Capsule { radius, length } => ("capsule", vec![radius, length]),
+            Geometry::Sphere(radius) => ("sphere", vec![radius]),
+        };
+        let color = visual.color.map(|rgba| {
+            let [r, g, b, _] = rgba.map(|x| (255.0 * x.clamp(0.0, 1.0)).round() as u8);
+            format!("#{r:02x}{g:02x}{b:02x}")
+        });
+        let pose = pose(frame.placement * visual.origin);
+        shapes.entry(frame.body).or_default().push(Shape {
+            kind,
+            size,
+            position: [pose[0], pose[1], pose[2]],
+            quaternion: [pose[3], pose[4], pose[5], pose[6]],
+            color,
+        });
     }
     shapes
 }
