@@ -27,7 +27,7 @@ struct Forked {
     next: OnceLock<Box<Forked>>,
 }
 
-/// Where work is shared.
+/// The pool in which work is shared.
 enum Pool {
     /// The pool that the calling thread belongs to.
     Current,
@@ -84,6 +84,21 @@ pub fn threads() -> usize {
 
 /// Does some work in the pool whose [`threads`] share it, so that no [`join`] within has to enter it.
 pub fn enter<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    let (mut work, mut result) = (Some(work), None);
+    enter_dyn(&mut || result = work.take().map(|work| work()));
+    result.expect("the work was done")
+}
+
+/// Does two pieces of work, at the same time if one of the [`threads`] is free.
+pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
+    let (mut one, mut other) = (Some(one), Some(other));
+    join_dyn(&mut || one.take().into_iter().for_each(|one| one()), &mut || {
+        other.take().into_iter().for_each(|other| other());
+    });
+}
+
+/// [`enter`], compiled once for all kinds of work: what rayon makes of each is some kilobytes.
+fn enter_dyn(work: &mut (dyn FnMut() + Send)) {
     match pool() {
         Pool::Global => rayon::scope(|_| work()),
         Pool::Forked(pool) => pool.install(work),
@@ -91,11 +106,16 @@ pub fn enter<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     }
 }
 
-/// Does two pieces of work, at the same time if one of the [`threads`] is free.
-pub fn join<A: Send, B: Send>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B + Send) -> (A, B) {
+/// [`join`], likewise.
+fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     match pool() {
-        Pool::Current | Pool::Global => rayon::join(one, other),
-        Pool::Forked(pool) => pool.install(|| rayon::join(one, other)),
-        Pool::Missing => (one(), other()),
+        Pool::Missing => {
+            one();
+            other();
+        }
+        Pool::Forked(pool) => pool.install(|| join_dyn(one, other)),
+        Pool::Current | Pool::Global => {
+            rayon::join(one, other);
+        }
     }
 }
