@@ -6,7 +6,7 @@ mod common;
 use common::*;
 use condyle_dynamics::{Data, gravity, integrate, robots};
 use condyle_wholebody::{
-    Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
+    Backend, Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
 };
 
 /// Finite, and within the limits to the last bit.
@@ -85,6 +85,23 @@ fn nothing_breaks_the_limits() {
             assert!(command.status != Status::Solved || command.source == CommandSource::Solution);
             assert!(contacts[0].min_force == 0.0 || command.status != Status::Solved, "5000 N on each foot");
             assert!(max_iterations > 2 || command.status == Status::IterationLimit, "{:?}", command.status);
+        }
+    }
+}
+
+/// No time at all is too little for each back end, which says so.
+#[test]
+fn too_slow_is_a_status() {
+    let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
+    let effort = model.limits().effort.clone();
+    for backend in [Backend::InteriorPoint, Backend::Clarabel] {
+        let settings = Settings { backend, time_limit: 1e-12, ..Settings::default() };
+        let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();
+        let references = controller.hold(&q);
+        for _ in 0..10 {
+            let command = controller.step(&q, &v, &references);
+            is_safe(command, &effort);
+            assert_eq!(command.status, Status::TimeLimit, "{backend:?}");
         }
     }
 }
