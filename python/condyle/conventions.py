@@ -82,7 +82,8 @@ def rotation(quaternion: ArrayLike) -> _Array:
     xyz, w = Q[..., :3], Q[..., 3]
     outer = xyz[..., :, None] * xyz[..., None, :]
     square = (w**2 - (xyz**2).sum(-1))[..., None, None]
-    return square * np.eye(3) + 2.0 * outer + 2.0 * w[..., None, None] * _hat(xyz)
+    R: _Array = square * np.eye(3) + 2.0 * outer + 2.0 * w[..., None, None] * _hat(xyz)
+    return R
 
 
 def wrench_to_body(oXb: ArrayLike, wrench: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> _Array:
@@ -327,11 +328,13 @@ def _pose(oXb: ArrayLike) -> tuple[_Array, _Array]:
 
 
 def _turn(R: _Array, x: _Array) -> _Array:
-    return np.einsum("...ij,...j->...i", R, x)
+    out: _Array = np.einsum("...ij,...j->...i", R, x)
+    return out
 
 
 def _turn_back(R: _Array, x: _Array) -> _Array:
-    return np.einsum("...ji,...j->...i", R, x)
+    out: _Array = np.einsum("...ji,...j->...i", R, x)
+    return out
 
 
 def _hat(x: _Array) -> _Array:
