@@ -51,11 +51,11 @@ def linked(library: Path, platform: str) -> list[str]:
     if not needed:
         return ["objdump names no library that is needed"]
     found = [f"it needs {name}, which no manylinux tag allows" for name in sorted(needed - ALLOWED)]
-    versions = [(int(a), int(b)) for a, b in re.findall(r"GLIBC_(\d+)\.(\d+)", told)]
+    newest = max((int(a), int(b)) for a, b in re.findall(r"GLIBC_(\d+)\.(\d+)", told))
     promised = re.search(r"manylinux_(\d+)_(\d+)", platform)
-    if promised and max(versions) > (int(promised[1]), int(promised[2])):
-        found.append(f"it needs glibc {max(versions)}, its tag promises {promised[0]}")
-    print(f"needs {', '.join(sorted(needed))}; glibc {'.'.join(map(str, max(versions)))}")
+    if promised and newest > (int(promised[1]), int(promised[2])):
+        found.append(f"it needs glibc {newest[0]}.{newest[1]}, its tag promises {promised[0]}")
+    print(f"needs {', '.join(sorted(needed))}; glibc {newest[0]}.{newest[1]}")
     return found
 
 
