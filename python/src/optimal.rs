@@ -1,6 +1,7 @@
 //! Optimal control as Python sees it: the module `condyle.optimal`.
 
 mod actions;
+mod alone;
 mod costs;
 mod evaluation;
 mod models;
@@ -12,8 +13,8 @@ mod solvers;
 mod sweep;
 
 pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
+pub(crate) use alone::{Alone, alone};
 pub(crate) use costs::{Activation, Cost, Limit};
-pub(crate) use models::{Alone, alone};
 pub(crate) use own::{Action, ConstrainedAction, DifferentialAction, Lqr, Unicycle};
 pub(crate) use problem::{Problem, lock};
 pub(crate) use residuals::{FrictionCone, Residual, WrenchCone};
