@@ -23,6 +23,7 @@ mod scene;
 mod states;
 mod task;
 mod terminal;
+mod visuals;
 mod watch;
 
 use clap::error::ErrorKind;

@@ -2,6 +2,7 @@
 
 use crate::meshes::{Meshes, mjcf};
 use crate::robot::{Format, Robot};
+use crate::visuals::{self, Geometry};
 use condyle::{Act, Data, Model, Quaternion, Se3, Vec3, forward_kinematics};
 use serde::Serialize;
 use std::collections::HashMap;
@@ -70,37 +71,25 @@ fn hex(color: &[f64]) -> String {
 /// shows nothing else has an empty list.
 fn shapes_of_urdf(model: &Model, urdf: &str, mut meshes: Option<&mut Meshes>) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
-    // A visual that urdf-rs cannot read is no reason not to plan: then there are bones.
-    let Ok(robot) = urdf_rs::read_from_string(urdf) else { return shapes };
-    for link in &robot.links {
-        let Ok(frame) = model.frame(&link.name) else { continue };
+    for visual in visuals::read(urdf) {
+        let Ok(frame) = model.frame(&visual.link) else { continue };
         let frame = &model.frames()[frame];
-        for visual in &link.visual {
-            let (kind, size) = match &visual.geometry {
-                urdf_rs::Geometry::Box { size } => ("box", size.0.to_vec()),
-                urdf_rs::Geometry::Cylinder { radius, length } => ("cylinder", vec![*radius, *length]),
-                urdf_rs::Geometry::Capsule { radius, length } => ("capsule", vec![*radius, *length]),
-                urdf_rs::Geometry::Sphere { radius } => ("sphere", vec![*radius]),
-                urdf_rs::Geometry::Mesh { scale, .. } => ("mesh", scale.map_or([1.0; 3], |scale| scale.0).to_vec()),
-            };
-            let material = visual.material.as_ref();
-            let color = material.and_then(|m| {
-                let global = robot.materials.iter().find(|g| g.name == m.name).and_then(|g| g.color.as_ref());
-                m.color.as_ref().or(global).map(|c| hex(&c.rgba.0))
-            });
-            let [roll, pitch, yaw] = visual.origin.rpy.0;
-            let rotation = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
-            let origin = nalgebra::Isometry3::from_parts(visual.origin.xyz.0.into(), rotation);
-            let pose = pose(frame.placement * Se3::from(origin));
-            let place = shapes.entry(frame.body);
-            if let urdf_rs::Geometry::Mesh { filename, .. } = &visual.geometry {
+        let color = visual.color.map(|rgba| hex(&rgba));
+        let pose = pose(frame.placement * visual.origin);
+        let place = shapes.entry(frame.body);
+        let (kind, size) = match visual.geometry {
+            Geometry::Box(size) => ("box", size.to_vec()),
+            Geometry::Cylinder { radius, length } => ("cylinder", vec![radius, length]),
+            Geometry::Capsule { radius, length } => ("capsule", vec![radius, length]),
+            Geometry::Sphere(radius) => ("sphere", vec![radius]),
+            Geometry::Mesh { file, scale } => {
                 if let Some(meshes) = meshes.as_deref_mut() {
-                    place.or_default().extend(parts(meshes, filename, &size, pose, color.as_deref()));
+                    place.or_default().extend(parts(meshes, &file, &scale, pose, color.as_deref()));
                 }
                 continue;
             }
-            place.or_default().push(Shape { kind, size, color, ..at(pose) });
-        }
+        };
+        place.or_default().push(Shape { kind, size, color, ..at(pose) });
     }
     shapes
 }
