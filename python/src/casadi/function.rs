@@ -33,7 +33,7 @@ pub(crate) enum Kind {
 pub(super) enum Pattern {
     /// None.
     Zero,
-    /// Those by coordinates that move a body in common.
+    /// The entries by coordinates that move a body in common.
     Related,
     /// All.
     Full,
