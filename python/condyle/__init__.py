@@ -71,10 +71,11 @@ Contacts, loops, impacts: `ContactConstraint`, `ConstraintSet`, `constrained_dyn
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
-Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `casadi` (imported by itself)
+Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `conventions`
+    (other libraries' numbers), `casadi` (imported by itself)
 """
 
-from . import inertial_parameters, optimal, robots, simulation, wholebody
+from . import conventions, inertial_parameters, optimal, robots, simulation, wholebody
 from ._condyle import (
     WORLD,
     BodyId,
@@ -251,6 +252,7 @@ __all__ = [
     "constrained_dynamics",
     "constrained_dynamics_derivatives",
     "constrained_dynamics_equations",
+    "conventions",
     "coriolis_derivatives",
     "coriolis_matrix",
     "crba",

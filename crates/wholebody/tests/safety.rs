@@ -183,7 +183,7 @@ fn limits_give_way_to_contacts() {
     let mut upper = model.limits().upper.clone();
     (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are beyond: no motion of the trunk brings them all back
     let limits = JointLimits { upper: Some(upper), ..JointLimits::default() };
-    let settings = Settings { joint_limits: Some(limits), force_weight: 1e-5, ..Settings::default() };
+    let settings = Settings { joint_limits: Some(limits), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();
     let references = controller.hold(&q);
     let command = controller.step(&q, &[0.0; 18], &references);

@@ -40,7 +40,7 @@ pub(super) struct Output {
 pub(super) enum Pattern {
     /// None.
     Zero,
-    /// Those by coordinates that move a body in common.
+    /// The entries by coordinates that move a body in common.
     Related,
     /// All.
     Full,

@@ -49,7 +49,7 @@ pub(crate) struct Problem {
     written: Mutex<Vec<Py<PyAny>>>,
     /// The first error of the actions.
     fault: Fault,
-    /// Those of the residuals.
+    /// The errors of the residuals.
     faults: Mutex<Vec<Fault>>,
     /// How often the horizon has moved on.
     moved: AtomicUsize,

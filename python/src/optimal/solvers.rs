@@ -51,7 +51,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     Ok(())
 }
 
-/// Who looks at the iterations of a solve.
+/// The observer of the iterations of a solve.
 struct Observer<'py> {
     callback: Option<Bound<'py, PyAny>>,
     verbose: bool,

@@ -27,9 +27,9 @@ pub(super) fn check(model: &Model) -> Vec<Row> {
     let q = limits::start(model);
     let v: Vec<f64> = normal(&mut source(3), model.nv()).into_iter().map(|x| SPEED * x).collect();
     let row = |(name, integrator, bound, order)| {
-        let mut row = Row::new(name, "E(t) = E(0) in free motion");
+        let mut row = Row::new(name, "E(t) = E(0) in free motion", "small steps, or falling by the integrator's order");
         for dt in STEPS {
-            row = Row::new(row.name, row.equation);
+            row = Row::new(row.name, row.equation, row.because);
             let drifts = [1, 2, 4].map(|part| drift(model, integrator, dt / part as f64, COUNT * part, &q, &v));
             let [_, Some(before), Some(last)] = drifts else {
                 row.see(f64::NAN, bound);
