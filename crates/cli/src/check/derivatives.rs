@@ -4,7 +4,7 @@ use super::identities::{SOLVES, inverted, spectrum};
 use super::ledger::Row;
 use crate::states::States;
 use condyle::{Data, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_derivatives};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
 /// Both are exact but for rounding.
@@ -82,12 +82,15 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
     rows
 }
 
-/// The numbers of which ∂q̈/∂q = −M⁻¹ ∂τ/∂q (at q̈) and ∂q̈/∂v are the sums: |M⁻¹| |∂τ/∂q|, |M⁻¹| |∂τ/∂v|; M⁻¹ is ∂q̈/∂τ.
+/// The numbers of which ∂q̈/∂q = −M⁻¹ ∂τ/∂q (at q̈) and ∂q̈/∂v are the sums: |M⁻¹| |∂τ/∂q|, |M⁻¹| |∂τ/∂v|, and |M⁻¹| |M| |q̈|,
+/// whose terms cancel in ∂τ/∂q where a whole robot turns; M⁻¹ is ∂q̈/∂τ.
 fn parts(model: &Model, data: &mut Data<f64>, [q, v, tau]: State, M_inverse: &DMatrix<f64>) -> [f64; 3] {
     let qdd = aba(model, data, q, v, tau, &[]).to_vec();
     let d = rnea_derivatives(model, data, q, v, &qdd, &[]);
     let [by_q, by_v] = [d.dtau_dq, d.dtau_dv].map(|d| (M_inverse.abs() * d.abs()).amax());
-    [by_q, by_v, 0.0]
+    let M = crba(model, data, q).abs();
+    let inertial = (M_inverse.abs() * M * DVector::from_column_slice(&qdd).abs()).amax();
+    [by_q.max(inertial), by_v, 0.0]
 }
 
 fn analytical(function: Function, model: &Model, data: &mut Data<f64>, [q, v, x]: State) -> [DMatrix<f64>; 3] {

@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let mut rows = identities::check(&model, states, seed);
     rows.extend(derivatives::check(&model, few, seed));
     rows.extend(ratio::check(&model, few, seed, ARMATURE)?);
-    rows.extend(energy::check(&model));
+    rows.extend(energy::check(&model, ARMATURE)?);
     let report = Report {
         robot: found.source,
         nq: model.nq(),

@@ -11,6 +11,7 @@ pub fn enter<R: Send>(work: impl FnOnce() -> R + Send) -> R {
 }
 
 /// Does two pieces of work, one after the other.
-pub fn join<A: Send, B: Send>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B + Send) -> (A, B) {
-    (one(), other())
+pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
+    one();
+    other();
 }
