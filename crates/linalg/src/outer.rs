@@ -68,7 +68,7 @@ struct Part {
 pub struct OuterProducts {
     /// The numbers of all rows.
     pub rows: Vec<f64>,
-    /// From one row to the next.
+    /// The step from one row to the next.
     stride: usize,
     /// The columns of the sum.
     size: usize,
