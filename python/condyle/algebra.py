@@ -109,10 +109,10 @@ class Motion(_Spatial):
         """v × m or v ×* f: the rate of what moves along with v."""
         if isinstance(other, Motion):
             linear = np.cross(self.angular, other.linear) + np.cross(self.linear, other.angular)
-            return Motion(linear, np.cross(self.angular, other.angular))
+            return type(other)(linear, np.cross(self.angular, other.angular))
         if isinstance(other, Force):
             angular = np.cross(self.angular, other.angular) + np.cross(self.linear, other.linear)
-            return Force(np.cross(self.angular, other.linear), angular)
+            return type(other)(np.cross(self.angular, other.linear), angular)
         raise TypeError("the cross product of a motion is with a motion or a force")
 
     @property
@@ -189,7 +189,7 @@ class SE3:
     def inverse(self) -> "SE3":
         """bXa."""
         back = self.rotation.swapaxes(-1, -2)
-        return SE3(back, -_times(back, self.translation))
+        return type(self)(back, -_times(back, self.translation))
 
     @overload
     def act(self, x: "SE3") -> "SE3": ...
@@ -203,13 +203,13 @@ class SE3:
         """What is written in b, in a: a pose, a motion, a force, or points (…, 3)."""
         R, p = self.rotation, self.translation
         if isinstance(x, SE3):
-            return SE3(R @ x.rotation, _times(R, x.translation) + p)
+            return type(self)(R @ x.rotation, _times(R, x.translation) + p)
         if isinstance(x, Motion):
             angular = _times(R, x.angular)
-            return Motion(_times(R, x.linear) + np.cross(p, angular), angular)
+            return type(x)(_times(R, x.linear) + np.cross(p, angular), angular)
         if isinstance(x, Force):
             linear = _times(R, x.linear)
-            return Force(linear, _times(R, x.angular) + np.cross(p, linear))
+            return type(x)(linear, _times(R, x.angular) + np.cross(p, linear))
         return _times(R, _shaped(x, "x", 3)) + p
 
     __mul__ = act

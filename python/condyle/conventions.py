@@ -47,7 +47,6 @@ __all__ = [
 ]
 
 _Array = NDArray[np.float64]
-_Axes = Literal["body", "world"]
 
 
 def swap_halves(x: ArrayLike, axis: int = -1) -> _Array:
@@ -149,9 +148,9 @@ class FreeJoint(NamedTuple):
     """Quaternions are x, y, z, w, or w, x, y, z."""
     linear_first: bool
     """v = [linear, angular], or [angular, linear]."""
-    linear: _Axes
+    linear: Literal["body", "world"]
     """Along whose axes the linear velocity is."""
-    angular: _Axes
+    angular: Literal["body", "world"]
     """Along whose axes the angular velocity is."""
     angle: bool
     """A revolute joint without limits has its angle for a position, not its cosine and sine."""
