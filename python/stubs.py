@@ -131,6 +131,8 @@ ARGUMENTS = {
     "Settings": "WholeBodyController.settings",
     "Plan": "plan",
     "References": "references",
+    "Any": "_casadi_hold_knot.of",
+    "int | None": "_casadi_hold_knot.t",
 }
 
 # The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
@@ -160,7 +162,7 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Model.tree Problem.to_json _casadi_hold FrictionContact.frame Task.kind",
+    "str": "Model.name Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame Task.kind",
     "str | None": "Task.frame",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"] | None': "FrictionContact.forces",
@@ -178,7 +180,7 @@ RESULTS = {
     "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
     "list[str]": "Model.body_names Model.joint_types Model.names Model.warnings",
     "list[tuple[int, float]]": "Ltdl.row",
-    "tuple[Any, ...]": "Model.__reduce__",
+    "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__",
     "HyperDual": "HyperDual",
     "Model": """
         Model.__copy__ Model.__deepcopy__ Model.lock Model.with_armature Model.with_gravity

@@ -1,20 +1,22 @@
 #!/usr/bin/env python3
 """Times a tick of whole-body control by each of our back ends, and other solvers on the same programs.
 
-    python3 benches/peers/wholebody.py [--json] [--ticks N] [--window N] [--replays N] [--cpu K] [ROBOT ...]
+    python3 benches/peers/wholebody.py [--json] [--write] [--ticks N] [--window N] [--replays N] [--cpu K] [ROBOT ...]
 
 Robots that stand, walk and trot while they are pushed are recorded (benches/peers/wholebody.rs), and the recordings
 are replayed: each tick counts by the least of its replays, so that other work on the machine does not; the p99 of all
-stands beside it. Ours: a whole tick, from state to torques, on cones and on pyramids, and its assembly (kinematics,
-rows and condensing) alone. ProxQP, quadprog, DAQP, eiquadprog (TSID's) and ours: a solve alone, on pyramids, of the
-window's consecutive programs, in both forms, warm-started where they offer it. All run on one core. Talos and ANYmal
-come from example-robot-data. Needs Linux, Rust, Python 3 with venv and a C++ compiler; everything else is installed
-under target/peers.
+stands beside it. Ours: a whole tick, from state to torques, on cones and on pyramids, each back end in the form that
+it takes by itself, and its assembly (kinematics, rows and condensing) alone. ProxQP, quadprog, DAQP, eiquadprog
+(TSID's) and ours: a solve alone, on pyramids, of the window's consecutive programs, in both forms, warm-started where
+they offer it. All run on one core, for some minutes after the build. With --write the table goes into
+crates/wholebody/README.md. Talos and ANYmal come from example-robot-data. Needs Linux, Rust, Python 3 with venv and a
+C++ compiler; everything else is installed under target/peers.
 """
 
 import argparse
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -26,6 +28,7 @@ from dynamics import PEERS, ROOT, environment, processor, run
 HERE = Path(__file__).parent
 URDF = {"talos": "talos_data/robots/talos_reduced.urdf", "anymal": "anymal_b_simple_description/robots/anymal.urdf"}
 ROBOTS = ["talos", "anymal", "humanoid", "quadruped"]
+DOCUMENT = ROOT / "crates" / "wholebody" / "README.md"
 
 
 def build_ours() -> Path:
@@ -51,13 +54,15 @@ def build_eiquadprog(prefix: Path) -> Path:
 def table(records: list[dict]) -> str:
     """A row for each way to solve, a column for each recording."""
     columns = list(dict.fromkeys((r["robot"], r["workload"]) for r in records))
-    lines = ["| ms: p50, p99 (max) | " + " | ".join(f"{robot}, {what}" for robot, what in columns) + " |"]
+    lines = [
+        "| ms: p50, p99 (max; p99 of all replays) | " + " | ".join(f"{robot}, {what}" for robot, what in columns) + " |"
+    ]
     lines.append("| --- |" + " --- |" * len(columns))
     ways: dict[tuple, dict] = {}
     for r in records:
         name = f"{'ours, ' if r['ours'] else ''}{r['backend']}" if r["part"] != "assembly" else "ours"
         way = (name, r["part"], r["friction"], r["form"])
-        cell = f"{r['p50_ms']:.3f}, {r['p99_ms']:.3f} ({r['max_ms']:.3f})"
+        cell = f"{r['p50_ms']:.3f}, {r['p99_ms']:.3f} ({r['max_ms']:.3f}; {r['raw_p99_ms']:.3f})"
         if r.get("unsolved"):
             cell += f", {r['unsolved']} of {r['ticks']} unsolved"
         ways.setdefault(way, {})[(r["robot"], r["workload"])] = cell
@@ -70,7 +75,8 @@ def table(records: list[dict]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help=", ".join(ROBOTS))
-    parser.add_argument("--json", action="store_true", help="print a record a line in place of the table")
+    parser.add_argument("--json", action="store_true", help="print a record a line; the table goes to stderr")
+    parser.add_argument("--write", action="store_true", help="put the table into crates/wholebody/README.md")
     parser.add_argument("--ticks", type=int, default=10_000, help="the length of a recording")
     parser.add_argument("--window", type=int, default=1000, help="how many of them the other solvers see")
     parser.add_argument("--replays", type=int, default=5, help="how often each recording is replayed")
@@ -102,20 +108,24 @@ def main() -> None:
                 stdout=subprocess.PIPE,
                 text=True,
                 preexec_fn=pin,
-                env={**os.environ, "OMP_NUM_THREADS": "1"},
+                env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
             assert program.stdout is not None
             for line in program.stdout:
                 records.append(json.loads(line))
-                if options.json:
-                    print(line, end="", flush=True)
-                else:
-                    print(line, end="", file=sys.stderr, flush=True)
+                print(line, end="", file=sys.stdout if options.json else sys.stderr, flush=True)
             if program.wait() != 0:
                 raise SystemExit(f"{command[0]} failed")
-    if not options.json:
-        print(f"\n{processor()}, one core; each tick the least of {options.replays} replays\n")
-        print(table(records))
+    window = min(options.window, options.ticks)
+    made = (
+        f"{processor()}, one core; recordings of {options.ticks} ticks, solves of {window} of them; each the least of "
+    )
+    made += f"{options.replays} replays\n\n{table(records)}\n"
+    print(f"\n{made}", file=sys.stderr if options.json else sys.stdout)
+    if options.write:
+        text = DOCUMENT.read_text(encoding="utf-8")
+        pattern = r"(<!-- times -->\n).*?(<!-- end -->)"
+        DOCUMENT.write_text(re.sub(pattern, lambda m: m[1] + made + m[2], text, flags=re.S), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -106,7 +106,7 @@ fn print(robot: &Robot, motion: &str, what: serde_json::Value, times: &[Vec<f64>
     println!("{record}");
 }
 
-/// Times of each back end on cones and on pyramids, and of the assembly of the condensed program alone.
+/// Times of each back end on cones and on pyramids, in the form that it takes by itself, and of the assembly of the condensed program alone.
 fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     for (friction, friction_name) in [(Friction::Cone, "cone"), (PYRAMID, "pyramid")] {
         let settings = Settings { friction, ..Robot::settings() };
@@ -119,13 +119,9 @@ fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
         );
         let what = json!({"backend": "none", "part": "assembly", "friction": friction_name, "form": "condensed"});
         print(robot, motion, what, &assembly);
-        for (backend, form, name, form_name) in [
-            (Backend::InteriorPoint, Form::Condensed, "condyle", "condensed"),
-            (Backend::Clarabel, Form::Condensed, "clarabel", "condensed"),
-            (Backend::Clarabel, Form::Full, "clarabel", "full"),
-        ] {
+        for (backend, name) in [(Backend::InteriorPoint, "condyle"), (Backend::Clarabel, "clarabel")] {
             let (mut iterations, mut unsolved) = (0, 0);
-            let settings = Settings { backend, form, ..settings.clone() };
+            let settings = Settings { backend, ..settings.clone() };
             let times = replay(
                 ticks,
                 replays,
@@ -139,7 +135,7 @@ fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
             );
             let solves = (ticks.len() * replays) as f64;
             let what = json!({
-                "backend": name, "part": "tick", "friction": friction_name, "form": form_name,
+                "backend": name, "part": "tick", "friction": friction_name, "form": "automatic",
                 "iterations": f64::from(iterations) / solves, "unsolved": unsolved / replays,
             });
             print(robot, motion, what, &times);

@@ -23,6 +23,9 @@ AGREEMENT = 1e-6
 """An objective further from ours than this, relative to 1 and its size, is no solution."""
 ACCURACY = 1e-9
 """The tolerance of those that have one; ours has the same."""
+ITERATIONS = 500, 50
+"""Of ProxQP, outer and inner ones. With its own limits a tick on which it stalls takes seconds; with these it counts as
+unsolved, unless it is near enough."""
 Solver = Callable[[Program], np.ndarray]
 
 
@@ -43,6 +46,7 @@ def by_proxqp() -> Solver:
         if qp is None:
             qp = kept[shape] = proxsuite.proxqp.dense.QP(*shape)
             qp.settings.eps_abs = ACCURACY
+            qp.settings.max_iter, qp.settings.max_iter_in = ITERATIONS
             qp.settings.initial_guess = proxsuite.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
             qp.init(*arguments.values())
         else:

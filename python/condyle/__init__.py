@@ -71,10 +71,11 @@ Contacts, loops, impacts: `ContactConstraint`, `ConstraintSet`, `constrained_dyn
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
-Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `casadi` (imported by itself)
+Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
+    (poses, motions, forces), `conventions` (other libraries' numbers), `casadi` (imported by itself)
 """
 
-from . import inertial_parameters, optimal, robots, simulation, wholebody
+from . import algebra, conventions, inertial_parameters, optimal, robots, simulation, wholebody
 from ._condyle import (
     WORLD,
     BodyId,
@@ -231,6 +232,7 @@ __all__ = [
     "aba_derivatives",
     "aba_hessian",
     "aba_input_derivative",
+    "algebra",
     "body_acceleration",
     "body_acceleration_derivatives",
     "body_classical_acceleration",
@@ -251,6 +253,7 @@ __all__ = [
     "constrained_dynamics",
     "constrained_dynamics_derivatives",
     "constrained_dynamics_equations",
+    "conventions",
     "coriolis_derivatives",
     "coriolis_matrix",
     "crba",

@@ -89,6 +89,7 @@ __all__ = [
     "WrenchCone",
     "__version__",
     "_casadi_hold",
+    "_casadi_hold_knot",
     "_casadi_release",
     "_model_from_bytes",
     "aba",
@@ -520,6 +521,11 @@ def _casadi_hold(
     'constrained_dynamics'. Returns the name of its symbols.
     """
 
+def _casadi_hold_knot(of: Any, t: int | None) -> str:
+    """A slot that computes the next state and the cost of knot t of an action or of a problem, likewise; without t, of the knot
+    whose number is an argument.
+    """
+
 def _casadi_release(name: str) -> None:
     """The end of a hold: the slot lives on as long as CasADi has functions of it."""
 
@@ -758,6 +764,8 @@ class ConstraintSet:
         """The number of rows of J, and of numbers in λ."""
 
     def __len__(self, /) -> int: ...
+    @staticmethod
+    def _from_json(model: Model, text: str, mu: float, iterations: int) -> ConstraintSet: ...
     def range(self, k: int) -> slice:
         """The rows of constraint k, as a slice."""
 
@@ -1362,6 +1370,9 @@ class HyperDual:
     def __bool__(self, /) -> bool: ...
     def __truediv__(self, value: _Number, /) -> HyperDual: ...
     def __rtruediv__(self, value: _Number, /) -> HyperDual: ...
+    def __reduce__(self) -> HyperDual:
+        """The parts of a pickle."""
+
     def arctan2(self, x: _Number) -> HyperDual:
         """The angle of the point (x, self) in the plane."""
 
@@ -2525,6 +2536,8 @@ class FrictionCone:
         least: float = 0.0,
         greatest: float = ...,
     ) -> FrictionCone: ...
+    @staticmethod
+    def _from_json(text: str) -> FrictionCone: ...
     def rows(self) -> _Array:
         """The matrix A, (facets + 1, 3)."""
 
@@ -2899,6 +2912,8 @@ class WrenchCone:
     """
 
     def __new__(cls, friction: FrictionCone, size: _Size) -> WrenchCone: ...
+    @staticmethod
+    def _from_json(text: str) -> WrenchCone: ...
     def rows(self) -> _Array:
         """The matrix A, (facets + 13, 6)."""
 

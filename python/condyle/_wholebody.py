@@ -184,6 +184,9 @@ class Target:
         members = ", ".join(f"{name}={np.array2string(view, precision=4)}" for name, view in self._views.items())
         return f"{type(self).__name__}({members})"
 
+    def __reduce__(self) -> "tuple[type[Target], tuple[Any, ...]]":
+        return type(self), (self._name, self._numbers.copy())
+
 
 class ComTarget(Target):
     """Where the centre of mass should be, in the world's frame."""
@@ -257,6 +260,9 @@ class PostureTarget(Target):
     def __init__(self, name: str, numbers: _Array, nq: int, nv: int) -> None:
         self._name, self._numbers = name, numbers
         self._views = {"q": numbers[:nq], "v": numbers[nq : nq + nv], "a": numbers[nq + nv :]}
+
+    def __reduce__(self) -> "tuple[type[Target], tuple[Any, ...]]":
+        return type(self), (self._name, self._numbers.copy(), len(self._views["q"]), len(self._views["v"]))
 
     q = Numbers(0)
     """q_ref, nq numbers."""

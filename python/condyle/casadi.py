@@ -31,7 +31,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _condyle
-from ._condyle import Action, Model
+from ._condyle import (
+    Action,
+    ConstrainedAction,
+    ContactDynamics,
+    FreeDynamics,
+    ImpulseDynamics,
+    InverseDynamics,
+    Lqr,
+    Model,
+    Problem,
+    Unicycle,
+)
 from ._types import ContactConstraint
 
 try:
@@ -48,12 +59,17 @@ __all__ = [
     "crba",
     "forward_kinematics",
     "frame_velocity",
+    "knot",
     "rnea",
 ]
 
 
 def _function(model: Model, function: str, **options: Any) -> "_casadi.Function":
-    name = _condyle._casadi_hold(model, function, **options)
+    return _external(_condyle._casadi_hold(model, function, **options))
+
+
+def _external(name: str) -> "_casadi.Function":
+    """The function of a slot that is held."""
     try:
         return _casadi.external(name, _condyle.__file__)
     finally:
@@ -122,6 +138,42 @@ def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint])
     (6, 1)
     """
     return _function(model, "constrained_dynamics", constraints=list(constraints))
+
+
+_Knot = (
+    ConstrainedAction | ContactDynamics | FreeDynamics | ImpulseDynamics | InverseDynamics | Lqr | Problem | Unicycle
+)
+
+
+def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
+    """The next state and the cost of a knot of an optimal control problem: (x, u) -> (next, cost).
+
+    of: an action of a robot, an `Lqr`, a `Unicycle`, or a `Problem`. What is written in Python raises `ProblemError`:
+        write it as CasADi's expressions instead.
+    t: the number of the knot, from 0 to N of a problem; of an action, which of its `costs_at` count. None makes it an
+        argument, (x, u, t) -> (next, cost), so that one function serves all knots of an action:
+        `f.map(N)(xs, us, range(N))`.
+
+    A knot without controls, as an impact, is x -> (next, cost); the end is x -> cost. Bounds on controls, limits and
+    the constraints of a `ConstrainedAction` are left to the optimiser. The rotations in x are divided by their lengths
+    as those of q are in the other functions, and in `next` they have the length 1: so multiple shooting,
+    x⁺ = next(x, u), holds the lengths by itself.
+
+    First derivatives are exact. Hessians are those that the knot has for `Fddp(second_order=True)`: of the cost of a
+    robot Gauss–Newton's, w (∂r)ᵀ a″ ∂r, exact for an `Lqr` and a `Unicycle`; of the next state exact for these, and for
+    `FreeDynamics` and `InverseDynamics` by 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta rules count as
+    linear along the tangent space of the state. The optimum is the same; an optimiser may take more iterations to it.
+
+    >>> import condyle, condyle.casadi
+    >>> from condyle.optimal import Cost, FreeDynamics, Residual
+    >>> effort = Cost("effort", 2.0, Residual.control(np.zeros(7)))
+    >>> step = condyle.casadi.knot(FreeDynamics(condyle.robots.arm7(), 0.05, [effort]))
+    >>> step.size_in("x"), step.size_in("u"), step.size_out("next")
+    ((14, 1), (7, 1), (14, 1))
+    >>> step(0, 1)[1]  # Δt w ½ uᵀu
+    DM(0.35)
+    """
+    return _external(_condyle._casadi_hold_knot(of, t))
 
 
 def action(

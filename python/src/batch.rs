@@ -134,7 +134,7 @@ pub(crate) fn stack<'py>(
 
 /// The numbers of an argument for all states, one state after the other.
 pub(crate) enum Rows<'py> {
-    /// As they lie in the caller's array.
+    /// The numbers as they lie in the caller's array.
     Array(Input<'py, Ix2>),
     /// Copied, where results may be written over them.
     Copy(Vec<f64>),

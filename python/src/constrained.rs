@@ -2,7 +2,7 @@
 
 use crate::arrays::{Give, array, class, named_tuples, pose, type_name};
 use crate::data::{Holds, Scratch};
-use crate::exceptions::{exception, within, wrong_word};
+use crate::exceptions::{ModelError, exception, within, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
 use crate::hyper_dual::Hyper;
 use crate::made_for::MadeFor;
@@ -12,6 +12,7 @@ use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
+use std::sync::Arc;
 
 named_tuples! {
     Constrained<'_> { a, lambda as lambda_, residual, redundant }
@@ -98,9 +99,18 @@ pub(crate) struct ConstraintSet {
     constraints: Vec<ContactConstraint>,
     nv: usize,
     made_for: MadeFor,
+    /// The model that it was made for.
+    robot: Arc<condyle::Model>,
 }
 
 impl ConstraintSet {
+    fn make(model: &Bound<'_, Model>, constraints: Vec<ContactConstraint>, proximal: Proximal) -> PyResult<Self> {
+        let (made_for, robot) = (MadeFor::with_geometry(model.get()), model.get().inner.clone());
+        let mut inner = condyle::ConstraintSet::new(&robot, &constraints).map_err(exception)?;
+        inner.proximal = proximal;
+        Ok(Self { inner, dual: None, constraints, nv: robot.nv(), made_for, robot })
+    }
+
     fn checked(&self, k: usize) -> PyResult<usize> {
         let n = self.inner.len();
         let error = || PyIndexError::new_err(format!("k: expected less than {n}, found {k}"));
@@ -143,12 +153,27 @@ impl ConstraintSet {
             return Err(PyValueError::new_err(format!("mu: expected a number of at least 0, found {mu}")));
         }
         within("iterations", iterations, 1, 10_000)?;
-        let (made_for, model) = (MadeFor::with_geometry(model.get()), &model.get().inner);
         let constraints = members_of("constraints", "`ContactConstraint`s", constraints)?;
-        let constraints = constraints.iter().map(|c| constraint(model, c)).collect::<PyResult<Vec<_>>>()?;
-        let mut inner = condyle::ConstraintSet::new(model, &constraints).map_err(exception)?;
-        inner.proximal = Proximal { mu, iterations };
-        Ok(Self { inner, dual: None, constraints, nv: model.nv(), made_for })
+        let robot = &model.get().inner;
+        let constraints = constraints.iter().map(|c| constraint(robot, c)).collect::<PyResult<Vec<_>>>()?;
+        Self::make(model, constraints, Proximal { mu, iterations })
+    }
+
+    /// The parts of a pickle: the robot, and the constraints with their present targets.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let this = slf.borrow();
+        let Proximal { mu, iterations } = this.inner.proximal;
+        let text = serde_json::to_string(&this.constraints)
+            .map_err(|error| ModelError::new_err(format!("these constraints cannot be pickled: {error}")))?;
+        let arguments = (Model::from((*this.robot).clone()), text, mu, iterations);
+        Ok((slf.get_type().getattr("_from_json")?, arguments).into_pyobject(slf.py())?.into_any())
+    }
+
+    #[staticmethod]
+    fn _from_json(model: &Bound<'_, Model>, text: &str, mu: f64, iterations: usize) -> PyResult<Self> {
+        let wrong = |error| ModelError::new_err(format!("no constraints: {error}"));
+        let constraints = serde_json::from_str(text).map_err(wrong)?;
+        Self::make(model, constraints, Proximal { mu, iterations })
     }
 
     /// The robot's name, and how many constraints and rows there are.

@@ -9,6 +9,7 @@ use pyo3::PyClass;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::False;
+use std::sync::Arc;
 
 /// The memory that algorithms compute in, for one model: made once, and used by one thread at a time.
 ///
@@ -26,6 +27,8 @@ use pyo3::pyclass::boolean_struct::False;
 pub(crate) struct Data {
     inner: condyle::Data<f64>,
     made_for: MadeFor,
+    /// The model that it was made for.
+    robot: Arc<condyle::Model>,
     threads: usize,
     /// The scratch for hyper-dual numbers, made when it is first needed.
     dual: Option<Box<condyle::Data<Hyper>>>,
@@ -41,7 +44,14 @@ impl Data {
         within("threads", threads, 1, condyle::Batch::<f64>::MOST_THREADS)?;
         let model = model.get();
         let (inner, made_for) = (condyle::Data::new(&model.inner), MadeFor::new(model));
-        Ok(Self { inner, made_for, threads, dual: None, batch: None })
+        Ok(Self { inner, made_for, robot: model.inner.clone(), threads, dual: None, batch: None })
+    }
+
+    /// The parts of a pickle: of another one, as good as this, for the same model.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let this = slf.borrow();
+        let model = Model::from((*this.robot).clone());
+        Ok((slf.get_type(), (model, this.threads)).into_pyobject(slf.py())?.into_any())
     }
 
     /// The robot's name.

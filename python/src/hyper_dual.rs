@@ -175,6 +175,11 @@ impl HyperDual {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = self.0;
         format!("HyperDual({re}, eps1={eps1}, eps2={eps2}, eps1eps2={eps1eps2})")
     }
+    /// The parts of a pickle.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = slf.get().0;
+        Ok((slf.get_type(), (re, eps1, eps2, eps1eps2)).into_pyobject(slf.py())?.into_any())
+    }
     fn __add__(&self, other: Operand) -> Self {
         Self(self.0 + other.0)
     }

@@ -2,7 +2,9 @@
 
 use crate::arrays::{Give, three};
 use crate::exceptions::wrong_word;
+use condyle::Vec3;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 /// The kind of a joint, with its axis and pitch where it has them.
 ///
@@ -95,6 +97,18 @@ impl Joint {
     fn __repr__(&self) -> String {
         let axis = self.0.axis().map_or(String::new(), |a| format!(" about or along {:?}", a.to_array()));
         format!("<condyle.Joint {}{axis}>", kind(self.0))
+    }
+
+    /// The parts of a pickle.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, joint) = (slf.py(), slf.get().0);
+        let axis = joint.axis().map(Vec3::to_array);
+        let arguments = match (joint, axis) {
+            (condyle::Joint::Helical { pitch, .. }, Some(axis)) => (axis, pitch).into_pyobject(py)?,
+            (_, Some(axis)) => (axis,).into_pyobject(py)?,
+            (_, None) => PyTuple::empty(py),
+        };
+        Ok((slf.get_type().getattr(kind(joint))?, arguments).into_pyobject(py)?.into_any())
     }
 }
 

@@ -1,4 +1,4 @@
-//! Where bodies and frames are and how they move: the library's functions one to one.
+//! Places and motions of bodies and frames: the library's functions one to one.
 
 use crate::functions::functions;
 use condyle::Scalar;

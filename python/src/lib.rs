@@ -58,7 +58,7 @@ mod _condyle {
     #[pymodule_export]
     use builder::{BodyId, ModelBuilder};
     #[pymodule_export]
-    use casadi::{casadi_hold, casadi_release};
+    use casadi::{casadi_hold, casadi_hold_knot, casadi_release};
     #[pymodule_export]
     use centroidal::{
         centroidal_map, centroidal_map_rate, centroidal_momentum, centroidal_momentum_rate, com, com_acceleration,

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 /// The models that something was made for: one, and all others of the same bodies and joints.
 pub(crate) struct MadeFor {
     structure: u64,
-    /// Of the places of joints and frames, where they matter.
+    /// The hash of the places of joints and frames, where they matter.
     geometry: Option<u64>,
     /// The name of the model that it was made for.
     pub(crate) name: String,

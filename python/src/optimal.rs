@@ -13,6 +13,7 @@ mod sweep;
 
 pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
 pub(crate) use costs::{Activation, Cost, Limit};
+pub(crate) use models::{Alone, alone};
 pub(crate) use own::{Action, ConstrainedAction, DifferentialAction, Lqr, Unicycle};
 pub(crate) use problem::{Problem, lock};
 pub(crate) use residuals::{FrictionCone, Residual, WrenchCone};

@@ -11,6 +11,7 @@ import pytest
 
 import condyle
 from condyle import WORLD, ConstraintSet, ContactConstraint, Data, Joint, Model, ModelBuilder
+from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, Problem
 
 ARM = condyle.robots.arm7()
 DATA = Data(ARM)
@@ -114,6 +115,27 @@ def test_texts_paths_and_macros(tmp_path: Path) -> None:
     )
     message = told(lambda: Model.from_urdf(path), condyle.ParseError)
     assert message.startswith(f"{path}:2: property `a`: belongs to xacro: expand the file first (`xacro ")
+
+
+def test_settings_that_are_not_there_are_told_those_that_are() -> None:
+    problem = Problem(np.zeros(14), [FreeDynamics(ARM, 0.1, [])], [0], FreeDynamics(ARM, None, []))
+    for solver in (Fddp, AugmentedLagrangian):
+        message = told(lambda solver=solver: solver(problem, tolerence=1e-6), ValueError)
+        assert message.startswith("settings: there is no setting 'tolerence'; there are ")
+        names = message.split("there are ", 1)[1].split(", ")
+        assert "tolerance" in names
+        words = {"method": "fddp", "time_budget": 1.0, "second_order": True, "inverse_dynamics_form": True}
+        numbers = {"regularisation_min": 1e-9, "regularisation_factor": 10.0}
+        for name in names:  # each is one
+            solver(problem, **{name: (words | numbers).get(name, 1)})
+
+
+def test_a_running_action_is_no_end() -> None:
+    step, end = FreeDynamics(ARM, 0.1, []), FreeDynamics(ARM, None, [])
+    message = told(lambda: Problem(np.zeros(14), [step], [0], step), condyle.optimal.ProblemError)
+    assert message.startswith("terminal: expected an action without controls")
+    message = told(lambda: Problem(np.zeros(14), [end], [0], end), condyle.optimal.ProblemError)
+    assert message.startswith("knot 0")
 
 
 ATTRIBUTES = {

@@ -220,15 +220,6 @@ LONG = {
         def check():
             assert np.isfinite(out[0]).all() and np.isnan(out[-1]).all()  # written as far as it came
     """,
-    "states one by one": """
-        humanoid = condyle.robots.humanoid()
-        data, states = condyle.Data(humanoid), 10**7
-        q = np.broadcast_to(condyle.neutral(humanoid), (states, humanoid.nq))
-        def call():
-            condyle.potential_energy(humanoid, data, q)
-        def check():
-            pass
-    """,
 }
 
 INTERRUPTED = """
@@ -303,6 +294,21 @@ def test_signals_on_another_thread() -> None:
 
 
 MEANWHILE = {
+    "batch": """
+        humanoid = condyle.robots.humanoid()
+        data, states = condyle.Data(humanoid), 300_000
+        q, v = np.tile(condyle.neutral(humanoid), (states, 1)), np.zeros((states, humanoid.nv))
+        out = np.zeros((states, humanoid.nv))
+        def call():
+            condyle.aba(humanoid, data, q, v, v, out=out)
+    """,
+    "states one by one": """
+        humanoid = condyle.robots.humanoid()
+        data, states = condyle.Data(humanoid), 2 * 10**6
+        q = np.broadcast_to(condyle.neutral(humanoid), (states, humanoid.nq))
+        def call():
+            condyle.potential_energy(humanoid, data, q)
+    """,
     "rollout": """
         arm, knots = condyle.robots.arm7(), 250_000
         problem = Problem(np.zeros(14), [FreeDynamics(arm, 1e-6, [])], [0] * knots, FreeDynamics(arm, None, []))

@@ -1,4 +1,4 @@
-// The pages of two plans in headless Chromium: an arm that reaches, a quadruped that trots. PAGES names their folder.
+// The pages of plans in headless Chromium: an arm that reaches, a quadruped that trots, meshes. PAGES names their folder.
 //
 // Looks at what a reader meets: no request, no error, a robot that moves with slider, player and keys, a gait, dark mode,
 // small windows, paper, and a link to a time. Pictures are left in PAGES.
@@ -31,7 +31,7 @@ async function open(name, { hash = "#t=0", width = 900, height = 640, dark = fal
   page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) wrong.push(request.url()); });
   await page.setViewport({ width, height });
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: dark ? "dark" : "light" }]);
-  await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + hash, { waitUntil: "load" });
+  await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + hash, { waitUntil: "load", timeout: 120_000 });
   await settled(page);
   return { page, wrong };
 }
@@ -113,6 +113,61 @@ test("the trot has a gait: a row for each foot, a line that moves, arrows while 
   assert.equal(await page.$eval("#key-forces", (key) => key.hidden), false);
   await page.close();
 });
+
+test("meshes of three kinds of files are drawn in their colours, where they belong", async () => {
+  const { page, wrong } = await open("meshes", { width: 700, height: 600 });
+  const data = await page.evaluate(() => {
+    const { scene } = JSON.parse(document.getElementById("data").textContent);
+    const shapes = scene.bodies.map((body) => body.shapes.filter((shape) => shape.kind === "mesh"));
+    const corners = (b) => shapes[b].flatMap((shape) => cornersOf(shape, scene.meshes[shape.part]).map((p) => p.toArray()));
+    const geometry = meshesOf(scene.bodies[1].shapes, scene.meshes)[0][1];
+    const { position, normal } = geometry.attributes;
+    // the corners stand on the box of the mesh, and each normal points away from its middle
+    let outward = true;
+    for (let i = 0; i < position.count; i++) outward &&= position.getX(i) * normal.getX(i) + position.getY(i) * normal.getY(i) + (position.getZ(i) - 0.2) * normal.getZ(i) > 0;
+    return { counts: shapes.map((s) => s.length), corners: corners(2), vertices: position.count, outward };
+  });
+  assert.deepEqual(data.counts, [1, 1, 1, 0]);
+  assert.equal(data.vertices, 36);
+  assert.ok(data.outward, "a mirrored mesh keeps its outside");
+  for (let k = 0; k < 3; k++) {
+    const [least, most] = [[-0.03, -0.03, 0][k], [0.03, 0.03, 0.3][k]];
+    const along = data.corners.map((corner) => corner[k]);
+    assert.ok(Math.abs(Math.min(...along) - least) < 1e-6 && Math.abs(Math.max(...along) - most) < 1e-6);
+  }
+  await page.screenshot({ path: join(folder, "meshes.png") });
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
+for (const name of ["trot", "talos"]) {
+  test(`${name}: the script of a frame, measured (ms)`, { skip: !existsSync(join(folder, `${name}.html`)) }, async () => {
+    const page = await browser.newPage();
+    await page.setViewport({ width: 480, height: 400 }); // small: without a GPU a frame's pixels take longer than its script
+    // all that asks to run before a frame is drawn runs under a clock; callbacks of one frame have one time stamp
+    await page.evaluateOnNewDocument(() => {
+      window.frames_ms = new Map();
+      const own = window.requestAnimationFrame.bind(window);
+      window.requestAnimationFrame = (callback) => own((stamp) => {
+        const begin = performance.now();
+        callback(stamp);
+        window.frames_ms.set(stamp, (window.frames_ms.get(stamp) ?? 0) + performance.now() - begin);
+      });
+    });
+    await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + "#t=0", { waitUntil: "load", timeout: 120_000 });
+    await settled(page);
+    await page.evaluate(() => { window.frames_ms.clear(); document.getElementById("loop").click(); document.getElementById("play").click(); });
+    const enough = page.waitForFunction(() => window.frames_ms.size > 120, { timeout: 30_000 });
+    await enough.catch(() => {}); // a slow machine draws fewer: they are counted below
+    const times = (await page.evaluate(() => [...window.frames_ms.values()])).sort((a, b) => a - b);
+    const at = (share) => times[Math.min(Math.floor(share * times.length), times.length - 1)].toFixed(2);
+    const triangles = await page.evaluate(() => JSON.parse(document.getElementById("data").textContent).scene.meshes.reduce((sum, mesh) => sum + numbersOf(mesh.triangles).length / 3, 0));
+    console.log(`${name}: script per frame p50 ${at(0.5)} ms, p99 ${at(0.99)} ms of ${times.length} frames, ${triangles} triangles of meshes (wanted: at most 8 ms)`);
+    await page.screenshot({ path: join(folder, `${name}_playing.png`) });
+    assert.ok(times.length > 2, `${times.length} frames were drawn`);
+    await page.close();
+  });
+}
 
 test("the tables of iterations and of the budget are full", async () => {
   const { page } = await open("reach");

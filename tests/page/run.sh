@@ -24,4 +24,14 @@ fi
 "$program" plan --out "$folder/pages/reach.html" >/dev/null
 "$program" plan --example trot >"$folder/pages/trot.toml"
 "$program" plan "$folder/pages/trot.toml" --out "$folder/pages/trot.html" >/dev/null
+# A motion that is too short to arrive is good enough for a picture: 1 is no error here.
+plan() { "$program" plan "$@" >/dev/null 2>"$folder/pages/notes" || [ $? = 1 ] || { cat "$folder/pages/notes"; exit 1; }; }
+plan --robot crates/cli/tests/boxes/boxes.urdf --target 0.2,0.1,0.6 --knots 40 --out "$folder/pages/meshes.html"
+# A humanoid with meshes, where the environment of the peers has one: what the script of a frame costs is measured on it.
+talos=$(find .venv/pinocchio -path '*talos_data/robots/talos_reduced.urdf' 2>/dev/null | head -1)
+rm -f "$folder/pages/talos.html"
+if [ -n "$talos" ]; then
+    plan --robot "$talos" --frame gripper_right_base_link --target 0.45,-0.3,0.2 --knots 60 --max-iterations 10 \
+        --out "$folder/pages/talos.html"
+fi
 cd "$folder" && PAGES="$folder/pages" npm test --silent

@@ -5,7 +5,7 @@
 // (a number that is not finite becomes null too). N knots have a control, N + 1 a state.
 //
 //   robot, title      names: of the robot; the heading of the page
-//   status            "converged", or in a few words why the solver stopped
+//   status            "converged", "settled" (limits hold, hardly anything left to gain), or in a few words why the solver stopped
 //   frame             name of the end-effector frame, or null
 //   target            [x, y, z] that it is to reach, m, or null
 //   miss, tolerance   distance at the last knot, and what counts as reached, m, or null
@@ -21,7 +21,10 @@
 //                     quaternion [x, y, z, w], color "#rrggbb" } }; position and quaternion: pose in the body, null for
 //                     the identity; color null: the page's own for bones and joints, light or dark. By kind, size is
 //                       box [x, y, z] · sphere [radius] · cylinder [radius, length], axis z ·
-//                       capsule [radius, length of its straight part], axis z · segment [from (3), to (3), radius]
+//                       capsule [radius, length of its straight part], axis z · segment [from (3), to (3), radius] ·
+//                       mesh [scale along x, y, z], with `part`, its number among the meshes
+//   scene.meshes      [] of { low [3], side [3], points, triangles }: the box of a part of a mesh, its points (three numbers
+//                     each, point = low + side n / 65535) and the corners of its triangles: base64 of 16-bit numbers
 //   scene.poses       [N + 1][B][7]: pose of each body in the world, px py pz qx qy qz qw
 //   scene.trail       [N + 1][3]: the end-effector in the world, or null
 //   contacts          { feet: [F] names, trails: [F][N + 1][3] (m), touches: [N][F], forces: [N][F] of [3] (N) or null where
@@ -90,7 +93,8 @@ function header(data) {
     item.append(text);
     $("badges").append(item);
   };
-  badge(data.status === "converged" ? "good" : "bad", data.status === "converged" ? "Converged" : `Not converged: ${data.status}`);
+  const solved = { converged: "Converged", settled: "Settled: limits held, the cost hardly falls any more" }[data.status];
+  badge(solved ? "good" : "bad", solved ?? `Not converged: ${data.status}`);
   if (data.miss != null) {
     const reached = data.tolerance == null || data.miss <= data.tolerance;
     const within = data.tolerance == null ? "" : reached ? ` (within ${length(data.tolerance)})` : ` (more than ${length(data.tolerance)})`;

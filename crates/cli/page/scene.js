@@ -68,7 +68,7 @@ function makeScene(data, host) {
   const groups = bodies.map((body) => {
     const group = new THREE.Group();
     for (const shape of body.shapes) {
-      const geometry = geometryOf(shape);
+      const geometry = shape.kind === "mesh" ? null : geometryOf(shape);
       if (!geometry) continue;
       const material = materials[shape.color ?? shape.kind] ??= shape.color
         ? new THREE.MeshStandardMaterial({ color: shape.color, roughness: 0.5, metalness: 0.05 })
@@ -76,9 +76,16 @@ function makeScene(data, host) {
       const mesh = new THREE.Mesh(geometry, material);
       if (shape.position) mesh.position.fromArray(shape.position);
       if (shape.quaternion) mesh.quaternion.fromArray(shape.quaternion);
-      mesh.castShadow = mesh.receiveShadow = true;
       group.add(mesh);
     }
+    for (const [coloured, geometry] of meshesOf(body.shapes, data.scene.meshes)) {
+      const material = materials[`mesh ${coloured}`] ??= coloured
+        ? new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.55, metalness: 0.05 })
+        : paint("mesh");
+      material.side = 2; // both: not every file has its triangles the right way round
+      group.add(new THREE.Mesh(geometry, material));
+    }
+    for (const mesh of group.children) mesh.castShadow = mesh.receiveShadow = true;
     scene.add(group);
     return group;
   });
@@ -256,7 +263,8 @@ function makeScene(data, host) {
  * Points that enclose the motion: origins and shapes of the bodies at some knots, the path, the target;
  * and the height of the lowest middle of a shape, which says whether the robot stays above the ground.
  */
-function cloudOf({ scene: { bodies, poses, trail }, target }) {
+function cloudOf({ scene: { bodies, poses, trail, meshes }, target }) {
+  const boxes = bodies.map((body) => body.shapes.filter((shape) => shape.kind === "mesh").flatMap((shape) => cornersOf(shape, meshes[shape.part])));
   const points = [...(trail ?? []), ...(target ? [target] : [])].map((p) => new THREE.Vector3().fromArray(p));
   const q = new THREE.Quaternion(), o = new THREE.Vector3();
   let lowest = 0;
@@ -266,7 +274,12 @@ function cloudOf({ scene: { bodies, poses, trail }, target }) {
       o.fromArray(poses[k][b]);
       q.fromArray(poses[k][b], 3);
       if (body.shapes.length || b === 0) points.push(o.clone());
+      const corners = boxes[b].map((corner) => corner.clone().applyQuaternion(q).add(o));
+      points.push(...corners);
+      // opposite corners of each box
+      for (let i = 0; i < corners.length; i += 8) lowest = Math.min(lowest, (corners[i].z + corners[i + 7].z) / 2);
       for (const { kind, size, position } of body.shapes) {
+        if (kind === "mesh") continue;
         const middle = new THREE.Vector3().fromArray(kind === "segment" ? size : position ?? [0, 0, 0], kind === "segment" ? 3 : 0);
         middle.applyQuaternion(q).add(o);
         lowest = Math.min(lowest, middle.z);

@@ -10,6 +10,7 @@ mod gait;
 mod inspect;
 mod limits;
 mod lines;
+mod meshes;
 mod motion;
 mod page;
 mod plan;

@@ -1,7 +1,7 @@
 //! A planned motion: what was asked for, and what came out.
 
 use crate::robot::Robot;
-use condyle::optimal::{Iteration, Solution};
+use condyle::optimal::{Iteration, Solution, Status};
 use condyle::{Model, Vec3};
 use std::sync::Arc;
 
@@ -21,6 +21,8 @@ pub(crate) struct Plan {
     pub model: Arc<Model>,
     /// The robot's file, of which the page draws the shapes.
     pub robot: Robot,
+    /// Whether the page draws the meshes that are found.
+    pub meshes: bool,
     pub title: String,
     pub goal: Option<Goal>,
     pub feet: Vec<usize>,
@@ -33,11 +35,19 @@ pub(crate) struct Plan {
     pub dt: f64,
     pub budget_ms: f64,
     pub solution: Solution,
+    /// Where limits hold and hardly anything is left to gain, though the solver's own tolerance was not reached: the decrease
+    /// that is still expected, relative to the cost.
+    pub settled: Option<f64>,
     /// The iterations of all solves.
     pub trace: Vec<Iteration>,
 }
 
 impl Plan {
+    /// Whether it is a solution.
+    pub(crate) fn is_solved(&self) -> bool {
+        self.solution.status == Status::Converged || self.settled.is_some()
+    }
+
     /// The knots that have a control.
     pub(crate) fn knots(&self) -> usize {
         self.times.len() - 1

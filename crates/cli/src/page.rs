@@ -9,27 +9,35 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// The template's parts, in the order in which they go in: the data last, so that nothing in them is looked into.
-const PARTS: [(&str, &str); 7] = [
+const PARTS: [(&str, &str); 8] = [
     ("/*{{uplot.css}}*/", include_str!("../page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../page/plan.css")),
     ("/*{{three.js}}*/", include_str!("../page/vendor/three.bundle.js")),
     ("/*{{uplot.js}}*/", include_str!("../page/vendor/uPlot.iife.min.js")),
+    ("/*{{meshes.js}}*/", include_str!("../page/meshes.js")),
     ("/*{{scene.js}}*/", include_str!("../page/scene.js")),
     ("/*{{plots.js}}*/", include_str!("../page/plots.js")),
     ("/*{{plan.js}}*/", include_str!("../page/plan.js")),
 ];
 
-/// Writes the page, and makes the folder for it.
-pub(crate) fn write(path: &Path, plan: &Plan, budget: &Budget, violations: &[Violation]) -> std::io::Result<()> {
+/// Writes the page, and makes the folder for it. Says in a line which meshes are left out, if there are such.
+pub(crate) fn write(
+    path: &Path,
+    plan: &Plan,
+    budget: &Budget,
+    violations: &[Violation],
+) -> std::io::Result<Option<String>> {
     let mut page = include_str!("../page/plan.html").to_owned();
     for (place, text) in PARTS {
         page = page.replacen(place, text, 1);
     }
-    let data = rounded(data(plan, budget, violations)).to_string().replace('<', "\\u003c");
+    let (data, note) = data(plan, budget, violations);
+    let data = rounded(data).to_string().replace('<', "\\u003c");
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    std::fs::write(path, page.replacen("/*{{data}}*/", &data, 1))
+    std::fs::write(path, page.replacen("/*{{data}}*/", &data, 1))?;
+    Ok(note)
 }
 
 /// The joints that the page shows: those with a degree of freedom of their own.
@@ -81,8 +89,8 @@ fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::Error> {
     Ok(json!({"feet": names, "trails": trails, "touches": touches, "forces": forces, "weight": weight}))
 }
 
-/// All that the page shows; the head of `plan.js` says what each entry is.
-fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
+/// All that the page shows, and a line on what it leaves out; the head of `plan.js` says what each entry is.
+fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Option<String>) {
     let Plan { model, solution, .. } = plan;
     let (nq, limits) = (model.nq(), model.limits());
     let knots = with_time(plan);
@@ -125,10 +133,12 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
         })
         .collect();
     let ends: Vec<usize> = goal.map(|goal| goal.frame).into_iter().chain(plan.feet.iter().copied()).collect();
-    json!({
+    let (bodies, meshes) = scene::bodies(model, &plan.robot, &ends, plan.meshes);
+    let note = meshes.note();
+    let data = json!({
         "robot": model.name(),
         "title": plan.title,
-        "status": report::status(solution.status),
+        "status": report::status(plan),
         "frame": goal.map(|goal| &model.frames()[goal.frame].name),
         "target": goal.map(|goal| goal.target.to_array()),
         "miss": goal.map(|goal| goal.miss),
@@ -145,7 +155,8 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
         })).collect::<Vec<_>>(),
         "budget": budget,
         "scene": {
-            "bodies": scene::bodies(model, &plan.robot, &ends),
+            "bodies": bodies,
+            "meshes": meshes.written(),
             "poses": poses,
             "trail": (!trail.is_empty()).then_some(trail),
         },
@@ -154,7 +165,8 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
         "violations": violations,
         "version": env!("CARGO_PKG_VERSION"),
         "command": std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word),
-    })
+    });
+    (data, note)
 }
 
 /// Numbers to six digits: what a screen can show.

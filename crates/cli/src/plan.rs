@@ -23,7 +23,9 @@ use std::sync::Arc;
   condyle plan trot.toml --out trot.html --record trot.csv
 
 A task file is TOML; --example writes one that says what its entries mean. Limits of positions, speeds and efforts are
-held; where that is not possible the exit status is 1, as it is when the target is missed. Ctrl-C ends the solver, and the
+held; where that is not possible the exit status is 1, as it is when the target is missed. A motion is `settled`, and the
+status 0, where limits hold and the cost is expected to fall by less than 1e-7 of itself, but the solver's own tolerance for
+the gradient of the Lagrangian is not reached. Ctrl-C ends the solver, and the
 page and the record are written with the best motion so far.")]
 pub(crate) struct Arguments {
     /// A task file, in place of the flags for robot, frame and target
@@ -32,7 +34,7 @@ pub(crate) struct Arguments {
     /// Write a task to standard output, to begin with: reach, trot, walk, jump, stand-up
     #[arg(long, value_name = "NAME", exclusive = true)]
     example: Option<String>,
-    /// URDF, MJCF or SDF of the robot, or one that comes along; meshes are not needed. Default: arm7
+    /// URDF, MJCF or SDF of the robot, or one that comes along; nothing needs its meshes. Default: arm7
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
     #[command(flatten)]
@@ -64,12 +66,22 @@ pub(crate) struct Arguments {
     /// Where the page goes
     #[arg(long, default_value = "out/plan.html", value_name = "FILE")]
     out: PathBuf,
+    /// Meshes (STL, DAE, OBJ) in the page: those that are found, with at most 60 000 triangles in all, or none
+    #[arg(long, default_value = "auto", value_name = "WHEN", value_enum)]
+    meshes: Show,
     /// Also write the trajectory: to a file that ends in .csv, .npz or .json
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Write a summary as JSON instead of text
     #[arg(long)]
     json: bool,
+}
+
+/// Whether something is shown.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Show {
+    Auto,
+    Never,
 }
 
 /// Numbers on the command line, with commas between them.
@@ -134,12 +146,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
 fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::Format)>) -> Result<(), Error> {
     let budget = report::measure(plan);
     let violations = report::violations(plan);
-    let written = |path: &Path, result: std::io::Result<()>| {
-        result.map_err(|source| Error::Write { file: path.display().to_string(), source })
+    let unwritten = |path: &Path| {
+        let file = path.display().to_string();
+        move |source| Error::Write { file, source }
     };
-    written(&arguments.out, page::write(&arguments.out, plan, &budget, &violations))?;
+    let note = page::write(&arguments.out, plan, &budget, &violations).map_err(unwritten(&arguments.out))?;
     if let Some((path, format)) = record {
-        written(path, record::write(path, format, plan))?;
+        record::write(path, format, plan).map_err(unwritten(path))?;
+    }
+    if let Some(note) = note {
+        eprintln!("note: {note}");
     }
     if arguments.json {
         crate::terminal::say_json(&report::summary(plan, &budget, &violations));
@@ -171,8 +187,8 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
             "the {} of `{}` is {:.2e} beyond its limit {} at knot {}: more knots, or more time, may help",
             v.what, v.joint, v.amount, v.limit, v.at_knot
         ))),
-        None if plan.goal.is_none() && plan.solution.status != Status::Converged => {
-            Err(Error::No(format!("the solver stopped: {}", report::status(plan.solution.status))))
+        None if plan.goal.is_none() && !plan.is_solved() => {
+            Err(Error::No(format!("the solver stopped: {}", report::status(plan))))
         }
         None => Ok(()),
     }
@@ -245,13 +261,15 @@ fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
         dt,
         budget_ms: arguments.budget_ms,
         robot,
+        meshes: arguments.meshes == Show::Auto,
         model,
         solution,
+        settled: None,
         trace: vec![],
     };
     if must_hold(arguments, &plan) {
         let (problem, ..) = reach::problem(&plan.model, frame, target, (&q0, &q_end), (knots, dt), true)?;
-        plan.solution = hold(arguments, &plan, problem, &mut watch, DUAL[0])?;
+        (plan.solution, plan.settled) = hold(arguments, &plan, problem, &mut watch, DUAL[0])?;
     }
     plan.trace = watch.end();
     let mut data = Data::new(&plan.model);
@@ -301,12 +319,14 @@ fn gait(arguments: &Arguments, task: &Task) -> Result<Plan, Error> {
         dt,
         budget_ms: arguments.budget_ms,
         robot,
+        meshes: arguments.meshes == Show::Auto,
         model: model.clone(),
         solution,
+        settled: None,
         trace: vec![],
     };
     if must_hold(arguments, &plan) {
-        plan.solution = hold(arguments, &plan, posed(true)?.problem, &mut watch, DUAL[1])?;
+        (plan.solution, plan.settled) = hold(arguments, &plan, posed(true)?.problem, &mut watch, DUAL[1])?;
     }
     plan.trace = watch.end();
     Ok(plan)
@@ -325,26 +345,27 @@ fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
     true
 }
 
-/// Solves a problem with limits, from a solution that exceeds them.
+/// Solves a problem with limits, from a solution that exceeds them. With the solution comes, where the solver's own tolerance
+/// was not reached but limits and cost say that nothing is left to do, the decrease that is still expected, relative to the cost.
 fn hold(
     arguments: &Arguments,
     plan: &Plan,
     mut problem: Problem,
     watch: &mut Watch,
     dual: f64,
-) -> Result<Solution, Error> {
+) -> Result<(Solution, Option<f64>), Error> {
     let mut solver = AugmentedLagrangian::new(&problem);
     (solver.inner.max_iterations, solver.settings.max_solves) = (arguments.max_iterations, SOLVES);
     (solver.settings.tolerance, solver.settings.tolerance_dual) = (HELD, dual);
     let (xs, us) = (&plan.solution.xs, &plan.solution.us);
-    let mut solution = solver.solve_with(&mut problem, xs, us, watch.quiet(arguments.json))?.clone();
+    let solution = solver.solve_with(&mut problem, xs, us, watch.quiet(arguments.json))?.clone();
     // Along many knots of an unstable motion the gradient of the Lagrangian is lost in rounding, and never falls below its
-    // tolerance: then cost and limits tell.
-    let settled = solution.trace.last().is_some_and(|last| last.feasible && last.stop < SETTLED * solution.cost.abs());
-    if solution.status == Status::MaxIterations && solver.outcome().primal <= HELD && settled {
-        solution.status = Status::Converged;
-    }
-    Ok(solution)
+    // tolerance. What the cost is still expected to fall by (half of Newton's decrement, squared; FDDP itself stops by it) is
+    // no worse a witness: the limits hold, and there is nothing left to gain.
+    let last = solution.trace.last().filter(|last| last.feasible && last.stop < SETTLED * solution.cost.abs());
+    let settled = last.filter(|_| solution.status == Status::MaxIterations && solver.outcome().primal <= HELD);
+    let settled = settled.map(|last| last.stop / solution.cost.abs());
+    Ok((solution, settled))
 }
 
 /// Shows the robot and the task.

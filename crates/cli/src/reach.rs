@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::limits::{efforts_of, inside, limits_of};
 use condyle::optimal::Problem;
-use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residual};
 use condyle::{Data, Model, Vec3, difference, gravity, integrate, neutral, rnea};
 use std::sync::Arc;
 
@@ -29,6 +29,8 @@ pub(crate) fn problem(
 ) -> Result<Posed, Error> {
     let nv = model.nv();
     let limits = model.limits();
+    let nu = Actuation::joints(model).nu();
+    let driven = nv - nu..; // all but a floating base
     let rest = |q: &[f64]| [q, &vec![0.0; nv]].concat();
     let x0 = rest(q0);
     let state = || Residual::State { reference: rest(&neutral(model)) };
@@ -42,16 +44,17 @@ pub(crate) fn problem(
         (lower[nv + k], upper[nv + k]) = (-speed, speed);
     }
     let within = || Activation::Barrier { lower: lower.clone(), upper: upper.clone() };
-    let bounds: Vec<f64> = limits.effort.iter().map(|&e| if e > 0.0 { e } else { f64::INFINITY }).collect();
+    let bounds: Vec<f64> =
+        limits.effort[driven.clone()].iter().map(|&e| if e > 0.0 { e } else { f64::INFINITY }).collect();
     let share = bounds.iter().map(|e| if e.is_finite() { e.powi(-2) } else { WITHOUT_LIMIT }).collect();
     let efforts = Activation::Barrier { lower: bounds.iter().map(|e| -e).collect(), upper: bounds };
-    let hold = gravity(model, &mut Data::new(model), q0).to_vec();
+    let hold = gravity(model, &mut Data::new(model), q0)[driven.clone()].to_vec();
     let position = Residual::FrameTranslation { frame: (&model.frames()[frame]).into(), target };
     let running = vec![
         Cost::new("speed", 1e-1, state(), moving(1.0)),
         Cost::new("effort", 1e0, Residual::Control { reference: hold }, Activation::Weighted(share)),
         Cost::new("limits", 1e2, state(), within()),
-        Cost::new("effort limits", 1e1, Residual::Control { reference: vec![0.0; nv] }, efforts),
+        Cost::new("effort limits", 1e1, Residual::Control { reference: vec![0.0; nu] }, efforts),
     ];
     let terminal = vec![
         Cost::new("target", 1e4, position, Activation::Quadratic),
@@ -70,7 +73,7 @@ pub(crate) fn problem(
         let a = along(60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / (duration * duration));
         integrate(model, q0, &along(r * r * r * (10.0 + r * (6.0 * r - 15.0))), &mut q);
         if t < knots {
-            us.extend(rnea(model, &mut data, &q, &v, &a, &[]));
+            us.extend(&rnea(model, &mut data, &q, &v, &a, &[])[driven.clone()]);
         }
         xs.extend(q.iter().chain(&v));
     }
@@ -79,7 +82,7 @@ pub(crate) fn problem(
     if held {
         let state = limits_of(model, &inside(model, neutral(model)));
         end = end.with_limits(state.clone())?;
-        action = action.with_limits([state, efforts_of(model, model.nv())].concat())?;
+        action = action.with_limits([state, efforts_of(model, nu)].concat())?;
     }
     Ok((Problem::new(x0, vec![Box::new(action)], vec![0; knots], Box::new(end))?, xs, us))
 }

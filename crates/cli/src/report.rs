@@ -147,8 +147,9 @@ pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
 }
 
 /// How the solve ended, in words.
-pub(crate) fn status(status: Status) -> &'static str {
-    match status {
+pub(crate) fn status(plan: &Plan) -> &'static str {
+    match plan.solution.status {
+        _ if plan.settled.is_some() => "settled",
         Status::Converged => "converged",
         Status::MaxIterations => "iteration limit",
         Status::RegularisationLimit => "no descent found",
@@ -161,9 +162,12 @@ pub(crate) fn status(status: Status) -> &'static str {
 /// Everything after the iterations.
 pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> String {
     let (model, iterations) = (&plan.model, plan.trace.len());
-    let converged = plan.solution.status == Status::Converged;
-    let ended = styled(if converged { Style::Good } else { Style::Bad }, status(plan.solution.status));
+    let ended = styled(if plan.is_solved() { Style::Good } else { Style::Bad }, status(plan));
     let mut text = format!("\n{ended} after {iterations} iterations, {:.1} ms\n", budget.solve_ms);
+    if let Some(left) = plan.settled {
+        let why = "the gradient of the Lagrangian is lost in rounding above its tolerance";
+        text += &format!("settled: limits hold, the cost would fall by {left:.0e} of itself; {why}\n");
+    }
     if let Some(goal) = &plan.goal {
         text += &format!("`{}` ends {:.2} mm from the target\n", model.frames()[goal.frame].name, 1e3 * goal.miss);
     }
@@ -206,7 +210,7 @@ pub(crate) fn summary(plan: &Plan, budget: &Budget, violations: &[Violation]) ->
         json!({"frame": frame, "target": goal.target.to_array(), "miss": goal.miss, "tolerance": goal.tolerance})
     });
     json!({
-        "robot": plan.model.name(), "title": plan.title, "status": plan.solution.status, "cost": plan.solution.cost,
+        "robot": plan.model.name(), "title": plan.title, "status": plan.solution.status, "settled": plan.settled, "cost": plan.solution.cost,
         "iterations": plan.trace.len(), "knots": plan.knots(), "duration_s": plan.times.last(), "goal": goal,
         "solve_ms": budget.solve_ms, "budget": budget, "violations": violations,
     })

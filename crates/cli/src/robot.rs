@@ -1,6 +1,7 @@
 //! The robot of a command: a file of any kind, or one that comes along.
 
 use crate::error::{Error, nearest};
+use crate::meshes::Places;
 use condyle::{Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, robots};
 use std::path::{Path, PathBuf};
 
@@ -79,16 +80,20 @@ pub(crate) struct Robot {
     pub format: Format,
     /// The text of the file.
     pub text: String,
+    /// Where its meshes are looked for.
+    pub places: Places,
 }
 
 /// Reads a robot.
 pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
+    let places = |path: &Path| Places { folder: path.parent().map(Path::to_owned), packages: options.packages.clone() };
     let Some(path) = locate(name) else {
         return embedded(name, options);
     };
-    let (format, text) = sniff(&path)?;
+    let found = if name.starts_with("package://") { places(Path::new("")).find(name).unwrap_or(path) } else { path };
+    let (format, text) = sniff(&found)?;
     let model = read(name, format, options)?;
-    Ok(Robot { model, source: name.to_owned(), format, text })
+    Ok(Robot { model, source: name.to_owned(), format, text, places: places(&found) })
 }
 
 /// The file of that name, if the name is none of a robot that comes along. An address of a package is looked up later.
@@ -131,7 +136,7 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     };
     let model =
         Model::from_urdf_str(text, &UrdfOptions { root_joint, mimic: options.mimic, ..UrdfOptions::default() })?;
-    Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned() })
+    Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned(), places: Places::default() })
 }
 
 /// An error for a name that is neither a file's nor that of a robot that comes along; with what it could have meant.

@@ -1,5 +1,6 @@
-//! What the page draws: the simple shapes of a URDF, or bones between the joints where it has none.
+//! What the page draws: the shapes and meshes of a robot's file, or bones between the joints where it has none.
 
+use crate::meshes::{Meshes, mjcf};
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};
 use condyle::{Act, Data, Model, Quaternion, Se3, Vec3, forward_kinematics};
@@ -14,7 +15,7 @@ pub(crate) struct Body {
     shapes: Vec<Shape>,
 }
 
-/// A box, cylinder, sphere, or a segment with round ends.
+/// A box, cylinder, sphere, a segment with round ends, or a part of a mesh, whose `size` is its scale.
 #[derive(Clone, Serialize)]
 pub(crate) struct Shape {
     kind: &'static str,
@@ -22,6 +23,9 @@ pub(crate) struct Shape {
     position: [f64; 3],
     quaternion: [f64; 4],
     color: Option<String>,
+    /// The number of the part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    part: Option<usize>,
 }
 
 /// Position and quaternion (x, y, z, w).
@@ -30,48 +34,99 @@ pub(crate) fn pose(placement: Se3<f64>) -> [f64; 7] {
     [p.x, p.y, p.z, q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// All bodies, the world first.
-pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize]) -> Vec<Body> {
-    let mut shapes = if robot.format == Format::Urdf { primitives(model, &robot.text) } else { HashMap::new() };
-    // bones, unless most moving bodies have shapes of their own
-    let drawn = (1..model.bodies().len()).filter(|b| shapes.contains_key(b)).count();
-    if 2 * drawn < model.bodies().len() - 1 {
-        shapes = bones(model, ends);
+/// All bodies, the world first; and the meshes that they show, where meshes are wanted.
+pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool) -> (Vec<Body>, Meshes) {
+    let mut meshes = Meshes::new(robot.places.clone());
+    let mut shapes = match robot.format {
+        Format::Urdf => shapes_of_urdf(model, &robot.text, wanted.then_some(&mut meshes)),
+        Format::Mjcf if wanted => shapes_of_mjcf(model, &robot.text, &mut meshes),
+        Format::Mjcf | Format::Sdf => HashMap::new(),
+    };
+    // Bones where a mesh is left out; and everywhere but at meshes, unless most moving bodies have shapes of their own.
+    let drawn = |b: &usize| shapes.get(b).is_some_and(|shapes| !shapes.is_empty());
+    let few = 2 * (1..model.bodies().len()).filter(drawn).count() < model.bodies().len() - 1;
+    for (body, bones) in bones(model, ends) {
+        match shapes.get(&body) {
+            Some(own) if own.iter().any(|shape| shape.part.is_some()) => {}
+            Some(own) if !few && !own.is_empty() => {}
+            None if !few => {}
+            _ => _ = shapes.insert(body, bones),
+        }
     }
     let body = |(i, b): (usize, &condyle::Body)| Body {
         name: b.name.clone(),
         parent: if i == 0 { -1 } else { b.parent as isize },
         shapes: shapes.remove(&i).unwrap_or_default(),
     };
-    model.bodies().iter().enumerate().map(body).collect()
+    (model.bodies().iter().enumerate().map(body).collect(), meshes)
 }
 
-/// Boxes, cylinders, spheres and capsules of the URDF's visuals, by body.
-fn primitives(model: &Model, urdf: &str) -> HashMap<usize, Vec<Shape>> {
+/// A colour as style sheets write it.
+fn hex(color: &[f64]) -> String {
+    let byte = |x: &f64| format!("{:02x}", (255.0 * x.clamp(0.0, 1.0)).round() as u8);
+    "#".to_owned() + &color.iter().take(3).map(byte).collect::<String>()
+}
+
+/// Boxes, cylinders, spheres, capsules and meshes of the URDF's visuals, by body; a body whose meshes are left out and that
+/// shows nothing else has an empty list.
+fn shapes_of_urdf(model: &Model, urdf: &str, mut meshes: Option<&mut Meshes>) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
     for visual in visuals::read(urdf) {
         let Ok(frame) = model.frame(&visual.link) else { continue };
         let frame = &model.frames()[frame];
+        let color = visual.color.map(|rgba| hex(&rgba));
+        let pose = pose(frame.placement * visual.origin);
+        let place = shapes.entry(frame.body);
         let (kind, size) = match visual.geometry {
             Geometry::Box(size) => ("box", size.to_vec()),
             Geometry::Cylinder { radius, length } => ("cylinder", vec![radius, length]),
             Geometry::Capsule { radius, length } => ("capsule", vec![radius, length]),
             Geometry::Sphere(radius) => ("sphere", vec![radius]),
+            Geometry::Mesh { file, scale } => {
+                if let Some(meshes) = meshes.as_deref_mut() {
+                    place.or_default().extend(parts(meshes, &file, &scale, pose, color.as_deref()));
+                }
+                continue;
+            }
         };
-        let color = visual.color.map(|rgba| {
-            let [r, g, b, _] = rgba.map(|x| (255.0 * x.clamp(0.0, 1.0)).round() as u8);
-            format!("#{r:02x}{g:02x}{b:02x}")
-        });
-        let pose = pose(frame.placement * visual.origin);
-        shapes.entry(frame.body).or_default().push(Shape {
-            kind,
-            size,
-            position: [pose[0], pose[1], pose[2]],
-            quaternion: [pose[3], pose[4], pose[5], pose[6]],
-            color,
-        });
+        place.or_default().push(Shape { kind, size, color, ..at(pose) });
     }
     shapes
+}
+
+/// The meshes of an MJCF's bodies.
+fn shapes_of_mjcf(model: &Model, text: &str, meshes: &mut Meshes) -> HashMap<usize, Vec<Shape>> {
+    let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
+    for visual in mjcf::visuals(text) {
+        let (body, placement) = match visual.body.as_deref().map(|name| model.frame(name)) {
+            None => (0, Se3::identity()),
+            Some(Ok(frame)) => (model.frames()[frame].body, model.frames()[frame].placement),
+            Some(Err(_)) => continue,
+        };
+        let pose = pose(placement * Se3::from(visual.pose));
+        let color = visual.color.map(|color| hex(&color));
+        let found = parts(meshes, &visual.file, &visual.scale, pose, color.as_deref());
+        shapes.entry(body).or_default().extend(found);
+    }
+    shapes
+}
+
+/// The parts of a mesh. The colours that its own file gives come first, as RViz has them.
+fn parts(meshes: &mut Meshes, file: &str, scale: &[f64], pose: [f64; 7], color: Option<&str>) -> Vec<Shape> {
+    let shape = |drawn: crate::meshes::Drawn| Shape {
+        kind: "mesh",
+        size: scale.to_vec(),
+        color: drawn.color.map(|own| hex(&own)).or(color.map(str::to_owned)),
+        part: Some(drawn.part),
+        ..at(pose)
+    };
+    meshes.get(file).into_iter().map(shape).collect()
+}
+
+/// A shape at a pose, without anything to see yet.
+fn at(pose: [f64; 7]) -> Shape {
+    let [x, y, z, quaternion @ ..] = pose;
+    Shape { kind: "", size: vec![], position: [x, y, z], quaternion, color: None, part: None }
 }
 
 /// A segment from each body to the joints that it carries, a sphere at each joint, and a segment to each end.
@@ -84,8 +139,7 @@ fn bones(model: &Model, ends: &[usize]) -> HashMap<usize, Vec<Shape>> {
         reach = reach.max(placements.body(i).translation.norm_squared().sqrt());
     }
     let r = 0.035 * reach.max(0.1);
-    let shape =
-        |kind, size: Vec<f64>| Shape { kind, size, position: [0.0; 3], quaternion: [0.0, 0.0, 0.0, 1.0], color: None };
+    let shape = |kind, size: Vec<f64>| Shape { kind, size, ..at([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]) };
     let segment = |to: Vec3<f64>, radius| shape("segment", vec![0.0, 0.0, 0.0, to.x, to.y, to.z, radius]);
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
     let mut is_leaf = vec![true; model.bodies().len()];

@@ -17,9 +17,20 @@ pub(crate) struct Visual {
 #[derive(Debug, PartialEq)]
 pub(crate) enum Geometry {
     Box([f64; 3]),
-    Cylinder { radius: f64, length: f64 },
-    Capsule { radius: f64, length: f64 },
+    Cylinder {
+        radius: f64,
+        length: f64,
+    },
+    Capsule {
+        radius: f64,
+        length: f64,
+    },
     Sphere(f64),
+    /// A file, as the URDF writes it, whose lengths are multiplied with a scale for each axis.
+    Mesh {
+        file: String,
+        scale: [f64; 3],
+    },
 }
 
 /// The visuals of all links, in the file's order. What cannot be read is left out: a picture is no reason to refuse a robot.
@@ -65,6 +76,10 @@ fn geometry(node: Node<'_, '_>) -> Option<Geometry> {
         "cylinder" => Some(Geometry::Cylinder { radius: number("radius")?, length: number("length")? }),
         "capsule" => Some(Geometry::Capsule { radius: number("radius")?, length: number("length")? }),
         "sphere" => number("radius").map(Geometry::Sphere),
+        "mesh" => {
+            let scale = if shape.has_attribute("scale") { numbers(shape, "scale")? } else { [1.0; 3] };
+            Some(Geometry::Mesh { file: shape.attribute("filename")?.to_owned(), scale })
+        }
         _ => None,
     }
 }
@@ -111,6 +126,7 @@ mod tests {
             [
                 ("a", &Geometry::Box([1.0, 2.0, 3.0]), Some([0.5, 0.5, 0.6, 1.0])),
                 ("a", &Geometry::Sphere(0.5), Some([1.0, 0.0, 0.0, 1.0])),
+                ("a", &Geometry::Mesh { file: "a.stl".to_owned(), scale: [1.0; 3] }, None),
                 ("b", &Geometry::Cylinder { radius: 0.1, length: 2.0 }, None),
             ]
         );

@@ -198,13 +198,23 @@ impl<S> Data<S> {
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
-        let made_for = (self.size.bodies, self.size.columns, self.size.nv);
-        let given = (model.nodes().len(), model.columns().len(), model.nv());
+        if self.tree != model.tree_hash() {
+            let given = [model.nodes().len(), model.columns().len(), model.nv()];
+            self.size.wrong_tree(given);
+        }
+    }
+}
+
+impl Size {
+    /// The panic of [`Data::check`], not inlined: every call checks its data.
+    #[cold]
+    #[inline(never)]
+    #[track_caller]
+    fn wrong_tree(&self, given: [usize; 3]) -> ! {
+        let made_for = [self.bodies, self.columns, self.nv];
         let other = if made_for == given { " in another tree" } else { "" };
-        assert!(
-            self.tree == model.tree_hash(),
-            "data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}{other}"
-        );
+        let [made_for, given] = [made_for, given].map(|[bodies, columns, nv]| (bodies, columns, nv));
+        panic!("data: made for a model of {made_for:?} bodies, joint axes and coordinates, found {given:?}{other}");
     }
 }
 
@@ -212,5 +222,15 @@ impl<S> Data<S> {
 #[inline]
 #[track_caller]
 pub(crate) fn check_forces(found: usize, bodies: usize) {
-    assert!(found == 0 || found == bodies, "f_ext: expected no force or {bodies} (one for each body), found {found}");
+    if found != 0 && found != bodies {
+        wrong_forces(found, bodies);
+    }
+}
+
+/// The panic of [`check_forces`].
+#[cold]
+#[inline(never)]
+#[track_caller]
+fn wrong_forces(found: usize, bodies: usize) -> ! {
+    panic!("f_ext: expected no force or {bodies} (one for each body), found {found}");
 }

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 mod common;
-#[path = "common/counting.rs"]
+#[path = "../../../tests/common/counting.rs"]
 mod counting;
 
 use common::table::{Input, Output, functions};

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 mod common;
-#[path = "common/counting.rs"]
+#[path = "../../../tests/common/counting.rs"]
 mod counting;
 
 use common::{State, Tree, lift, moved, normal, relative, rng};

@@ -50,5 +50,15 @@ pub use vectors::{add_product_vector, add_scaled_product, copy, copy_scaled, dot
 #[inline]
 #[track_caller]
 pub fn check(argument: &str, found: usize, expected: usize) {
-    assert!(found == expected, "{argument}: expected {expected} numbers, found {found}");
+    if found != expected {
+        wrong_length(argument, found, expected);
+    }
+}
+
+/// The panic of [`check`], not inlined: hundreds of calls check several arguments each.
+#[cold]
+#[inline(never)]
+#[track_caller]
+fn wrong_length(argument: &str, found: usize, expected: usize) -> ! {
+    panic!("{argument}: expected {expected} numbers, found {found}");
 }

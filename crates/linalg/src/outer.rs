@@ -115,7 +115,7 @@ struct Active {
 pub struct OuterProducts {
     /// The numbers of all rows.
     pub rows: Vec<f64>,
-    /// From one row to the next.
+    /// The step from one row to the next.
     stride: usize,
     /// The columns of the sum.
     size: usize,

@@ -1,4 +1,4 @@
-//! Where matrices with the zeros of a tree have entries.
+//! Entries of matrices with the zeros of a tree.
 
 /// The rows in which a column of such a matrix may differ from zero.
 #[derive(Clone, Debug)]

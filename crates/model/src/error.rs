@@ -83,7 +83,7 @@ pub enum Error {
     /// A gravity is infinite or not a number.
     #[error("gravity: ({}, {}, {}) m/s² is not finite", gravity[0], gravity[1], gravity[2])]
     Gravity {
-        /// As given (m/s²).
+        /// The acceleration as given (m/s²).
         gravity: [f64; 3],
     },
     /// A position is none of the robot's.

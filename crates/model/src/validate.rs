@@ -311,9 +311,17 @@ impl<R> Model<R> {
     #[track_caller]
     pub fn check_regular(&self) {
         if let Some(&i) = self.singular.first() {
-            panic!("{}", Warning::Singular { joint: self.bodies[i].joint_name.clone() });
+            singular(&self.bodies[i].joint_name);
         }
     }
+}
+
+/// The panic of [`Model::check_regular`].
+#[cold]
+#[inline(never)]
+#[track_caller]
+fn singular(joint: &str) -> ! {
+    panic!("{}", Warning::Singular { joint: joint.to_owned() });
 }
 
 #[cfg(test)]

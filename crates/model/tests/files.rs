@@ -141,6 +141,21 @@ fn long_names() {
     assert!(matches!(model.frame(&b), Err(Error::UnknownFrame { nearest, .. }) if nearest == a));
 }
 
+/// A line break or tab in a name is a space, as XML has it in every attribute; written as a character's number it stays.
+#[test]
+fn names_with_line_breaks() {
+    for (written, read) in
+        [("a\tb", "a b"), ("a\nb", "a b"), ("a\r\nb", "a b"), ("a&#10;b", "a\nb"), ("a&#9;b", "a\tb")]
+    {
+        let ends = format!("<parent link='base'/><child link='{written}'/><limit effort='1' velocity='1'/>");
+        let joint = format!("<joint name='{written}' type='revolute'>{ends}</joint>");
+        let model = urdf(&format!("<robot><link name='base'/><link name='{written}'/>{joint}</robot>")).unwrap();
+        let body = &model.bodies()[1];
+        assert_eq!((&*body.name, &*body.joint_name), (read, read), "{written:?}");
+        assert!(model.frame(read).is_ok());
+    }
+}
+
 /// Frames that are attached to frames, and poses relative to poses: each is looked at once.
 #[test]
 fn attached_frames() {

@@ -1,7 +1,8 @@
 //! A solve allocates nothing, once the solver and its trace exist.
-#![allow(unsafe_code)] // a counting allocator cannot be written without
 
 mod common;
+#[path = "../../../tests/common/counting.rs"]
+mod counting;
 
 use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
 use condyle_dynamics::{ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
@@ -10,43 +11,7 @@ use condyle_optimal::robot::{
     ImpulseDynamics, Integrator, Limit, Residual,
 };
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Iteration, Problem, Status, Sweep};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
-// and allocates nothing itself.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.set(COUNT.get() + 1);
-        // SAFETY: the caller's promise about `layout` is the one that is asked for.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(f: impl FnOnce()) -> usize {
-    let before = COUNT.get();
-    f();
-    COUNT.get() - before
-}
-
-#[test]
-fn the_counter_counts() {
-    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(7)))), 1);
-}
+use counting::{allocated, allocations};
 
 #[test]
 fn a_sweep_allocates_nothing() {
@@ -302,7 +267,7 @@ fn active_rows_allocate_nothing() {
     solver.settings.max_iterations = 3;
     let mut counts = [None; 4];
     solver
-        .solve_with(&mut problem, &x0.repeat(9), &us, |i: &Iteration| counts[i.iteration] = Some(COUNT.get()))
+        .solve_with(&mut problem, &x0.repeat(9), &us, |i: &Iteration| counts[i.iteration] = Some(allocated()))
         .unwrap();
     assert_eq!(counts[0], counts[2], "{counts:?}");
 }

@@ -486,14 +486,17 @@ fn settings_that_count_are_limited() {
     assert_eq!(solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap().status, Status::Converged);
 }
 
-/// An arm reaches for a point in 50 knots, and nothing but a tiny weight keeps its efforts small.
-fn reckless_reach(dt: f64, effort: f64, point: f64) -> (Problem, Vec<f64>) {
+/// An arm reaches for a point in 50 knots, and nothing but a tiny weight keeps its efforts small, and bounds that are far away.
+fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Problem, Vec<f64>) {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
     let there = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
     let effort = Cost::new("effort", effort, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
     let point = Cost::new("point", point, there, Activation::Quadratic);
-    let knot = FreeDynamics::running(arm.clone(), dt, vec![effort]).unwrap();
+    let mut knot = FreeDynamics::running(arm.clone(), dt, vec![effort]).unwrap();
+    if let Some(bound) = bound {
+        knot = knot.with_bounds(vec![-bound; 7], vec![bound; 7]);
+    }
     let end = FreeDynamics::terminal(arm, vec![point]).unwrap();
     let problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 50], Box::new(end)).unwrap();
     (problem, x0.repeat(51))
@@ -505,7 +508,7 @@ fn reckless_reach(dt: f64, effort: f64, point: f64) -> (Problem, Vec<f64>) {
 fn a_solve_that_blows_up_returns_its_best_iterate() {
     for (dt, effort, point) in [(0.02, 1e-6, 1e2), (0.02, 1e-6, 1e4), (0.05, 1e-3, 1e4), (0.05, 1e-4, 1e2)] {
         let run = |threads: usize| {
-            let (mut problem, xs) = reckless_reach(dt, effort, point);
+            let (mut problem, xs) = reckless_reach(dt, effort, point, None);
             let mut solver = Fddp::new(&problem);
             solver.settings.threads = threads;
             let first = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
@@ -535,10 +538,33 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
     }
 }
 
+/// The same with bounds on the controls, whose steps are quadratic programs: the solve accepts an iterate that costs more than
+/// a hundred times as much, no direction can be found there, and it goes back.
+#[test]
+fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
+    for (dt, effort, point) in [(0.02, 1e-6, 1e2), (0.02, 1e-6, 1e4), (0.05, 1e-3, 1e4)] {
+        let (mut problem, xs) = reckless_reach(dt, effort, point, Some(1e6));
+        let mut solver = Fddp::new(&problem);
+        let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+        let (first, last) = (&solution.trace[0], solution.trace.last().unwrap());
+        assert_eq!(solution.status, Status::NotFinite);
+        assert!(last.accepted && last.cost > 1e2 * (1.0 + first.cost), "{last:?}");
+        let most = solution.trace.iter().map(|i| i.gap).fold(0.0, f64::max);
+        assert!(solution.cost < 1e3 && solution.gap < most, "{} {}", solution.cost, solution.gap);
+        assert!(solution.us.iter().all(|u| u.abs() <= 1e6));
+        let (mut next, mut costs) = (vec![0.0; 50 * 14], vec![0.0; 51]);
+        problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
+        assert!((costs.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
+        assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
+        let next = solver.resume(&mut problem).unwrap();
+        assert!(next.trace[0].gap == solution.gap && next.gap <= solution.gap && next.cost.is_finite());
+    }
+}
+
 /// The feedback of a solution that a solve went back to is that of the sweep there.
 #[test]
 fn the_feedback_is_that_of_the_iterate() {
-    let (mut problem, xs) = reckless_reach(0.02, 1e-6, 1e2);
+    let (mut problem, xs) = reckless_reach(0.02, 1e-6, 1e2, None);
     let mut solver = Fddp::new(&problem);
     let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
     assert_eq!(solution.status, Status::NotFinite);
@@ -561,7 +587,7 @@ fn the_feedback_is_that_of_the_iterate() {
 /// What blows up within the augmented Lagrangian leaves it its best iterate too, measured.
 #[test]
 fn a_constrained_solve_that_blows_up_says_how_far_its_best_iterate_is() {
-    let (mut problem, xs) = reckless_reach(0.02, 1e-6, 1e2);
+    let (mut problem, xs) = reckless_reach(0.02, 1e-6, 1e2, None);
     let mut solver = AugmentedLagrangian::new(&problem);
     let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
     assert_eq!(solution.status, Status::NotFinite);

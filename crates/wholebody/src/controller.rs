@@ -202,10 +202,11 @@ impl WholeBodyController {
     /// their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
     ///
     /// # Panics
-    /// If the references or the plan were made for another controller.
+    /// If the references were made for another controller, or the plan for a robot of other bodies and joints.
     pub fn track(&mut self, plan: &Plan, t: f64, references: &mut References) {
         let Self { equations: Equations { kinematics: k, contacts, .. }, objective, planned, .. } = self;
         check("references.contacts", references.contacts.len(), contacts.len());
+        plan.check(&k.model);
         plan.read(t, planned, &mut objective.error);
         let PlannedState { q, v, a } = planned;
         k.update(q, v);

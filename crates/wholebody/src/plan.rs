@@ -108,6 +108,12 @@ impl Plan {
         (after - 1, if to > from { ((t - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 })
     }
 
+    /// Panics unless it was made for this robot, or one of the same bodies and joints.
+    pub(crate) fn check(&self, model: &Model) {
+        let same = self.model.tree_hash() == model.tree_hash();
+        assert!(same, "plan: made for another model (`{}`) than `{}`", self.model.name(), model.name());
+    }
+
     /// q, v and a at a time; before the first and after the last knot at rest in it.
     pub(crate) fn read(&self, t: f64, out: &mut PlannedState, tangent: &mut [f64]) {
         let (nq, nx) = (self.model.nq(), self.model.nq() + self.model.nv());

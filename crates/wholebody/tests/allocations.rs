@@ -1,13 +1,13 @@
 //! A step allocates nothing but what clarabel does.
 
 mod common;
-#[path = "common/counting.rs"]
+#[path = "../../../tests/common/counting.rs"]
 mod counting;
 
 use common::*;
 use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Settings, Task, WholeBodyController};
-use counting::COUNT;
+use counting::allocated;
 
 /// Assembly and our solver allocate nothing, whatever touches; clarabel once in a solve, and more for a new set of contacts.
 #[test]
@@ -26,21 +26,21 @@ fn assembly_allocates_nothing() {
                 for k in 0..2 {
                     references.contacts[k].activation = f64::from(set >> k & 1);
                 }
-                let before = COUNT.get();
+                let before = allocated();
                 controller.step(&q, &v, &references).solved().unwrap();
                 // clarabel's: one for each priority, unless what comes before it leaves nothing open
                 let allowed = if backend == Backend::Clarabel { priority + 1 } else { 0 };
                 if round > 0 || backend == Backend::InteriorPoint {
-                    assert!(COUNT.get() - before <= allowed, "set {set}: {}", COUNT.get() - before);
+                    assert!(allocated() - before <= allowed, "set {set}: {}", allocated() - before);
                 }
             }
         }
         // a safe command allocates nothing at all
         references.com.position.x = f64::NAN;
         for _ in 0..10 {
-            let before = COUNT.get();
+            let before = allocated();
             controller.step(&q, &v, &references).solved().unwrap_err();
-            assert_eq!(COUNT.get(), before);
+            assert_eq!(allocated(), before);
         }
     }
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use condyle_dynamics::{Model, integrate, robots};
+use condyle_dynamics::{Joint, Model, UrdfOptions, integrate, robots};
 use condyle_wholebody::{Plan, PlanData, Settings, Task, WholeBodyController};
 
 /// Five knots 0.1 s apart: the trunk accelerates upwards with 0.4 m/s² from rest; the first foot is off in the third step.
@@ -89,4 +89,21 @@ fn wrong_arrays_are_named() {
         refusal(&|d| d.gains[7] = f64::NAN),
         "setting `gains` is NaN, but it must be finite, and times in their order"
     );
+}
+
+/// A robot with as many coordinates, whose knees slide.
+#[test]
+#[should_panic(expected = "plan: made for another model (`sliding`) than `quadruped`")]
+fn a_plan_of_another_robot_is_refused() {
+    let model = robots::quadruped();
+    let text = robots::QUADRUPED
+        .replace("type=\"revolute\"", "type=\"prismatic\"")
+        .replace("<robot name=\"quadruped\"", "<robot name=\"sliding\"");
+    let options = UrdfOptions { root_joint: Some(Joint::FreeFlyer), ..UrdfOptions::default() };
+    let other = Model::from_urdf_str(&text, &options).unwrap();
+    assert_eq!((other.nq(), other.nv()), (model.nq(), model.nv()));
+    let plan = Plan::new(&other, 4, data(&other)).unwrap();
+    let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), Settings::default()).unwrap();
+    let mut references = controller.hold(&stance());
+    controller.track(&plan, 0.1, &mut references);
 }

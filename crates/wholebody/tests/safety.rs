@@ -6,7 +6,7 @@ mod common;
 use common::*;
 use condyle_dynamics::{Data, gravity, integrate, robots};
 use condyle_wholebody::{
-    Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
+    Backend, Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
 };
 
 /// Finite, and within the limits to the last bit.
@@ -89,6 +89,23 @@ fn nothing_breaks_the_limits() {
     }
 }
 
+/// No time at all is too little for each back end, which says so.
+#[test]
+fn too_slow_is_a_status() {
+    let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
+    let effort = model.limits().effort.clone();
+    for backend in [Backend::InteriorPoint, Backend::Clarabel] {
+        let settings = Settings { backend, time_limit: 1e-12, ..Settings::default() };
+        let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();
+        let references = controller.hold(&q);
+        for _ in 0..10 {
+            let command = controller.step(&q, &v, &references);
+            is_safe(command, &effort);
+            assert_eq!(command.status, Status::TimeLimit, "{backend:?}");
+        }
+    }
+}
+
 /// In the air the compensation is gravity's torques.
 #[test]
 fn compensation_without_contacts() {
@@ -166,7 +183,7 @@ fn limits_give_way_to_contacts() {
     let mut upper = model.limits().upper.clone();
     (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are beyond: no motion of the trunk brings them all back
     let limits = JointLimits { upper: Some(upper), ..JointLimits::default() };
-    let settings = Settings { joint_limits: Some(limits), force_weight: 1e-5, ..Settings::default() };
+    let settings = Settings { joint_limits: Some(limits), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();
     let references = controller.hold(&q);
     let command = controller.step(&q, &[0.0; 18], &references);

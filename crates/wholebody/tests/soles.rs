@@ -172,6 +172,79 @@ fn edges_and_walls() {
     }
 }
 
+/// A hand leans on a wall beside the robot, whose normal is the world's: it pushes, and friction is across that normal.
+#[test]
+fn a_hand_leans_on_a_wall() {
+    let model = robots::humanoid();
+    let (q, v) = (squat(&model), vec![0.0; 38]);
+    let wall = FrictionContact {
+        normal: Normal::World(Vec3::new(0.0, -1.0, 0.0)),
+        min_force: 20.0,
+        ..FrictionContact::point("left_hand", 0.4)
+    };
+    let contacts = [soles(0.7), vec![wall]].concat();
+    let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // so that the wall gives no more than it must
+    // It should carry a part of the weight as well, more than friction allows.
+    let (references, command) = solve(&model, &contacts, &humanoid_tasks(), settings, &q, &v, |r| {
+        r.contacts[2].force.linear = Vec3::new(0.0, 0.0, 100.0);
+    });
+    check(&model, &contacts, &q, &v, &references, &command);
+    let f = command.forces[2].linear;
+    assert!(f.y < -20.0 + EQUALITY, "{f:?}");
+    assert!(f.z > 0.0 && (f.x.hypot(f.z) / (-0.4 * f.y) - 1.0).abs() < 1e-3, "at the edge of its cone: {f:?}");
+}
+
+/// Any convex polygon, whichever way round its corners are listed.
+#[test]
+fn soles_of_many_corners() {
+    let model = robots::humanoid();
+    let (q, v) = (squat(&model), vec![0.0; 38]);
+    let heel_and_toes = [[0.12, 0.03], [0.06, 0.05], [-0.08, 0.04], [-0.1, 0.0], [-0.08, -0.04], [0.06, -0.05]];
+    let corners = heel_and_toes.map(|[x, y]| Vec3::new(x, y, -0.01));
+    let backwards: Vec<_> = corners.iter().rev().copied().collect();
+    for push in [Vec3::zero(), Vec3::new(3.0, 0.5, 0.0)] {
+        let command = |corners: &[Vec3<f64>], by_corners: bool| {
+            let contacts = ["left_sole", "right_sole"].map(|sole| {
+                let sole = FrictionContact::surface(sole, 0.7, corners);
+                if by_corners { sole.by_corners() } else { sole }
+            });
+            let settings = Settings { tolerance: 1e-12, force_weight: 1e-5, ..Settings::default() };
+            let change = |r: &mut References| r.com.acceleration = push;
+            let (references, command) = solve(&model, &contacts, &humanoid_tasks(), settings, &q, &v, change);
+            check(&model, &contacts, &q, &v, &references, &command);
+            command
+        };
+        for by_corners in [false, true] {
+            let [one, other] = [&corners[..], &backwards].map(|corners| command(corners, by_corners));
+            let apart = max_abs(one.a.iter().zip(&other.a).map(|(a, b)| a - b));
+            assert!(apart < AGREEMENT * (1.0 + max_abs(one.a.iter().copied())), "q̈ by {apart:.1e}");
+        }
+    }
+}
+
+/// On one foot, whose moment about the normal is bounded, the robot turns no faster than that bound allows.
+#[test]
+fn the_yaw_moment_binds() {
+    let model = robots::humanoid();
+    let (q, v) = (squat(&model), vec![0.0; 38]);
+    let only_z = [false, false, true, false, false, false];
+    let spin = Task { weight: 10.0, mask: only_z, ..Task::angular_momentum() };
+    let tasks = [spin, Task { weight: 1e-3, ..Task::posture() }];
+    let moment = |yaw: f64| {
+        let contacts: Vec<_> =
+            soles(0.7).into_iter().map(|c| FrictionContact { yaw_friction: Some(yaw), ..c }).collect();
+        let (references, command) = solve(&model, &contacts, &tasks, Settings::default(), &q, &v, |r| {
+            r.contacts[1].activation = 0.0;
+            r.momentum.rate.z = 20.0;
+        });
+        check(&model, &contacts, &q, &v, &references, &command);
+        let f = command.forces[0];
+        f.angular.z / f.linear.z // soles are level, and their frames are in their middles
+    };
+    let (less, more) = (moment(0.003), moment(0.006));
+    assert!((less - 0.003).abs() < 1e-6 && (more - 0.006).abs() < 1e-6, "{less} {more}");
+}
+
 /// Four points on one foot: twelve rows of which six are independent.
 #[test]
 fn redundant_contacts_are_no_obstacle() {

@@ -2,6 +2,8 @@
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "common/optimality.rs"]
+mod optimality;
 
 use common::*;
 use condyle_dynamics::{Force, Model, integrate, robots};
@@ -89,7 +91,11 @@ fn fading_contacts_do_not_jerk() {
             largest = largest.max(if tick > 650 { jump } else { 0.0 }); // the reference's c̈ jumps at 600
         }
         before = Some(command.tau.clone());
-        advance(&model, &mut q, &mut v, &command.a, dt);
+        let a = command.a.clone();
+        if tick % 16 == 0 {
+            optimality::check_optimality(&mut controller, &q, &v, &references, &format!("tick {tick}"));
+        }
+        advance(&model, &mut q, &mut v, &a, dt);
     }
     // A tick of the ramp is 4 N on the feet's distance of 0.4 m. In the last one, the friction that these 4 N allowed (2.7 N, of
     // what accelerates the centre of mass) goes as well, to the other foot, on the hips' height of 0.9 m.

@@ -114,7 +114,7 @@ fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> P
 pub(crate) enum Expected<'a> {
     /// One shape.
     Shape(&'a [usize]),
-    /// That of one state, or of many with one axis more in front.
+    /// The shape of one state, or of many with one axis more in front.
     States(&'a [usize]),
 }
 

@@ -39,7 +39,8 @@ impl Group {
 #[derive(Clone, Debug)]
 pub(super) struct Chart {
     groups: Vec<Group>,
-    nq: usize,
+    pub(super) nq: usize,
+    pub(super) nv: usize,
 }
 
 /// A position, and T at it.
@@ -60,7 +61,12 @@ impl Chart {
             let (q, v) = (body.idx_q..body.idx_q + body.joint.nq(), body.idx_v..body.idx_v + body.joint.nv());
             Group { joint: body.joint, q, v }
         };
-        Self { groups: own.map(group).collect(), nq: model.nq() }
+        Self { groups: own.map(group).collect(), nq: model.nq(), nv: model.nv() }
+    }
+
+    /// That of an argument without a position.
+    pub(super) fn none() -> Self {
+        Self { groups: Vec::new(), nq: 0, nv: 0 }
     }
 
     pub(super) fn position(&self) -> Position {
@@ -68,8 +74,12 @@ impl Chart {
         Position { q: vec![0.0; self.nq], T: vec![Block::zeros(); groups], lengths: vec![1.0; groups] }
     }
 
-    /// The tangent coordinates that a coordinate of q moves.
+    /// The tangent coordinates that a coordinate moves: of q, or after it.
     pub(super) fn moved_by(&self, q: usize) -> Range<usize> {
+        if q >= self.nq {
+            let own = q - self.nq + self.nv;
+            return own..own + 1;
+        }
         let group = self.groups.iter().find(|group| group.q.contains(&q)).expect("each coordinate is a joint's");
         match group.unit() {
             None => group.v.start + (q - group.q.start)..group.v.start + (q - group.q.start) + 1,
@@ -143,6 +153,93 @@ impl Chart {
                 }
             }
         }
+    }
+}
+
+impl Chart {
+    /// The groups that are none of numbers, with their ranges in q and v.
+    fn curved(&self) -> impl Iterator<Item = &Group> {
+        self.groups.iter().filter(|group| group.unit().is_some())
+    }
+
+    /// Changes of a position's numbers, those of q ⊕ δ, from δ: E δ with E = ∂(q ⊕ δ)/∂δ at zero.
+    pub(super) fn push(&self, q: &[f64], delta: &[f64], out: &mut [f64]) {
+        for group in self.groups.iter().filter(|group| group.unit().is_none()) {
+            out[group.q.clone()].copy_from_slice(&delta[group.v.clone()]);
+        }
+        for group in self.curved() {
+            let E = group.retraction(q);
+            for (i, k) in group.q.clone().enumerate() {
+                out[k] = group.v.clone().enumerate().map(|(j, v)| E[(j, i)] * delta[v]).sum();
+            }
+        }
+    }
+
+    /// Eᵀ λ.
+    pub(super) fn pull(&self, q: &[f64], lambda: &[f64], out: &mut [f64]) {
+        for group in self.groups.iter().filter(|group| group.unit().is_none()) {
+            out[group.v.clone()].copy_from_slice(&lambda[group.q.clone()]);
+        }
+        for group in self.curved() {
+            let E = group.retraction(q);
+            for (j, v) in group.v.clone().enumerate() {
+                out[v] = group.q.clone().enumerate().map(|(i, k)| E[(j, i)] * lambda[k]).sum();
+            }
+        }
+    }
+
+    /// Shows λᵀ ∂²(q ⊕ δ)/∂δ² of each group that has one: its range in v, and the matrix in the leading rows and columns.
+    pub(super) fn each_curvature(
+        &self,
+        q: &[f64],
+        lambda: &[f64],
+        mut show: impl FnMut(Range<usize>, &SMatrix<f64, 6, 6>),
+    ) {
+        for group in self.curved() {
+            show(group.v.clone(), &group.curvature(&q[group.q.clone()], &lambda[group.q.clone()]));
+        }
+    }
+}
+
+impl Group {
+    /// Eᵀ at a position of length 1, from T E = 1: T of lengths is a rotation, that of a circle has length 1, and that of a
+    /// quaternion length 2.
+    fn retraction(&self, q: &[f64]) -> Block {
+        let mut E = tangent_map(self.joint, &q[self.q.clone()], 1.0);
+        let turns = self.unit().expect("a group that is none of numbers");
+        if turns.len() == 4 {
+            E.columns_mut(turns.start - self.q.start, 4).scale_mut(0.25);
+        }
+        E
+    }
+
+    /// λᵀ ∂²(q ⊕ δ)/∂δ²: of p ⊕ δ = p + R (δ_v + ½ δ_ω × δ_v + …), and of q ⊕ δ_ω = q (1 − ½ (|δ_ω| / n)²) + E δ_ω + …,
+    /// where n is 1 for a point of a circle and 2 for a quaternion.
+    fn curvature(&self, q: &[f64], lambda: &[f64]) -> SMatrix<f64, 6, 6> {
+        let mut C = SMatrix::zeros();
+        let start = self.unit().map_or(0, |unit| unit.start - self.q.start);
+        let (turns, along) = (start..self.v.len(), (start..q.len()).map(|k| q[k] * lambda[k]).sum::<f64>());
+        let share = if q.len() - start == 4 { 0.25 } else { 1.0 };
+        turns.clone().for_each(|k| C[(k, k)] = -share * along);
+        if start > 0 {
+            let T = tangent_map(self.joint, q, 1.0);
+            let at = |i: usize| (0..start).map(|k| T[(i, k)] * lambda[k]).sum::<f64>(); // Rᵀ λ
+            let half = match start {
+                2 => Vec3::new(at(0), at(1), 0.0),
+                _ => Vec3::new(at(0), at(1), at(2)),
+            };
+            for j in turns {
+                let axis = match start {
+                    2 => Vec3::new(0.0, 0.0, 1.0),
+                    _ => Vec3::new(f64::from(j == 3), f64::from(j == 4), f64::from(j == 5)),
+                };
+                let column = half.cross(axis).to_array(); // λᵀR (ω × v) = vᵀ (Rᵀλ × ω)
+                for i in 0..start {
+                    (C[(i, j)], C[(j, i)]) = (0.5 * column[i], 0.5 * column[i]);
+                }
+            }
+        }
+        C
     }
 }
 

@@ -1,5 +1,6 @@
 //! Functions of a robot and their derivatives by tangent vectors; this file knows nothing of CasADi.
 
+use super::computation::Output;
 use crate::hyper_dual::Hyper;
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Error, Model, ReferenceFrame, RneaSecondDerivatives, Scalar, Vec3,
@@ -27,20 +28,12 @@ pub(crate) enum Kind {
     ConstrainedDynamics { constraints: Vec<ContactConstraint> },
 }
 
-/// A result: a matrix.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Output {
-    pub(super) name: &'static str,
-    pub(super) rows: usize,
-    pub(super) columns: usize,
-}
-
 /// Which second derivatives may differ from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pattern {
     /// None.
     Zero,
-    /// Those by coordinates that move a body in common.
+    /// The entries by coordinates that move a body in common.
     Related,
     /// All.
     Full,

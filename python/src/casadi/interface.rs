@@ -1,4 +1,4 @@
-//! CasADi's C interface to functions of a robot, by numbered slots.
+//! CasADi's C interface to what is bound to numbered slots.
 //!
 //! `casadi.external` finds a function by its name among the symbols of a library, and its derivatives by names that follow
 //! from it. A robot is known only when the program runs, so the library has the symbols of [`SLOTS`] functions, which do
@@ -8,14 +8,12 @@
 //! `jac_adj1_condyle_n`, whose blocks are the Hessian of λᵀf and Jᵀ.
 #![allow(unsafe_code)]
 
-use super::chart::{Chart, Position};
-use super::function::{DualScratch, Kind, Pattern, Scratch};
-use condyle::{Error, Model};
+use super::bound::{Bound, Description, HESSIAN, JACOBIAN, Port, REVERSE, VALUE};
+use super::computation::Computation;
+use condyle::Error;
 use core::ffi::{c_char, c_int};
 use core::ptr::null;
 use core::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
-use nalgebra::DMatrix;
-use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -25,341 +23,6 @@ pub(super) const SLOTS: usize = 64;
 
 /// How long a function may take from its making to its first question, before it counts as loaded.
 const DESCRIPTION_TIME: Duration = Duration::from_millis(50);
-
-/// The functions of a slot, by their numbers.
-const VALUE: usize = 0;
-const JACOBIAN: usize = 1;
-const REVERSE: usize = 2;
-const HESSIAN: usize = 3;
-
-/// An argument or a result, as CasADi describes it.
-struct Port {
-    name: CString,
-    /// Rows, columns, the first entry of each column, the row of each entry.
-    sparsity: Vec<i64>,
-}
-
-impl Port {
-    /// A matrix whose entries are where `present` says, and their places when all entries stand column by column.
-    fn new(name: &str, rows: usize, columns: usize, present: impl Fn(usize, usize) -> bool) -> (Self, Vec<usize>) {
-        let number = |n: usize| i64::try_from(n).expect("robots are smaller");
-        let (mut starts, mut entries, mut places) = (vec![0], Vec::new(), Vec::new());
-        for j in 0..columns {
-            for i in (0..rows).filter(|&i| present(i, j)) {
-                entries.push(number(i));
-                places.push(j * rows + i);
-            }
-            starts.push(number(entries.len()));
-        }
-        let sparsity = [number(rows), number(columns)].into_iter().chain(starts).chain(entries).collect();
-        (Self { name: CString::new(name).expect("names have no zeros"), sparsity }, places)
-    }
-
-    fn full(name: &str, rows: usize, columns: usize) -> Self {
-        Self::new(name, rows, columns, |_, _| true).0
-    }
-
-    fn empty(name: &str, rows: usize, columns: usize) -> Self {
-        Self::new(name, rows, columns, |_, _| false).0
-    }
-}
-
-/// Where a result's numbers come from: entry (i, j) of a matrix of so many rows.
-#[derive(Clone, Copy)]
-enum Source {
-    Value,
-    Jacobian,
-    Gradient,
-    Hessian,
-    TransposedJacobian,
-    Nothing,
-}
-
-struct Output {
-    port: Port,
-    source: Source,
-    /// For each entry, its number in the source.
-    from: Vec<usize>,
-}
-
-/// One of the functions of a slot.
-#[derive(Default)]
-struct Description {
-    inputs: Vec<Port>,
-    outputs: Vec<Output>,
-}
-
-/// A function of a robot that is bound to a slot.
-struct Bound {
-    model: Model,
-    kind: Kind,
-    key: Vec<u8>,
-    chart: Chart,
-    /// How many numbers the results have.
-    ny: usize,
-    /// The results' sizes and places: where each begins among all, and where its entries stand from there.
-    results: Vec<(usize, Vec<usize>)>,
-    descriptions: [Description; 4],
-    /// What calls compute in; each takes one, and there are as many as calls at the same time.
-    free: Mutex<Vec<Box<Work>>>,
-}
-
-/// What a call computes in.
-struct Work {
-    scratch: Scratch<f64>,
-    dual: Option<Box<DualScratch>>,
-    position: Position,
-    x: Vec<Vec<f64>>,
-    lambda: Vec<f64>,
-    y: Vec<f64>,
-    /// By tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
-    J: DMatrix<f64>,
-    g: Vec<f64>,
-    H: DMatrix<f64>,
-    /// By the coordinates that CasADi has: J, Jᵀλ, and the Hessian.
-    Jx: DMatrix<f64>,
-    gx: Vec<f64>,
-    Hx: DMatrix<f64>,
-    /// H T and its transpose.
-    half: DMatrix<f64>,
-    turned: DMatrix<f64>,
-}
-
-impl Bound {
-    fn new(model: &Model, kind: Kind, key: Vec<u8>) -> Result<Self, Error> {
-        let (nq, nv) = (model.nq(), model.nv());
-        let chart = Chart::new(model);
-        let rows = match &kind {
-            Kind::ConstrainedDynamics { constraints } => condyle::ConstraintSet::<f64>::new(model, constraints)?.rows(),
-            _ => 0,
-        };
-        let (arguments, outputs) = (kind.arguments(), kind.outputs(nv, rows));
-        let size = |argument: usize| if argument == 0 { nq } else { nv };
-        let x_start = |argument: usize| if argument == 0 { 0 } else { nq + (argument - 1) * nv };
-        let nx = x_start(arguments.len());
-        let y_start: Vec<usize> = outputs
-            .iter()
-            .scan(0, |sum, o| {
-                *sum += o.rows * o.columns;
-                Some(*sum - o.rows * o.columns)
-            })
-            .collect();
-        let ny = outputs.iter().map(|o| o.rows * o.columns).sum::<usize>();
-
-        let mut relation = vec![false; nv * nv];
-        for (j, rows) in model.nonzero_rows().iter().enumerate() {
-            rows.rows.iter().for_each(|&i| (relation[i * nv + j], relation[j * nv + i]) = (true, true));
-        }
-        let related = |i: usize, j: usize| relation[i * nv + j];
-        let tangent = |argument: usize, k: usize| if argument == 0 { chart.moved_by(k) } else { k..k + 1 };
-        let depends =
-            |y: usize, argument: usize, k: usize| tangent(argument, k).any(|j| kind.depends(y, j, nv, related));
-        // an entry of the result is there if it may differ from zero, as the entries of M
-        let in_result = |o: usize, i: usize, j: usize| match kind {
-            Kind::Crba => related(i, j),
-            _ => o < outputs.len(),
-        };
-        let second = |(a, i): (usize, usize), (b, j): (usize, usize)| match kind.second_derivatives(a, b) {
-            Pattern::Zero => false,
-            Pattern::Full => true,
-            Pattern::Related => tangent(a, i).any(|i| tangent(b, j).any(|j| related(i, j))),
-        };
-
-        let inputs = || arguments.iter().enumerate().map(|(k, name)| Port::full(name, size(k), 1));
-        let unread = || outputs.iter().map(|o| Port::empty(&format!("out_{}", o.name), o.rows, o.columns));
-        let seeds = || {
-            let seed = |(k, o): (usize, &super::function::Output)| {
-                Port::new(&format!("adj_{}", o.name), o.rows, o.columns, |i, j| in_result(k, i, j)).0
-            };
-            outputs.iter().enumerate().map(seed)
-        };
-
-        let mut value = Description { inputs: inputs().collect(), ..Description::default() };
-        let mut results = Vec::new();
-        for (k, o) in outputs.iter().enumerate() {
-            let (port, places) = Port::new(o.name, o.rows, o.columns, |i, j| in_result(k, i, j));
-            let from = places.iter().map(|place| y_start[k] + place).collect();
-            value.outputs.push(Output { port, source: Source::Value, from });
-            results.push((y_start[k], places));
-        }
-
-        let mut jacobian = Description { inputs: inputs().chain(unread()).collect(), ..Description::default() };
-        for (k, o) in outputs.iter().enumerate() {
-            for (a, argument) in arguments.iter().enumerate() {
-                let count = o.rows * o.columns;
-                let present =
-                    |i: usize, j: usize| in_result(k, i % o.rows, i / o.rows) && depends(y_start[k] + i, a, j);
-                let (port, places) = Port::new(&format!("jac_{}_{argument}", o.name), count, size(a), present);
-                let number = |place: usize| (x_start(a) + place / count) * ny + y_start[k] + place % count;
-                let from = places.into_iter().map(number).collect();
-                jacobian.outputs.push(Output { port, source: Source::Jacobian, from });
-            }
-        }
-
-        let mut reverse =
-            Description { inputs: inputs().chain(unread()).chain(seeds()).collect(), ..Description::default() };
-        for (a, argument) in arguments.iter().enumerate() {
-            let port = Port::full(&format!("adj_{argument}"), size(a), 1);
-            let from = (x_start(a)..x_start(a) + size(a)).collect();
-            reverse.outputs.push(Output { port, source: Source::Gradient, from });
-        }
-
-        let unread_gradient =
-            arguments.iter().enumerate().map(|(a, name)| Port::empty(&format!("out_adj_{name}"), size(a), 1));
-        let inputs_of_hessian = inputs().chain(unread()).chain(seeds()).chain(unread_gradient);
-        let mut hessian = Description { inputs: inputs_of_hessian.collect(), ..Description::default() };
-        for (a, argument) in arguments.iter().enumerate() {
-            for (b, by) in arguments.iter().enumerate() {
-                let present = |i: usize, j: usize| second((a, i), (b, j));
-                let (port, places) = Port::new(&format!("jac_adj_{argument}_{by}"), size(a), size(b), present);
-                let number = |place: usize| (x_start(b) + place / size(a)) * nx + x_start(a) + place % size(a);
-                let from = places.into_iter().map(number).collect();
-                hessian.outputs.push(Output { port, source: Source::Hessian, from });
-            }
-            for o in &outputs {
-                let port = Port::empty(&format!("jac_adj_{argument}_out_{}", o.name), size(a), o.rows * o.columns);
-                hessian.outputs.push(Output { port, source: Source::Nothing, from: Vec::new() });
-            }
-            for (k, o) in outputs.iter().enumerate() {
-                let name = format!("jac_adj_{argument}_adj_{}", o.name);
-                let present =
-                    |j: usize, i: usize| in_result(k, i % o.rows, i / o.rows) && depends(y_start[k] + i, a, j);
-                let (port, places) = Port::new(&name, size(a), o.rows * o.columns, present);
-                let number = |place: usize| (x_start(a) + place % size(a)) * ny + y_start[k] + place / size(a);
-                let from = places.into_iter().map(number).collect();
-                hessian.outputs.push(Output { port, source: Source::TransposedJacobian, from });
-            }
-        }
-        let descriptions = [value, jacobian, reverse, hessian];
-        let bound =
-            Self { model: model.clone(), kind, key, chart, ny, results, descriptions, free: Mutex::new(Vec::new()) };
-        let work = bound.work()?;
-        bound.give_back(work);
-        Ok(bound)
-    }
-
-    fn work(&self) -> Result<Box<Work>, Error> {
-        let free = self.free.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        if let Some(work) = free {
-            return Ok(work);
-        }
-        let (nq, nv, arguments) = (self.model.nq(), self.model.nv(), self.kind.arguments().len());
-        let (tangents, nx) = (arguments * nv, nq + (arguments - 1) * nv);
-        let ny = self.ny;
-        Ok(Box::new(Work {
-            scratch: self.kind.scratch(&self.model)?,
-            dual: None,
-            position: self.chart.position(),
-            x: (0..arguments).map(|k| vec![0.0; if k == 0 { nq } else { nv }]).collect(),
-            lambda: vec![0.0; ny],
-            y: vec![0.0; ny],
-            J: DMatrix::zeros(ny, tangents),
-            g: vec![0.0; tangents],
-            H: DMatrix::zeros(tangents, tangents),
-            Jx: DMatrix::zeros(ny, nx),
-            gx: vec![0.0; nx],
-            Hx: DMatrix::zeros(nx, nx),
-            half: DMatrix::zeros(tangents, nx),
-            turned: DMatrix::zeros(nx, tangents),
-        }))
-    }
-
-    fn give_back(&self, work: Box<Work>) {
-        self.free.lock().unwrap_or_else(PoisonError::into_inner).push(work);
-    }
-
-    /// Evaluates a function of the slot.
-    ///
-    /// # Safety
-    /// `arg` and `res` have a pointer, to as many numbers as it has entries or null, for each input and each output.
-    unsafe fn evaluate(&self, function: usize, arg: *const *const f64, res: *const *mut f64) -> Result<(), Error> {
-        let mut work = self.work()?;
-        let w = &mut *work;
-        // SAFETY: by the caller.
-        let input = |k: usize, count: usize| unsafe {
-            let given = *arg.add(k);
-            (!given.is_null()).then(|| core::slice::from_raw_parts(given, count))
-        };
-        for (k, x) in w.x.iter_mut().enumerate() {
-            match input(k, x.len()) {
-                Some(given) => x.copy_from_slice(given),
-                None => x.fill(0.0),
-            }
-        }
-        let x = &mut w.x;
-        self.chart.update(&x[0], &mut w.position);
-        x[0].copy_from_slice(&w.position.q);
-        let (arguments, nv) = (x.len(), self.model.nv());
-        if function >= REVERSE {
-            w.lambda.fill(0.0);
-            for (k, (start, places)) in self.results.iter().enumerate() {
-                if let Some(seed) = input(arguments + self.results.len() + k, places.len()) {
-                    places.iter().zip(seed).for_each(|(place, &seed)| w.lambda[start + place] = seed);
-                }
-            }
-        }
-        match function {
-            VALUE => self.kind.value(&self.model, &mut w.scratch, x, &mut w.y),
-            HESSIAN => {
-                let closed = self.kind.closed_hessian(&self.model, &mut w.scratch, x, &w.lambda, &mut w.J, &mut w.H);
-                if !closed {
-                    self.kind.jacobian(&self.model, &mut w.scratch, x, &mut w.J);
-                    if w.dual.is_none() {
-                        w.dual = Some(Box::new(self.kind.dual_scratch(&self.model, w.y.len())?));
-                    }
-                    let dual = w.dual.as_mut().expect("was just made");
-                    self.kind.hessian(&self.model, dual, x, &w.lambda, &mut w.H);
-                }
-            }
-            _ => self.kind.jacobian(&self.model, &mut w.scratch, x, &mut w.J),
-        }
-        if function != VALUE {
-            self.by_coordinates(&w.position, &w.J, &mut w.Jx);
-        }
-        if function >= REVERSE {
-            for (g, column) in w.g.iter_mut().zip(w.J.column_iter()) {
-                *g = column.iter().zip(&w.lambda).map(|(x, l)| x * l).sum(); // Jᵀλ
-            }
-            for (g, column) in w.gx.iter_mut().zip(w.Jx.column_iter()) {
-                *g = column.iter().zip(&w.lambda).map(|(x, l)| x * l).sum();
-            }
-        }
-        if function == HESSIAN {
-            self.by_coordinates(&w.position, &w.H, &mut w.half);
-            w.half.transpose_to(&mut w.turned); // (H T)ᵀ
-            self.by_coordinates(&w.position, &w.turned, &mut w.Hx); // Tᵀ H T, which is symmetric
-            self.chart.add_curvature(&w.position, &w.g[..nv], &mut w.Hx, 0);
-        }
-        for (k, output) in self.descriptions[function].outputs.iter().enumerate() {
-            // SAFETY: by the caller.
-            let to = unsafe {
-                let to = *res.add(k);
-                if to.is_null() {
-                    continue;
-                }
-                core::slice::from_raw_parts_mut(to, output.from.len())
-            };
-            let source = match output.source {
-                Source::Value => &w.y[..],
-                Source::Jacobian | Source::TransposedJacobian => w.Jx.as_slice(),
-                Source::Gradient => &w.gx,
-                Source::Hessian => w.Hx.as_slice(),
-                Source::Nothing => &[],
-            };
-            to.iter_mut().zip(&output.from).for_each(|(to, &from)| *to = source[from]);
-        }
-        self.give_back(work);
-        Ok(())
-    }
-
-    /// A matrix with a column for each tangent coordinate, as one with a column for each of CasADi's.
-    fn by_coordinates(&self, at: &Position, from: &DMatrix<f64>, to: &mut DMatrix<f64>) {
-        let (nq, nv) = (self.model.nq(), self.model.nv());
-        self.chart.multiply(at, from, 0, to, 0);
-        let rest = from.ncols() - nv;
-        to.columns_mut(nq, rest).copy_from(&from.columns(nv, rest));
-    }
-}
 
 /// A slot: what is bound to it, and by how many it is used.
 struct Slot {
@@ -449,10 +112,12 @@ impl Slot {
     }
 }
 
-/// Holds a slot that computes a function of a robot: one that does so already, or a free one. There is none if all are taken.
-pub(super) fn hold(model: &Model, kind: Kind) -> Result<Option<String>, Error> {
-    let mut key = format!("{kind:?}").into_bytes();
-    key.extend(postcard::to_allocvec(model).unwrap_or_default());
+/// Holds a slot that computes what has this key: one that does so already, or a free one, to which what `make` makes is
+/// bound. There is none if all are taken.
+pub(super) fn hold(
+    key: Vec<u8>,
+    make: impl FnOnce() -> Result<Box<dyn Computation>, Error>,
+) -> Result<Option<String>, Error> {
     let name = |k: usize| Some(format!("condyle_{k}"));
     for (k, slot) in SLOT.iter().enumerate() {
         let mut users = slot.users();
@@ -461,7 +126,7 @@ pub(super) fn hold(model: &Model, kind: Kind) -> Result<Option<String>, Error> {
             return Ok(name(k));
         }
     }
-    let bound = Box::new(Bound::new(model, kind, key)?);
+    let bound = Box::new(Bound::new(make()?, key)?);
     for (k, slot) in SLOT.iter().enumerate() {
         let mut users = slot.users();
         if !users.any() {

@@ -1,19 +1,29 @@
 //! Functions of a robot for CasADi's `external`: exact values and derivatives without Python in the loop.
 //!
-//! `chart` has positions as CasADi sees them, `function` what is computed, `interface` CasADi's C interface to it: numbered
-//! slots, each with the symbols of a function, its Jacobian, its reverse product and the Jacobian of that.
+//! `chart` has positions as CasADi sees them. `computation` says what a function is that can be computed; `function` and
+//! `robot` have those of a robot, `knot` those of an optimal control problem. `bound` has them by CasADi's numbers, and
+//! `interface` CasADi's C interface: numbered slots, each with the symbols of a function, its Jacobian, its reverse product
+//! and the Jacobian of that.
 
+mod bound;
 mod chart;
+mod computation;
 mod function;
 mod interface;
+mod knot;
+mod robot;
 
 use crate::constrained::constraint;
-use crate::exceptions::{exception, wrong_word};
+use crate::exceptions::{ProblemError, exception, wrong_word};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
+use crate::optimal::{Alone, alone};
+use computation::Computation;
 use function::Kind;
+use knot::KnotFunction;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use robot::RobotFunction;
 
 /// A slot of CasADi's interface that computes a function of a robot, held for the caller until `_casadi_release`.
 ///
@@ -54,7 +64,33 @@ pub(crate) fn casadi_hold(
     if matches!(kind, Kind::Aba | Kind::ConstrainedDynamics { .. }) {
         crate::functions::regular(robot)?;
     }
-    interface::hold(robot, kind).map_err(exception)?.ok_or_else(|| {
+    let mut key = format!("{kind:?}").into_bytes();
+    key.extend(postcard::to_allocvec(&**robot).unwrap_or_default());
+    named(interface::hold(key, || Ok(Box::new(RobotFunction::new(robot, kind)?))).map_err(exception)?)
+}
+
+/// A slot that computes the next state and the cost of knot t of an action or of a problem, likewise; without t, of the knot
+/// whose number is an argument.
+#[pyfunction]
+#[pyo3(name = "_casadi_hold_knot", signature = (of, t))]
+pub(crate) fn casadi_hold_knot(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<String> {
+    let Alone { action, robot, end, text } = alone(of, t)?;
+    let mut key = format!("{} {end} {text}", t.is_some()).into_bytes(); // the text has the costs of knot t
+    let robot = robot.as_deref();
+    key.extend(robot.and_then(|robot| postcard::to_allocvec(robot).ok()).unwrap_or_default());
+    let knot: Box<dyn Computation> = match KnotFunction::new(action, robot, t, end) {
+        Some(knot) => Box::new(knot),
+        None => {
+            let what = "action: it has parts that are written in Python, which CasADi does not call";
+            return Err(ProblemError::new_err(what));
+        }
+    };
+    named(interface::hold(key, || Ok(knot)).map_err(exception)?)
+}
+
+/// The name of a slot, if there was one.
+fn named(slot: Option<String>) -> PyResult<String> {
+    slot.ok_or_else(|| {
         let message = format!("all {} functions for CasADi are in use: drop some of them", interface::SLOTS);
         PyValueError::new_err(message)
     })

@@ -2,10 +2,13 @@
 
 use super::actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
 use super::own::{Action, ConstrainedAction, DifferentialAction, Fault, Lqr, Unicycle};
-use super::robot_action::Boxed;
+use super::problem::{Problem, lock};
+use super::robot_action::{Boxed, Described};
+use crate::exceptions::{ProblemError, problem_error};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use std::sync::Arc;
 
 /// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `fault`.
 pub(super) fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> PyResult<Boxed> {
@@ -46,4 +49,80 @@ pub(super) fn residuals(model: &Bound<'_, PyAny>) -> Vec<Py<PyAny>> {
     }
     of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics);
     Vec::new()
+}
+
+/// A knot by itself, without the limits and the bounds that a solver holds.
+pub(crate) struct Alone {
+    pub(crate) action: Box<dyn rust::ActionModel>,
+    pub(crate) robot: Option<Arc<condyle::Model>>,
+    /// Whether there is no next state.
+    pub(crate) end: bool,
+    /// The knot as text, which tells it from others of this robot.
+    pub(crate) text: String,
+}
+
+/// Knot t of an action, or of a problem; or all knots of an action, for each of which it computes.
+pub(crate) fn alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> {
+    let Ok(problem) = of.cast::<Problem>() else { return action_alone(of, t) };
+    let (py, problem) = (of.py(), problem.get());
+    let (inner, described) = (lock("problem", &problem.inner)?, lock("problem", &problem.described)?);
+    let horizon = inner.horizon();
+    let Some(t) = t else {
+        return Err(ProblemError::new_err("t: expected the number of a knot of the problem, found None"));
+    };
+    let k = match inner.stages().get(t) {
+        Some(&k) => k,
+        None if t == horizon => described.len() - 1,
+        None => return Err(ProblemError::new_err(format!("t: expected 0 to {horizon}, found {t}"))),
+    };
+    let mut alone = match (&described[k], &problem.objects[k]) {
+        (Some(described), _) => robot_alone(described, Some(t))?,
+        (None, Some(object)) => action_alone(object.bind(py), Some(t))?,
+        (None, None) => unreachable!("a model is a robot's or an object"),
+    };
+    alone.end |= t == horizon;
+    Ok(alone)
+}
+
+fn action_alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> {
+    let alone = |action, text| Ok(Alone { action, robot: None, end: false, text });
+    if let Ok(lqr) = of.cast::<Lqr>() {
+        let lqr = &lqr.get().0;
+        return alone(Box::new(lqr.clone()), format!("{lqr:?}"));
+    }
+    if let Ok(unicycle) = of.cast::<Unicycle>() {
+        let unicycle = &unicycle.get().0;
+        return alone(Box::new(unicycle.clone()), format!("{unicycle:?}"));
+    }
+    if let Ok(constrained) = of.cast::<ConstrainedAction>() {
+        return action_alone(constrained.get().action.bind(of.py()), t);
+    }
+    if of.is_instance_of::<Action>() || of.is_instance_of::<DifferentialAction>() || !residuals(of).is_empty() {
+        let found = of.get_type().name()?;
+        return Err(ProblemError::new_err(format!(
+            "action: this {found} is written in Python, which CasADi does not call: write it as CasADi's expressions"
+        )));
+    }
+    match boxed(of, false, &Fault::default()).ok().and_then(|boxed| boxed.described) {
+        Some(described) => robot_alone(&described, t),
+        None => {
+            let found = of.get_type().name()?;
+            Err(PyTypeError::new_err(format!("action: expected an action or a Problem, found '{found}'")))
+        }
+    }
+}
+
+fn robot_alone(Described { robot, knot }: &Described, t: Option<usize>) -> PyResult<Alone> {
+    let mut knot = knot.clone();
+    if let Some(t) = t {
+        knot.costs = knot.costs_at.remove(&t).unwrap_or(knot.costs);
+        knot.costs_at.clear();
+    }
+    (knot.limits, knot.bounds) = (vec![], None);
+    knot.limits_at.clear();
+    let text = serde_json::to_string(&knot)
+        .map_err(|error| ProblemError::new_err(format!("this knot cannot be a function of CasADi: {error}")))?;
+    let action = knot.build(robot).map_err(problem_error)?;
+    let end = action.is_end();
+    Ok(Alone { action, robot: Some(robot.clone()), end, text })
 }

@@ -41,15 +41,15 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
     /// The models, the terminal one last, as data where they are a robot's.
-    described: Mutex<Vec<Option<Arc<Described>>>>,
+    pub(super) described: Mutex<Vec<Option<Arc<Described>>>>,
     /// The models, the terminal one last, as they were given where they are no robot's: the problem's copies of them compute
     /// with their functions.
-    objects: Vec<Option<Py<PyAny>>>,
+    pub(super) objects: Vec<Option<Py<PyAny>>>,
     /// The residuals of robots that are written in Python, likewise.
     written: Mutex<Vec<Py<PyAny>>>,
     /// The first error of the actions.
     fault: Fault,
-    /// Those of the residuals.
+    /// The errors of the residuals.
     faults: Mutex<Vec<Fault>>,
     /// How often the horizon has moved on.
     moved: AtomicUsize,

@@ -296,6 +296,19 @@ impl FrictionCone {
         Ok(Self(cone))
     }
 
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let text = serde_json::to_string(&slf.get().0).expect("is made of numbers and words");
+        Ok((slf.get_type().getattr("_from_json")?, (text,)))
+    }
+
+    #[staticmethod]
+    fn _from_json(text: &str) -> PyResult<Self> {
+        let wrong = |error| ProblemError::new_err(format!("no cone: {error}"));
+        let cone: robot::FrictionCone = serde_json::from_str(text).map_err(wrong)?;
+        cone.check().map_err(problem_error)?;
+        Ok(Self(cone))
+    }
+
     /// The matrix A, (facets + 1, 3).
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.0.rows().give(py, None)
@@ -325,6 +338,19 @@ impl WrenchCone {
     #[new]
     fn new(friction: &Bound<'_, FrictionCone>, size: [f64; 2]) -> PyResult<Self> {
         let cone = robot::WrenchCone { friction: friction.get().0.clone(), size };
+        cone.check().map_err(problem_error)?;
+        Ok(Self(cone))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let text = serde_json::to_string(&slf.get().0).expect("is made of numbers and words");
+        Ok((slf.get_type().getattr("_from_json")?, (text,)))
+    }
+
+    #[staticmethod]
+    fn _from_json(text: &str) -> PyResult<Self> {
+        let wrong = |error| ProblemError::new_err(format!("no cone: {error}"));
+        let cone: robot::WrenchCone = serde_json::from_str(text).map_err(wrong)?;
         cone.check().map_err(problem_error)?;
         Ok(Self(cone))
     }

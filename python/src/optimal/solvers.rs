@@ -19,7 +19,11 @@ macro_rules! set {
         for (name, value) in $given.into_iter().flatten() {
             match name.extract::<String>()?.as_str() {
                 $(stringify!($field) => $settings.$field = set!(value $(, $read)?),)*
-                other => return Err(PyValueError::new_err(format!("settings: there is no setting '{other}'"))),
+                other => {
+                    let all = [$(stringify!($field)),*].join(", ");
+                    let what = format!("settings: there is no setting '{other}'; there are {all}");
+                    return Err(PyValueError::new_err(what));
+                }
             }
         }
     };
@@ -51,7 +55,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     Ok(())
 }
 
-/// Who looks at the iterations of a solve.
+/// The observer of the iterations of a solve.
 struct Observer<'py> {
     callback: Option<Bound<'py, PyAny>>,
     verbose: bool,

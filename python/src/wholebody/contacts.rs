@@ -1,4 +1,4 @@
-//! Where a robot may touch its environment.
+//! Contacts: where a robot may touch its environment.
 
 use crate::arrays::{Give, array, matrix, three};
 use crate::exceptions::wrong_word;

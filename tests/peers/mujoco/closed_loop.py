@@ -3,18 +3,20 @@
 
     .venv/pinocchio/bin/python tests/peers/mujoco/closed_loop.py [disturbances] [pushes] [--write]
 
-Without a name it makes both tables, in some minutes with a release build; with --write it puts them into
-docs/wholebody.md.
+Without a name it makes both tables, in some minutes with a release build, all cores at work; with --write it puts them
+into docs/wholebody.md.
 """
 
 import re
 import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scenes import FEET, FRICTION, PUSH_TIME, Disturbance, Humanoid, Quadruped, Record, anymal, urdf
+from scenes import FEET, PUSH_TIME, Disturbance, Humanoid, Quadruped, Record, anymal, urdf
 
 from condyle.wholebody import Pyramid
 
@@ -29,13 +31,17 @@ DISTURBANCES = {
     "these three: 1 %, late, more": Disturbance(0.01, 1, 1.2),
     "10 %, five ticks late, more": Disturbance(0.1, 5, 1.2),
 }
-DIRECTIONS = {"forwards": (1.0, 0.0, 0.0), "to the left": (0.0, 1.0, 0.0)}
+DIRECTIONS = range(0, 360, 30)
+"""In which TALOS is pushed: degrees from ahead, to the left."""
 STIFFNESS = 20.0
 """Of the PD hold: in parts of a joint's greatest effort for 1 rad."""
 PUSH = 20.0
 """N s, in the table of disturbances."""
-STEP = 2.0
-"""To which the largest pushes are found (N s)."""
+LAWS = {"cones": {}, "pyramids of 4 sides": {"cone": Pyramid(4, True)}, "PD hold": {"stiffness": STIFFNESS}}
+"""Which controller keeps it on its feet."""
+FIRST, STRIDE, STEP = 40.0, 8.0, 2.0
+"""The search for the largest push begins with the first, goes on by the second, and ends when it is known to the third
+(N s)."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -85,35 +91,43 @@ def disturbances() -> str:
 
 
 def largest(survives: Callable[[float], bool]) -> float:
-    """The largest push (N s) below which all of a bisection's are survived."""
-    low, high = 0.0, 32.0
-    while survives(high):
-        low, high = high, 2.0 * high
+    """The largest push (N s) that is survived, where all weaker ones that were tried are."""
+    low = high = FIRST
+    if survives(FIRST):
+        while survives(high := low + STRIDE):
+            low = high
+    else:
+        while not survives(low := high - STRIDE):
+            high = low
     while high - low > STEP:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if survives(middle) else (low, middle)
     return low
 
 
-def pushed(direction: Sequence[float], friction: float, cone: Any = "cone", stiffness: float | None = None) -> float:
-    """The largest push that TALOS survives: 4 s later it stands."""
+def pushed(direction: float, law: str) -> float:
+    """The largest push that TALOS survives in a direction (degrees): 3.5 s after its beginning it stands."""
+    angle, settings = np.radians(direction), LAWS[law]
+    unit = np.array([np.cos(angle), np.sin(angle), 0.0])
 
     def survives(push: float) -> bool:
-        humanoid = Humanoid(friction=friction, cone=cone)
-        law = humanoid.control() if stiffness is None else humanoid.hold(stiffness)
-        return humanoid.run(law, 4.0, push * np.array(direction)).stands
+        if push <= 0.0:
+            return True
+        humanoid = Humanoid(cone=settings.get("cone", "cone"))
+        stiffness = settings.get("stiffness")
+        control = humanoid.control() if stiffness is None else humanoid.hold(stiffness)
+        return humanoid.run(control, 4.0, push * unit).stands
 
     return largest(survives)
 
 
 def pushes() -> str:
-    """The largest ones."""
-    rows = []
-    for name, direction in DIRECTIONS.items():
-        cones, pyramid = (pushed(direction, FRICTION, cone) for cone in ("cone", Pyramid(4, True)))
-        found = cones, pyramid, pushed(direction, FRICTION, stiffness=STIFFNESS)
-        rows.append([name, *(f"{push:.0f} N s" for push in found)])
-    return table([f"TALOS is pushed for {PUSH_TIME} s", "cones", "pyramids of 4 sides", "PD hold"], rows)
+    """The largest ones, around the circle."""
+    cases = list(product(DIRECTIONS, LAWS))
+    with ProcessPoolExecutor() as pool:
+        found = dict(zip(cases, pool.map(pushed, *zip(*cases, strict=True)), strict=True))
+    rows = [[f"{direction}°", *(f"{found[direction, law]:.0f}" for law in LAWS)] for direction in DIRECTIONS]
+    return table([f"N s in {PUSH_TIME} s", *LAWS], rows)
 
 
 def main() -> None:

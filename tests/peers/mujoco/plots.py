@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Draws the pictures of docs/wholebody.md from runs in MuJoCo.
+"""Draws the pictures of docs/wholebody.md from runs in MuJoCo, and from the table of the largest pushes that is there.
 
 .venv/pinocchio/bin/python tests/peers/mujoco/plots.py
 """
 
+import re
 from pathlib import Path
 
 import matplotlib as mpl
@@ -13,7 +14,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 from scenes import FEET, Humanoid, Quadruped, anymal, urdf
 
-PICTURES = Path(__file__).parents[3] / "docs" / "pictures"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "wholebody.md"
+PICTURES = DOCUMENT.parent / "pictures"
 PUSHES = (10.0, 20.0, 30.0, 40.0)  # N s, forwards
 
 
@@ -39,6 +41,24 @@ def push() -> None:
         axes.legend(loc="upper right")
     left.set_ylabel("centre of mass, ahead (mm)")
     save(figure, "wholebody_push.png")
+
+
+def pushes() -> None:
+    """The largest pushes around the circle, as closed_loop.py wrote them down."""
+    text = DOCUMENT.read_text(encoding="utf-8")
+    head, _, *rows = re.search(r"<!-- pushes -->\n(.*?)<!-- end -->", text, re.S)[1].strip().splitlines()
+    laws = [cell.strip() for cell in head.strip("|").split("|")][1:]
+    found = np.array([[float(cell.strip(" °")) for cell in row.strip("|").split("|")] for row in rows])
+    figure, axes = plt.subplots(figsize=(5.4, 4.8), layout="constrained", subplot_kw={"projection": "polar"})
+    around = np.radians(np.r_[found[:, 0], found[0, 0] + 360.0])
+    for k, (law, line) in enumerate(zip(laws, ("-", "--", ":"), strict=True), 1):
+        axes.plot(around, np.r_[found[:, k], found[0, k]], line, marker="o", markersize=4, label=law)
+    axes.set_theta_zero_location("N")  # ahead is up, and the left is on the left
+    axes.set_thetagrids(range(0, 360, 90), ["ahead", "left", "back", "right"])
+    axes.set_rlim(0.0, 10.0 * np.ceil(found[:, 1:].max() / 10.0))
+    axes.set_title("largest push that is survived (N s)")
+    figure.legend(loc="outside lower center", ncols=3)
+    save(figure, "wholebody_pushes.png")
 
 
 def lift() -> None:
@@ -79,5 +99,6 @@ def trot() -> None:
 
 if __name__ == "__main__":
     push()
+    pushes()
     lift()
     trot()

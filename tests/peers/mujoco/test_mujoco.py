@@ -63,9 +63,10 @@ def test_a_humanoid_stands(disturbance: Disturbance) -> None:
     assert record.loads[-20:].sum(1).mean() == pytest.approx(weight, rel=0.01)
 
 
-def test_a_humanoid_is_pushed() -> None:
+@pytest.mark.parametrize("push", [(20.0, 10.0, 0.0), (-15.0, 15.0, 0.0), (0.0, -30.0, 0.0)])
+def test_a_humanoid_is_pushed(push: tuple[float, float, float]) -> None:
     humanoid = Humanoid()
-    record = humanoid.run(humanoid.control(), 3.5, (20.0, 10.0, 0.0))
+    record = humanoid.run(humanoid.control(), 3.5, push)
     assert record.stands
     away = np.linalg.norm((record.com - record.wanted)[:, :2], axis=1)
     assert away.max() > 3.0 * RETURNED and away[-1] < RETURNED

@@ -1,8 +1,9 @@
-"""The program on all robots of example-robot-data: what `inspect` says against Pinocchio, `check`, `budget`.
+"""The program on all robots of example-robot-data: what `inspect` says against Pinocchio, `check`, `budget`, meshes.
 
 It is looked for where cargo builds it (`cargo test` does), or where CONDYLE_PROGRAM says.
 """
 
+import base64
 import json
 import os
 import subprocess
@@ -13,7 +14,7 @@ import pinocchio as pin
 import pytest
 from example_robot_data.robots_loader import ROBOTS
 from test_cassie import path as cassie_path
-from test_robots import NO_URDF, root_joint, urdf_path
+from test_robots import NO_URDF, SINGULAR, root_joint, urdf_path
 
 ROOT = Path(__file__).resolve().parents[3]
 ROUNDING = 1e-10
@@ -148,3 +149,62 @@ def test_budget(name: str) -> None:
     report = run("budget", name, "--knots", "4", "--repetitions", "1", "--cores", "2")
     assert len(report["algorithms"]) == 6
     assert all(row["finite"] for row in report["iterations"])
+
+
+MOST_TRIANGLES = 60_000
+"""Of a page, as `condyle plan --help` says."""
+MESH_ROUNDING = 0.02
+"""How far the box around a body's meshes may be from that of the files, relative to its largest side: meshes are made
+smaller by edges that collapse, and have 16 bits along a side."""
+
+
+def scene_of(name: str, folder: Path) -> dict:
+    page = folder / "plan.html"
+    line = [str(PROGRAM), "plan", "--robot", urdf_path(name), "--target", "0,0,0", "--knots", "1"]
+    done = subprocess.run(
+        [*line, "--max-iterations", "1", "--out", str(page)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode in (0, 1), (name, done.stderr)
+    data = page.read_text().split('type="application/json" id="data">')[1].split("</script>")[0]
+    return dict(json.loads(data)["scene"], notes=[line for line in done.stderr.splitlines() if "meshes" in line])
+
+
+def box_of_meshes(scene: dict, shapes: list[dict]) -> np.ndarray | None:
+    """The box around the meshes of a body, in the body's frame: least and largest coordinates."""
+    points = []
+    for shape in (shape for shape in shapes if shape["kind"] == "mesh"):
+        mesh = scene["meshes"][shape["part"]]
+        numbers = np.frombuffer(base64.b64decode(mesh["points"]), "<u2").reshape(-1, 3)
+        corners = np.frombuffer(base64.b64decode(mesh["triangles"]), "<u2")
+        assert corners.size % 3 == 0 and corners.max() < len(numbers)
+        local = np.array(mesh["low"]) + np.array(mesh["side"]) * numbers / 65535
+        pose = pin.SE3(pin.Quaternion(np.array(shape["quaternion"])).normalized(), np.array(shape["position"]))
+        points.append(local * shape["size"] @ pose.rotation.T + pose.translation)
+    return np.array([np.vstack(points).min(0), np.vstack(points).max(0)]) if points else None
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in {*NO_URDF, *SINGULAR}])
+def test_meshes(name: str, tmp_path: Path) -> None:
+    """All meshes are found, and each body's are where Pinocchio, which reads them by assimp, has them."""
+    model = pin.buildModelFromUrdf(urdf_path(name))
+    if model.nv == 0:
+        pytest.skip("on a fixed root nothing moves")
+    packages = [str(parent) for parent in Path(urdf_path(name)).parents]
+    theirs = pin.buildGeomFromUrdf(model, urdf_path(name), pin.GeometryType.VISUAL, package_dirs=packages)
+    scene = scene_of(name, tmp_path)
+    assert scene["notes"] == []
+    triangles = sum(len(base64.b64decode(mesh["triangles"])) // 6 for mesh in scene["meshes"])
+    assert triangles <= MOST_TRIANGLES
+    boxes: dict[int, list[np.ndarray]] = {}
+    for shape in theirs.geometryObjects:
+        if Path(shape.meshPath).suffix.lower() in (".stl", ".dae", ".obj"):
+            points = shape.geometry.vertices() if hasattr(shape.geometry, "vertices") else None
+            if points is not None and len(points):
+                points = np.array(points) @ shape.placement.rotation.T + shape.placement.translation
+                boxes.setdefault(shape.parentJoint, []).append(np.array([points.min(0), points.max(0)]))
+    for body, found in boxes.items():
+        expected = np.array([np.min([box[0] for box in found], 0), np.max([box[1] for box in found], 0)])
+        ours = box_of_meshes(scene, scene["bodies"][body]["shapes"])
+        assert ours is not None, (name, model.names[body])
+        side = (expected[1] - expected[0]).max()
+        assert np.abs(ours - expected).max() < MESH_ROUNDING * side, (name, model.names[body], ours, expected)

@@ -13,6 +13,8 @@ pub(crate) struct Row {
     pub error: f64,
     /// The most that is allowed there.
     pub bound: f64,
+    /// Why that much is.
+    pub because: &'static str,
     /// How often it was looked at.
     pub cases: usize,
     pub pass: bool,
@@ -22,8 +24,8 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    pub(super) fn new(name: &'static str, equation: &'static str) -> Self {
-        Self { name, equation, error: 0.0, bound: 0.0, cases: 0, pass: true, note: String::new() }
+    pub(super) fn new(name: &'static str, equation: &'static str, because: &'static str) -> Self {
+        Self { name, equation, because, error: 0.0, bound: 0.0, cases: 0, pass: true, note: String::new() }
     }
 
     /// Counts a case; the one that uses most of what it is allowed is kept.
@@ -54,7 +56,7 @@ mod tests {
 
     #[test]
     fn the_worst_case_is_kept() {
-        let mut row = Row::new("", "");
+        let mut row = Row::new("", "", "");
         row.compare(&[1.0, 2.0], &[1.0, 2.0 + 3e-12], 0.0, 1e-10);
         assert!(row.pass && row.error > 0.9e-12 && row.error < 1.1e-12);
         row.see(1e-3, 1e-2); // uses more of what it is allowed
@@ -65,11 +67,11 @@ mod tests {
 
     #[test]
     fn what_is_no_number_fails_and_stays() {
-        let mut row = Row::new("", "");
+        let mut row = Row::new("", "", "");
         row.compare(&[f64::NAN, 1.0], &[0.0, 1.0], 0.0, 1e-10);
         row.compare(&[1.0], &[1.0], 0.0, 1e-10);
         assert!(!row.pass && row.error.is_nan());
-        let mut row = Row::new("", "");
+        let mut row = Row::new("", "", "");
         row.compare(&[1.0], &[f64::INFINITY], 0.0, 1e-10);
         assert!(!row.pass);
     }

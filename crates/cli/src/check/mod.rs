@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let mut rows = identities::check(&model, states, seed);
     rows.extend(derivatives::check(&model, few, seed));
     rows.extend(ratio::check(&model, few, seed, ARMATURE)?);
-    rows.extend(energy::check(&model));
+    rows.extend(energy::check(&model, ARMATURE)?);
     let report = Report {
         robot: found.source,
         nq: model.nq(),
@@ -91,12 +91,20 @@ impl Report {
         for joint in &self.armature_added {
             text += &format!("  joint `{joint}` moves nothing with inertia: checked with armature\n");
         }
-        let mut table = Table::new(&["check", "equation", "error", "bound", "", ""]);
+        let mut table = Table::new(&["check", "equation", "error", "bound", "", "the bound is", ""]);
         for row in &self.rows {
             let verdict = if row.pass { styled(Style::Good, "pass") } else { styled(Style::Bad, "FAIL") };
             let bound = if row.bound.is_finite() { format!("{:.1e}", row.bound) } else { "by order".to_owned() };
             let error = if row.error.is_nan() { "not finite".to_owned() } else { format!("{:.1e}", row.error) };
-            table.row(vec![row.name.to_owned(), row.equation.to_owned(), error, bound, verdict, row.note.clone()]);
+            table.row(vec![
+                row.name.to_owned(),
+                row.equation.to_owned(),
+                error,
+                bound,
+                verdict,
+                row.because.to_owned(),
+                row.note.clone(),
+            ]);
         }
         text += &table.text();
         let passed = self.rows.iter().filter(|row| row.pass).count();

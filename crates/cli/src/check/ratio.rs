@@ -1,6 +1,6 @@
 //! A mass ratio of 10⁶: heavy tips on light limbs, where forward dynamics loses most digits.
 
-use super::identities::{inverted, largest, spectrum};
+use super::identities::{SOLVES, inverted, largest, spectrum};
 use super::ledger::Row;
 use crate::error::Error;
 use crate::robot;
@@ -14,8 +14,8 @@ const RATIO: f64 = 1e6;
 /// ABA of the robot with heavy tips, against RNEA and against a solve with M; no rows where no body with mass carries
 /// another one.
 pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> Result<Vec<Row>, Error> {
-    let mut round = Row::new("mass ratio 10⁶", "rnea(q, v, aba(q, v, τ)) = τ");
-    let mut forward = Row::new("mass ratio 10⁶", "aba(q, v, τ) = M⁻¹ (τ − h)");
+    let mut round = Row::new("mass ratio 10⁶", "rnea(q, v, aba(q, v, τ)) = τ", SOLVES);
+    let mut forward = Row::new("mass ratio 10⁶", "aba(q, v, τ) = M⁻¹ (τ − h)", SOLVES);
     let factors = factors(model);
     if factors.iter().all(|&f| f == 1.0) {
         return Ok(Vec::new());

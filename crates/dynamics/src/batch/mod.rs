@@ -50,7 +50,7 @@ pub struct Batch<T: Real = f64> {
     vectors: Vec<T>,
 }
 
-/// Of the vectors that the level has.
+/// Groups of as many states as the vectors of the level have lanes.
 #[derive(Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
@@ -263,7 +263,7 @@ pub struct Matrices<'b, T: Real> {
 }
 
 impl<'b, T: Real> Matrices<'b, T> {
-    /// That of state k: a view, which [`copy_from`](nalgebra::Matrix::copy_from) copies to a matrix of one's own.
+    /// The matrix of state k: a view, which [`copy_from`](nalgebra::Matrix::copy_from) copies to a matrix of one's own.
     ///
     /// # Panics
     /// If there are not so many states.

@@ -115,7 +115,7 @@ pub(super) trait Pass<T: Real>: Copy + Sync {
 }
 
 impl<'a, T> Arguments<'a, T> {
-    /// Those of the first `n` of `states` states, and of the others.
+    /// The arguments of the first `n` of `states` states, and of the others.
     fn split(self, n: usize, states: usize) -> (Self, Self) {
         let Self { q, v, x, f_ext } = self;
         let (q, v, x, f_ext) = (part(q, n, states), part(v, n, states), part(x, n, states), part(f_ext, n, states));
@@ -128,7 +128,7 @@ fn part<T>(of: &[T], n: usize, states: usize) -> (&[T], &[T]) {
 }
 
 impl<S: Block> Results<'_, S> {
-    /// As for the arguments.
+    /// The places of the first `n` of `states` states, and of the others.
     fn split(self, n: usize, states: usize) -> (Self, Self) {
         let vectors = self.vectors.split_at_mut(self.vectors.len() / states * n);
         let matrices = self.matrices.split_at_mut(n.div_ceil(S::LANES).min(self.matrices.len()));

@@ -13,7 +13,7 @@ pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
-    /// Where what there is of the bodies stands, if they were not computed one by one.
+    /// The lanes in which the bodies stand, if they were not computed one by one.
     pub limbs: Option<LaneView<'d>>,
 }
 

@@ -132,7 +132,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Over a factor of M.
+/// Forward dynamics over a factor of M.
 pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

@@ -9,7 +9,7 @@ use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
-/// With the limbs side by side where there are some, else body by body.
+/// RNEA with the limbs side by side where there are some, else body by body.
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
     if !run_limbs(Task::Rnea, model, data, q, v, a, f_ext) {
         rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, f_ext);

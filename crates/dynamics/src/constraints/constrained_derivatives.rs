@@ -32,7 +32,7 @@ pub(crate) struct Workspace<S> {
     pub P: DMatrix<S>,
     /// ∂(M q̈ + h − Jᵀ λ)/∂q. Shape: nv × nv. Written by: `differentiate`.
     pub dtau_dq: DMatrix<S>,
-    /// Of q̈ or of the velocity. Shape: nv × nv. Written by: `constrained_dynamics_derivatives`,
+    /// The derivative of q̈ or of the velocity. Shape: nv × nv. Written by: `constrained_dynamics_derivatives`,
     /// `impulse_dynamics_derivatives`.
     pub da_dq: DMatrix<S>,
     pub da_dv: DMatrix<S>,

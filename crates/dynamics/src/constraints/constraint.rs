@@ -112,7 +112,8 @@ pub struct ContactConstraint {
     pub kp: f64,
     /// How fast an error of velocity decays (1/s).
     pub kd: f64,
-    /// Where and how; can be changed later ([`ConstraintSet::set_target`](crate::ConstraintSet::set_target)).
+    /// The place and motion that are aimed at; can be changed later
+    /// ([`ConstraintSet::set_target`](crate::ConstraintSet::set_target)).
     pub target: Target<f64>,
 }
 

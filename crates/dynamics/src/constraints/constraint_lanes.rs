@@ -12,7 +12,7 @@ pub(crate) const WIDE: usize = 2 * LANES;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub body: usize,
-    /// Of its joint: how many columns it has, and where the first stands among the places of the constraint.
+    /// The columns of its joint: how many there are, and where the first stands among the places of the constraint.
     pub nv: usize,
     pub at: usize,
 }
@@ -20,7 +20,7 @@ pub(crate) struct Link {
 /// One constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
-    /// From the body of the first frame, from that of the other, and from where both ways meet: to the root, without it.
+    /// The ways to the root, without it: from the body of the first frame, of the other, and from where both ways meet.
     pub ways: [Vec<Link>; 3],
     /// The number of numbers that each of its places has in Y, and the beginning of those of place 0.
     pub wide: usize,
@@ -63,7 +63,7 @@ pub(crate) struct ConstraintLanes {
 }
 
 impl ConstraintLanes {
-    /// For a robot with limbs on which no joint follows another.
+    /// The lanes for a robot with limbs on which no joint follows another.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>, plans: &[Plan]) -> Option<Box<Self>> {
         if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() {
             return None;

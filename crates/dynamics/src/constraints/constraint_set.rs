@@ -131,7 +131,7 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
-    /// Where constraint k wants its frame to be, in each lane by itself.
+    /// The target of constraint k, where it wants its frame to be, in each lane by itself.
     ///
     /// # Panics
     /// If there is no such constraint.
@@ -178,6 +178,16 @@ impl<S: Scalar> ConstraintSet<S> {
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
-        assert!(self.geometry == model.geometry_hash(), "constraints: made for another model than `{}`", model.name());
+        if self.geometry != model.geometry_hash() {
+            wrong_model(model.name());
+        }
     }
+}
+
+/// The panic of [`ConstraintSet::check`].
+#[cold]
+#[inline(never)]
+#[track_caller]
+fn wrong_model(name: &str) -> ! {
+    panic!("constraints: made for another model than `{name}`");
 }

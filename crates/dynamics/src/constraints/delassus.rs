@@ -29,7 +29,7 @@ pub(crate) struct Delassus<S> {
     /// J L⁻¹, and that times D⁻¹, on the places of each constraint. Shape: entries of all rows. Written by: `multiply`.
     Y: Vec<S>,
     Z: Vec<S>,
-    /// From column to column of `CE`, from row to row of `rows`: room for a row more, in whole steps.
+    /// The stride of the columns of `CE` and of the rows of `rows`: room for a row more, in whole steps.
     pub stride: usize,
     /// J M⁻¹ Jᵀ from the diagonal on, column by column; then C E. Shape: stride × rows, and a step. Written by: `multiply`,
     /// or in lanes by `limbs`; then by `decompose`.

@@ -150,7 +150,7 @@ impl Plan {
         self.kind.rows()
     }
 
-    /// Where row r (counted from the constraint's first) stands in the array of all rows.
+    /// The place where row r (counted from the constraint's first) stands in the array of all rows.
     #[inline(always)]
     pub(crate) fn range(&self, r: usize) -> Range<usize> {
         let n = self.places.len();

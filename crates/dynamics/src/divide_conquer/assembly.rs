@@ -42,7 +42,7 @@ pub(crate) struct Piece {
     pub dofs: usize,
     /// The number of pieces of which it is made, itself included.
     pub pieces: usize,
-    /// Over how many pieces the longest way from it to a run leads, itself included.
+    /// The number of pieces on the longest way from it to a run, itself included.
     levels: usize,
 }
 
@@ -205,7 +205,8 @@ impl Planner {
     }
 }
 
-/// Where to cut a row of weights so that the heavier part is lightest, if it may be cut; both parts have at least one.
+/// The place at which to cut a row of weights so that the heavier part is lightest, if it may be cut; both parts have at
+/// least one.
 fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> {
     let total: usize = weights.iter().sum();
     let (mut left, mut best) = (0, None);

@@ -66,7 +66,7 @@ pub(crate) struct Ties<S> {
 }
 
 impl<S: Scalar> Ties<S> {
-    /// Those of a model, whose degrees of freedom are in the order of `links`.
+    /// The shared coordinates of a model, whose degrees of freedom are in the order of `links`.
     pub(crate) fn new<R: Constant<S>>(model: &Model<R>, links: &[Link]) -> Self {
         let mut joints = vec![0; model.nv()];
         model.columns().iter().for_each(|column| joints[column.coordinate] += 1);

@@ -52,9 +52,9 @@ pub struct DivideConquer<S> {
     /// The hash of the robot that it was planned for.
     geometry: u64,
     assembly: Assembly,
-    /// In the order of the assembly. Shape: moving bodies.
+    /// The bodies in the order of the assembly. Shape: moving bodies.
     bodies: Vec<Body<S>>,
-    /// In the order of the assembly. Shape: degrees of freedom of all joints.
+    /// The degrees of freedom in the order of the assembly. Shape: those of all joints.
     dofs: Vec<Dof<S>>,
     /// Shape: pieces. Written by: `relate`, `assemble`.
     handles: Vec<ArticulatedPair<S>>,

@@ -38,12 +38,12 @@ impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
 }
 
 impl<S: Scalar> Coriolis<S> {
-    /// Of a body at rest.
+    /// The terms of a body at rest.
     pub(crate) fn zero() -> Self {
         Self { momentum: Force::zero(), rate: Sym3::zero() }
     }
 
-    /// Of a body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
+    /// The terms of a moving body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
     #[inline(always)]
     pub(crate) fn of(I: Inertia<S>, v: Motion<S>) -> Self {
         let turning = v.angular.skew() * I.rotational.full();

@@ -17,13 +17,13 @@ use core::ops::Deref;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// In which frame what is asked about a frame (or a body, whose frame is then meant) is expressed.
+/// The frame in which what is asked about a frame (or a body, whose frame is then meant) is expressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ReferenceFrame {
-    /// In the frame itself.
+    /// The frame itself.
     Local,
-    /// In the world's frame: the velocity of the body's point at the world's origin.
+    /// The world's frame: the velocity of the body's point at the world's origin.
     World,
     /// The motion of the frame's origin, along the axes of the world.
     LocalWorldAligned,

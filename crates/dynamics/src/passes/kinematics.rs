@@ -30,7 +30,7 @@ pub(crate) enum PlacementCache {
     Nowhere,
     /// Body by body.
     Bodies,
-    /// In the steps of limbs side by side.
+    /// Placements in the steps of limbs side by side.
     Limbs,
 }
 

@@ -27,7 +27,7 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
-/// In the bodies' turned frames.
+/// Scratch in the bodies' turned frames.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {

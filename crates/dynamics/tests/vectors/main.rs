@@ -3,7 +3,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-#[path = "../common/counting.rs"]
+#[path = "../../../../tests/common/counting.rs"]
 mod counting;
 
 mod batch;

@@ -122,7 +122,7 @@ struct Edge<'a> {
 struct Reader<'a> {
     model: &'a Element,
     links: HashMap<&'a str, &'a Element>,
-    /// In the order of the file.
+    /// The edges in the order of the file.
     edges: Vec<Edge<'a>>,
     poses: Poses<'a>,
     axes: Axes<'a>,

@@ -244,7 +244,7 @@ pub(crate) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split_whitespace().map(|w| number(w).ok_or_else(|| wrong(w))).collect()
 }
 
-/// As many finite numbers as there must be.
+/// The numbers of a text: finite ones, as many as there must be.
 pub(crate) fn array<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let x = numbers(text)?;
     <[f64; N]>::try_from(x).map_err(|x| {

@@ -58,9 +58,9 @@ pub struct Pair {
 /// The entry from which an entry of the support gets what changes on the way out.
 #[derive(Clone, Debug)]
 pub enum Predecessor {
-    /// From this entry, in the same lanes; the step's own columns from themselves.
+    /// One entry, in the same lanes; the step's own columns come from themselves.
     InPlace(usize),
-    /// From several entries, or from other lanes.
+    /// Several entries, or other lanes.
     Moved(Vec<(usize, Move)>),
 }
 

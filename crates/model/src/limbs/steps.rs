@@ -35,9 +35,9 @@ pub struct Step {
 /// The places of the parents of a step's bodies.
 #[derive(Clone, Debug)]
 pub enum Parents {
-    /// In one step, each in its child's lane.
+    /// The parents are in one step, each in its child's lane.
     InPlace(usize),
-    /// In several steps or in other lanes.
+    /// The parents are in several steps or in other lanes.
     Moved {
         /// The steps from which something comes, and how its lanes change.
         from: Vec<(usize, Move)>,

@@ -44,7 +44,7 @@ pub(crate) struct Trials {
     knot_costs: Vec<f64>,
     knot: Vec<usize>,
     dx: Vec<f64>,
-    /// Where a terminal action may write a next state nobody reads.
+    /// A place for the next state of a terminal action, which nobody reads.
     unread: Vec<f64>,
 }
 

@@ -51,9 +51,9 @@ pub struct Iteration {
     pub d1: f64,
     /// Curvature of the expected change.
     pub d2: f64,
-    /// By how much the cost fell with the step tried last.
+    /// The decrease of the cost with the step tried last.
     pub decrease: f64,
-    /// By how much it was expected to.
+    /// The decrease that was expected.
     pub expected_decrease: f64,
     /// Whether the iterate after the step satisfies the dynamics.
     pub feasible: bool,

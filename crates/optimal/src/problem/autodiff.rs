@@ -1,6 +1,7 @@
 //! Derivatives of actions that are written for any scalar, by hyper-dual numbers.
 
 use super::action::ActionModel;
+use super::action::differences::write_curvature;
 use crate::lq::{Hessian, LqNode};
 use condyle_spatial::Scalar;
 use num_dual::HyperDual64;
@@ -177,13 +178,7 @@ impl<A: GenericAction> ActionModel for AutoDiff<A> {
         for i in 0..n {
             for j in 0..=i {
                 let cost = self.along(t, i, j);
-                match (i < ndx, j < ndx) {
-                    (true, _) => (node.Q[(i, j)], node.Q[(j, i)]) = (cost.eps1eps2, cost.eps1eps2),
-                    (false, true) => node.S[(j, i - ndx)] = cost.eps1eps2,
-                    (false, false) => {
-                        (node.R[(i - ndx, j - ndx)], node.R[(j - ndx, i - ndx)]) = (cost.eps1eps2, cost.eps1eps2);
-                    }
-                }
+                write_curvature([&mut node.Q, &mut node.S, &mut node.R], ndx, (i, j), cost.eps1eps2);
                 if j == i {
                     let (gradient, slopes) = if i < ndx {
                         (&mut node.q[i], node.A.column_mut(i))
@@ -204,13 +199,8 @@ impl<A: GenericAction> ActionModel for AutoDiff<A> {
             for j in 0..=i {
                 self.along(t, i, j);
                 let curvature = lambda.iter().zip(&self.change).map(|(l, change)| l * change.eps1eps2).sum();
-                match (i < ndx, j < ndx) {
-                    (true, _) => (hessian.xx[(i, j)], hessian.xx[(j, i)]) = (curvature, curvature),
-                    (false, true) => hessian.xu[(j, i - ndx)] = curvature,
-                    (false, false) => {
-                        (hessian.uu[(i - ndx, j - ndx)], hessian.uu[(j - ndx, i - ndx)]) = (curvature, curvature);
-                    }
-                }
+                let Hessian { xx, xu, uu } = hessian;
+                write_curvature([xx, xu, uu], ndx, (i, j), curvature);
             }
         }
         true

@@ -62,7 +62,7 @@ pub struct Problem {
     knots: Vec<usize>,
     /// Copies of the models, for threads.
     copies: Copies,
-    /// Where the terminal action may write a next state.
+    /// A place for the next state of the terminal action.
     unread: Vec<f64>,
 }
 

@@ -17,7 +17,7 @@ const COMPARED: usize = 64;
 #[derive(Default)]
 pub(crate) struct Models {
     pub(crate) actions: Vec<Box<dyn ActionModel>>,
-    /// Of each model the action that stands for it, and the model's number there.
+    /// The action that stands for each model, and the model's number there.
     places: Vec<[usize; 2]>,
 }
 

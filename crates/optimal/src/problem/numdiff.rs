@@ -1,7 +1,7 @@
 //! Derivatives of any action by finite differences: the oracle against which written derivatives are tested.
 
 use super::action::ActionModel;
-use super::action::differences::{SECOND, at, calc_diff};
+use super::action::differences::{SECOND, at, calc_diff, write_curvature};
 use crate::lq::{Hessian, LqNode};
 
 /// An action whose derivatives, whatever it has of its own, are central differences of [`calc`](ActionModel::calc), taken
@@ -95,13 +95,8 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
                     (z[i], z[j]) = (0.0, 0.0);
                 }
                 let curvature = sum / (4.0 * SECOND * SECOND);
-                match (i < ndx, j < ndx) {
-                    (true, _) => (hessian.xx[(i, j)], hessian.xx[(j, i)]) = (curvature, curvature),
-                    (false, true) => hessian.xu[(j, i - ndx)] = curvature,
-                    (false, false) => {
-                        (hessian.uu[(i - ndx, j - ndx)], hessian.uu[(j - ndx, i - ndx)]) = (curvature, curvature);
-                    }
-                }
+                let Hessian { xx, xu, uu } = hessian;
+                write_curvature([xx, xu, uu], ndx, (i, j), curvature);
             }
         }
         true

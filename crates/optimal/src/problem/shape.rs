@@ -15,7 +15,7 @@ pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
 pub(crate) struct Shape {
     pub(crate) nx: usize,
     pub(crate) ndx: usize,
-    /// Where uₜ starts in the flat controls; N + 1 entries, the last is their length.
+    /// The place where uₜ starts in the flat controls; N + 1 entries, the last is their length.
     pub(crate) offsets: Vec<usize>,
 }
 

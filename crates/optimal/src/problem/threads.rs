@@ -44,6 +44,7 @@ impl Copies {
             for ((copy, copied), model) in copies.iter_mut().zip(&mut self.copied).zip(models) {
                 if copy.is_none() {
                     *copy = model.fork();
+                    copy.iter_mut().for_each(|copy| copy.reserve());
                 }
                 *copied = copy.is_some();
             }

@@ -53,6 +53,7 @@ mod horizon_terms;
 mod integrators;
 mod knot;
 mod limits;
+mod on_demand;
 mod per_knot;
 mod per_model;
 mod problem;

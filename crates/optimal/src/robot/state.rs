@@ -34,7 +34,7 @@ pub fn groups(model: &Model) -> Vec<Range<usize>> {
 }
 
 /// Room for the second derivatives of q ⊕ δ along the groups, empty where there are none.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct GroupHessian {
     /// δ, with one coordinate of each group moving. Shape: nv. Written by: `run`.
     delta: Vec<LaneDual<f64>>,

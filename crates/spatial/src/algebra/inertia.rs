@@ -21,7 +21,7 @@ pub struct Inertia<S> {
 impl_linear!(Inertia { mass, mass_com, rotational });
 
 impl<S: Scalar> Inertia<S> {
-    /// From mass, centre of mass and rotational inertia about the centre of mass: Ī = I_c − m c× c×.
+    /// An inertia from mass, centre of mass and rotational inertia about the centre of mass: Ī = I_c − m c× c×.
     ///
     /// ```
     /// use condyle_spatial::{Inertia, Motion, Sym3, Vec3};

@@ -140,9 +140,9 @@ pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<
 /// A linear map of motions that keeps rotations apart: [[A, B], [0, A]] on [linear; angular].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionMap<S> {
-    /// Of linear on linear, and of angular on angular.
+    /// The block of linear on linear, and of angular on angular.
     pub diagonal: Mat3<S>,
-    /// Of angular on linear.
+    /// The block of angular on linear.
     pub coupling: Mat3<S>,
 }
 

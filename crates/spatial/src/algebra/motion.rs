@@ -36,7 +36,7 @@ impl_linear!(Force { linear, angular });
 macro_rules! impl_six {
     ($type:ident) => {
         impl<S: Scalar> $type<S> {
-            /// From linear and angular part.
+            /// A vector from its linear and angular part.
             #[inline(always)]
             pub fn new(linear: Vec3<S>, angular: Vec3<S>) -> Self {
                 Self { linear, angular }

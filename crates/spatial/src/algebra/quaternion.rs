@@ -14,7 +14,7 @@ pub struct Quaternion<S> {
 }
 
 impl<S: Scalar> Quaternion<S> {
-    /// From x, y, z, w.
+    /// A quaternion from x, y, z, w.
     #[inline(always)]
     pub fn new(x: S, y: S, z: S, w: S) -> Self {
         Self { vector: Vec3::new(x, y, z), scalar: w }

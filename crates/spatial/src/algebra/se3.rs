@@ -20,9 +20,9 @@ impl_lift!(Se3 { rotation, translation });
 
 /// What a pose does to the coordinates of a `T`.
 pub trait Act<T> {
-    /// From coordinates in b to coordinates in a, for the pose aXb.
+    /// The map from coordinates in b to coordinates in a, for the pose aXb.
     fn act(&self, x: T) -> T;
-    /// From coordinates in a to coordinates in b, for the pose aXb.
+    /// The map from coordinates in a to coordinates in b, for the pose aXb.
     fn act_inv(&self, x: T) -> T;
 }
 
@@ -32,7 +32,7 @@ impl<S: Scalar> Se3<S> {
     pub fn identity() -> Self {
         Self { rotation: Mat3::identity(), translation: Vec3::zero() }
     }
-    /// From rotation and translation.
+    /// A pose from rotation and translation.
     #[inline(always)]
     pub fn new(rotation: Mat3<S>, translation: Vec3<S>) -> Self {
         Self { rotation, translation }

@@ -86,7 +86,7 @@ pub trait Scalar:
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// At least one of the masks holds.
+    /// Whether at least one of the masks holds.
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
 
     /// 0.

@@ -10,7 +10,8 @@
 //! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
 //!
 //! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one
-//! state.
+//! state, and [`level_function!`](crate::level_function) for small functions that are called often, such as the tiles of dense
+//! kernels: it passes arguments in registers, where the two others pass them as one value in memory.
 #![allow(unsafe_code)]
 
 pub use crate::simd::fused::Fused;
@@ -138,6 +139,51 @@ macro_rules! register_kernel {
                 <Long as $crate::Scalar>::enter(Work::<_, Long>(work, ::core::marker::PhantomData));
             } else {
                 <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
+            }
+        }
+    };
+}
+
+/// A function that is compiled for each level in the crate that owns it: `item` is what it consists of, `long`, `short` and
+/// `baseline` are the functions of its arguments for registers of eight, of four, and of those that every processor has.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! level_function {
+    (
+        $(#[$doc:meta])*
+        $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)?
+        { $item:item long: $long:expr, short: $short:expr, baseline: $baseline:expr $(,)? }
+    ) => {
+        $(#[$doc])*
+        #[allow(unsafe_code, unused_unsafe, clippy::extra_unused_type_parameters)]
+        #[inline]
+        $vis fn $name($($arg: $type),*) $(-> $out)? {
+            use $crate::simd::gate::{Level, level};
+
+            $item
+
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+            #[inline(never)]
+            fn long($($arg: $type),*) $(-> $out)? {
+                $long($($arg),*)
+            }
+            #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
+            #[inline(never)]
+            fn short($($arg: $type),*) $(-> $out)? {
+                $short($($arg),*)
+            }
+            #[inline(never)]
+            fn baseline($($arg: $type),*) $(-> $out)? {
+                $baseline($($arg),*)
+            }
+            match level() {
+                // SAFETY: the processor has the level in use.
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx512 => unsafe { long($($arg),*) },
+                Level::Baseline => baseline($($arg),*),
+                // SAFETY: as above.
+                _ => unsafe { short($($arg),*) },
             }
         }
     };

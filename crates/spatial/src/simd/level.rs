@@ -45,7 +45,7 @@ impl Level {
         }
     }
 
-    /// As `CONDYLE_LEVEL` writes it.
+    /// The name of a level, as `CONDYLE_LEVEL` writes it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Baseline => "baseline",

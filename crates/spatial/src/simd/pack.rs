@@ -1,4 +1,4 @@
-//! From rows of numbers, one row for each lane, to vectors, one for each place in a row, and back.
+//! Packers: rows of numbers, one row for each lane, to vectors, one for each place in a row, and back.
 //!
 //! L rows of L numbers are L vectors, and what is wanted is their transpose: log₂ L exchanges of ever larger parts, each
 //! of which keeps one half of a vector and takes the other from its partner.

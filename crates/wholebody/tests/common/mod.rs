@@ -3,7 +3,7 @@
 
 use condyle_dynamics::{Act, Data, Force, Model, Se3, Vec3, forward_kinematics, integrate, rnea};
 use condyle_wholebody::{
-    Command, FrictionContact, Normal, References, Settings, Shape, Status, Task, WholeBodyController,
+    Command, FrictionContact, Normal, References, Settings, Shape, Status, SurfaceForces, Task, WholeBodyController,
 };
 use num_dual::Dual2_64;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -186,7 +186,13 @@ pub fn check_forces(
         let f_n = f.linear.dot(n);
         let slip = norm(f.linear - n.scale(f_n)) - contact.friction * f_n;
         assert!(slip < EQUALITY, "{}: {f:?} leaves the cone by {slip:.1e}", contact.frame);
-        if let Shape::Surface { corners, .. } = &contact.shape {
+        if let Shape::Surface { corners, forces } = &contact.shape {
+            if let (Some(yaw), SurfaceForces::Wrench) = (contact.yaw_friction, forces) {
+                let sum = corners.iter().fold(Vec3::zero(), |sum, &corner| sum + corner);
+                let middle = R * sum.scale(1.0 / corners.len() as f64);
+                let moment = (f.angular - middle.cross(f.linear)).dot(n);
+                assert!(moment.abs() < yaw * f_n + EQUALITY, "{}: it turns, {moment:.1e} N m", contact.frame);
+            }
             // each edge of the polygon: the moment about it cannot tip the sole over it
             let count = corners.len();
             for k in 0..count {

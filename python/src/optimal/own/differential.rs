@@ -58,7 +58,7 @@ struct Written {
     nv: usize,
     nu: usize,
     functions: Functions,
-    /// Of states.
+    /// The space of states.
     space: Space,
     way: Way,
 }

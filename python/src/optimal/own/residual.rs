@@ -21,7 +21,7 @@ pub(in crate::optimal) struct OwnFunction {
     pub fault: Fault,
 }
 
-/// Where the residuals of a knot that are written in Python leave their errors.
+/// The places where the residuals of a knot that are written in Python leave their errors.
 pub(in crate::optimal) fn faults(knot: &Knot) -> Vec<Fault> {
     let costs = knot.costs.iter().chain(knot.costs_at.values().flatten());
     let limits = knot.limits.iter().chain(knot.limits_at.values().flatten());

@@ -191,7 +191,7 @@ impl Layout for Limbs<'_> {
     fn column(&self, i: usize) -> usize {
         self.steps[i].idx_v
     }
-    /// That is done where the lanes' efforts are put together.
+    /// Nothing: that is done where the lanes' efforts are put together.
     #[inline(always)]
     fn add_armature_torque(&self, _: &[Four], _: &mut [Four]) {}
 }

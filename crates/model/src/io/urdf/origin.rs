@@ -17,7 +17,7 @@ pub(super) struct Origins {
 }
 
 impl Origins {
-    /// By the version that a robot names, or 1.0.
+    /// The rules by the version that a robot names, or 1.0.
     pub(super) fn of(robot: &Element) -> Result<Self, Error> {
         match robot.attribute("version").unwrap_or("1.0") {
             "1.0" => Ok(Self { quaternions: false }),

@@ -2,6 +2,7 @@
 
 use super::ActionModel;
 use crate::lq::LqNode;
+use nalgebra::DMatrix;
 
 /// The step of first differences, about ε^⅓: truncation h² meets rounding ε/h.
 pub(crate) const FIRST: f64 = 6e-6;
@@ -64,11 +65,21 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
                 z[j] = 0.0;
             }
             let curvature = sum / (4.0 * SECOND * SECOND);
-            match (i < ndx, j < ndx) {
-                (true, _) => (node.Q[(i, j)], node.Q[(j, i)]) = (curvature, curvature),
-                (false, true) => node.S[(j, i - ndx)] = curvature,
-                (false, false) => (node.R[(i - ndx, j - ndx)], node.R[(j - ndx, i - ndx)]) = (curvature, curvature),
-            }
+            write_curvature([&mut node.Q, &mut node.S, &mut node.R], ndx, (i, j), curvature);
         }
+    }
+}
+
+/// Writes the second derivative by entries i ≥ j of z = (δx, δu) to the blocks by δx twice, by both, and by δu twice.
+pub(crate) fn write_curvature(
+    [xx, xu, uu]: [&mut DMatrix<f64>; 3],
+    ndx: usize,
+    (i, j): (usize, usize),
+    curvature: f64,
+) {
+    match (i < ndx, j < ndx) {
+        (true, _) => (xx[(i, j)], xx[(j, i)]) = (curvature, curvature),
+        (false, true) => xu[(j, i - ndx)] = curvature,
+        (false, false) => (uu[(i - ndx, j - ndx)], uu[(j - ndx, i - ndx)]) = (curvature, curvature),
     }
 }

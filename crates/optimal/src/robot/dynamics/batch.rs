@@ -19,12 +19,11 @@ use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_dynamics_equations, rnea, rnea_derivatives,
 };
-use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, gather_rows, scatter};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Where accelerations come from.
+/// The law from which accelerations follow.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Law {
     /// Nowhere: time stands still, or the state jumps.
@@ -38,7 +37,7 @@ pub(crate) enum Law {
 }
 
 /// A law with the scratch that it takes.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) enum Pass<S> {
     None,
     Free,
@@ -62,31 +61,6 @@ pub(crate) struct KnotBatch<S> {
     linear: LinearEquations<S>,
     /// Whether the last pass was at q.
     visited: bool,
-}
-
-impl<S: Scalar> Clone for KnotBatch<S> {
-    #[inline(never)] // large
-    fn clone(&self) -> Self {
-        let Self { data, pass, surplus, residuals, q, v, tau, a, linear, visited } = self;
-        let (data, pass, surplus, residuals) = (clone(data), clone(pass), clone(surplus), clone(residuals));
-        Self {
-            data,
-            pass,
-            surplus,
-            residuals,
-            q: q.clone(),
-            v: v.clone(),
-            tau: tau.clone(),
-            a: a.clone(),
-            linear: linear.clone(),
-            visited: *visited,
-        }
-    }
-}
-
-#[inline(never)]
-fn clone<T: Clone>(of: &T) -> T {
-    of.clone()
 }
 
 impl<S: Block<Number = f64>> KnotBatch<S> {
@@ -256,7 +230,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 }
 
 /// The linear equations of some knots, side by side.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct LinearEquations<S> {
     size: Tableau,
     limbs: Arc<LimbElimination>,

@@ -1,7 +1,7 @@
 //! Impacts: knots without time and controls, at which velocities jump.
 
 use super::batch::Law;
-use super::robot::{DynamicsSensitivities, RobotDynamics, Work};
+use super::robot::{DynamicsSensitivities, Parts, RobotDynamics, Work};
 use crate::ActionModel;
 use crate::Error;
 use crate::lq::LqNode;
@@ -11,6 +11,7 @@ use crate::robot::capabilities::{Capabilities, Output};
 use crate::robot::contact::{Contact, check_contacts, constraint_set, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::knot::{KnotData, KnotState};
+use crate::robot::on_demand::OnDemand;
 use crate::robot::state::{state_difference, state_integrate};
 use condyle_dynamics::{
     ConstraintSet, Data, Model, centroidal_derivatives, forward_velocities, impulse_dynamics,
@@ -49,8 +50,7 @@ pub struct ImpulseDynamics {
     contacts: Vec<Contact>,
     restitution: f64,
     damping: f64,
-    /// The constraints, made when they are first needed.
-    set: Option<Box<ConstraintSet<f64>>>,
+    set: OnDemand<ConstraintSet<f64>>,
     /// Zeros. Shape: nv.
     zero: Vec<f64>,
 }
@@ -76,15 +76,15 @@ impl ImpulseDynamics {
         let capabilities = Capabilities { impulse: true, contacts: rows_of(contacts), ..Capabilities::default() };
         let (none, zero) = (Actuation::none(&model), vec![0.0; model.nv()]);
         let robot = RobotDynamics::new(model, none, capabilities, Law::None, costs)?;
-        Ok(Self { robot, contacts: contacts.to_vec(), restitution, damping, set: None, zero })
+        Ok(Self { robot, contacts: contacts.to_vec(), restitution, damping, set: OnDemand::default(), zero })
     }
 
     /// Computes v⁺ − v and the impulses at a state, with their derivatives if these are asked for, and what the residuals
     /// see.
     fn evaluate(&mut self, t: usize, x: &[f64], slopes: bool) {
-        self.reserve();
-        let Self { robot, set: Some(set), restitution, zero, .. } = self else { unreachable!("was just made") };
-        let (model, _, terms, Work { single, data, .. }) = robot.parts();
+        let Self { robot, contacts, damping, set, restitution, zero } = self;
+        let Parts { model, terms, work: Work { single, data, .. }, .. } = robot.parts();
+        let set = set.get(|| made_constraints(model, contacts, *damping));
         let ((q, v), knot) = (x.split_at(model.nq()), &mut data[0]);
         knot.residuals.reserve(v.len(), terms.layouts());
         if slopes {
@@ -105,6 +105,11 @@ impl ImpulseDynamics {
         }
         single.run_residuals_at(model, t, x, terms, slopes, knot);
     }
+}
+
+/// The constraints of contacts that were checked.
+fn made_constraints(model: &Model, contacts: &[Contact], damping: f64) -> ConstraintSet<f64> {
+    constraint_set(model, contacts, damping).expect("was checked when it was given")
 }
 
 fn write_change(v: &[f64], after: &[f64], lambda: &[f64], to: &mut KnotData) {
@@ -143,7 +148,7 @@ impl ActionModel for ImpulseDynamics {
     fn reserve(&mut self) {
         self.robot.reserve();
         let Self { robot: RobotDynamics { model, .. }, contacts, damping, set, .. } = self;
-        set.get_or_insert_with(|| Box::new(constraint_set(model, contacts, *damping).expect("was checked when given")));
+        set.get(|| made_constraints(model, contacts, *damping));
     }
 
     fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
@@ -177,7 +182,7 @@ impl ActionModel for ImpulseDynamics {
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.evaluate(t, x, false);
-        let (model, _, terms, Work { data, .. }) = self.robot.parts();
+        let Parts { model, terms, work: Work { data, .. }, .. } = self.robot.parts();
         let (nq, data) = (model.nq(), &data[0]);
         next.copy_from_slice(x);
         (0..model.nv()).for_each(|k| next[nq + k] += data.a[k]);
@@ -186,7 +191,7 @@ impl ActionModel for ImpulseDynamics {
 
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         self.evaluate(t, x, true);
-        let (model, actuation, terms, Work { data, .. }) = self.robot.parts();
+        let Parts { model, actuation, terms, work: Work { data, .. }, .. } = self.robot.parts();
         let (nv, data) = (model.nv(), &data[0]);
         let sensitivities = DynamicsSensitivities { given: Output::Effort, data, actuation };
         terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, 1.0, node);

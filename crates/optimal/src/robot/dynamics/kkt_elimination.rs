@@ -49,7 +49,7 @@ impl Tableau {
 }
 
 /// The elimination for one set of contacts, and its scratch.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct KktElimination {
     tableau: Tableau,
     /// The number of coordinates, the first ones, that are not driven.

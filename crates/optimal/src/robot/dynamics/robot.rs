@@ -14,6 +14,7 @@ use crate::robot::continuous::{Derivatives, KnotInput, Wanted};
 use crate::robot::costs::Cost;
 use crate::robot::horizon_terms::HorizonTerms;
 use crate::robot::knot::{KnotData, KnotState, Sensitivities, add_matrix_row};
+use crate::robot::on_demand::OnDemand;
 use crate::robot::residuals::rows::Row;
 use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
@@ -51,12 +52,21 @@ pub(crate) struct RobotDynamics {
     capabilities: Capabilities,
     /// The coordinates of each group of positions that is no vector space.
     pub groups: Vec<Range<usize>>,
-    /// Made when it is first needed, so that an action costs little to make, and to merge with others.
-    work: Option<Box<Work>>,
+    work: OnDemand<Work>,
+}
+
+/// What [`RobotDynamics`] consists of when knots are computed.
+pub(crate) struct Parts<'a> {
+    pub model: &'a Arc<Model>,
+    pub actuation: &'a Actuation,
+    pub terms: &'a mut HorizonTerms,
+    capabilities: &'a Capabilities,
+    groups: &'a [Range<usize>],
+    pub work: &'a mut Work,
 }
 
 /// The memory in which the dynamics of knots are computed.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Work {
     /// The dynamics of one knot.
     pub single: KnotBatch<f64>,
@@ -72,7 +82,7 @@ pub(crate) struct Work {
 
 /// The dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for derivatives
 /// they are not: too rarely used to stay in the caches.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct VectorBatches {
     short: KnotBatch<Short>,
     long: Option<KnotBatch<Long>>,
@@ -89,8 +99,14 @@ fn lanes(law: &Law) -> usize {
 
 impl Work {
     #[inline(never)]
-    fn new(of: &RobotDynamics) -> Self {
-        let RobotDynamics { model, actuation, law, given, capabilities, groups, .. } = of;
+    fn new(
+        model: &Model,
+        actuation: &Actuation,
+        law: &Law,
+        given: Output,
+        capabilities: &Capabilities,
+        groups: &[Range<usize>],
+    ) -> Self {
         let (nv, lanes) = (model.nv(), lanes(law));
         let mut vectors = (lanes > 1).then(|| {
             let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, law));
@@ -103,7 +119,7 @@ impl Work {
         };
         // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
-        let mut data = KnotData::new(nv, capabilities, *given);
+        let mut data = KnotData::new(nv, capabilities, given);
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
             let damped = matches!(law, Law::Contact(_, damping) if *damping != 0.0);
             let limbs = Arc::new(LimbElimination::new(model, passive, &moved_by, damped));
@@ -180,22 +196,20 @@ impl RobotDynamics {
         }
         let given = if matches!(law, Law::Inverse) { Output::Acceleration } else { Output::Effort };
         let groups = groups(&model);
-        Ok(Self { model, actuation, terms, law, given, capabilities, groups, work: None })
+        Ok(Self { model, actuation, terms, law, given, capabilities, groups, work: OnDemand::default() })
     }
 
     /// Makes the memory in which knots are computed, unless it is there.
     pub(crate) fn reserve(&mut self) {
-        self.terms.reserve();
-        if self.work.is_none() {
-            self.work = Some(Box::new(Work::new(self)));
-        }
+        self.parts();
     }
 
     /// The robot, its drives, the terms of its knots, and the memory in which they are computed.
-    pub(crate) fn parts(&mut self) -> (&Arc<Model>, &Actuation, &mut HorizonTerms, &mut Work) {
-        self.reserve();
-        let Self { model, actuation, terms, work: Some(work), .. } = self else { unreachable!("was just made") };
-        (model, actuation, terms, work)
+    pub(crate) fn parts(&mut self) -> Parts<'_> {
+        let Self { model, actuation, terms, law, given, capabilities, groups, work } = self;
+        terms.reserve();
+        let work = work.get(|| Work::new(model, actuation, law, *given, capabilities, groups));
+        Parts { model, actuation, terms, capabilities, groups, work }
     }
 
     /// As [`ActionModel::merge`](crate::ActionModel::merge).
@@ -215,7 +229,8 @@ impl RobotDynamics {
 
     /// As [`ContinuousModel::prepare`](crate::robot::ContinuousModel::prepare): side by side where that is worthwhile.
     pub(crate) fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
-        let (model, actuation, terms, Work { single, vectors, data, prepared, .. }) = self.parts();
+        let Parts { model, actuation, terms, work, .. } = self.parts();
+        let Work { single, vectors, data, prepared, .. } = work;
         let (nu, nx, count) = (actuation.nu(), model.nq() + model.nv(), knots.len());
         let data = &mut data[..count];
         for (k, data) in data.iter_mut().enumerate() {
@@ -241,7 +256,7 @@ impl RobotDynamics {
 
     /// As [`ContinuousModel::calc`](crate::robot::ContinuousModel::calc).
     pub(crate) fn calc(&mut self, KnotInput { lane, t, x, u }: KnotInput<'_>) -> (&[f64], f64) {
-        let (_, _, terms, Work { data, .. }) = self.parts();
+        let Parts { terms, work: Work { data, .. }, .. } = self.parts();
         let data = &data[lane];
         (&data.a, terms.calc(t, KnotState { x, u, data }))
     }
@@ -249,7 +264,7 @@ impl RobotDynamics {
     /// As [`ContinuousModel::calc_diff`](crate::robot::ContinuousModel::calc_diff).
     pub(crate) fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
         let given = self.given;
-        let (model, actuation, terms, work) = self.parts();
+        let Parts { model, actuation, terms, work, .. } = self.parts();
         let in_equations = work.prepared == Wanted::Equations;
         let inverse = in_equations && work.write_inverse_dynamics_form(terms, input, scale, node);
         let Work { single, data, da_du, .. } = work;
@@ -269,13 +284,12 @@ impl RobotDynamics {
 
     /// As [`ContinuousModel::inverse_dynamics_form`](crate::robot::ContinuousModel::inverse_dynamics_form).
     pub(crate) fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
-        Some([self.work.as_ref()?.elimination.as_ref()?.most_dependent(), self.terms.layout().rows[0]])
+        Some([self.work.made()?.elimination.as_ref()?.most_dependent(), self.terms.layout().rows[0]])
     }
 
     /// As [`ActionModel::outputs`](crate::ActionModel::outputs), of a knot that was prepared.
     pub(crate) fn outputs(&mut self, lane: usize, show: &mut dyn FnMut(&str, &[f64])) {
-        self.reserve();
-        let Self { capabilities, work: Some(work), .. } = self else { unreachable!("was just made") };
+        let Parts { capabilities, work, .. } = self.parts();
         let data = &work.data[lane];
         if capabilities.effort {
             show("acceleration", &data.a);
@@ -293,13 +307,9 @@ impl RobotDynamics {
         if self.law == Law::Inverse {
             return vec![0.0; nv]; // q̈ = u
         }
-        // one state does not need the memory of many knots
-        let Self { model, actuation, law, work, .. } = self;
-        let (mut own, mut J) = (None, DMatrix::zeros(0, nv));
-        let data = match work {
-            Some(work) => &mut work.single.data,
-            None => own.insert(Data::new(model)),
-        };
+        // one state does not need the memory of many knots, which may not be there
+        let Self { model, actuation, law, .. } = self;
+        let (data, mut J) = (&mut Data::new(model), DMatrix::zeros(0, nv));
         if let Law::Contact(contacts, damping) = law {
             let mut set = constraint_set(model, contacts, *damping).expect("was checked when it was given");
             constrained_dynamics(model, data, &mut set, &x[..nq], &x[nq..], &vec![0.0; nv], &[]);
@@ -316,7 +326,7 @@ impl RobotDynamics {
         mu: &[f64],
         hessian: &mut Hessian,
     ) -> Option<Derivatives<'_>> {
-        let (model, actuation, _, work) = self.parts();
+        let Parts { model, actuation, work, .. } = self.parts();
         let Work { single: KnotBatch { data, pass, .. }, data: knots, da_du, .. } = work;
         let knot = &mut knots[0];
         match pass {
@@ -361,8 +371,7 @@ impl RobotDynamics {
 
     /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
     pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
-        self.reserve();
-        let Self { model, groups, work: Some(work), .. } = self else { unreachable!("was just made") };
+        let Parts { model, groups, work, .. } = self.parts();
         work.group_hessian.run(model, groups, dq, lambda, hessian);
     }
 }

@@ -6,6 +6,7 @@ mod retraction;
 mod runge_kutta;
 
 use super::continuous::{ContinuousModel, KnotInput, Wanted, limit_term};
+use super::on_demand::OnDemand;
 use crate::ActionModel;
 use crate::Error;
 use crate::error::assert_length;
@@ -44,8 +45,7 @@ pub struct Integrated<M> {
     method: Method,
     /// The least and the greatest controls.
     bounds: Option<[Vec<f64>; 2]>,
-    /// Made when it is first needed.
-    work: Option<Box<Work>>,
+    work: OnDemand<Work>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +59,7 @@ enum Method {
 }
 
 /// The memory of a step.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Work {
     retraction: Retraction,
     curvature: Curvature,
@@ -81,7 +81,7 @@ impl<M: ContinuousModel> Integrated<M> {
             Integrator::RungeKutta3 => Method::RungeKutta(dt, 3),
             Integrator::RungeKutta4 => Method::RungeKutta(dt, 4),
         };
-        Ok(Self { inner: model, method, bounds: None, work: None })
+        Ok(Self { inner: model, method, bounds: None, work: OnDemand::default() })
     }
 
     /// The end of a horizon, for a model without controls.
@@ -90,19 +90,19 @@ impl<M: ContinuousModel> Integrated<M> {
     /// If the model has controls.
     pub fn end(model: M) -> Self {
         assert!(model.nu() == 0, "model: a terminal one has no controls, found {}", model.nu());
-        Self { inner: model, method: Method::Still, bounds: None, work: None }
+        Self { inner: model, method: Method::Still, bounds: None, work: OnDemand::default() }
     }
 
     /// The model, the rule of a step, and its memory.
     fn parts(&mut self) -> (&mut M, Method, &mut Work) {
         let Self { inner, method, work, .. } = self;
-        let work = work.get_or_insert_with(|| {
+        let work = work.get(|| {
             let runge_kutta = match *method {
                 Method::RungeKutta(_, stages) => Some(RungeKutta::new(stages, inner)),
                 _ => None,
             };
             let (retraction, curvature) = (Retraction::new(inner.nv()), Curvature::new(inner));
-            Box::new(Work { retraction, curvature, runge_kutta })
+            Work { retraction, curvature, runge_kutta }
         });
         (inner, *method, work)
     }
@@ -231,7 +231,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
 
     fn fork(&self) -> Option<Box<dyn ActionModel>> {
         let Self { inner, method, bounds, work } = self;
-        Some(Box::new(Self { inner: inner.fork()?, method: *method, bounds: bounds.clone(), work: work.clone() }))
+        let (inner, bounds, work) = (inner.fork()?, bounds.clone(), work.clone());
+        Some(Box::new(Self { inner, method: *method, bounds, work }))
     }
 
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
@@ -278,7 +279,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         }
     }
 
-    /// By semi-implicit Euler: see `curvature.rs`.
+    /// Second derivatives by semi-implicit Euler: see `curvature.rs`.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let (inner, Method::Euler(dt), Work { retraction, curvature, .. }) = self.parts() else { return false };
         curvature.run(inner, dt, KnotInput { lane: 0, t, x, u }, lambda, retraction, hessian)

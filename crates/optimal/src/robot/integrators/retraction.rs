@@ -10,7 +10,7 @@ use core::ops::Range;
 use nalgebra::DMatrix;
 
 /// A step of a configuration and its Jacobians.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Retraction {
     /// δ. Shape: nv.
     pub delta: Vec<f64>,

@@ -61,7 +61,7 @@ impl KnotGroup<'_> {
 }
 
 /// Scratch of residuals of kinematics.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct ResidualKernel<S> {
     /// The numbers of targets.
     t: [S; 12],

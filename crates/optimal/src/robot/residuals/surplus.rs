@@ -8,7 +8,7 @@ use condyle_spatial::{Scalar, kernel};
 use nalgebra::DMatrix;
 
 /// M q̈ + h − g at knots with contacts, else −g.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Surplus<S> {
     /// The value. Shape: nv.
     value: Vec<S>,

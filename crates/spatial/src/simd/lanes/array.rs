@@ -73,7 +73,7 @@ pub mod moves {
     }
 
     impl Move {
-        /// From lane to lane, for each pair.
+        /// A move from lane to lane, for each pair.
         pub fn new(pairs: &[(usize, usize)]) -> Self {
             let mut this = Self { from: [4; 4] };
             for &(from, to) in pairs {

@@ -26,7 +26,7 @@ mod processor;
 
 /// A number of which vectors of N exist.
 pub trait Element<const N: usize>: Number {
-    /// Where they are.
+    /// The place where they are.
     type Register: Register<Self, N>;
 }
 
@@ -40,7 +40,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn enter(kernel: impl Kernel);
     /// The numbers of an array.
     fn load(x: [T; N]) -> Self;
-    /// As an array.
+    /// The lanes as an array.
     fn store(a: Self) -> [T; N];
     /// x in every lane.
     fn splat(x: T) -> Self;
@@ -66,7 +66,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// At least one of the masks holds.
+    /// Whether at least one of the masks holds.
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// The mask holds in some lane.
     fn any(mask: Self::Mask) -> bool;

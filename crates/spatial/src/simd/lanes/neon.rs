@@ -91,7 +91,7 @@ pub mod moves {
     }
 
     impl Move {
-        /// From lane to lane, for each pair.
+        /// A move from lane to lane, for each pair.
         pub fn new(pairs: &[(usize, usize)]) -> Self {
             let mut this = Self { from: [[u8::MAX; 8]; 4] };
             for &(from, to) in pairs {

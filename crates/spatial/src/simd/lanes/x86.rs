@@ -173,7 +173,7 @@ pub mod moves {
     }
 
     impl Move {
-        /// From lane to lane, for each pair.
+        /// A move from lane to lane, for each pair.
         pub fn new(pairs: &[(usize, usize)]) -> Self {
             let mut this = Self { from: [0; 8], to: [0; 4] };
             for &(from, to) in pairs {

@@ -1,8 +1,10 @@
 //! The program as the method sees it: padded, without what constrains nothing, and in units in which all is of size one.
 //!
-//! With x = D x̂, Dⱼ = C / √Pⱼⱼ and C = max |cⱼ| / √Pⱼⱼ, the cost divided by C² has a P̂ with a diagonal of ones and a ĉ of at
-//! most one. So weights that differ by many orders of magnitude, as those of tasks and of forces do, meet one tolerance.
-//! Rows of Ĝ = G D, and the longest row of each cone, have length one.
+//! x = D x̂, where Dⱼ is what the cost alone would make of xⱼ, C / √Pⱼⱼ with C = max |cⱼ| / √Pⱼⱼ, but no more than some times
+//! what rows with two bounds leave to it alone, max(|lᵢ|, |uᵢ|) / |Gᵢⱼ|: where a task asks for the impossible, a force of
+//! little weight would else have a unit of millions of newtons, in which its limits are nothing. The cost is divided by the
+//! greatest of |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². So weights that differ by many orders of magnitude, as those of tasks and of forces do,
+//! meet one tolerance. Rows of Ĝ = G D, and the longest row of each cone, have length one.
 
 use crate::cone_program::{ConeProgram, Size, Status};
 use condyle_linalg::{SLACK, View, add_product_vector, block, dot, mask, transposed_product_vector};
@@ -10,6 +12,11 @@ use std::ops::Range;
 
 /// A diagonal entry of P below this share of the greatest counts as zero when units are chosen.
 const NO_CURVATURE: f64 = 1e-14;
+/// A unit is at most so many times what bounds leave to its unknown alone. At 1, programs with a singular P lose digits; from
+/// 1000 on, some that ask for the impossible have no solution.
+const ROOM: f64 = 30.0;
+/// Bounds make a unit no smaller than this share of the cost's: a P̂ⱼⱼ of its square is what rounding errors still leave.
+const LEAST_SHARE: f64 = 1e-5;
 /// By this much, relative to its size, a bound of a row without coefficients may be exceeded.
 const NO_ROW_TOLERANCE: f64 = 1e-9;
 
@@ -60,6 +67,8 @@ pub(super) struct Scaled {
     pub c: Vec<f64>,
     /// D, the unit of each unknown.
     pub units: Vec<f64>,
+    /// Scratch: one over what rows with two bounds leave to an unknown alone.
+    inverse_limits: Vec<f64>,
     /// P and c were multiplied with this.
     pub cost: f64,
     /// Eᵀ: equalities, and rows of G with l = u.
@@ -97,6 +106,7 @@ impl Scaled {
             P: vec![0.0; ld * n],
             c: vec![0.0; ld],
             units: vec![1.0; n],
+            inverse_limits: vec![0.0; n],
             cost: 1.0,
             E: vec![0.0; ld * (me + SLACK)],
             e: vector(me),
@@ -166,7 +176,7 @@ impl Scaled {
             self.E.fill(0.0);
             self.K.fill(0.0);
         }
-        self.choose_units(&program.c[..n], program.P.as_slice(), most);
+        self.choose_units(program);
         let (P, D) = (program.P.as_slice(), &self.units[..n]);
         for j in 0..n {
             let unit = self.cost * D[j];
@@ -235,30 +245,47 @@ impl Scaled {
         }
     }
 
-    /// D and the cost's factor 1 / C².
-    fn choose_units(&mut self, c: &[f64], P: &[f64], stride: usize) {
-        let most = (0..c.len()).map(|j| P[j * stride + j]).fold(0.0, f64::max);
+    /// The units of the unknowns and of the cost; see the module.
+    fn choose_units(&mut self, program: &ConeProgram) {
+        let (n, most) = (program.size.unknowns, program.capacity().unknowns);
+        let (P, c) = (|j: usize| program.P.as_slice()[j * most + j], &program.c[..n]);
+        let greatest = (0..n).map(P).fold(0.0, f64::max);
+        let units = &mut self.units[..n];
         let mut size = 0.0_f64;
-        for (j, unit) in self.units[..c.len()].iter_mut().enumerate() {
-            let curvature = P[j * stride + j];
+        for j in 0..n {
             // Without curvature there is no size of its own: that of the others.
-            let curvature = if curvature > NO_CURVATURE * most {
-                curvature
-            } else if most > 0.0 {
-                most
-            } else {
-                1.0
+            let curvature = match P(j) {
+                own if own > NO_CURVATURE * greatest => own,
+                _ if greatest > 0.0 => greatest,
+                _ => 1.0,
             };
-            *unit = curvature.sqrt().recip();
-            size = size.max(*unit * c[j].abs());
-        }
-        if size == 0.0 {
-            size = 1.0;
+            units[j] = curvature.sqrt().recip();
+            size = size.max(units[j] * c[j].abs());
         }
         // Without any curvature only the cost has a size.
-        let length = if most > 0.0 { size } else { 1.0 };
-        self.cost = 1.0 / (size * length);
-        self.units[..c.len()].iter_mut().for_each(|unit| *unit *= length);
+        let length = if greatest > 0.0 && size > 0.0 { size } else { 1.0 };
+
+        // max |Gᵢⱼ| / max(|lᵢ|, |uᵢ|)
+        let inverse = &mut self.inverse_limits[..n];
+        inverse.fill(0.0);
+        for i in 0..program.size.rows {
+            let (lower, upper) = (program.lower[i], program.upper[i]);
+            let bound = lower.abs().max(upper.abs());
+            if lower < upper && bound < f64::INFINITY {
+                let weight = bound.recip();
+                for (most, g) in inverse.iter_mut().zip(&program.row(i)[..n]) {
+                    let share = weight * g.abs();
+                    *most = if share > *most { share } else { *most };
+                }
+            }
+        }
+        let mut cost = 0.0_f64;
+        for j in 0..n {
+            let unit = length * units[j];
+            units[j] = unit / (unit * inverse[j] / ROOM).clamp(1.0, LEAST_SHARE.recip());
+            cost = cost.max(units[j] * c[j].abs()).max(units[j] * units[j] * P(j));
+        }
+        self.cost = if cost > 0.0 { cost.recip() } else { 1.0 };
     }
 
     fn add_row(&mut self, row: &[f64], [lower, upper]: [f64; 2], source: Source) -> Result<(), Status> {

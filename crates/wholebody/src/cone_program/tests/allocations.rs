@@ -1,12 +1,12 @@
 //! A solve allocates nothing, whatever the sizes in use.
 
-#[path = "../../../tests/common/counting.rs"]
+#[path = "../../../../../tests/common/counting.rs"]
 mod counting;
 
 use super::random::{Draw, Kind};
 use super::walk::Walk;
 use crate::cone_program::{InteriorPoint, Settings, Solver, Start};
-use counting::COUNT;
+use counting::allocated;
 
 #[test]
 fn a_solve_allocates_nothing() {
@@ -21,16 +21,16 @@ fn a_solve_allocates_nothing() {
         program.size.rows = 96 - tick;
         program.lower[5] = program.upper[5];
         program.upper[7] = f64::INFINITY;
-        let before = COUNT.get();
+        let before = allocated();
         let outcome = solver.solve(&program, if tick % 4 == 0 { Start::Cold } else { Start::Warm });
-        assert_eq!(COUNT.get() - before, 0);
+        assert_eq!(allocated() - before, 0);
         assert_eq!(outcome.stopped, None);
     }
     for kind in Kind::ALL {
         let program = Draw::new(1).program(kind, 18, [3, 40, 6]);
         let mut solver = InteriorPoint::new(program.capacity(), Settings::default());
-        let before = COUNT.get();
+        let before = allocated();
         solver.solve(&program, Start::Cold);
-        assert_eq!(COUNT.get() - before, 0);
+        assert_eq!(allocated() - before, 0);
     }
 }

@@ -1,0 +1,100 @@
+//! OBJ (Wavefront): faces of any number of corners, with the diffuse colours of their material file.
+
+use super::part::{Part, Triangle, Words, full};
+use std::collections::HashMap;
+
+/// A colour, and the triangles that have it.
+type Group = (Option<[f64; 3]>, Vec<Triangle>);
+
+/// The triangles of an OBJ, a part for each material; `library` gives the text of a material file by its name.
+pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
+    let (mut points, mut colours) = (Vec::new(), HashMap::new());
+    let mut groups: Vec<Group> = vec![(None, Vec::new())];
+    let (mut of_material, mut group, mut count) = (HashMap::new(), 0, 0);
+    for (number, line) in text.lines().enumerate() {
+        let wrong = |what: &str| format!("line {}: {what}", number + 1);
+        let mut words = Words::new(line);
+        match words.next() {
+            Some("v") => points.push(words.numbers().ok_or_else(|| wrong("a vertex has three numbers"))?),
+            Some("mtllib") => colours.extend(words.rest().and_then(library).map(|t| materials(&t)).unwrap_or_default()),
+            Some("usemtl") => {
+                let name = words.rest().unwrap_or_default();
+                group = *of_material.entry(name.to_owned()).or_insert_with(|| {
+                    groups.push((colours.get(name).copied(), Vec::new()));
+                    groups.len() - 1
+                });
+            }
+            Some("f") => {
+                let mut corner = || -> Option<Result<u32, String>> {
+                    let word = words.next()?;
+                    let index = word.split('/').next().and_then(|i| i.parse::<i64>().ok()).unwrap_or(0);
+                    // from 1, or back from the last one
+                    let from_zero = if index > 0 { index - 1 } else { points.len() as i64 + index };
+                    let known = index != 0 && (0..points.len() as i64).contains(&from_zero);
+                    Some(if known { Ok(from_zero as u32) } else { Err(wrong(&format!("no vertex is `{word}`"))) })
+                };
+                let (Some(first), Some(second)) = (corner().transpose()?, corner().transpose()?) else {
+                    return Err(wrong("a face has at least three corners"));
+                };
+                let mut before = second;
+                while let Some(next) = corner().transpose()? {
+                    count += 1;
+                    full(count)?;
+                    groups[group].1.push([first, before, next]);
+                    before = next;
+                }
+            }
+            _ => {}
+        }
+    }
+    let part = |(color, triangles): Group| Part::of(&points, triangles, color);
+    Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
+}
+
+/// The diffuse colours of a material file, by name.
+fn materials(text: &str) -> HashMap<String, [f64; 3]> {
+    let (mut found, mut name) = (HashMap::new(), String::new());
+    for line in text.lines() {
+        let mut words = Words::new(line);
+        match words.next() {
+            Some("newmtl") => name = words.rest().unwrap_or_default().to_owned(),
+            Some("Kd") => found.extend(words.numbers().map(|colour| (name.clone(), colour))),
+            _ => {}
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::read;
+
+    const TEXT: &str =
+        "mtllib a b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl red\nf 1/1/1 2//3 3 -1\nusemtl none\nf 1 2 3\n";
+
+    #[test]
+    fn polygons_and_colours() {
+        let library = |name: &str| (name == "a b.mtl").then(|| "newmtl red\nKd 1 0 0.5\n".to_owned());
+        let parts = read(TEXT, &library).unwrap();
+        assert_eq!(parts.len(), 2);
+        assert_eq!((parts[0].triangles.len(), parts[0].color), (2, Some([1.0, 0.0, 0.5])));
+        assert_eq!((parts[1].points.len(), parts[1].color), (3, None));
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        for (from, to, said) in [
+            ("v 1 0 0", "v 1 0", "line 3: a vertex"),
+            ("v 1 0 0", "v 1 0 nan", "line 3: a vertex"),
+            ("f 1 2 3", "f 1 2 9", "no vertex is `9`"),
+            ("f 1 2 3", "f 1 2 -9", "no vertex is `-9`"),
+            ("f 1 2 3", "f 0 2 3", "no vertex is `0`"),
+            ("f 1 2 3", "f 1", "line 9: a face"),
+            ("f 1 2 3", "f 1 2 99999999999999999999", "no vertex"),
+        ] {
+            let error = read(&TEXT.replace(from, to), &|_| None).unwrap_err();
+            assert!(error.contains(said), "{error}");
+        }
+        assert!(read("", &|_| None).unwrap().is_empty());
+    }
+}

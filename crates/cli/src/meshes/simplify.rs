@@ -1,0 +1,341 @@
+//! Fewer triangles for the same shape: edges are collapsed where that changes least (Garland and Heckbert, "Surface
+//! simplification using quadric error metrics", SIGGRAPH 1997), after points that coincide have been made one.
+
+use super::part::Part;
+use nalgebra::{Matrix3, Vector3};
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap, HashSet};
+
+/// The cells along the longest side in which points are one, and how many triangles may be left before edges collapse.
+const CELLS: f64 = 32768.0;
+const MOST: usize = 200_000;
+/// The weight of the edges of an open surface beside its planes.
+const BORDER: f64 = 10.0;
+/// How far a triangle may turn when a corner moves: the cosine.
+const TURN: f64 = 0.2;
+
+/// A part with at most `target` triangles, 12 or more.
+pub(super) fn simplify(part: &Part, target: usize) -> Part {
+    let mut cells = CELLS;
+    let mut welded = weld(part, cells);
+    while welded.triangles.len() > MOST.max(target) && cells > 2.0 {
+        cells /= 2.0;
+        welded = weld(part, cells);
+    }
+    if welded.triangles.len() > target {
+        welded = Surface::new(&welded).collapse(target);
+    }
+    // Many small pieces cannot lose edges: cells make them one.
+    cells = cells.min(256.0);
+    while welded.triangles.len() > target && cells > 1.0 {
+        cells /= 2.0;
+        welded = weld(part, cells);
+    }
+    welded
+}
+
+/// A part whose points in one cell are their mean, without the triangles that are gone then.
+fn weld(part: &Part, cells: f64) -> Part {
+    let (low, high) = bounds(&part.points);
+    let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+    let side = if longest > 0.0 { longest / cells } else { 1.0 };
+    let (mut numbers, mut sums) = (HashMap::new(), Vec::<(Vector3<f64>, f64)>::new());
+    let number: Vec<u32> = part
+        .points
+        .iter()
+        .map(|p| {
+            let cell = [0, 1, 2].map(|k| ((p[k] - low[k]) / side).round() as u32);
+            let number = *numbers.entry(cell).or_insert_with(|| {
+                sums.push((Vector3::zeros(), 0.0));
+                sums.len() - 1
+            });
+            sums[number].0 += Vector3::from(*p);
+            sums[number].1 += 1.0;
+            number as u32
+        })
+        .collect();
+    let mut seen = HashSet::new();
+    let whole = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    let mut new = |t: &[u32; 3]| {
+        let mut sorted = *t;
+        sorted.sort_unstable();
+        seen.insert(sorted)
+    };
+    let triangles = part.triangles.iter().map(|t| t.map(|c| number[c as usize]));
+    let triangles = triangles.filter(|t| whole(t) && new(t)).collect();
+    let points: Vec<[f64; 3]> = sums.iter().map(|(sum, count)| (sum / *count).into()).collect();
+    Part::of(&points, triangles, part.color)
+}
+
+/// The corners of the box around points.
+pub(super) fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
+    let limits = |f: fn(f64, f64) -> f64, from| [0, 1, 2].map(|k| points.iter().map(|p| p[k]).fold(from, f));
+    if points.is_empty() {
+        return Default::default();
+    }
+    (limits(f64::min, f64::INFINITY), limits(f64::max, f64::NEG_INFINITY))
+}
+
+/// The sum of squared distances from planes: xᵀ A x + 2 bᵀ x + c.
+#[derive(Clone)]
+struct Quadric {
+    A: Matrix3<f64>,
+    b: Vector3<f64>,
+    c: f64,
+}
+
+impl Quadric {
+    const ZERO: Self =
+        Self { A: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), b: Vector3::new(0.0, 0.0, 0.0), c: 0.0 };
+
+    /// A plane through a point, with its unit normal.
+    fn add_plane(&mut self, normal: Vector3<f64>, point: Vector3<f64>, weight: f64) {
+        let d = -normal.dot(&point);
+        self.A += weight * normal * normal.transpose();
+        self.b += weight * d * normal;
+        self.c += weight * d * d;
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        Self { A: self.A + other.A, b: self.b + other.b, c: self.c + other.c }
+    }
+
+    fn at(&self, x: Vector3<f64>) -> f64 {
+        (x.dot(&(self.A * x)) + 2.0 * self.b.dot(&x) + self.c).max(0.0)
+    }
+}
+
+/// An edge in the queue: its cost as bits, both ends, their changes.
+type Edge = (u64, [u32; 2], [u32; 2]);
+
+/// A surface whose edges collapse, in a box of side 1.
+struct Surface {
+    low: Vector3<f64>,
+    side: f64,
+    color: Option<[f64; 3]>,
+    points: Vec<Vector3<f64>>,
+    quadrics: Vec<Quadric>,
+    /// The changes of each point; what was reckoned before one is out of date.
+    changes: Vec<u32>,
+    triangles: Vec<Option<[u32; 3]>>,
+    /// The triangles at each point, some of them gone.
+    around: Vec<Vec<u32>>,
+    left: usize,
+    edges: BinaryHeap<Reverse<Edge>>,
+}
+
+impl Surface {
+    fn new(part: &Part) -> Self {
+        let (low, high) = bounds(&part.points);
+        let (low, high) = (Vector3::from(low), Vector3::from(high));
+        let side = (high - low).max().max(f64::MIN_POSITIVE);
+        let points: Vec<_> = part.points.iter().map(|p| (Vector3::from(*p) - low) / side).collect();
+        let count = points.len();
+        let mut surface = Self {
+            low,
+            side,
+            color: part.color,
+            quadrics: vec![Quadric::ZERO; count],
+            changes: vec![0; count],
+            triangles: part.triangles.iter().copied().map(Some).collect(),
+            around: vec![Vec::new(); count],
+            left: part.triangles.len(),
+            edges: BinaryHeap::new(),
+            points,
+        };
+        let mut faces = HashMap::<[u32; 2], (u32, Vector3<f64>)>::new();
+        for (number, t) in part.triangles.iter().enumerate() {
+            let [a, b, c] = t.map(|c| surface.points[c as usize]);
+            let normal = (b - a).cross(&(c - a));
+            let area = normal.norm();
+            let unit = if area > 0.0 { normal / area } else { Vector3::zeros() };
+            for k in 0..3 {
+                surface.around[t[k] as usize].push(number as u32);
+                surface.quadrics[t[k] as usize].add_plane(unit, a, area);
+                faces.entry(edge(t[k], t[(k + 1) % 3])).or_insert((0, unit)).0 += 1;
+            }
+        }
+        for (&[a, b], &(count, unit)) in &faces {
+            if count == 1 {
+                // the plane that holds the border, upright on its only triangle
+                let (from, to) = (surface.points[a as usize], surface.points[b as usize]);
+                let along = to - from;
+                let normal = along.cross(&unit);
+                let weight = BORDER * along.norm_squared();
+                if normal.norm() > 0.0 {
+                    for end in [a, b] {
+                        surface.quadrics[end as usize].add_plane(normal.normalize(), from, weight);
+                    }
+                }
+            }
+        }
+        let mut all: Vec<[u32; 2]> = faces.into_keys().collect();
+        all.sort_unstable();
+        for [a, b] in all {
+            surface.push(a, b);
+        }
+        surface
+    }
+
+    /// Where the ends of an edge would become one, and what it would cost.
+    fn best(&self, a: u32, b: u32) -> (f64, Vector3<f64>) {
+        let quadric = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
+        let (p, q) = (self.points[a as usize], self.points[b as usize]);
+        let middle = 0.5 * (p + q);
+        let solved = quadric.A.try_inverse().map(|inverse| -(inverse * quadric.b));
+        // A flat part has no best point, or one far away.
+        let near = solved.filter(|x| (x - middle).norm() <= (p - q).norm());
+        let cost = |x: Vector3<f64>| (quadric.at(x), x);
+        let ends = [middle, p, q]
+            .into_iter()
+            .map(cost)
+            .fold((f64::INFINITY, middle), |best, this| if this.0 < best.0 { this } else { best });
+        near.map(cost).filter(|this| this.0 < ends.0).unwrap_or(ends)
+    }
+
+    fn push(&mut self, a: u32, b: u32) {
+        // of edges that cost nothing the shortest first
+        let length = (self.points[a as usize] - self.points[b as usize]).norm_squared();
+        let cost = self.best(a, b).0 + 1e-9 * length;
+        self.edges.push(Reverse((cost.to_bits(), [a, b], [a, b].map(|end| self.changes[end as usize]))));
+    }
+
+    /// Whether the triangles around one end, but for those that the edge takes with it, keep their side.
+    fn keeps(&self, moved: u32, other: u32, to: Vector3<f64>) -> bool {
+        self.around[moved as usize].iter().filter_map(|&t| self.triangles[t as usize]).all(|t| {
+            if t.contains(&other) {
+                return true;
+            }
+            let normal = |at: &dyn Fn(u32) -> Vector3<f64>| {
+                let [a, b, c] = t.map(at);
+                (b - a).cross(&(c - a))
+            };
+            let before = normal(&|c| self.points[c as usize]);
+            let after = normal(&|c| if c == moved { to } else { self.points[c as usize] });
+            before.dot(&after) >= TURN * before.norm() * after.norm()
+        })
+    }
+
+    /// Collapses edges until so many triangles are left, or no edge can go.
+    fn collapse(mut self, target: usize) -> Part {
+        while self.left > target {
+            let Some(Reverse((_, [a, b], changes))) = self.edges.pop() else { break };
+            if changes != [a, b].map(|end| self.changes[end as usize]) {
+                continue;
+            }
+            let to = self.best(a, b).1;
+            if !self.keeps(a, b, to) || !self.keeps(b, a, to) {
+                continue;
+            }
+            self.points[a as usize] = to;
+            self.quadrics[a as usize] = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
+            self.changes[a as usize] += 1;
+            self.changes[b as usize] += 1;
+            let mut own = std::mem::take(&mut self.around[a as usize]);
+            let moved = std::mem::take(&mut self.around[b as usize]);
+            own.retain(|&t| self.triangles[t as usize].is_some());
+            for t in moved {
+                let Some(corners) = &mut self.triangles[t as usize] else { continue };
+                if corners.contains(&a) {
+                    self.triangles[t as usize] = None;
+                    self.left -= 1;
+                } else {
+                    corners.iter_mut().filter(|c| **c == b).for_each(|c| *c = a);
+                    own.push(t);
+                }
+            }
+            own.retain(|&t| self.triangles[t as usize].is_some());
+            let corners = own.iter().filter_map(|&t| self.triangles[t as usize]).flatten();
+            let mut others: Vec<u32> = corners.filter(|&c| c != a).collect();
+            others.sort_unstable();
+            others.dedup();
+            self.around[a as usize] = own;
+            for other in others {
+                let [from, to] = edge(a, other);
+                self.push(from, to);
+            }
+        }
+        let points: Vec<[f64; 3]> = self.points.iter().map(|p| (self.low + self.side * p).into()).collect();
+        Part::of(&points, self.triangles.into_iter().flatten().collect(), self.color)
+    }
+}
+
+fn edge(a: u32, b: u32) -> [u32; 2] {
+    if a < b { [a, b] } else { [b, a] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{bounds, simplify};
+    use crate::meshes::part::Part;
+
+    /// A sphere of radius 1 as a soup of triangles.
+    fn sphere(n: usize) -> Part {
+        let at = |i: usize, j: usize| {
+            let (a, b) =
+                (core::f64::consts::PI * i as f64 / n as f64, core::f64::consts::TAU * (j % n) as f64 / n as f64);
+            [a.sin() * b.cos(), a.sin() * b.sin(), a.cos()]
+        };
+        let mut part = Part::default();
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            for corners in [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]] {
+                let first = part.points.len() as u32;
+                part.points.extend(corners);
+                part.triangles.push([first, first + 1, first + 2]);
+            }
+        }
+        part
+    }
+
+    /// The volume that a closed surface encloses, from its outward side.
+    fn volume(part: &Part) -> f64 {
+        let corner = |c: u32| nalgebra::Vector3::from(part.points[c as usize]);
+        part.triangles.iter().map(|t| corner(t[0]).dot(&corner(t[1]).cross(&corner(t[2]))) / 6.0).sum()
+    }
+
+    #[test]
+    fn a_sphere_stays_one() {
+        let whole = sphere(60);
+        let less = simplify(&whole, 400);
+        assert!((300..=400).contains(&less.triangles.len()), "{}", less.triangles.len());
+        assert!((volume(&less) / volume(&whole) - 1.0).abs() < 0.02, "{}", volume(&less) / volume(&whole));
+        let far = less.points.iter().map(|p| (nalgebra::Vector3::from(*p).norm() - 1.0).abs()).fold(0.0, f64::max);
+        assert!(far < 0.02, "a point is {far} off the sphere");
+    }
+
+    #[test]
+    fn a_flat_square_needs_few_triangles_and_keeps_its_corners() {
+        let (mut part, n) = (Part::default(), 40u32);
+        for (i, j) in (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+            part.points.push([f64::from(i), f64::from(j), 0.0]);
+            if i < n && j < n {
+                let k = i * (n + 1) + j;
+                part.triangles.extend([[k, k + n + 1, k + n + 2], [k, k + n + 2, k + 1]]);
+            }
+        }
+        let less = simplify(&part, 12);
+        assert!(less.triangles.len() <= 12);
+        let (low, high) = bounds(&less.points);
+        for k in 0..2 {
+            assert!(low[k].abs() < 1e-6 && (high[k] - 40.0).abs() < 1e-6, "{low:?} {high:?}");
+        }
+    }
+
+    #[test]
+    fn odd_parts_are_no_trouble() {
+        assert!(simplify(&Part::default(), 12).triangles.is_empty());
+        let point = Part { points: vec![[1.0; 3]; 3], triangles: vec![[0, 1, 2]], color: None };
+        assert!(simplify(&point, 12).triangles.is_empty());
+        // many pieces that share nothing: cells make them few
+        let mut pieces = Part::default();
+        for k in 0..5000u32 {
+            let x = f64::from(k % 70);
+            let y = f64::from(k / 70);
+            pieces.points.extend([[x, y, 0.0], [x + 0.1, y, 0.0], [x, y + 0.1, 0.0]]);
+            pieces.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
+        }
+        assert!(simplify(&pieces, 100).triangles.len() <= 100);
+        let huge = Part { points: vec![[1e300, 0.0, 0.0], [-1e300, 0.0, 0.0], [0.0, 1e300, 0.0]], ..point };
+        assert!(simplify(&huge, 12).triangles.len() <= 1);
+    }
+}

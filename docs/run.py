@@ -1,0 +1,138 @@
+#!/usr/bin/env python3
+"""Runs the Python blocks of the book, and checks its structure.
+
+    python docs/run.py                   # everything
+    python docs/run.py rnea.md           # one chapter, after those that it goes on from
+    python docs/run.py --write aba.md    # puts what is printed into the chapter
+
+Each chapter is one program. It may go on from another one: `<!-- goes on from: trees.md -->` in its first lines. A
+block ```text right after a block ```python is what it prints. Rust blocks are doctests of the crate `condyle`.
+"""
+
+import argparse
+import contextlib
+import io
+import re
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+BOOK = Path(__file__).parent
+FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"(?<!\\)\[[^\]\n]*\]\(([^)\s]+)\)")
+MATHS = re.compile(r"\$[^$\n]*\$|`[^`\n]*`")
+
+
+class Block(NamedTuple):
+    """A block of Python: its first line, its text, and what it should print."""
+
+    line: int
+    code: str
+    expected: str | None
+    where: tuple[int, int]
+    """Where the expected text is in the file."""
+
+
+def blocks(text: str) -> list[Block]:
+    """The Python blocks of a page."""
+    found, fences = [], list(FENCE.finditer(text))
+    for k, fence in enumerate(fences):
+        if fence[1] != "python":
+            continue
+        after = fences[k + 1] if k + 1 < len(fences) else None
+        prints = after is not None and after[1] == "text" and not text[fence.end() : after.start()].strip()
+        line = text.count("\n", 0, fence.start(2)) + 1
+        found.append(
+            Block(line, fence[2], after[2] if after and prints else None, after.span(2) if after and prints else (0, 0))
+        )
+    return found
+
+
+def before(text: str) -> list[str]:
+    """The chapters that a chapter goes on from."""
+    said = re.search(r"<!-- goes on from: (.*?) -->", text)
+    return said[1].split(", ") if said else []
+
+
+def run(chapter: str, write: bool = False, namespace: dict[str, Any] | None = None) -> dict[str, Any]:
+    """What a chapter's blocks leave behind. Raises AssertionError where they print what the page does not say."""
+    path = BOOK / chapter
+    text = path.read_text(encoding="utf-8")
+    names: dict[str, Any] = {"__name__": chapter} if namespace is None else namespace
+    done: set[str] = names.setdefault("_chapters", set())
+    for earlier in before(text):
+        if earlier not in done:
+            run(earlier, False, names)
+    done.add(chapter)
+    replaced: list[tuple[tuple[int, int], str]] = []
+    for block in blocks(text):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile("\n" * (block.line - 1) + block.code, str(path), "exec"), names)
+        if block.expected is None:
+            if printed.getvalue():
+                raise AssertionError(f"{path}:{block.line}: prints what the page does not show")
+        elif write:
+            replaced.append((block.where, printed.getvalue()))
+        elif printed.getvalue() != block.expected:
+            raise AssertionError(
+                f"{path}:{block.line}: prints\n{printed.getvalue()}where the page has\n{block.expected}"
+            )
+    for (start, end), new in reversed(replaced):
+        text = text[:start] + new + text[end:]
+    if write:
+        path.write_text(text, encoding="utf-8")
+    return names
+
+
+def chapters() -> list[str]:
+    """The pages in the order of the table of contents."""
+    return re.findall(r"\]\(([\w.]+\.md)\)", (BOOK / "SUMMARY.md").read_text(encoding="utf-8"))
+
+
+def anchors(path: Path) -> set[str]:
+    """The headings of a page, as addresses."""
+    text = FENCE.sub("", path.read_text(encoding="utf-8"))
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
+def faults() -> list[str]:
+    """What is wrong: pages outside of the contents, links that lead nowhere, blocks without a language."""
+    listed = chapters()
+    wrong = [
+        f"{page.name}: not in SUMMARY.md" for page in BOOK.glob("*.md") if page.name not in [*listed, "SUMMARY.md"]
+    ]
+    wrong += [f"SUMMARY.md: {name} twice" for name in {n for n in listed if listed.count(n) > 1}]
+    for page in [*(BOOK / name for name in listed), BOOK.parent / "README.md", BOOK.parent / "DESIGN.md"]:
+        if not page.is_file():
+            wrong.append(f"{page.name}: is not there")
+            continue
+        text = page.read_text(encoding="utf-8")
+        wrong += [f"{page.name}: a block without a language" for fence in FENCE.finditer(text) if not fence[1]]
+        for target in LINK.findall(MATHS.sub("", FENCE.sub("", text))):
+            if re.match(r"\w+:", target):
+                continue
+            file, _, anchor = target.partition("#")
+            to = (page.parent / file).resolve() if file else page
+            if not to.exists():
+                wrong.append(f"{page.name}: no {target}")
+            elif anchor and to.suffix == ".md" and anchor not in anchors(to):
+                wrong.append(f"{page.name}: no heading for {target}")
+    return wrong
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("chapters", nargs="*")
+    parser.add_argument("--write", action="store_true", help="put what is printed into the pages")
+    arguments = parser.parse_args()
+    for chapter in arguments.chapters or chapters():
+        run(chapter, arguments.write)
+        print(chapter)
+    if not arguments.chapters and (wrong := faults()):
+        sys.exit("\n".join(wrong))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,237 @@
+//! A knot of an optimal control problem, as slots compute it: the next state and the cost of a state and controls.
+//!
+//! With the changes ψ(z) = φ(x ⊕ δx, u + δu) ⊖ φ(x, u) by z = (δx, δu), of which a problem's actions tell ∂ψ = [A B] and
+//! ∂²(μᵀψ), the numbers of the next state are those of φ ⊕ ψ. With E = ∂(φ ⊕ δ)/∂δ
+//!
+//! ```text
+//! ∂x⁺ = E [A B]      ∂²(λᵀx⁺) = ∂²(μᵀψ) + [A B]ᵀ ∂²(λᵀ(φ ⊕ δ)) [A B],   μ = Eᵀ λ
+//! ```
+
+use super::chart::Chart;
+use super::computation::{Calls, Computation, Output};
+use condyle::optimal::{ActionModel, Hessian, LqNode};
+use condyle::{Error, Model};
+use nalgebra::DMatrix;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::sync::{Mutex, PoisonError};
+
+/// At how many random states a derivative of the next state is zero if it always is. It is an analytic function there, so
+/// that one would do.
+const STATES: u64 = 3;
+
+/// A knot.
+pub(super) struct KnotFunction {
+    /// What is copied for calls.
+    action: Mutex<Box<dyn ActionModel>>,
+    /// Its number; none if it is an argument.
+    t: Option<usize>,
+    chart: Chart,
+    nx: usize,
+    nu: usize,
+    /// Whether there is no next state.
+    end: bool,
+    /// Whether a derivative of the next state may differ from zero, nx rows for each tangent coordinate.
+    slopes: Vec<bool>,
+}
+
+impl KnotFunction {
+    /// Knot t of an action, of a robot's if there is one, or all its knots; none if the action cannot be copied.
+    pub(super) fn new(
+        mut action: Box<dyn ActionModel>,
+        robot: Option<&Model>,
+        t: Option<usize>,
+        end: bool,
+    ) -> Option<Self> {
+        action.reserve();
+        let (nx, nu) = (action.nx(), action.nu());
+        let chart = robot.map_or_else(Chart::none, Chart::new);
+        let mut calls = KnotCalls::new(action.fork()?, chart.clone(), t, end);
+        let action = Mutex::new(action);
+        let mut slopes = Vec::new();
+        if !end {
+            let tangents = nx - chart.nq + chart.nv + nu;
+            let mut J = DMatrix::zeros(nx + 1, tangents);
+            slopes.resize(nx * tangents, false);
+            for seed in 0..STATES {
+                let mut rng = StdRng::seed_from_u64(seed);
+                let mut x = robot.map_or_else(Vec::new, |robot| condyle::random_configuration(robot, &mut rng));
+                let numbers = nx - x.len();
+                x.extend((0..numbers).map(|_| rng.random_range(-1.0..1.0)));
+                let u = (0..nu).map(|_| rng.random_range(-1.0..1.0)).collect();
+                calls.jacobian(&[x, u, vec![0.0]], &mut J);
+                for (slopes, column) in slopes.chunks_exact_mut(nx.max(1)).zip(J.column_iter()) {
+                    slopes.iter_mut().zip(column.iter()).for_each(|(slope, x)| *slope |= *x != 0.0);
+                }
+            }
+        }
+        Some(Self { action, t, chart, nx, nu, end, slopes })
+    }
+}
+
+impl KnotFunction {
+    /// The number of entries of (δx, δu).
+    fn tangents(&self) -> usize {
+        self.nx - self.chart.nq + self.chart.nv + self.nu
+    }
+}
+
+impl Computation for KnotFunction {
+    fn arguments(&self) -> Vec<(&'static str, usize)> {
+        let mut arguments = vec![("x", self.nx)];
+        if self.nu > 0 {
+            arguments.push(("u", self.nu));
+        }
+        if self.t.is_none() {
+            arguments.push(("t", 1));
+        }
+        arguments
+    }
+
+    fn outputs(&self) -> Vec<Output> {
+        let output = |name, rows| Output { name, rows, columns: 1 };
+        let cost = output("cost", 1);
+        if self.end { vec![cost] } else { vec![output("next", self.nx), cost] }
+    }
+
+    fn chart(&self) -> Chart {
+        self.chart.clone()
+    }
+
+    fn depends(&self, row: usize, j: usize) -> bool {
+        j < self.tangents() && (self.end || row == self.nx || self.slopes[j * self.nx + row])
+    }
+
+    fn curves(&self, i: usize, j: usize) -> bool {
+        i.max(j) < self.tangents()
+    }
+
+    fn calls(&self) -> Result<Box<dyn Calls>, Error> {
+        let action = self.action.lock().unwrap_or_else(PoisonError::into_inner);
+        let copy = action.fork().expect("was copied before");
+        Ok(Box::new(KnotCalls::new(copy, self.chart.clone(), self.t, self.end)))
+    }
+}
+
+/// What a call of a knot computes in.
+struct KnotCalls {
+    action: Box<dyn ActionModel>,
+    chart: Chart,
+    t: Option<usize>,
+    end: bool,
+    next: Vec<f64>,
+    /// μ.
+    mu: Vec<f64>,
+    node: LqNode,
+    hessian: Hessian,
+}
+
+impl KnotCalls {
+    fn new(mut action: Box<dyn ActionModel>, chart: Chart, t: Option<usize>, end: bool) -> Self {
+        action.reserve();
+        let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
+        let (next, mu) = (vec![0.0; nx], vec![0.0; ndx]);
+        let (node, hessian) = (LqNode::zeros(ndx, nu), Hessian::zeros(ndx, nu));
+        Self { action, chart, t, end, next, mu, node, hessian }
+    }
+
+    /// The knot, its state and its controls, of the arguments.
+    fn read<'a>(&self, x: &'a [Vec<f64>]) -> (usize, &'a [f64], &'a [f64]) {
+        let last = || x.last().map_or(0.0, |t| t[0]);
+        let u: &[f64] = if self.action.nu() > 0 { &x[1] } else { &[] };
+        (self.t.unwrap_or_else(|| last() as usize), &x[0], u)
+    }
+}
+
+/// Column j of [A B].
+fn slope(node: &LqNode, j: usize) -> &[f64] {
+    let n = node.ndx();
+    match j.checked_sub(n) {
+        None => &node.A.as_slice()[j * n..][..n],
+        Some(k) => &node.B.as_slice()[k * n..][..n],
+    }
+}
+
+impl Calls for KnotCalls {
+    fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]) {
+        let (t, x, u) = self.read(x);
+        let cost = self.action.calc(t, x, u, &mut self.next);
+        let (last, next) = y.split_last_mut().expect("the cost is there");
+        *last = cost;
+        if !self.end {
+            next.copy_from_slice(&self.next);
+        }
+    }
+
+    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut DMatrix<f64>) {
+        let (t, x, u) = self.read(x);
+        let Self { action, chart, end, next, node, .. } = self;
+        if !*end {
+            action.calc(t, x, u, next);
+        }
+        action.calc_diff(t, x, u, node);
+        let (ndx, nq, nv) = (node.ndx(), chart.nq, chart.nv);
+        for (j, mut column) in J.columns_mut(0, ndx + node.nu()).column_iter_mut().enumerate() {
+            let (cost, rows) = column.as_mut_slice().split_last_mut().expect("the cost is there");
+            *cost = if j < ndx { node.q[j] } else { node.r[j - ndx] };
+            if !*end {
+                let slope = slope(node, j);
+                chart.push(&next[..nq], &slope[..nv], &mut rows[..nq]);
+                rows[nq..].copy_from_slice(&slope[nv..]);
+            }
+        }
+    }
+
+    fn hessian(
+        &mut self,
+        x: &[Vec<f64>],
+        lambda: &[f64],
+        J: &mut DMatrix<f64>,
+        H: &mut DMatrix<f64>,
+    ) -> Result<(), Error> {
+        self.jacobian(x, J);
+        let (t, x, u) = self.read(x);
+        let Self { action, chart, end, next, mu, node, hessian, .. } = self;
+        let n = node.ndx() + node.nu(); // after which stands t
+        let (weight, lambda) = lambda.split_last().expect("the cost is there");
+        H.fill(0.0);
+        add(H, *weight, [&node.Q, &node.S, &node.R]);
+        if *end {
+            return Ok(());
+        }
+        let Chart { nq, nv, .. } = *chart;
+        chart.pull(&next[..nq], &lambda[..nq], &mut mu[..nv]);
+        mu[nv..].copy_from_slice(&lambda[nq..]);
+        if action.dynamics_hessian(t, x, u, mu, hessian) {
+            add(H, 1.0, [&hessian.xx, &hessian.xu, &hessian.uu]);
+        }
+        chart.each_curvature(&next[..nq], &lambda[..nq], |group, C| {
+            for j in 0..n {
+                let by_j = &slope(node, j)[group.clone()];
+                let along: Vec<f64> =
+                    (0..by_j.len()).map(|r| (0..by_j.len()).map(|c| C[(r, c)] * by_j[c]).sum()).collect();
+                for i in 0..n {
+                    let by_i = &slope(node, i)[group.clone()];
+                    H[(i, j)] += by_i.iter().zip(&along).map(|(x, y)| x * y).sum::<f64>();
+                }
+            }
+        });
+        Ok(())
+    }
+}
+
+/// H += factor [xx xu; xuᵀ uu].
+fn add(H: &mut DMatrix<f64>, factor: f64, [xx, xu, uu]: [&DMatrix<f64>; 3]) {
+    let (n, all) = (xx.nrows(), xx.nrows() + uu.nrows());
+    for j in 0..all {
+        for i in 0..all {
+            H[(i, j)] += factor
+                * match (i < n, j < n) {
+                    (true, true) => xx[(i, j)],
+                    (true, false) => xu[(i, j - n)],
+                    (false, true) => xu[(j, i - n)],
+                    (false, false) => uu[(i - n, j - n)],
+                };
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The functions of a robot, as slots compute them.
+
+use super::chart::Chart;
+use super::computation::{Calls, Computation, Output};
+use super::function::{DualScratch, Kind, Pattern, Scratch};
+use condyle::{ConstraintSet, Error, Model};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// A function of a robot.
+pub(super) struct RobotFunction {
+    of: Arc<(Model, Kind)>,
+    /// The numbers of the constraints' rows, and of all results.
+    rows: usize,
+    results: usize,
+    /// For each two coordinates whether they move a body in common, nv × nv.
+    relation: Vec<bool>,
+}
+
+impl RobotFunction {
+    pub(super) fn new(model: &Model, kind: Kind) -> Result<Self, Error> {
+        let nv = model.nv();
+        let rows = match &kind {
+            Kind::ConstrainedDynamics { constraints } => ConstraintSet::<f64>::new(model, constraints)?.rows(),
+            _ => 0,
+        };
+        let results = kind.outputs(nv, rows).iter().map(|o| o.rows * o.columns).sum();
+        let mut relation = vec![false; nv * nv];
+        for (j, rows) in model.nonzero_rows().iter().enumerate() {
+            rows.rows.iter().for_each(|&i| (relation[i * nv + j], relation[j * nv + i]) = (true, true));
+        }
+        Ok(Self { of: Arc::new((model.clone(), kind)), rows, results, relation })
+    }
+
+    fn related(&self, i: usize, j: usize) -> bool {
+        self.relation[i * self.of.0.nv() + j]
+    }
+}
+
+impl Computation for RobotFunction {
+    fn arguments(&self) -> Vec<(&'static str, usize)> {
+        let (model, kind) = &*self.of;
+        let size = |k: usize| if k == 0 { model.nq() } else { model.nv() };
+        kind.arguments().iter().enumerate().map(|(k, name)| (*name, size(k))).collect()
+    }
+
+    fn outputs(&self) -> Vec<Output> {
+        self.of.1.outputs(self.of.0.nv(), self.rows)
+    }
+
+    fn chart(&self) -> Chart {
+        Chart::new(&self.of.0)
+    }
+
+    fn present(&self, _: usize, i: usize, j: usize) -> bool {
+        !matches!(self.of.1, Kind::Crba) || self.related(i, j) // the entries of M
+    }
+
+    fn depends(&self, row: usize, j: usize) -> bool {
+        let nv = self.of.0.nv();
+        self.of.1.depends(row, j % nv, nv, |i, j| self.related(i, j))
+    }
+
+    fn curves(&self, i: usize, j: usize) -> bool {
+        let nv = self.of.0.nv();
+        match self.of.1.second_derivatives(i / nv, j / nv) {
+            Pattern::Zero => false,
+            Pattern::Full => true,
+            Pattern::Related => self.related(i % nv, j % nv),
+        }
+    }
+
+    fn calls(&self) -> Result<Box<dyn Calls>, Error> {
+        let (model, kind) = &*self.of;
+        let scratch = kind.scratch(model)?;
+        Ok(Box::new(RobotCalls { of: self.of.clone(), results: self.results, scratch, dual: None }))
+    }
+}
+
+/// What a call of a robot's function computes in.
+struct RobotCalls {
+    of: Arc<(Model, Kind)>,
+    results: usize,
+    scratch: Scratch<f64>,
+    dual: Option<Box<DualScratch>>,
+}
+
+impl Calls for RobotCalls {
+    fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]) {
+        self.of.1.value(&self.of.0, &mut self.scratch, x, y);
+    }
+
+    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut DMatrix<f64>) {
+        self.of.1.jacobian(&self.of.0, &mut self.scratch, x, J);
+    }
+
+    fn hessian(
+        &mut self,
+        x: &[Vec<f64>],
+        lambda: &[f64],
+        J: &mut DMatrix<f64>,
+        H: &mut DMatrix<f64>,
+    ) -> Result<(), Error> {
+        let Self { of, results, scratch, dual } = self;
+        let (model, kind) = &**of;
+        if kind.closed_hessian(model, scratch, x, lambda, J, H) {
+            return Ok(());
+        }
+        kind.jacobian(model, scratch, x, J);
+        let dual = match dual {
+            Some(dual) => dual,
+            None => dual.insert(Box::new(kind.dual_scratch(model, *results)?)),
+        };
+        kind.hessian(model, dual, x, lambda, H);
+        Ok(())
+    }
+}

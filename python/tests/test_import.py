@@ -1,0 +1,17 @@
+"""What an import takes: NumPy, and nothing else that is slow to import."""
+
+import subprocess
+import sys
+
+# What some functions need, and some users have not; and what takes long.
+LATER = {"casadi", "tqdm", "scipy", "matplotlib", "pandas", "pinocchio", "crocoddyl", "mujoco", "example_robot_data"}
+
+
+def test_nothing_is_imported_but_numpy() -> None:
+    code = "import sys, numpy.typing; before = set(sys.modules); import condyle; print(*set(sys.modules) - before)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    imported = run.stdout.split()
+    assert "condyle" in imported
+    assert not {name.split(".")[0] for name in imported} & LATER
+    others = {name for name in imported if name.split(".")[0] not in ("condyle", "numpy")}
+    assert not others, "a module of the standard library is imported where a function needs it"

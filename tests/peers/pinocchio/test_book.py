@@ -1,0 +1,48 @@
+"""The identities of the book's chapter `factorisation.md`, on every robot of example-robot-data."""
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_robots import NO_URDF, ROBOTS, SINGULAR, root_joint, urdf_path
+
+import condyle
+
+EXACT = 1e-11
+"""Relative to the largest entry: some thousand roundings."""
+INVERSE = 1e-9
+"""The same where pivots divide, whose ratio is up to 1e7 but on icub."""
+SEMIDEFINITE = 1e-11
+"""An eigenvalue that is zero, relative to the largest entry."""
+NOT_PHYSICAL = {"icub", "icub_reduced"}
+"""Robots whose inertias no body can have: pivots lose 11 digits."""
+
+
+@pytest.fixture(scope="module")
+def book() -> dict[str, Any]:
+    """What the chapter defines."""
+    path = Path(__file__).parents[3] / "docs" / "run.py"
+    spec = importlib.util.spec_from_file_location("run", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    names: dict[str, Any] = module.run("factorisation.md")
+    return names
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in NO_URDF and name not in SINGULAR])
+def test_one_factorisation(book: dict[str, Any], name: str) -> None:
+    model = condyle.Model.from_urdf(urdf_path(name), root_joint=root_joint(name))
+    rng = np.random.default_rng(0)
+    armature = rng.uniform(0.1, 1.0, model.nv) * (rng.random(model.nv) < 0.5)
+    found = book["identities"](model.with_armature(armature), condyle.random_configuration(model, seed=0))
+    assert len(found) == 6
+    for identity, value in found.items():
+        if "⪯" in identity:
+            assert value > -SEMIDEFINITE, identity
+        elif "Ψ" in identity or "pivots" in identity:
+            assert value < (1e-4 if name in NOT_PHYSICAL else INVERSE), identity
+        else:
+            assert value < EXACT, identity
