@@ -1,8 +1,9 @@
 //! Copies of matrices: whole ones, triangles and transposes.
+#![allow(unsafe_code)]
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
-use crate::tile::{SLACK, View};
+use crate::tile::{SLACK, View, holds};
 use crate::vectors::copy;
 
 compiled! {
@@ -65,6 +66,8 @@ fn transposed<V: Vector, const NEGATED: bool>(out: &mut [f64], ldo: usize, a: Vi
         }
         return;
     }
+    let inside = holds(a.data, a.stride, [rows, columns]) && holds(out, ldo, [columns, rows]);
+    assert!(inside, "a matrix ends before the last of its entries");
     // In square blocks, of which the last ones overlap those before.
     let mut j = 0;
     loop {
@@ -72,12 +75,18 @@ fn transposed<V: Vector, const NEGATED: bool>(out: &mut [f64], ldo: usize, a: Vi
         loop {
             let mut block = [V::splat(0.0); SLACK];
             for k in 0..V::N {
-                let x = V::load(&a.data[(j + k) * a.stride + i..]);
+                let at = (j + k) * a.stride + i;
+                debug_assert!(at + V::N <= a.data.len());
+                // SAFETY: a block's rows and columns are among those of the matrix, which is inside.
+                let x = V::load(unsafe { a.data.get_unchecked(at..at + V::N) });
                 block[k] = if NEGATED { x.mul(V::splat(-1.0)) } else { x };
             }
             V::transpose(&mut block[..V::N]);
             for k in 0..V::N {
-                block[k].store(&mut out[(i + k) * ldo + j..]);
+                let at = (i + k) * ldo + j;
+                debug_assert!(at + V::N <= out.len());
+                // SAFETY: as above.
+                block[k].store(unsafe { out.get_unchecked_mut(at..at + V::N) });
             }
             if i + V::N >= rows {
                 break;

@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // L, X, B
 
 use crate::compiled::compiled;
+use crate::diagonal_block::DiagonalBlock;
 use crate::registers::Vector;
 use crate::tile::{SLACK, Store, View, column_block};
 
@@ -16,18 +17,17 @@ compiled! {
         let ([rows, size, m], mut j0) = (shape, 0);
         while j0 < m {
             let width = COLUMNS.min(m - j0);
-            subtract_outer::<V, COLUMNS>(h, stride, rows, j0, width, j0);
-            for j in j0..j0 + width {
-                let (done, column) = h.split_at_mut(j * stride);
-                let column = &mut column[j..];
-                let done = View { data: done, stride };
-                subtract_multiples::<V>(column, rows - j, j0..j, done, j, done, j);
-                let pivot = column[0];
-                if !(pivot > 0.0 && pivot.is_finite()) {
-                    return Err((j, pivot));
-                }
-                scale::<V>(column, rows - j, pivot.sqrt().recip());
+            let (done, columns) = h.split_at_mut(j0 * stride);
+            let (a, b) = (View { data: done, stride }, View { data: done, stride }.at(j0, 0));
+            let mut block = DiagonalBlock::<COLUMNS>::new(width);
+            let factor = match V::N < COLUMNS {
+                true => block.factor::<V, 2>(columns, j0, a, b),
+                false => block.factor::<V, 1>(columns, j0, a, b),
+            };
+            if let Err((j, pivot)) = factor {
+                return Err((j0 + j, pivot));
             }
+            block.solve_rows::<V>(columns, stride, j0 + COLUMNS..rows, a, b, j0);
             j0 += COLUMNS;
         }
         let mut j = m;
@@ -38,22 +38,21 @@ compiled! {
         Ok(())
     }
 
-    /// X ← X L⁻ᵀ for the L of an H of which m columns were eliminated; X has m columns, `rows` rows and slack rows.
+    /// X ← X L⁻ᵀ for the L of an H of which m columns were eliminated; X has m columns, `rows` rows and slack rows, as H
+    /// has.
     pub fn solve_transposed<V, COLUMNS>(x: &mut [f64], ldx: usize, rows: usize, h: View<'_>, m: usize) {
         let mut j0 = 0;
         while j0 < m {
             let width = COLUMNS.min(m - j0);
             let (done, columns) = x.split_at_mut(j0 * ldx);
             let (a, b) = (View { data: done, stride: ldx }, View { data: &h.data[j0..], ..h });
-            if j0 > 0 {
-                column_block::<V, COLUMNS>(columns, ldx, 0..rows, 0, width, a, b, j0, Store::Subtract);
-            }
+            let mut block = DiagonalBlock::<COLUMNS>::new(width);
             for j in 0..width {
-                let (done, column) = columns.split_at_mut(j * ldx);
-                let (done, L) = (View { data: done, stride: ldx }, View { data: &h.data[j0 * h.stride..], ..h });
-                subtract_multiples::<V>(column, rows, 0..j, done, 0, L, j0 + j);
-                scale::<V>(column, rows, h.data[(j0 + j) * h.stride + j0 + j].recip());
+                let column = &h.data[(j0 + j) * h.stride + j0..][..COLUMNS];
+                block.L[j].copy_from_slice(column);
+                block.inverse[j] = column[j].recip();
             }
+            block.solve_rows::<V>(columns, ldx, 0..rows, a, b, j0);
             j0 += COLUMNS;
         }
     }

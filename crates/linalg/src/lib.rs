@@ -14,6 +14,7 @@ mod cast;
 mod cholesky;
 mod compiled;
 mod copy;
+mod diagonal_block;
 #[doc(hidden)]
 pub mod elimination_tree;
 mod factor;
@@ -35,7 +36,7 @@ pub use copy::{copy_lower, copy_matrix, copy_symmetric, transpose, transpose_neg
 pub use elimination_tree::ColumnTree;
 pub use factor::{backward_solve, eliminate, forward_solve, solve_right, solve_transposed};
 pub use ltdl::Ltdl;
-pub use outer::{OuterProducts, SparseRows, block, mask};
+pub use outer::{OuterProducts, SparseRows, block, mask, subtract_rows};
 pub use product::{
     add_matrix, add_product, add_product_lower, add_transposed_product_lower, product, product_of_upper_lower,
     product_with_upper, product_without_slack, subtract_product, sum_of_squares,

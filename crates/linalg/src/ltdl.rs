@@ -61,12 +61,15 @@ fn eliminate<S: Scalar, const N: usize>(
             update([-(row[p] * D_inv[k])], [row], &mut before[at(e)..at(e + 1)]); // H_e −= (H_ke / D_k) H_k
         }
     }
-    let own: [&[S]; N] = core::array::from_fn(|i| &block[at(start + i)..at(start + i + 1)]);
+    let mut own = [&block[..0]; N]; // not by `from_fn`, which would not be inlined
+    for i in 0..N {
+        own[i] = &block[at(start + i)..at(start + i + 1)];
+    }
     let mut e = parent[start];
     for p in (0..depth[start]).rev() {
         let mut scale = [S::zero(); N];
         for i in 0..N {
-            scale[i] = -(own[i][p] * D_inv[start + i]); // not by `from_fn`, which would not be inlined in lanes
+            scale[i] = -(own[i][p] * D_inv[start + i]);
         }
         update(scale, own, &mut above[first[e]..first[e + 1]]);
         e = parent[e];
@@ -310,17 +313,14 @@ impl<S: Scalar> Ltdl<S> {
             row.fill(S::zero());
             let (mut e, mut p) = (parent[k], depth[k]);
             while p >= 4 {
-                let mut x = [&[][..]; 4];
-                for x in &mut x {
-                    *x = &above[e * nv..][..k];
-                    e = parent[e];
-                }
-                let s = [-L[p - 1], -L[p - 2], -L[p - 3], -L[p - 4]];
+                let (e1, e2, e3) = (parent[e], parent[parent[e]], parent[parent[parent[e]]]);
+                let (x0, x1) = (&above[e * nv..][..k], &above[e1 * nv..][..k]);
+                let (x2, x3) = (&above[e2 * nv..][..k], &above[e3 * nv..][..k]);
+                let (s0, s1, s2, s3) = (-L[p - 1], -L[p - 2], -L[p - 3], -L[p - 4]);
                 for j in 0..k {
-                    row[j] = x[0][j]
-                        .mul_add(s[0], x[1][j].mul_add(s[1], x[2][j].mul_add(s[2], x[3][j].mul_add(s[3], row[j]))));
+                    row[j] = x0[j].mul_add(s0, x1[j].mul_add(s1, x2[j].mul_add(s2, x3[j].mul_add(s3, row[j]))));
                 }
-                p -= 4;
+                (e, p) = (parent[e3], p - 4);
             }
             while p > 0 {
                 axpy(-L[p - 1], &above[e * nv..], row);
@@ -332,8 +332,8 @@ impl<S: Scalar> Ltdl<S> {
                 e = parent[e];
             }
             rest[k] = diagonal;
-            for (j, &x) in rest[..k].iter().enumerate() {
-                above[j * nv + k] = x;
+            for (column, &x) in above.chunks_exact_mut(nv).zip(&rest[..k]) {
+                column[k] = x; // by symmetry
             }
         }
         for &(i, k) in swaps.iter().rev() {

@@ -1,7 +1,9 @@
 //! Sums of outer products of rows that have blocks of zeros.
+#![allow(unsafe_code)]
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
+use crate::tile::{SLACK, add_outer, next_strip};
 use crate::vectors::copy_scaled;
 
 /// Rows of numbers, one after the other, and for each row which of its blocks are not zero (see [`mask`]).
@@ -32,17 +34,56 @@ impl SparseRows {
 /// The blocks of a row that are not zero: bit k stands for the columns from k times [`block`] on.
 #[inline(always)]
 pub fn mask(row: &[f64]) -> u64 {
-    let (wide, mut mask) = (block(row.len()) / 8, 0);
-    let (eights, rest) = row.as_chunks::<8>();
-    for (k, x) in eights.iter().enumerate() {
-        let mut bits = 0;
-        for i in 0..8 {
-            bits |= x[i].to_bits() << 1; // all but the sign
+    let mut mask = 0;
+    for (k, block) in row.chunks(block(row.len()).max(1)).enumerate() {
+        let (eights, rest) = block.as_chunks::<8>();
+        let mut bits = [0; 8];
+        for x in eights {
+            for i in 0..8 {
+                bits[i] |= x[i].to_bits();
+            }
         }
-        mask |= u64::from(bits != 0) << (k / wide);
+        for (i, x) in rest.iter().enumerate() {
+            bits[i] |= x.to_bits();
+        }
+        let mut all = 0;
+        for i in 0..8 {
+            all |= bits[i];
+        }
+        mask |= u64::from(all << 1 != 0) << k; // all but the sign
     }
-    let rest = rest.iter().any(|x| *x != 0.0);
-    mask | u64::from(rest) << (eights.len() / wide)
+    mask
+}
+
+/// y −= Σ aᵢ xᵢ on the blocks of a [`mask`], in whole registers.
+///
+/// # Panics
+/// If an x has not as many numbers as y.
+#[inline(always)]
+pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N], mut mask: u64) {
+    let (n, wide) = (y.len(), block(y.len()));
+    let mut factors = [V::splat(0.0); N];
+    for k in 0..N {
+        assert!(x[k].len() == n, "rows of different lengths");
+        factors[k] = V::splat(-a[k]);
+    }
+    while mask != 0 {
+        let mut i = mask.trailing_zeros() as usize * wide;
+        let end = n.min(i + wide);
+        while i + V::N <= end {
+            // SAFETY: end ≤ n, and all rows have n numbers.
+            unsafe {
+                let y = y.get_unchecked_mut(i..i + V::N);
+                let mut sum = V::load(y);
+                for k in 0..N {
+                    sum = V::load(x[k].get_unchecked(i..i + V::N)).mul_add(factors[k], sum);
+                }
+                sum.store(y);
+            }
+            i += V::N;
+        }
+        mask &= mask - 1;
+    }
 }
 
 /// The number of columns that one bit of a [`mask`] stands for, in rows of `stride` numbers.
@@ -51,15 +92,21 @@ pub fn block(stride: usize) -> usize {
     8 * stride.div_ceil(8 * 64)
 }
 
-/// Outer products of some rows with as many others, with the same blocks of zeros.
+/// The outer product of a row on the left with one on the right.
 #[derive(Debug, Clone, Copy)]
-struct Part {
-    /// The first row on the left and on the right.
+struct Product {
     rows: [usize; 2],
     /// The masks of both.
     masks: [u64; 2],
-    /// The number of products.
-    count: usize,
+}
+
+/// A product that some columns of the sum have a part in.
+#[derive(Debug, Clone, Copy, Default)]
+struct Active {
+    /// The place of the left row, and that of the columns in the right row.
+    at: [usize; 2],
+    /// The mask of the left row.
+    mask: u64,
 }
 
 /// A sum Σ left rightᵀ of outer products, without the blocks that are zero. Each row has a number more than the sum has
@@ -74,19 +121,22 @@ pub struct OuterProducts {
     size: usize,
     /// The number of rows.
     count: usize,
-    parts: Vec<Part>,
+    products: Vec<Product>,
+    /// Scratch for the products of a block of columns. Shape: products.
+    active: Vec<Active>,
 }
 
 impl OuterProducts {
     /// Room for `numbers` numbers of all rows together, and for `products` products.
     pub fn with_capacity(numbers: usize, products: usize) -> Self {
-        Self { rows: vec![0.0; numbers], parts: Vec::with_capacity(products), ..Self::default() }
+        let active = Vec::with_capacity(products);
+        Self { rows: vec![0.0; numbers], products: Vec::with_capacity(products), active, ..Self::default() }
     }
 
     /// An empty sum with `size` columns, of rows that are `stride` apart.
     pub fn clear(&mut self, size: usize, stride: usize) {
         (self.size, self.stride, self.count) = (size, stride, 0);
-        self.parts.clear();
+        self.products.clear();
     }
 
     /// The number of rows.
@@ -118,10 +168,7 @@ impl OuterProducts {
     /// Adds the product of the row `rows[0]` on the left with `rows[1]` on the right, with such masks, to the sum.
     #[inline(always)]
     pub fn multiply(&mut self, rows: [usize; 2], masks: [u64; 2]) {
-        match self.parts.last_mut() {
-            Some(last) if last.masks == masks && last.rows.map(|row| row + last.count) == rows => last.count += 1,
-            _ => self.parts.push(Part { rows, masks, count: 1 }),
-        }
+        self.products.push(Product { rows, masks });
     }
 
     /// Adds d₂ x xᵀ to the sum and d₁ x to the gradient, for a row x with such a mask.
@@ -142,49 +189,52 @@ impl OuterProducts {
 
     /// Adds the lower triangle of the sum, and the gradient below it, to H (with some of what is above the diagonal). H has
     /// slack rows.
-    pub fn add_to(&self, h: &mut [f64], ldh: usize) {
-        add_parts(h, ldh, self);
+    pub fn add_to(&mut self, h: &mut [f64], ldh: usize) {
+        let Self { rows, stride, size, products, active, .. } = self;
+        active.resize(products.len(), Active::default());
+        add_products(h, ldh, Sum { rows, stride: *stride, size: *size, products }, active);
     }
+}
+
+/// A sum of outer products, as [`OuterProducts`] holds it.
+#[derive(Clone, Copy)]
+struct Sum<'a> {
+    rows: &'a [f64],
+    stride: usize,
+    size: usize,
+    products: &'a [Product],
 }
 
 compiled! {
     /// See [`OuterProducts::add_to`].
-    fn add_parts<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: &OuterProducts) {
-        let OuterProducts { ref rows, stride, size, ref parts, .. } = *sum;
-        let wide = block(stride);
-        let bits = |from: usize, length: usize| {
-            let (first, last) = (from / wide, (from + length - 1) / wide);
-            (2_u64 << (last - first)).wrapping_sub(1) << first
-        };
+    fn add_products<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: Sum<'_>, active: &mut [Active]) {
+        let Sum { rows, stride, size, products } = sum;
+        assert!(size + SLACK <= stride, "rows without slack");
+        let (wide, count) = (block(stride), rows.len() / stride);
+        for Product { rows: [left, right], .. } in products {
+            assert!(*left < count && *right < count, "a product of rows that there are not");
+        }
         let mut j = 0;
         while j < size {
-            let columns = bits(j, COLUMNS.min(size - j));
-            let mut i = j;
-            while i <= size {
-                let strip = if size - i >= V::N { 2 } else { 1 };
-                let upper = bits(i, V::N);
-                let lower = if strip == 2 { bits(i + V::N, V::N) } else { 0 };
-                let mut tile = [[V::splat(0.0); 2]; COLUMNS];
-                for part in parts {
-                    if part.masks[1] & columns == 0 {
-                        continue;
-                    }
-                    match [part.masks[0] & upper != 0, part.masks[0] & lower != 0] {
-                        [true, true] => add_part::<V, 0, 2, COLUMNS>(&mut tile, rows, stride, part, [i, j]),
-                        [true, false] => add_part::<V, 0, 1, COLUMNS>(&mut tile, rows, stride, part, [i, j]),
-                        [false, true] => add_part::<V, 1, 2, COLUMNS>(&mut tile, rows, stride, part, [i, j]),
-                        [false, false] => (),
-                    }
+            let (columns, mut many) = (bits(wide, j, COLUMNS.min(size - j)), 0);
+            for product in products {
+                if product.masks[1] & columns != 0 {
+                    let [left, right] = product.rows;
+                    active[many] = Active { at: [left * stride, right * stride + j], mask: product.masks[0] };
+                    many += 1;
                 }
-                for jj in 0..COLUMNS {
-                    if jj < size - j {
-                        let column = &mut h[(j + jj) * ldh + i..][..strip * V::N];
-                        for s in 0..2 {
-                            if s < strip {
-                                let place = &mut column[s * V::N..];
-                                V::load(place).add(tile[jj][s]).store(place);
-                            }
-                        }
+            }
+            let (active, mut i) = (&active[..many], j);
+            while i <= size {
+                let strip = next_strip::<V>(size + 1 - i);
+                let mask = bits(wide, i, strip * V::N);
+                // SAFETY: the places in `active` are those of rows that exist, of which each has `stride` numbers, and the
+                // last of the strip's at most `SLACK` behind the sum's size.
+                unsafe {
+                    match strip {
+                        1 => add_strip::<V, 1, COLUMNS>(h, ldh, sum, active, mask, [i, j]),
+                        2 => add_strip::<V, 2, COLUMNS>(h, ldh, sum, active, mask, [i, j]),
+                        _ => add_strip::<V, 3, COLUMNS>(h, ldh, sum, active, mask, [i, j]),
                     }
                 }
                 i += strip * V::N;
@@ -194,27 +244,46 @@ compiled! {
     }
 }
 
-/// The registers FROM..TO of rows of a tile at (i, j) += those of a part.
+/// The bits of a [`mask`] for some numbers, of which each stands for `wide` numbers.
 #[inline(always)]
-fn add_part<V: Vector, const FROM: usize, const TO: usize, const COLUMNS: usize>(
-    tile: &mut [[V; 2]; COLUMNS],
-    rows: &[f64],
-    stride: usize,
-    part: &Part,
+fn bits(wide: usize, from: usize, length: usize) -> u64 {
+    let (first, last) = (from / wide, (from + length - 1) / wide);
+    (2_u64 << (last - first)).wrapping_sub(1) << first
+}
+
+/// H[i.., j..] += the products of which a strip of S registers of rows has a part.
+///
+/// # Safety
+/// Each product's left row has S registers of numbers from i on, and its right row COLUMNS numbers where it says.
+#[inline(always)]
+unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
+    h: &mut [f64],
+    ldh: usize,
+    sum: Sum<'_>,
+    active: &[Active],
+    mask: u64,
     [i, j]: [usize; 2],
 ) {
-    for p in 0..part.count {
-        let [left, right] = part.rows;
-        let (left, right) =
-            (&rows[(left + p) * stride + i..][..TO * V::N], &rows[(right + p) * stride + j..][..COLUMNS]);
-        let mut registers = [V::splat(0.0); 2];
-        for s in FROM..TO {
-            registers[s] = V::load(&left[s * V::N..]);
+    let mut tile = [[V::splat(0.0); S]; COLUMNS];
+    for product in active {
+        if product.mask & mask == 0 {
+            continue;
         }
-        for jj in 0..COLUMNS {
-            let x = V::splat(right[jj]);
-            for s in FROM..TO {
-                tile[jj][s] = registers[s].mul_add(x, tile[jj][s]);
+        let [left, right] = product.at;
+        debug_assert!((left + i + S * V::N).max(right + COLUMNS) <= sum.rows.len());
+        // SAFETY: by the caller.
+        let (strip, row) = unsafe {
+            let from = |at: usize, count| core::slice::from_raw_parts(sum.rows.as_ptr().add(at), count);
+            (from(left + i, S * V::N), from(right, COLUMNS))
+        };
+        add_outer(&mut tile, strip, row);
+    }
+    for jj in 0..COLUMNS {
+        if jj < sum.size - j {
+            let column = &mut h[(j + jj) * ldh + i..][..S * V::N];
+            for s in 0..S {
+                let place = &mut column[s * V::N..];
+                V::load(place).add(tile[jj][s]).store(place);
             }
         }
     }
@@ -223,9 +292,9 @@ fn add_part<V: Vector, const FROM: usize, const TO: usize, const COLUMNS: usize>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::at_level;
     use crate::registers::Vectorized;
     use crate::registers::tests::at_each_level;
-    use crate::{SLACK, at_level};
 
     /// Entries of size one, sums of 20 of them: 1e-12 leaves room for rounding and nothing else.
     const TOLERANCE: f64 = 1e-12;

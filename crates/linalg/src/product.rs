@@ -129,7 +129,7 @@ compiled! {
         }
     }
 
-    /// Σ aᵢⱼ² of `rows` rows and `columns` columns, where some entries may count more than once (at most 8 times): enough
+    /// Σ aᵢⱼ² of `rows` rows and `columns` columns, where some entries may count twice: enough
     /// to see whether one has diverged.
     pub fn sum_of_squares<V, COLUMNS>(a: View<'_>, shape: [usize; 2]) -> f64 {
         let ([rows, columns], mut sums) = (shape, [V::splat(0.0); 2]);
@@ -141,15 +141,11 @@ compiled! {
                 }
                 continue;
             }
-            let (last, mut i) = (rows - V::N, 0);
-            while i < last {
-                for sum in &mut sums {
-                    let x = V::load(&x[i.min(last)..]);
-                    *sum = x.mul_add(x, *sum);
-                    i += V::N;
-                }
+            for (k, x) in x[..rows - 1].chunks_exact(V::N).enumerate() {
+                let x = V::load(x);
+                sums[k % 2] = x.mul_add(x, sums[k % 2]);
             }
-            let x = V::load(&x[last..]);
+            let x = V::load(&x[rows - V::N..]);
             sums[0] = x.mul_add(x, sums[0]);
         }
         let mut numbers = [0.0; SLACK];

@@ -1,4 +1,5 @@
 //! The tile that all dense kernels are built from: a strip of registers of rows by a few columns, accumulated in registers.
+#![allow(unsafe_code)]
 
 use crate::registers::Vector;
 
@@ -28,6 +29,46 @@ impl<'a> View<'a> {
     }
 }
 
+/// Whether a matrix has so many rows in so many columns, one at least.
+#[inline(always)]
+pub(crate) fn holds(data: &[f64], stride: usize, [rows, columns]: [usize; 2]) -> bool {
+    match (columns - 1).checked_mul(stride) {
+        Some(last) if last <= data.len() => rows <= data.len() - last,
+        _ => false,
+    }
+}
+
+/// Some rows of the first columns of a matrix, one column after the other, where all of them were found to be inside.
+#[derive(Clone, Copy)]
+struct Walk<'a> {
+    data: &'a [f64],
+    at: usize,
+    stride: usize,
+}
+
+impl<'a> Walk<'a> {
+    /// `count` rows from `first` on, of `length` > 0 columns.
+    #[inline(always)]
+    fn new(of: View<'a>, first: usize, count: usize, length: usize) -> Self {
+        let View { data, stride } = of;
+        assert!(first <= data.len() && holds(data, stride, [first + count, length]), "a matrix ends before its tile");
+        Self { data, at: first, stride }
+    }
+
+    /// The rows in this column; those in the next one come next.
+    ///
+    /// # Safety
+    /// It is called `length` times, for the `count` rows of [`new`](Self::new).
+    #[inline(always)]
+    unsafe fn next(&mut self, count: usize) -> &'a [f64] {
+        debug_assert!(self.at + count <= self.data.len());
+        // SAFETY: by the caller, and by what `new` has found.
+        let rows = unsafe { core::slice::from_raw_parts(self.data.as_ptr().add(self.at), count) };
+        self.at += self.stride;
+        rows
+    }
+}
+
 /// tile = a[i.., ..length] · b[j.., ..length]ᵀ, with S registers of rows.
 #[inline(always)]
 pub(crate) fn tile_rows<V: Vector, const S: usize, const COLUMNS: usize>(
@@ -38,21 +79,47 @@ pub(crate) fn tile_rows<V: Vector, const S: usize, const COLUMNS: usize>(
     length: usize,
 ) -> [[V; S]; COLUMNS] {
     let mut tile = [[V::splat(0.0); S]; COLUMNS];
-    for k in 0..length {
-        let strip = &a.data[k * a.stride + i..][..S * V::N];
-        let row = &b.data[k * b.stride + j..][..COLUMNS];
-        let mut registers = [V::splat(0.0); S];
-        for s in 0..S {
-            registers[s] = V::load(&strip[s * V::N..]);
-        }
-        for jj in 0..COLUMNS {
-            let x = V::splat(row[jj]);
-            for s in 0..S {
-                tile[jj][s] = registers[s].mul_add(x, tile[jj][s]);
-            }
-        }
+    if length == 0 {
+        return tile;
+    }
+    let (mut a, mut b) = (Walk::new(a, i, S * V::N, length), Walk::new(b, j, COLUMNS, length));
+    for _ in 0..length {
+        // SAFETY: so many times, for so many rows.
+        let (strip, row) = unsafe { (a.next(S * V::N), b.next(COLUMNS)) };
+        add_outer(&mut tile, strip, row);
     }
     tile
+}
+
+/// tile += strip · rowᵀ, with S registers of rows.
+#[inline(always)]
+pub(crate) fn add_outer<V: Vector, const S: usize, const COLUMNS: usize>(
+    tile: &mut [[V; S]; COLUMNS],
+    strip: &[f64],
+    row: &[f64],
+) {
+    let mut registers = [V::splat(0.0); S];
+    for s in 0..S {
+        registers[s] = V::load(&strip[s * V::N..]);
+    }
+    for jj in 0..COLUMNS {
+        let x = V::splat(row[jj]);
+        for s in 0..S {
+            tile[jj][s] = registers[s].mul_add(x, tile[jj][s]);
+        }
+    }
+}
+
+/// The number of registers of rows that the next strip has, of `rows` that are left: three where there are 32 registers, if
+/// that leaves no single one; else two. (Three of 16 leave too few for the other operand: they were measured to spill.)
+#[inline(always)]
+pub(crate) fn next_strip<V: Vector>(rows: usize) -> usize {
+    match rows.div_ceil(V::N) {
+        1 => 1,
+        2 | 4 => 2,
+        _ if V::N < 8 => 2,
+        _ => 3,
+    }
 }
 
 /// The new value of an entry of C.
@@ -92,8 +159,8 @@ fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     }
 }
 
-/// C[i, j] ← A[i, ..length] · B[j, ..length]ᵀ for some rows and for `columns` columns from j on, in strips of two registers;
-/// the last strip has one register where that is enough.
+/// C[i, j] ← A[i, ..length] · B[j, ..length]ᵀ for some rows and for `columns` columns from j on, in strips of up to three
+/// registers.
 #[inline(always)]
 pub(crate) fn column_block<V: Vector, const COLUMNS: usize>(
     c: &mut [f64],
@@ -108,14 +175,21 @@ pub(crate) fn column_block<V: Vector, const COLUMNS: usize>(
 ) {
     let mut i = rows.start;
     while i < rows.end {
-        if rows.end - i > V::N {
-            let tile = tile_rows::<V, 2, COLUMNS>(a, i, b, j, length);
-            store_tile(c, ldc, [i, j], columns, &tile, how);
-            i += 2 * V::N;
-        } else {
-            let tile = tile_rows::<V, 1, COLUMNS>(a, i, b, j, length);
-            store_tile(c, ldc, [i, j], columns, &tile, how);
-            i += V::N;
+        let strip = next_strip::<V>(rows.end - i);
+        match strip {
+            1 => {
+                let tile = tile_rows::<V, 1, COLUMNS>(a, i, b, j, length);
+                store_tile(c, ldc, [i, j], columns, &tile, how);
+            }
+            2 => {
+                let tile = tile_rows::<V, 2, COLUMNS>(a, i, b, j, length);
+                store_tile(c, ldc, [i, j], columns, &tile, how);
+            }
+            _ => {
+                let tile = tile_rows::<V, 3, COLUMNS>(a, i, b, j, length);
+                store_tile(c, ldc, [i, j], columns, &tile, how);
+            }
         }
+        i += strip * V::N;
     }
 }

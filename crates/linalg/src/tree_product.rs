@@ -1,4 +1,5 @@
 //! X = −A B, of square matrices, where the columns of B have the zeros of a tree.
+#![allow(unsafe_code)]
 
 use crate::axpy::axpy;
 use crate::cast::{as_f64, as_f64_mut};
@@ -45,20 +46,60 @@ fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2]
         let columns = j * n..(j + many) * n;
         let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
         let C = [&mut C0[columns.clone()], &mut C1[columns]];
-        match many {
-            4 => twice::<S, 4, 2>(A, B, C, rows, n),
-            3 => twice::<S, 3, 2>(A, B, C, rows, n),
-            2 => twice::<S, 2, 4>(A, B, C, rows, n),
-            _ => twice::<S, 1, 4>(A, B, C, rows, n),
+        let rows = Inside::new(rows, n);
+        // sums and operands fill 32 registers of eight numbers, or 16 of four
+        match (many, size_of::<S>()) {
+            (4, 64..) => twice::<S, 4, 2>(A, B, C, rows),
+            (4, _) => twice::<S, 4, 1>(A, B, C, rows),
+            (3, 64..) => twice::<S, 3, 2>(A, B, C, rows),
+            (3, _) => twice::<S, 3, 1>(A, B, C, rows),
+            (2, 64..) => twice::<S, 2, 4>(A, B, C, rows),
+            (2, _) => twice::<S, 2, 2>(A, B, C, rows),
+            _ => twice::<S, 1, 4>(A, B, C, rows),
         }
         j += many;
     }
 }
 
+/// Rows of a matrix with n of them.
+#[derive(Clone, Copy)]
+struct Inside<'a> {
+    rows: &'a [usize],
+    n: usize,
+}
+
+impl<'a> Inside<'a> {
+    /// The rows, after a look at each.
+    #[inline(always)]
+    fn new(rows: &'a [usize], n: usize) -> Self {
+        let mut last = 0;
+        for &k in rows {
+            last = last.max(k);
+        }
+        assert!(last < n, "a row that there is not");
+        Self { rows, n }
+    }
+}
+
+/// An entry of a column of n numbers.
+///
+/// # Safety
+/// It is one of the rows of [`Inside`] for this n.
+#[inline(always)]
+unsafe fn entry<T: Copy>(column: &[T], k: usize) -> T {
+    debug_assert!(k < column.len());
+    // SAFETY: by the caller.
+    unsafe { *column.get_unchecked(k) }
+}
+
 /// The sums of `subtract_column` for N rows of M columns at a time: of A, N columns are read from end to end.
 #[inline(always)]
-fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&mut [S]; 2], rows: &[usize], n: usize) {
-    let ([B0, B1], [C0, C1]) = (B, C);
+fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&mut [S]; 2], rows: Inside<'_>) {
+    let (Inside { rows, n }, [B0, B1], [C0, C1]) = (rows, B, C);
+    let mut b = [[&B0[..n]; 2]; M];
+    for x in 0..M {
+        b[x] = [&B0[x * n..][..n], &B1[x * n..][..n]];
+    }
     let mut i = 0;
     while i < n {
         let mut a = [&A[..n]; N];
@@ -67,11 +108,19 @@ fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&
         }
         let mut c = [[[S::zero(); 2]; M]; N];
         for &k in rows {
-            for x in 0..M {
-                let (b0, b1) = (-B0[x * n + k], -B1[x * n + k]);
+            // SAFETY: `k` is one of the rows, and all columns have n numbers.
+            unsafe {
+                let mut minus_a = [S::zero(); N];
                 for y in 0..N {
-                    c[y][x][0] = a[y][k].mul_add(b0, c[y][x][0]);
-                    c[y][x][1] = a[y][k].mul_add(b1, c[y][x][1]);
+                    minus_a[y] = -entry(a[y], k);
+                }
+                for x in 0..M {
+                    for z in 0..2 {
+                        let b = entry(b[x][z], k);
+                        for y in 0..N {
+                            c[y][x][z] = minus_a[y].mul_add(b, c[y][x][z]);
+                        }
+                    }
                 }
             }
         }
@@ -220,6 +269,7 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
             let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
             // columns j, …, j + same − 1 of the one matrix, then of the other
             let (same, mut k) = (*same_pattern, 0);
+            let rows = Inside::new(rows, self.nonzero_rows.len());
             while k < 2 * same {
                 let at = |k: usize| (k / same, j + k % same);
                 match 2 * same - k {
@@ -235,9 +285,9 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
 
     /// Some columns of X: of which matrix, and which.
     #[inline(always)]
-    fn columns<const M: usize, const N: usize>(&mut self, which: [(usize, usize); M], rows: &[usize]) {
-        let (n, wide) = (self.nonzero_rows.len(), N * V::LANES);
-        let mut b = [&self.B[0][..n]; M];
+    fn columns<const M: usize, const N: usize>(&mut self, which: [(usize, usize); M], rows: Inside<'_>) {
+        let (Inside { rows, n }, wide) = (rows, N * V::LANES);
+        let (A, mut b) = (&self.A[..n * n], [&self.B[0][..n]; M]);
         for m in 0..M {
             b[m] = &self.B[which[m].0][which[m].1 * n..][..n];
         }
@@ -246,15 +296,18 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
             let start = i.min(n - wide);
             let mut sums = [[V::zero(); N]; M];
             for &k in rows {
-                let column = &self.A[k * n + start..][..wide];
-                let mut a = [V::zero(); N];
+                debug_assert!(k * n + start + wide <= A.len());
+                // SAFETY: `k` is one of the rows of A, which has n columns of n numbers, and start + wide ≤ n.
+                let column = unsafe { A.get_unchecked(k * n + start..k * n + start + wide) };
+                let mut minus_a = [V::zero(); N];
                 for x in 0..N {
-                    a[x] = V::load(&column[x * V::LANES..]);
+                    minus_a[x] = -V::load(&column[x * V::LANES..]);
                 }
                 for m in 0..M {
-                    let b = V::splat(-b[m][k]);
+                    // SAFETY: `k` is one of the rows, and the column has n numbers.
+                    let b = V::splat(unsafe { entry(b[m], k) });
                     for x in 0..N {
-                        sums[m][x] = a[x].mul_add(b, sums[m][x]);
+                        sums[m][x] = minus_a[x].mul_add(b, sums[m][x]);
                     }
                 }
             }

@@ -119,10 +119,8 @@ pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
         }
         return;
     }
-    let mut i = 0;
-    while i + V::N < length {
-        V::load(&x[i..]).store(&mut to[i..]);
-        i += V::N;
+    for (to, x) in to[..length - 1].chunks_exact_mut(V::N).zip(x[..length - 1].chunks_exact(V::N)) {
+        V::load(x).store(to);
     }
     V::load(&x[length - V::N..]).store(&mut to[length - V::N..]); // may overlap what was copied before
 }
@@ -138,10 +136,9 @@ pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
         }
         return;
     }
-    let (a, last, mut i) = (V::splat(a), length - V::N, 0);
-    while i < last {
-        V::load(&x[i..]).mul(a).store(&mut to[i..]);
-        i += V::N;
+    let (a, last) = (V::splat(a), length - V::N);
+    for (to, x) in to[..length - 1].chunks_exact_mut(V::N).zip(x[..length - 1].chunks_exact(V::N)) {
+        V::load(x).mul(a).store(to);
     }
     V::load(&x[last..]).mul(a).store(&mut to[last..]);
 }

@@ -14,6 +14,7 @@
 
 use crate::joint::Joint;
 use crate::model::Model;
+use crate::tree::{Node, Tree};
 use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};
 use core::marker::PhantomData;
 use core::ops::{AddAssign, Range};
@@ -55,11 +56,6 @@ pub trait Layout {
 
     /// The sum over the lanes in which body i stands: each may hold a part of what the body carries.
     fn sum_lanes<T: Copy>(&self, i: usize, x: T) -> T;
-    /// Replaces the entry of body i in an array by bodies by its sum over the lanes.
-    #[inline(always)]
-    fn sum_lanes_at<T: Copy>(&self, of: &mut [T], i: usize) {
-        of[i] = self.sum_lanes(i, of[i]);
-    }
 
     /// The k-th number of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
@@ -116,7 +112,15 @@ pub trait Pairs: Columns<Number = <Self as Layout>::S> {
 
 /// One body at a time: of one state, or of several knots of a horizon in the lanes of the scalar.
 pub struct Single<'m, S, R> {
-    model: &'m Model<R>,
+    /// What passes ask for in each step is at hand, and not to be looked up in the model again after every store.
+    nodes: &'m [Node<R>],
+    closed: &'m [usize],
+    support: &'m [usize],
+    armature: &'m [R],
+    tree: &'m Tree<R>,
+    gravity: &'m Vec3<R>,
+    nv: usize,
+    has_mimic: bool,
     scalar: PhantomData<S>,
 }
 
@@ -124,7 +128,10 @@ impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
     /// The layout of a model.
     #[inline(always)]
     pub fn new(model: &'m Model<R>) -> Self {
-        Self { model, scalar: PhantomData }
+        let Model { tree, armature, gravity, .. } = model;
+        let Tree { nodes, closed, support, nv, .. } = tree;
+        let (nv, has_mimic) = (*nv, tree.has_mimic());
+        Self { nodes, closed, support, armature, tree, gravity, nv, has_mimic, scalar: PhantomData }
     }
 }
 
@@ -133,70 +140,68 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
 
     #[inline(always)]
     fn bodies(&self) -> Range<usize> {
-        1..self.model.tree.nodes.len()
+        1..self.nodes.len()
     }
     #[inline(always)]
     fn joint(&self, i: usize) -> Joint {
-        self.model.tree.nodes[i].joint
+        self.nodes[i].joint
     }
     #[inline(always)]
     fn placement(&self, i: usize) -> Se3<S> {
-        self.model.tree.nodes[i].placement.lift()
+        self.nodes[i].placement.lift()
     }
     #[inline(always)]
     fn inertia(&self, i: usize) -> Inertia<S> {
-        self.model.tree.nodes[i].inertia.lift()
+        self.nodes[i].inertia.lift()
     }
     #[inline(always)]
     fn minus_gravity(&self) -> Vec3<S> {
-        -self.model.gravity.lift()
+        -self.gravity.lift()
     }
     #[inline(always)]
     fn armature(&self, i: usize, k: usize) -> S {
-        self.model.armature[self.model.tree.nodes[i].idx_v + k].lift()
+        self.armature[self.nodes[i].idx_v + k].lift()
     }
     #[inline(always)]
     fn force(&self, f_ext: &[Force<S>], i: usize) -> Option<Force<S>> {
-        let axis_rotation = Se3::new(self.model.tree.nodes[i].axis_rotation, Vec3::zero());
+        let axis_rotation = Se3::new(self.nodes[i].axis_rotation, Vec3::zero());
         f_ext.get(i).map(|&f| axis_rotation.lift().act_inv(f))
     }
 
     #[inline(always)]
     fn parent<T: Copy>(&self, of: &[T], i: usize) -> T {
-        of[self.model.tree.nodes[i].parent]
+        of[self.nodes[i].parent]
     }
     #[inline(always)]
     fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
-        onto[self.model.tree.nodes[i].parent] += x;
+        onto[self.nodes[i].parent] += x;
     }
 
     #[inline(always)]
     fn stack_index(&self, i: usize) -> usize {
-        self.model.tree.nodes[i].level
+        self.nodes[i].level
     }
     #[inline(always)]
     fn closed_by(&self, i: usize) -> &[usize] {
-        let (first, end) = self.model.tree.nodes[i].closed;
-        &self.model.tree.closed[first..end]
+        let (first, end) = self.nodes[i].closed;
+        &self.closed[first..end]
     }
     #[inline(always)]
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T {
-        of[self.model.tree.nodes[i].level - 1]
+        of[self.nodes[i].level - 1]
     }
     #[inline(always)]
     fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
-        onto[self.model.tree.nodes[i].level - 1] += x;
+        onto[self.nodes[i].level - 1] += x;
     }
     #[inline(always)]
     fn sum_lanes<T: Copy>(&self, _: usize, x: T) -> T {
         x
     }
-    #[inline(always)]
-    fn sum_lanes_at<T: Copy>(&self, _: &mut [T], _: usize) {}
 
     #[inline(always)]
     fn position(&self, q: &[S], i: usize, k: usize) -> S {
-        let node = &self.model.tree.nodes[i];
+        let node = &self.nodes[i];
         match node.mimic {
             None => q[node.idx_q + k],
             Some(mimic) => node.joint.mimic_position(mimic, &q[node.idx_q..], k),
@@ -204,7 +209,7 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     }
     #[inline(always)]
     fn joint_velocity(&self, x: &[S], i: usize, k: usize) -> S {
-        let node = &self.model.tree.nodes[i];
+        let node = &self.nodes[i];
         match node.mimic {
             None => x[node.idx_v + k],
             Some(mimic) => x[node.idx_v + k] * S::splat(mimic.ratio),
@@ -212,7 +217,7 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     }
     #[inline(always)]
     fn add_joint_effort(&self, x: &mut [S], i: usize, k: usize, value: S) {
-        let node = &self.model.tree.nodes[i];
+        let node = &self.nodes[i];
         match node.mimic {
             None => x[node.idx_v + k] += value,
             Some(mimic) => x[node.idx_v + k] += value * S::splat(mimic.ratio),
@@ -221,11 +226,11 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
 
     #[inline(always)]
     fn column(&self, i: usize) -> usize {
-        self.model.tree.nodes[i].column
+        self.nodes[i].column
     }
     #[inline(always)]
     fn add_armature_torque(&self, a: &[S], tau: &mut [S]) {
-        for (k, &armature) in self.model.armature.iter().enumerate() {
+        for (k, &armature) in self.armature.iter().enumerate() {
             tau[k] += armature.lift() * a[k];
         }
     }
@@ -238,8 +243,8 @@ impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
 
     #[inline(always)]
     fn support(&self, i: usize) -> &[usize] {
-        let node = &self.model.tree.nodes[i];
-        self.model.tree.support(node)
+        let node = &self.nodes[i];
+        &self.support[node.support..node.support + node.depth]
     }
     #[inline(always)]
     fn own_column(&self, i: usize, k: usize) -> usize {
@@ -253,7 +258,7 @@ impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
     fn broadcast<T: Copy>(&self, _: &mut [T]) {}
     #[inline(always)]
     fn clear(&self, matrix: &mut [S]) {
-        if self.model.has_mimic() {
+        if self.has_mimic {
             matrix.fill(S::zero());
         }
     }
@@ -267,8 +272,8 @@ impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
     }
     #[inline(always)]
     fn add_armature(&self, matrix: &mut [S]) {
-        for (k, &armature) in self.model.armature.iter().enumerate() {
-            matrix[k * (self.model.tree.nv + 1)] += armature.lift();
+        for (k, &armature) in self.armature.iter().enumerate() {
+            matrix[k * (self.nv + 1)] += armature.lift();
         }
     }
 }
@@ -276,19 +281,19 @@ impl<S: Scalar, R: Constant<S>> Columns for Single<'_, S, R> {
 impl<S: Scalar, R: Constant<S>> Pairs for Single<'_, S, R> {
     #[inline(always)]
     fn set_entry(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
-        if self.model.has_mimic() {
+        if self.has_mimic {
             self.add_entry(matrix, row, column, value);
         } else {
-            matrix[row + self.model.tree.nv * column] = value;
+            matrix[row + self.nv * column] = value;
         }
     }
     #[inline(always)]
     fn add_entry(&self, matrix: &mut [S], row: usize, column: usize, value: S) {
-        if self.model.has_mimic() {
-            let (r, c) = (&self.model.tree.columns[row], &self.model.tree.columns[column]);
-            matrix[r.coordinate + self.model.tree.nv * c.coordinate] += value * S::splat(r.ratio * c.ratio);
+        if self.has_mimic {
+            let (r, c) = (&self.tree.columns[row], &self.tree.columns[column]);
+            matrix[r.coordinate + self.nv * c.coordinate] += value * S::splat(r.ratio * c.ratio);
         } else {
-            matrix[row + self.model.tree.nv * column] += value;
+            matrix[row + self.nv * column] += value;
         }
     }
 }

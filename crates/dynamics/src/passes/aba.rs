@@ -62,11 +62,13 @@ fn eliminate<L: Layout>(
     i: usize,
     mut Ia: ArticulatedInertia<L::S>,
 ) -> ArticulatedInertia<L::S> {
+    let column = l.column(i);
     for k in (0..l.joint(i).nv()).rev() {
-        let c = l.column(i) + k;
-        U[c] = Ia * S[c]; // U = Iᴬ S
-        D_inv[c] = (S[c].dot(U[c]) + l.armature(i, k)).recip(); // D = Sᵀ U
-        Ia = Ia.minus_outer(U[c], D_inv[c]); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
+        let (c, Sc) = (column + k, S[column + k]);
+        let Uc = Ia * Sc; // U = Iᴬ S
+        let inverse = (Sc.dot(Uc) + l.armature(i, k)).recip(); // D = Sᵀ U
+        (U[c], D_inv[c]) = (Uc, inverse);
+        Ia = Ia.minus_outer(Uc, inverse); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
     }
     Ia
 }
@@ -75,10 +77,11 @@ fn eliminate<L: Layout>(
 #[inline(always)]
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;
+    let (IA, U, D_inv, oX, S) = (&mut IA[..], &mut U[..], &mut D_inv[..], &w.oX[..], &w.S[..]);
     for i in l.bodies() {
-        IA[l.stack_index(i)] = ArticulatedInertia::from(w.oX[i].act(l.inertia(i)));
+        IA[l.stack_index(i)] = ArticulatedInertia::from(oX[i].act(l.inertia(i)));
         for &j in l.closed_by(i) {
-            let Ia = eliminate(l, &w.S, U, D_inv, j, l.sum_lanes(j, IA[l.stack_index(j)]));
+            let Ia = eliminate(l, S, U, D_inv, j, l.sum_lanes(j, IA[l.stack_index(j)]));
             l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
         }
     }
@@ -109,11 +112,12 @@ pub(crate) fn inward<L: Layout>(
     f_ext: &[Force<L::S>],
 ) {
     let Workspace { IA, U, D_inv, v, c, pA, u, .. } = d;
-    let (oX, S) = (&w.oX, &w.S);
+    let (IA, U, D_inv, v, c) = (&mut IA[..], &mut U[..], &mut D_inv[..], &mut v[..], &mut c[..]);
+    let (pA, u, oX, S) = (&mut pA[..], &mut u[..], &w.oX[..], &w.S[..]);
     for i in l.bodies() {
-        let mut vJ = Motion::zero();
+        let (mut vJ, column) = (Motion::zero(), l.column(i));
         for k in 0..l.joint(i).nv() {
-            vJ = S[l.column(i) + k].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
+            vJ = S[column + k].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
         }
         let vi = l.parent_on_stack(v, i) + vJ; // v_i = v_λ + v_J
         let I = oX[i].act(l.inertia(i));
@@ -128,10 +132,12 @@ pub(crate) fn inward<L: Layout>(
             let here = l.stack_index(j);
             let Ia = eliminate(l, S, U, D_inv, j, l.sum_lanes(j, IA[here]));
             let mut pa = l.sum_lanes(j, pA[here]);
+            let column = l.column(j);
             for k in (0..l.joint(j).nv()).rev() {
-                let s = l.column(j) + k;
-                u[s] = l.joint_velocity(tau, j, k) - S[s].dot(pa); // u = τ − Sᵀ pᴬ
-                pa = U[s].scale_add(D_inv[s] * u[s], pa);
+                let s = column + k;
+                let us = l.joint_velocity(tau, j, k) - S[s].dot(pa); // u = τ − Sᵀ pᴬ
+                u[s] = us;
+                pa = U[s].scale_add(D_inv[s] * us, pa);
             }
             l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
             l.add_to_parent_on_stack(pA, j, pa + Ia * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
@@ -142,13 +148,15 @@ pub(crate) fn inward<L: Layout>(
 /// The accelerations: down once more.
 #[inline(always)]
 pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
-    let (Workspace { U, D_inv, a, c, u, qdd, .. }, S) = (d, &w.S);
+    let Workspace { U, D_inv, a, c, u, qdd, .. } = d;
+    let (U, D_inv, a, c, u, qdd, S) = (&U[..], &D_inv[..], &mut a[..], &c[..], &u[..], &mut qdd[..], &w.S[..]);
     a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
     qdd.fill(L::S::zero());
     for i in l.bodies() {
         let mut ai = l.parent_on_stack(a, i) + c[i]; // a' = a_λ + c
+        let column = l.column(i);
         for k in 0..l.joint(i).nv() {
-            let s = l.column(i) + k;
+            let s = column + k;
             let x = D_inv[s] * (u[s] - ai.dot(U[s])); // q̈ = D⁻¹ (u − Uᵀ a')
             l.add_joint_effort(qdd, i, k, x);
             ai = S[s].scale_add(x, ai); // a = a' + S q̈

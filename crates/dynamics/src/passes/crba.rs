@@ -35,8 +35,9 @@ impl<S> Workspace<S> {
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
 pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
+    let oX = &w.oX[..];
     for i in l.bodies() {
-        IC[i] = w.oX[i].act(l.inertia(i));
+        IC[i] = oX[i].act(l.inertia(i));
     }
     carry(l, w, IC, M);
 }
@@ -45,12 +46,13 @@ pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>],
 #[inline(always)]
 pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
     l.clear(M);
+    let S = &S[..];
     for i in l.bodies().rev() {
         let support = l.support(i);
-        let nv = l.joint(i).nv();
-        l.sum_lanes_at(IC, i);
+        let (nv, first) = (l.joint(i).nv(), l.column(i));
+        IC[i] = l.sum_lanes(i, IC[i]);
         for k in 0..nv {
-            let F = IC[i] * S[l.column(i) + k]; // F = Iᶜ S
+            let F = IC[i] * S[first + k]; // F = Iᶜ S
             let (own, column) = (support.len() - nv + k, l.own_column(i, k));
             for &e in &support[..own] {
                 let x = l.at(S, e).dot(F); // M_ej = S_eᵀ F for every ancestor e

@@ -50,11 +50,12 @@ impl<S: Scalar> World<S> {
 pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
     *placed = PlacementCache::Bodies;
     Joint::sin_cos(l, q, sin_cos);
+    let (oX, S, sin, cos) = (&mut oX[..], &mut S[..], &sin_cos.sin[..], &sin_cos.cos[..]);
     for i in l.bodies() {
-        oX[i] = l.parent(oX, i) * Joint::placement_with(l, i, q, sin_cos.sin[i], sin_cos.cos[i]); // oXi = oXλ λXi
-        let joint = l.joint(i);
+        oX[i] = l.parent(oX, i) * Joint::placement_with(l, i, q, sin[i], cos[i]); // oXi = oXλ λXi
+        let (joint, column) = (l.joint(i), l.column(i));
         for k in 0..joint.nv() {
-            S[l.column(i) + k] = joint.column(&oX[i], k); // oXi S, in the world
+            S[column + k] = joint.column(&oX[i], k); // oXi S, in the world
         }
     }
 }

@@ -91,14 +91,16 @@ pub(crate) fn pass<L: Layout>(
     f_ext: &[Force<L::S>],
 ) {
     let Workspace { X, motion, K, f, tau, .. } = d;
+    let (X, motion, K, f, tau) = (&mut X[..], &mut motion[..], &mut K[..], &mut f[..], &mut tau[..]);
     Joint::sin_cos(l, q, sin_cos);
+    let (sin, cos) = (&sin_cos.sin[..], &sin_cos.cos[..]);
     motion[0].a = l.minus_gravity();
     tau.fill(L::S::zero());
     for i in l.bodies() {
         let vJ = Joint::motion(l, i, qd); // v_J = S q̇
         let aJ = Joint::motion(l, i, qdd); // S q̈
         let Inertia { mass, mass_com, rotational } = l.inertia(i);
-        let Xi = Joint::placement_with(l, i, q, sin_cos.sin[i], sin_cos.cos[i]); // λXi = X_T X_J
+        let Xi = Joint::placement_with(l, i, q, sin[i], cos[i]); // λXi = X_T X_J
         let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
         let a = l.parent_on_stack(K, i).mul_add(Xi.translation, parent.a); // a_λ + K_λ p
         let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };

@@ -28,6 +28,7 @@ impl Joint {
     /// The sine and cosine of the angle by which each joint turns about z (0 and 1 where it does not), all of them at once.
     #[inline(always)]
     pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
+        let (sin, cos) = (&mut sin[..], &mut cos[..]);
         for i in l.bodies() {
             if let Self::Revolute { .. } | Self::Helical { .. } = l.joint(i) {
                 sin[i] = l.position(q, i, 0);

@@ -76,7 +76,7 @@ pub struct ColumnBlock {
 }
 
 /// The sizes of the two matrices that hold Z = L⁻¹, where M = Lᵀ D L is the inertia matrix.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
     /// The number of rows of both.
     pub rows: usize,

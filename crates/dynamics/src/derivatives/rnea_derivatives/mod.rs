@@ -126,31 +126,37 @@ pub(crate) fn pass<L: Columns>(
     minus_gravity: Vec3<L::S>,
     by_rows: bool,
 ) {
-    let (oX, S) = (&w.oX, &w.S);
+    let (oX, S) = (&w.oX[..], &w.S[..]);
     let Bodies { v, a, IC, BC, F, Psid, Psidd, PsidSd, rows } = d;
+    let (v, a, IC, BC, F) = (&mut v[..], &mut a[..], &mut IC[..], &mut BC[..], &mut F[..]);
+    let (Psid, Psidd, PsidSd) = (&mut Psid[..], &mut Psidd[..], &mut PsidSd[..]);
     a[0] = Motion::new(minus_gravity, Vec3::zero());
     for i in l.bodies() {
         let (v_parent, a_parent) = (l.parent(v, i), l.parent(a, i));
         let (mut vJ, mut aJ) = (Motion::zero(), Motion::zero());
-        for k in 0..l.joint(i).nv() {
-            let c = l.column(i) + k;
+        let (nv, column) = (l.joint(i).nv(), l.column(i));
+        for k in 0..nv {
+            let c = column + k;
             vJ = S[c].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
             aJ = S[c].scale_add(l.joint_velocity(qdd, i, k), aJ); // S q̈
         }
-        v[i] = v_parent + vJ; // v_i = v_λ + v_J
-        a[i] = a_parent + aJ + v[i].cross(vJ); // a_i = a_λ + S q̈ + v_i × v_J
-        for k in 0..l.joint(i).nv() {
-            let c = l.column(i) + k;
-            Psid[c] = v_parent.cross(S[c]); // Ψ̇ = v_λ × S
-            Psidd[c] = a_parent.cross(S[c]) + v_parent.cross(Psid[c]); // Ψ̈ = a_λ × S + v_λ × Ψ̇
-            PsidSd[c] = Psid[c] + v[i].cross(S[c]); // Ψ̇ + Ṡ
+        let vi = v_parent + vJ; // v_i = v_λ + v_J
+        let ai = a_parent + aJ + vi.cross(vJ); // a_i = a_λ + S q̈ + v_i × v_J
+        (v[i], a[i]) = (vi, ai);
+        for k in 0..nv {
+            let (c, Sc) = (column + k, S[column + k]);
+            let dPsi = v_parent.cross(Sc); // Ψ̇ = v_λ × S
+            Psidd[c] = a_parent.cross(Sc) + v_parent.cross(dPsi); // Ψ̈ = a_λ × S + v_λ × Ψ̇
+            PsidSd[c] = dPsi + vi.cross(Sc); // Ψ̇ + Ṡ
+            Psid[c] = dPsi;
         }
-        IC[i] = oX[i].act(l.inertia(i));
-        BC[i] = Coriolis::of(IC[i], v[i]);
-        F[i] = IC[i] * a[i] + v[i].cross(BC[i].momentum); // F = I a + v ×* I v
+        let I = oX[i].act(l.inertia(i));
+        let B = Coriolis::of(I, vi);
+        let mut Fi = I * ai + vi.cross(B.momentum); // F = I a + v ×* I v
         if let Some(external) = l.force(f_ext, i) {
-            F[i] -= oX[i].act(external);
+            Fi -= oX[i].act(external);
         }
+        (IC[i], BC[i], F[i]) = (I, B, Fi);
     }
     l.broadcast(Psid);
     l.broadcast(Psidd);
@@ -162,15 +168,16 @@ pub(crate) fn pass<L: Columns>(
         let support = l.support(i);
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
-        l.sum_lanes_at(IC, i);
-        l.sum_lanes_at(BC, i);
-        l.sum_lanes_at(F, i);
+        let (IC_i, BC_i, F_i) = (l.sum_lanes(i, IC[i]), l.sum_lanes(i, BC[i]), l.sum_lanes(i, F[i]));
+        (IC[i], BC[i], F[i]) = (IC_i, BC_i, F_i);
+        let first = l.column(i);
         for k in 0..nv {
-            let (s, column) = (l.column(i) + k, l.own_column(i, k));
-            let IS = IC[i] * S[s]; // Iᶜ S_d
-            let BS = BC[i].apply_transpose(S[s]); // 2Bᵀ S_d
-            let by_q = IC[i] * Psidd[s] + BC[i].apply(Psid[s]) + S[s].cross(F[i]); // Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F
-            let by_v = IC[i] * PsidSd[s] + BC[i].apply(S[s]); // Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d
+            let (s, column) = (first + k, l.own_column(i, k));
+            let Ss = S[s];
+            let IS = IC_i * Ss; // Iᶜ S_d
+            let BS = BC_i.apply_transpose(Ss); // 2Bᵀ S_d
+            let by_q = IC_i * Psidd[s] + BC_i.apply(Psid[s]) + Ss.cross(F_i); // Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F
+            let by_v = IC_i * PsidSd[s] + BC_i.apply(Ss); // Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d
             if by_rows {
                 rows.keep(s, IS, BS, by_q, by_v);
             }
@@ -194,7 +201,6 @@ pub(crate) fn pass<L: Columns>(
                 l.set_row(da, column, e, S_e.dot(IS));
             }
         }
-        let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
         l.add_to_parent(IC, i, IC_i);
         l.add_to_parent(BC, i, BC_i);
         l.add_to_parent(F, i, F_i);

@@ -10,6 +10,7 @@
 //! ```
 //!
 //! takes one product for each pair of columns and each column that carries both, and none of these waits for another.
+#![allow(unsafe_code)]
 
 use super::lanes::{Four, Limbs};
 use super::{LANES, Plan};
@@ -53,7 +54,7 @@ impl Scratch {
 
     /// Whether it was made for this plan, or one of the same shape.
     pub(crate) fn fits(&self, plan: &Plan) -> bool {
-        self.T.len() == plan.columns.support.len()
+        self.T.len() == plan.columns.support.len() && self.sizes == plan.columns.sizes
     }
 
     /// M⁻¹, after `aba::factorize` or `aba::pass`, for columns that are shared.
@@ -82,25 +83,26 @@ impl Scratch {
     #[inline(always)]
     fn carry(&mut self, l: &Limbs<'_>, w: &World<Four>, aba: &aba::Workspace<Four>) {
         let Self { T, ZD, Zt, .. } = self;
+        let (T, ZD, Zt, D_inv) = (&mut T[..], &mut ZD[..], &mut Zt[..], &aba.D_inv[..]);
         for i in l.bodies() {
             let (first, end) = l.steps[i].support;
             let nv = l.joint(i).nv();
             for k in 0..nv {
                 let (s, own) = (l.column(i) + k, end - nv + k);
-                let (S, U) = (w.S[s], -aba.U[s].scale(aba.D_inv[s]));
+                let (S, U) = (w.S[s], -aba.U[s].scale(D_inv[s]));
                 for entry in first..own {
                     let felt = if k == 0 { l.predecessor(T, entry) } else { T[entry] };
                     let e = l.support[entry];
                     let Z = felt.dot(U); // Z_de = −D_d⁻¹ U_dᵀ T
                     let pair = l.pair(e, k);
                     put(Zt, &pair.in_Zt, Z);
-                    put(ZD, &pair.in_ZD, Z * aba.D_inv[e.column]);
+                    put(ZD, &pair.in_ZD, Z * D_inv[e.column]);
                     if !l.steps[i].tip || nv > 1 {
                         T[entry] = S.scale_add(Z, felt); // T + S_d Z_de
                     }
                 }
                 T[own] = S;
-                put(ZD, &l.pair(l.support[own], k).in_ZD, aba.D_inv[s]);
+                put(ZD, &l.pair(l.support[own], k).in_ZD, D_inv[s]);
             }
         }
     }
@@ -123,24 +125,29 @@ impl Scratch {
     /// N vectors of each of M rows, from a column on.
     #[inline(always)]
     fn part<V: Block<Number = f64>, const M: usize, const N: usize>(&mut self, block: &ColumnBlock, start: usize) {
-        let Self { ZD, Zt, rows, sizes: Sizes { ZD: depth, Zt: width, .. }, .. } = self;
+        let Self { ZD, Zt, rows, sizes: Sizes { ZD: depth, Zt: width, rows: n }, .. } = self;
         let (depth, width, many) = (*depth, *width, N * V::LANES);
+        assert!(start + many <= width && Zt.len() >= *n * width);
+        let path = &block.path[..depth.min(block.path.len())];
         let mut ZD_of = [&ZD[..0]; M];
         for m in 0..M {
-            ZD_of[m] = &ZD[(block.first + m) * depth..][..depth];
+            ZD_of[m] = &ZD[(block.first + m) * depth..][..path.len()];
         }
         let mut sums = [[V::zero(); N]; M];
-        for (p, &e) in block.path[..depth.min(block.path.len())].iter().enumerate() {
+        for (p, &e) in path.iter().enumerate() {
             if e >= start + many {
                 break; // what e carries stands further on
             }
-            let Zt = &Zt[e * width + start..][..many];
+            debug_assert!(e < *n);
+            // SAFETY: the plan's paths are of columns, of which Zt has a row each.
+            let Zt = unsafe { Zt.get_unchecked(e * width + start..e * width + start + many) };
             let mut Z = [V::zero(); N];
             for x in 0..N {
                 Z[x] = V::load(&Zt[x * V::LANES..]);
             }
             for m in 0..M {
-                let s = V::splat(ZD_of[m][p]);
+                // SAFETY: `ZD_of` has a number for each column of the path.
+                let s = V::splat(unsafe { *ZD_of[m].get_unchecked(p) });
                 for x in 0..N {
                     sums[m][x] = Z[x].mul_add(s, sums[m][x]); // M⁻¹_dj = Σ Z_de D_e⁻¹ Z_je
                 }
@@ -160,38 +167,56 @@ impl Scratch {
 fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
     let x = x.to_array();
     for lane in 0..LANES {
-        to[at[lane] as usize] = x[lane];
+        debug_assert!((at[lane] as usize) < to.len());
+        // SAFETY: the plan's places are below the sizes that the matrices were made for, which `fits` compares.
+        unsafe { *to.get_unchecked_mut(at[lane] as usize) = x[lane] };
     }
 }
 
 /// A symmetric matrix from its rows up to the diagonal.
 #[inline(always)]
 fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [Fused]) {
+    assert!(n <= width && rows.len() >= n * width && X.len() >= n * n);
     let whole = n - n % LANES;
     for k in (0..whole).step_by(LANES) {
-        for j in (0..k).step_by(LANES) {
+        for j in (0..=k).step_by(LANES) {
             let mut block = [Four::zero(); LANES];
             for r in 0..LANES {
-                block[r] = Four::load(&rows[(k + r) * width + j..]);
-                X[(k + r) * n + j..][..LANES].copy_from_slice(&block[r].to_fused());
+                // SAFETY: k + r < n, and j + LANES ≤ n.
+                block[r] = Four::load(unsafe { rows.get_unchecked((k + r) * width + j..(k + r) * width + j + LANES) });
             }
+            // SAFETY: as above.
+            unsafe { write(X, k * n + j, n, &block) };
             Four::transpose(&mut block);
-            for r in 0..LANES {
-                X[(j + r) * n + k..][..LANES].copy_from_slice(&block[r].to_fused());
+            if j < k {
+                // SAFETY: j + r < n, and k + LANES ≤ n.
+                unsafe { write(X, j * n + k, n, &block) };
             }
         }
-        corner(rows, width, n, k, k..k + LANES, X);
+        for r in 1..LANES {
+            for j in 0..r {
+                X[(k + j) * n + k + r] = Fused(rows[(k + r) * width + k + j]);
+            }
+        }
     }
-    corner(rows, width, n, 0, whole..n, X);
-}
-
-/// Some rows from a column on, and what is equal to them by symmetry.
-#[inline(always)]
-fn corner(rows: &[f64], width: usize, n: usize, from: usize, of: core::ops::Range<usize>, X: &mut [Fused]) {
-    for r in of {
-        for j in from..=r {
+    for r in whole..n {
+        for j in 0..=r {
             let x = Fused(rows[r * width + j]);
             (X[r * n + j], X[j * n + r]) = (x, x);
         }
+    }
+}
+
+/// Writes a block of rows, n numbers apart, from entry `at` on.
+///
+/// # Safety
+/// X has the entries up to that of the last row.
+#[inline(always)]
+unsafe fn write(X: &mut [Fused], at: usize, n: usize, block: &[Four; LANES]) {
+    for r in 0..LANES {
+        debug_assert!(at + r * n + LANES <= X.len());
+        // SAFETY: by the caller.
+        let to = unsafe { X.get_unchecked_mut(at + r * n..at + r * n + LANES) };
+        to.copy_from_slice(&block[r].to_fused());
     }
 }

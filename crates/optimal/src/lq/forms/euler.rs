@@ -161,18 +161,20 @@ impl Vectorized for WriteSteps<'_> {
     fn run<V: Vector>(self) {
         let Self { steps: Steps { N, Pi, py, PB }, P, p, dt, blocks } = self;
         let (nv, ldp, ldn) = (p.len() / 2, p.len() + SLACK, p.len() / 2 + SLACK);
+        let whole = nv.next_multiple_of(V::N);
 
         // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  as if T and E were 1 from the left
         let step = V::splat(dt);
         for k in 0..nv {
             let (PE, P) = (column(k, blocks, P, PB, ldp), &P[(nv + k) * ldp..]);
-            let (N, Pi) = (&mut N[k * ldn..], &mut Pi[k * ldn..]);
-            let mut i = 0;
-            while i < nv {
-                let sum = V::load(&PE[i..]).mul_add(step, V::load(&P[i..]));
-                sum.store(&mut N[i..]);
-                sum.add(V::load(&PE[nv + i..])).mul_add(step, V::load(&P[nv + i..])).store(&mut Pi[i..]);
-                i += V::N;
+            let columns =
+                N[k * ldn..][..whole].chunks_exact_mut(V::N).zip(Pi[k * ldn..][..whole].chunks_exact_mut(V::N));
+            let above = registers::<V>(PE, 0, whole).zip(registers::<V>(P, 0, whole));
+            let below = registers::<V>(PE, nv, whole).zip(registers::<V>(P, nv, whole));
+            for ((N, Pi), ((PE, P), (PE_below, P_below))) in columns.zip(above.zip(below)) {
+                let sum = V::load(PE).mul_add(step, V::load(P));
+                sum.store(N);
+                sum.add(V::load(PE_below)).mul_add(step, V::load(P_below)).store(Pi);
             }
             py[k] = dt * p[k] + p[nv + k];
         }
@@ -214,10 +216,9 @@ impl Vectorized for AddPositions<'_> {
         for j in 0..nv {
             let (PT, H) = (column(j, blocks, P, PB, ldp), &mut H[j * ld..]);
             let gradient = H[nv];
-            let mut i = 0;
-            while i < nv {
-                V::load(&H[i..]).add(V::load(&PT[i..])).store(&mut H[i..]); // what lies above the diagonal is not read
-                i += V::N;
+            let whole = nv.next_multiple_of(V::N);
+            for (H, PT) in H[..whole].chunks_exact_mut(V::N).zip(registers::<V>(PT, 0, whole)) {
+                V::load(H).add(V::load(PT)).store(H); // what lies above the diagonal is not read
             }
             H[nv] = gradient;
         }
@@ -263,6 +264,12 @@ fn times_blocks(
 fn column<'a>(k: usize, blocks: &[EulerBlock], P: &'a [f64], PB: &'a [f64], ldp: usize) -> &'a [f64] {
     let in_block = blocks.iter().any(|block| block.range().contains(&k));
     &(if in_block { PB } else { P })[k * ldp..]
+}
+
+/// Some numbers of a column from a place on, a register of them at a time.
+#[inline(always)]
+fn registers<V: Vector>(column: &[f64], from: usize, count: usize) -> core::slice::ChunksExact<'_, f64> {
+    column[from..][..count].chunks_exact(V::N)
 }
 
 /// The rows of a block, with zeros up to a whole register.

@@ -20,7 +20,7 @@ use crate::lq::InverseDynamicsForm;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
 use crate::robot::residuals::rows::Row;
-use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, block, copy_scaled, mask, max_abs};
+use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, mask, max_abs, subtract_rows};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
 pub(super) const PREFERENCE: f64 = 1e-2;
@@ -161,28 +161,8 @@ struct Run<'a> {
     done: &'a mut bool,
 }
 
-/// How many rows are subtracted at once.
-const TOGETHER: usize = 4;
-
-/// y −= Σ aᵢ xᵢ on the blocks that are not zero in all x, in whole registers.
-#[inline(always)]
-fn subtract<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N], mut mask: u64) {
-    let (n, wide) = (y.len(), block(y.len()));
-    let (x, a) = (x.map(|x| &x[..n]), a.map(|a| V::splat(-a)));
-    while mask != 0 {
-        let mut i = mask.trailing_zeros() as usize * wide;
-        let end = n.min(i + wide);
-        while i + V::N <= end {
-            let mut sum = V::load(&y[i..][..V::N]);
-            for k in 0..N {
-                sum = V::load(&x[k][i..][..V::N]).mul_add(a[k], sum);
-            }
-            sum.store(&mut y[i..][..V::N]);
-            i += V::N;
-        }
-        mask &= mask - 1;
-    }
-}
+/// How many rows are subtracted at once: as many as those of a base that moves freely.
+const TOGETHER: usize = 6;
 
 impl Vectorized for Run<'_> {
     #[inline(always)]
@@ -222,7 +202,7 @@ impl Vectorized for Run<'_> {
             for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride)) {
                 let factor = other[k];
                 if factor != 0.0 {
-                    subtract::<V, 1>(other, [row], [factor], mask);
+                    subtract_rows::<V, 1>(other, [row], [factor], mask);
                     other[k] = 0.0;
                 }
             }
@@ -239,12 +219,12 @@ impl Vectorized for Run<'_> {
                 }
                 (x[count], a[count], blocks, count) = (&T[r * stride..][..stride], factor, blocks | mask, count + 1);
                 if count == TOGETHER {
-                    subtract::<V, TOGETHER>(other, x, a, blocks);
+                    subtract_rows::<V, TOGETHER>(other, x, a, blocks);
                     (a, blocks, count) = ([0.0; TOGETHER], 0, 0);
                 }
             }
             if count > 0 {
-                subtract::<V, TOGETHER>(other, x, a, blocks);
+                subtract_rows::<V, TOGETHER>(other, x, a, blocks);
             }
             e.late.iter().for_each(|&(r, _)| other[e.pivots[r]] = 0.0);
         }

@@ -1,0 +1,143 @@
+//! A block on the diagonal of a Cholesky factor, and the rows below it, whose columns stay in registers while they are solved.
+
+use crate::registers::Vector;
+use crate::tile::{View, next_strip, tile_rows};
+
+/// A block on the diagonal of L, of `width` ≤ COLUMNS columns: column after column, and 1 by its diagonal.
+pub(crate) struct DiagonalBlock<const COLUMNS: usize> {
+    pub(crate) L: [[f64; COLUMNS]; COLUMNS],
+    pub(crate) inverse: [f64; COLUMNS],
+    width: usize,
+}
+
+impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
+    /// A block of `width` columns, to be written.
+    #[inline(always)]
+    pub(crate) fn new(width: usize) -> Self {
+        Self { L: [[0.0; COLUMNS]; COLUMNS], inverse: [0.0; COLUMNS], width }
+    }
+
+    /// Factorises the block of H that begins in row j0 of some columns of it, after a bᵀ over the j0 columns before them was
+    /// subtracted; S registers hold COLUMNS rows. The entries above the diagonal lose their meaning.
+    ///
+    /// # Errors
+    /// The first column whose pivot is not positive, or not finite, and the pivot.
+    #[inline(always)]
+    pub(crate) fn factor<V: Vector, const S: usize>(
+        &mut self,
+        columns: &mut [f64],
+        j0: usize,
+        a: View<'_>,
+        b: View<'_>,
+    ) -> Result<(), (usize, f64)> {
+        let mut c = difference::<V, S, COLUMNS>(columns, a.stride, j0, self.width, a, b, j0);
+        for j in 0..COLUMNS {
+            if j < self.width {
+                let mut numbers = [0.0; COLUMNS];
+                for s in 0..S {
+                    c[j][s].store(&mut numbers[s * V::N..]);
+                }
+                let pivot = numbers[j];
+                if !(pivot > 0.0 && pivot.is_finite()) {
+                    return Err((j, pivot));
+                }
+                self.inverse[j] = pivot.sqrt().recip();
+                for s in 0..S {
+                    c[j][s] = c[j][s].mul(V::splat(self.inverse[j]));
+                    c[j][s].store(&mut self.L[j][s * V::N..]);
+                }
+                for k in j + 1..COLUMNS {
+                    let factor = V::splat(-self.L[j][k]);
+                    for s in 0..S {
+                        c[k][s] = c[j][s].mul_add(factor, c[k][s]);
+                    }
+                }
+                store(&c[j], columns, j * a.stride + j0);
+            }
+        }
+        Ok(())
+    }
+
+    /// C ← (C − a bᵀ) L⁻ᵀ on some rows of C, where a bᵀ is over `length` columns.
+    #[inline(always)]
+    pub(crate) fn solve_rows<V: Vector>(
+        &self,
+        c: &mut [f64],
+        ldc: usize,
+        rows: core::ops::Range<usize>,
+        a: View<'_>,
+        b: View<'_>,
+        length: usize,
+    ) {
+        let mut i = rows.start;
+        while i < rows.end {
+            let strip = next_strip::<V>(rows.end - i);
+            match strip {
+                1 => self.solve_strip::<V, 1>(c, ldc, i, a, b, length),
+                2 => self.solve_strip::<V, 2>(c, ldc, i, a, b, length),
+                _ => self.solve_strip::<V, 3>(c, ldc, i, a, b, length),
+            }
+            i += strip * V::N;
+        }
+    }
+
+    /// C ← (C − a bᵀ) L⁻ᵀ on S registers of rows of C from i on.
+    #[inline(always)]
+    fn solve_strip<V: Vector, const S: usize>(
+        &self,
+        c: &mut [f64],
+        ldc: usize,
+        i: usize,
+        a: View<'_>,
+        b: View<'_>,
+        length: usize,
+    ) {
+        let mut x = difference::<V, S, COLUMNS>(c, ldc, i, self.width, a, b, length);
+        for j in 0..COLUMNS {
+            if j < self.width {
+                for p in 0..j {
+                    let factor = V::splat(-self.L[p][j]);
+                    for s in 0..S {
+                        x[j][s] = x[p][s].mul_add(factor, x[j][s]);
+                    }
+                }
+                for s in 0..S {
+                    x[j][s] = x[j][s].mul(V::splat(self.inverse[j]));
+                }
+                store(&x[j], c, j * ldc + i);
+            }
+        }
+    }
+}
+
+/// C − a bᵀ, over `length` columns, on S registers of rows of C from i on and on its first `width` columns.
+#[inline(always)]
+fn difference<V: Vector, const S: usize, const COLUMNS: usize>(
+    c: &[f64],
+    ldc: usize,
+    i: usize,
+    width: usize,
+    a: View<'_>,
+    b: View<'_>,
+    length: usize,
+) -> [[V; S]; COLUMNS] {
+    let mut tile = tile_rows::<V, S, COLUMNS>(a, i, b, 0, length);
+    for j in 0..COLUMNS {
+        if j < width {
+            let column = &c[j * ldc + i..][..S * V::N];
+            for s in 0..S {
+                tile[j][s] = V::load(&column[s * V::N..]).sub(tile[j][s]);
+            }
+        }
+    }
+    tile
+}
+
+/// Writes S registers, from a place on.
+#[inline(always)]
+fn store<V: Vector, const S: usize>(x: &[V; S], to: &mut [f64], at: usize) {
+    let to = &mut to[at..][..S * V::N];
+    for s in 0..S {
+        x[s].store(&mut to[s * V::N..]);
+    }
+}
