@@ -38,8 +38,9 @@ fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[
     let (solution, times) = gait.solve().unwrap();
     let plan = plan_of(robot, &solution, &times, &touches, 0.02).unwrap();
     let contact_gains = Gains { stiffness: 0.0, damping };
-    // so that how the feet share the load is decided well above rounding
-    let settings = Settings { contact_gains, force_weight: 1e-5, ..Settings::default() };
+    // So that how the feet share the load is decided well above rounding; and a gap that is small beside 1 where the objective is,
+    // whose tolerance is relative to the solver's own units.
+    let settings = Settings { contact_gains, force_weight: 1e-5, tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(robot, contacts, tasks, settings).unwrap();
     let x0 = &solution.x(0)[..robot.nq()];
     let mut references = controller.hold(x0);
