@@ -41,6 +41,7 @@ ALIASES = {
     "_OfTwo": "Callable[[NDArray[Any], NDArray[Any]], Any]",
     "_Space": "Model | tuple[int, _OfTwo, _OfTwo]",
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
+    "_Polynomial": 'Literal["constant", "linear", "quadratic"]',
     "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
     "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Unicycle | Action"
     " | DifferentialAction | ConstrainedAction",
@@ -51,7 +52,7 @@ ARGUMENTS = {
     "ArrayLike": """
         A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
-        controls corners normal states times touches FrictionContact.size Plan.gains Task.joints""",
+        Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints""",
     "ArrayLike | None": "ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
@@ -102,6 +103,7 @@ ARGUMENTS = {
     "dict[int, Sequence[Limit]]": "limits_at",
     "dict[str, ContactConstraint]": "contacts",
     "_Scheme": "integrator",
+    "_Polynomial": "controls",
     "_Action": "action Problem.terminal",
     "Sequence[_Action]": "models",
     "Sequence[int] | None": "stages",
@@ -109,12 +111,13 @@ ARGUMENTS = {
     "Problem": "problem",
     # arrays of floats, or of numbers that know their derivatives
     "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
-    "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": "Action.calc_diff DifferentialAction.calc_diff",
+    "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": """
+        Action.calc_diff DifferentialAction.calc_diff Residual.own_cost.calc_diff""",
     "_Space": "space",
     "Callable[[Iteration], object]": "callback",
     "Sequence[LqNode]": "nodes",
     "Callable[[int, _Array, _Array], ArrayLike]": "ConstrainedAction.calc",
-    "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc",
+    "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc Residual.own_cost.calc",
     "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": """
         ConstrainedAction.calc_diff Residual.own.calc_diff""",
     "dict[str, Any]": "AugmentedLagrangian.inner Fddp._make.settings AugmentedLagrangian._make.settings",

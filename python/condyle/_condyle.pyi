@@ -192,6 +192,7 @@ _Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
 _OfTwo: TypeAlias = Callable[[NDArray[Any], NDArray[Any]], Any]
 _Space: TypeAlias = Model | tuple[int, _OfTwo, _OfTwo]
 _Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
+_Polynomial: TypeAlias = Literal["constant", "linear", "quadratic"]
 _Axes: TypeAlias = Literal["world", "local"] | tuple[Literal["frame"], str]
 _Action: TypeAlias = (
     FreeDynamics
@@ -2154,6 +2155,10 @@ class Activation:
         """
 
     @staticmethod
+    def sum() -> Activation:
+        """The sum Σ rᵢ, for residuals that are costs by themselves: see `Residual.own_cost`."""
+
+    @staticmethod
     def smooth1(epsilon: float = 1.0) -> Activation:
         """The smooth cost Σ √(ε + rᵢ²), nearly Σ |rᵢ|."""
 
@@ -2305,7 +2310,7 @@ class ContactDynamics:
     dt: Δt in seconds.
     costs: a list of `Cost`.
     damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-    costs_at, actuation, integrator, lower, upper, limits, limits_at: as of `FreeDynamics`.
+    costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`.
 
     Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
     damping.
@@ -2330,6 +2335,7 @@ class ContactDynamics:
         upper: ArrayLike | None = None,
         limits: Sequence[Limit] | None = None,
         limits_at: dict[int, Sequence[Limit]] | None = None,
+        controls: _Polynomial = "constant",
     ) -> ContactDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers."""
@@ -2344,8 +2350,8 @@ class Cost:
     name: what `Problem.set_weight` and errors call it.
     weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
-    activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
-        for other residuals.
+    activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, the sum for
+        `Residual.own_cost`, and quadratic for other residuals.
 
     >>> from condyle.optimal import Cost, Residual
     >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
@@ -2365,10 +2371,13 @@ class DifferentialAction:
         accelerations may be None.
     dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
     calc_diff: a function of (t, x, u) that returns a dict of what is not zero among da_dq, da_dv, da_du, the derivatives of
-        the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`.
+        the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`. Second
+        derivatives of the accelerations, for a solver's `second_order`, are always those of calc, and zero where it cannot
+        be differentiated by numbers; those of ⊕ are zero.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
     lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
     model: a robot whose positions q are, with its ⊕; None for vectors of nv numbers.
+    controls: 'constant', 'linear' or 'quadratic', as of `FreeDynamics`.
 
     Raises `ProblemError` if dt is not above 0.
 
@@ -2393,6 +2402,7 @@ class DifferentialAction:
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
         model: Model | None = None,
+        controls: _Polynomial = "constant",
     ) -> DifferentialAction: ...
 
 @final
@@ -2490,6 +2500,9 @@ class FreeDynamics:
     lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
     limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
     limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
+    controls: how they go through the knot's time: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times nu
+        controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt (by 'runge_kutta_3' 0, Δt/3 and 2 Δt/3);
+        bounds hold at each of them.
 
     Raises `ProblemError` for a cost, a limit or drives that do not fit.
     """
@@ -2506,6 +2519,7 @@ class FreeDynamics:
         upper: ArrayLike | None = None,
         limits: Sequence[Limit] | None = None,
         limits_at: dict[int, Sequence[Limit]] | None = None,
+        controls: _Polynomial = "constant",
     ) -> FreeDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The efforts that hold the robot still at the state x, nu numbers."""
@@ -2582,7 +2596,7 @@ class InverseDynamics:
     model: the robot.
     dt: Δt in seconds.
     costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
-    integrator, lower, upper, limits: as of `FreeDynamics`.
+    integrator, lower, upper, limits, controls: as of `FreeDynamics`.
 
     Raises `ProblemError` for a cost or a limit that does not fit.
     """
@@ -2596,6 +2610,7 @@ class InverseDynamics:
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
         limits: Sequence[Limit] | None = None,
+        controls: _Polynomial = "constant",
     ) -> InverseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """The accelerations that hold the robot still: nv zeros."""
@@ -2810,7 +2825,7 @@ class Residual:
 
     @staticmethod
     def contact_force(contact: str, target: ArrayLike | None = None) -> Residual:
-        """The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
+        """The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 1, 2, 3 or 6
         numbers; target has 6.
         """
 
@@ -2849,6 +2864,24 @@ class Residual:
 
         >>> from condyle.optimal import Residual
         >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
+        """
+
+    @staticmethod
+    def own_cost(
+        calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
+        calc_diff: Callable[[Any, _Array, _Array], dict[str, ArrayLike]] | None = None,
+    ) -> Residual:
+        """A cost that is written in Python, a number ℓ(t, x, u) of a knot t with a Hessian of its own, as a residual of one
+        entry; a `Cost` of it is weight · ℓ, by `Activation.sum()`, which it has by default.
+
+        calc: a function of (t, x, u) that returns ℓ; x = (q, v), and at the end u is empty.
+        calc_diff: a function of (t, x, u) that returns a dict of what is not zero among q, r, Q, S, R: the gradient and the
+            Hessian of ℓ by x, in the tangent space of the state, and by u. Without it, those of calc, as for `Action`.
+
+        Knots with such a cost are solved by their controls, not in inverse-dynamics form.
+
+        >>> from condyle.optimal import Cost, Residual
+        >>> swing = Cost("swing", 2.0, Residual.own_cost(lambda t, x, u: 1.0 - np.cos(x[0])))
         """
 
     @staticmethod

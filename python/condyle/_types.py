@@ -273,13 +273,15 @@ class ContactConstraint(NamedTuple):
     With velocity v and acceleration a of the frame relative to the other body, and its pose X in the other frame moved
     to the target, it asks for a − a* + kd (v − v*) + kp e = 0 with e = log X ('rigid'), or the difference of the
     frames' origins ('point'), along the axes of `reference` at the frame's origin: Pinocchio's RigidConstraintModel and
-    Crocoddyl's contacts. A point's acceleration is the classical one, a rigid frame's the spatial one.
+    Crocoddyl's contacts. A point's acceleration is the classical one, a rigid frame's the spatial one. A 'line' has
+    the row of a point along the third of `axes`, a 'plane' those along the first and the third: Crocoddyl's
+    ContactModel1D, whose rotation R and reference x are axes=R.T and a placement at R @ (0, 0, x), and ContactModel2D.
     """
 
     frame: str | int
     """The frame that is held."""
-    kind: Literal["point", "rigid"]
-    """What is held: the frame's origin, three rows; or the whole frame, six rows, linear first."""
+    kind: Literal["point", "line", "plane", "rigid"]
+    """What is held: the frame's origin, 3 rows; along one axis or two; or the whole frame, 6 rows, linear first."""
     other: str | int | None = None
     """The frame to which it is held; None is the world."""
     reference: Literal["local", "local_world_aligned"] = "local"
@@ -289,11 +291,13 @@ class ContactConstraint(NamedTuple):
     kd: float = 0.0
     """The gain of an error of velocity (1/s)."""
     placement: ArrayLike | None = None
-    """The wanted pose of the frame in the other frame, (4, 4); of a point, the translation alone."""
+    """The wanted pose of the frame in the other frame, (4, 4); of all but 'rigid', the translation alone."""
     velocity: ArrayLike | None = None
     """v*, six numbers along the axes of `reference` (m/s, rad/s)."""
     acceleration: ArrayLike | None = None
     """a*, six numbers along the axes of `reference` (m/s², rad/s²)."""
+    axes: ArrayLike | None = None
+    """The axes of a line or a plane as columns along those of `reference`, a rotation (3, 3); None are the same."""
 
 
 class CentroidalMap(NamedTuple):
@@ -479,7 +483,7 @@ class Evaluation(NamedTuple):
     efforts: list[_Array]
     """The efforts of all joints of each knot of a robot, nv numbers; none of other knots and of impacts."""
     forces: list[dict[str, _Array]]
-    """The forces of each knot's contacts by name, 3 or 6 numbers in the axes of their rows; of impacts the impulses."""
+    """The forces of each knot's contacts by name, 1 to 6 numbers in the axes of their rows; of impacts the impulses."""
 
 
 class _Solution(NamedTuple):

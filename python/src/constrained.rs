@@ -1,6 +1,6 @@
 //! Dynamics under constraints: the library's types and functions one to one.
 
-use crate::arrays::{Give, array, class, named_tuples, pose, type_name};
+use crate::arrays::{Give, array, class, named_tuples, pose, rotation, type_name};
 use crate::data::{Holds, Scratch};
 use crate::exceptions::{ModelError, exception, within, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
@@ -39,8 +39,13 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
     let mut constraint = match given.getattr("kind")?.extract()? {
         "point" => condyle::ContactConstraint::point(frame),
         "rigid" => condyle::ContactConstraint::rigid(frame),
-        other => return Err(wrong_word("kind", "'point' or 'rigid'", other)),
+        "line" => condyle::ContactConstraint::line(frame),
+        "plane" => condyle::ContactConstraint::plane(frame),
+        other => return Err(wrong_word("kind", "'point', 'line', 'plane' or 'rigid'", other)),
     };
+    if let Some(axes) = optional("axes")? {
+        constraint.axes = rotation("axes", &axes)?;
+    }
     constraint.other = optional("other")?.map(|other| frame_index(model, &other)).transpose()?;
     constraint.reference = Reference::read("reference", given.getattr("reference")?.extract()?, model)?;
     constraint.kp = given.getattr("kp")?.extract()?;

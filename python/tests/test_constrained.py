@@ -120,7 +120,7 @@ def test_what_is_refused(quadruped: Robot) -> None:
         condyle.ModelError, match="^constraint 1: it holds frame `LF_foot` as constraint 0 does already$"
     ):
         ConstraintSet(model, [point, point])
-    with pytest.raises(ValueError, match="^kind: expected 'point' or 'rigid', found 'line'$"):
+    with pytest.raises(ValueError, match="^kind: expected 'point', 'line', 'plane' or 'rigid', found 'edge'$"):
         ConstraintSet(model, [point._replace(kind="line")])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="^mu: expected a number of at least 0, found -1$"):
         ConstraintSet(model, [point], mu=-1.0)

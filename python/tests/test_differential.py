@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import DifferentialAction, Fddp, FreeDynamics, Problem, ProblemError
+from condyle.optimal import Cost, DifferentialAction, Fddp, FreeDynamics, Problem, ProblemError, Residual
 
 ARM = condyle.robots.arm7()
 SCHEMES = ("semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4")
@@ -132,3 +132,34 @@ def test_wrong_results_are_named(calc: Any, calc_diff: Any, text: str) -> None:
     problem = Problem([1.0, 0.0], [knot], [0] * 3, end)
     with pytest.raises((ValueError, TypeError), match=text):
         Fddp(problem).solve(np.zeros((4, 2)), np.zeros((3, 1)))
+
+
+def test_second_order_of_accelerations_written_in_python() -> None:
+    data = condyle.Data(ARM)
+
+    def arm(t: Any, x: Any, u: Any) -> Any:
+        return condyle.aba(ARM, data, x[:7], x[7:], u), 0.5 * (0.1 * x @ x + 1e-2 * u @ u)
+
+    rest = [Cost("x", 0.1, Residual.state(np.zeros(14))), Cost("u", 1e-2, Residual.control(np.zeros(7)))]
+    last = FreeDynamics(ARM, None, [Cost("x", 1.0, Residual.state(np.full(14, 0.1)))])
+    x0 = np.r_[0.3 * np.ones(7), np.zeros(7)]
+    traces = []
+    for knot in (DifferentialAction(7, 7, arm, 0.05), FreeDynamics(ARM, 0.05, rest)):
+        problem = Problem(x0, [knot], [0] * 4, last)
+        solver = Fddp(problem, max_iterations=4, second_order=True, inverse_dynamics_form=False)
+        traces.append(solver.solve(np.tile(x0, (5, 1)), np.zeros((4, 7))).trace)
+    np.testing.assert_allclose([i.cost for i in traces[0]], [i.cost for i in traces[1]], rtol=1e-9)
+    np.testing.assert_array_equal([i.step for i in traces[0]], [i.step for i in traces[1]])
+
+
+@pytest.mark.parametrize("controls", ["linear", "quadratic"])
+def test_controls_that_are_a_polynomial(controls: Any) -> None:
+    ours = DifferentialAction(1, 1, pendulum, 0.1, integrator="runge_kutta_4", upper=[2.0], controls=controls)
+    end = DifferentialAction(1, 0, lambda t, x, u: (None, 0.5 * (x @ x)), None)
+    problem, n = Problem([1.0, 0.0], [ours], [0] * 3, end), {"linear": 2, "quadratic": 3}[controls]
+    at = problem.derivatives(np.ones((4, 2)), np.ones((3, n)))[0]
+    assert at.B.shape == (2, n) and at.R.shape == (n, n)
+    constant = DifferentialAction(1, 1, pendulum, 0.1, integrator="runge_kutta_4")
+    same = Problem([1.0, 0.0], [constant], [0] * 3, end).derivatives(np.ones((4, 2)), np.ones((3, 1)))[0]
+    np.testing.assert_allclose(at.B.sum(axis=1), same.B[:, 0], atol=1e-14)
+    np.testing.assert_allclose(at.R.sum(), same.R[0, 0], atol=1e-14)

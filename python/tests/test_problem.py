@@ -317,6 +317,57 @@ def test_residuals_of_ones_own(calc: Any) -> None:
         ours.to_json()
 
 
+def bent(t: Any, x: Any, u: Any) -> Any:
+    swing = 1.0 - np.cos(x[0]) + 0.5 * x[7:] @ x[7:]
+    return swing + 0.5 * u @ u + 0.1 * u[0] * x[8] if len(u) else swing
+
+
+def bent_diff(t: Any, x: Any, u: Any) -> Any:
+    Q, S = np.diag(np.r_[np.cos(x[0]), np.zeros(6), np.ones(7)]), np.zeros((14, len(u)))
+    q = np.r_[np.sin(x[0]), np.zeros(6), x[7:]]
+    if not len(u):
+        return {"q": q, "Q": Q}
+    S[8, 0] = 0.1
+    q[8] += 0.1 * u[0]
+    return {"q": q, "Q": Q, "r": u + np.r_[0.1 * x[8], np.zeros(6)], "R": np.eye(7), "S": S}
+
+
+def as_float(t: Any, x: Any, u: Any) -> float:
+    return float(bent(t, x, u))
+
+
+@pytest.mark.parametrize(("calc", "tolerance"), [(bent, 1e-12), (as_float, 1e-6)])
+def test_costs_of_ones_own_have_a_hessian(calc: Any, tolerance: float) -> None:
+    def problem(*functions: Any) -> Problem:
+        cost = Cost("bent", 2.0, Residual.own_cost(*functions))
+        return Problem(X0, [FreeDynamics(ARM, 0.1, [cost])], [0] * 3, FreeDynamics(ARM, None, [cost]))
+
+    ours, expected = problem(calc), problem(bent, bent_diff)
+    rng = np.random.default_rng(3)
+    xs, us = rng.normal(size=(4, 14)), rng.normal(size=(3, 7))
+    values = [2.0 * (0.1 * bent(t, xs[t], us[t]) if t < 3 else bent(t, xs[t], [])) for t in range(4)]
+    np.testing.assert_allclose(ours.evaluate(xs, us).costs, values, rtol=1e-14)
+    for t, (one, other) in enumerate(zip(ours.derivatives(xs, us), expected.derivatives(xs, us), strict=True)):
+        scale, u = (0.2, us[t]) if t < 3 else (2.0, np.zeros(0))
+        exact = bent_diff(t, xs[t], u)
+        for name in exact:
+            np.testing.assert_allclose(getattr(other, name), scale * np.asarray(exact[name]), atol=1e-14)
+        for name in "qrQSR":
+            np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=tolerance)
+
+
+def test_what_is_no_cost_of_ones_own_is_said() -> None:
+    for functions, error, message in (
+        ([lambda t, x, u: x], TypeError, "the cost: expected a number"),
+        ([bent, lambda t, x, u: {"A": x}], ValueError, "expected q, r, Q, S or R, found 'A'"),
+        ([bent, lambda t, x, u: x], TypeError, "expected a dict of q, r, Q, S, R"),
+    ):
+        knot = FreeDynamics(ARM, 0.1, [Cost("own", 1.0, Residual.own_cost(*functions))])
+        problem = Problem(X0, [knot], [0] * 3, FreeDynamics(ARM, None, []))
+        with pytest.raises(error, match=message):
+            Fddp(problem).solve(np.tile(X0, (4, 1)), np.zeros((3, 7)))
+
+
 def test_errors_of_residuals_of_ones_own_are_raised() -> None:
     def fail(t: Any, x: Any, u: Any) -> Any:
         raise ZeroDivisionError("here")
@@ -367,7 +418,7 @@ def test_quasi_static_of_every_kind() -> None:
 KINDS: dict[str, Any] = {
     "FreeDynamics": lambda: FreeDynamics(ARM, 0.1, [Cost("rest", 1.0, Residual.state(X0))]),
     "end": lambda: FreeDynamics(ARM, None, []),
-    "InverseDynamics": lambda: InverseDynamics(ARM, 0.1, [], lower=np.full(7, -3.0)),
+    "InverseDynamics": lambda: InverseDynamics(ARM, 0.1, [], lower=np.full(7, -3.0), controls="linear"),
     "ContactDynamics": lambda: ContactDynamics(QUADRUPED, contacts(), 0.02, costs(3)),
     "ImpulseDynamics": lambda: ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), []),
     "Lqr": lambda: Lqr([[1.0]], B=[[2.0]], R=[[1.0]], lower=[-1.0]),
@@ -379,6 +430,7 @@ KINDS: dict[str, Any] = {
     "Unicycle, end": lambda: Unicycle(terminal=True),
     "Cost": lambda: Cost("a", 2.0, Residual.frame_velocity(ARM, "tool"), Activation.smooth2(0.5)),
     "Cost of one's own": lambda: Cost("a", 2.0, Residual.own(12, power, power_diff)),
+    "Cost with a Hessian of one's own": lambda: Cost("a", 2.0, Residual.own_cost(power, power_diff)),
     "Cost of a cone": lambda: Cost("a", 2.0, Residual.friction_cone("foot", FrictionCone(0.7))),
     "Limit": lambda: Limit("a", Residual.control([0.0]), lower=[-1.0]),
     "Limit, equality": lambda: Limit("a", Residual.control([0.0])),

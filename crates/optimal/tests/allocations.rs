@@ -5,10 +5,10 @@ mod common;
 mod counting;
 
 use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
-use condyle_dynamics::{ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
+use condyle_dynamics::{ConstraintKind, ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, FrictionCone,
-    ImpulseDynamics, Integrator, Limit, Residual,
+    Activation, Actuation, Contact, ContactDynamics, ControlPolynomial, Cost, FreeAcceleration, FreeDynamics,
+    FrictionCone, ImpulseDynamics, Integrator, Limit, Residual,
 };
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Iteration, Problem, Status, Sweep};
 use counting::{allocated, allocations};
@@ -170,12 +170,15 @@ fn a_gait_allocates_nothing() {
     .concat();
     let landing = [standing(), vec![quadratic("jump", 1e-2, Residual::ImpulseCenterOfMass)]].concat();
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, pushing).unwrap();
-    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, landing).unwrap();
+    let mut touch = contacts.clone();
+    (touch[0].constraint.kind, touch[1].constraint.kind) = (ConstraintKind::Line, ConstraintKind::Plane);
+    let impact = ImpulseDynamics::new(model.clone(), &touch, 0.0, 1e-9, landing).unwrap();
     let drives = Actuation::joints(&model);
     let flight = FreeAcceleration::new(model.clone(), drives, driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
+    let flight = flight.with_controls(ControlPolynomial::Quadratic);
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
-    let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 24]].concat();
+    let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 72]].concat();
     let models: Vec<Box<dyn condyle_optimal::ActionModel>> = vec![Box::new(stance), Box::new(impact), Box::new(flight)];
     let mut problem = Problem::new(x0.clone(), models, vec![0, 0, 1, 2, 2], Box::new(end)).unwrap();
     let xs = x0.repeat(6);

@@ -5,8 +5,10 @@ use condyle_dynamics::{
     Act, Data, FrameKind, Model, ModelBuilder, Se3, UrdfOptions, Vec3, WORLD, forward_kinematics, integrate, neutral,
     robots,
 };
-use condyle_optimal::robot::{Activation, Cost, Dynamics, FrameName, FreeDynamics, Knot, Limit, Residual};
-use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Sweep};
+use condyle_optimal::robot::{
+    Activation, Cost, Dynamics, FrameName, FreeDynamics, Knot, Limit, OwnResidual, Residual, ResidualFunction,
+};
+use condyle_optimal::{ActionModel, Error, Fddp, Hessian, LqNode, NumDiff, Problem, Sweep};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -246,7 +248,7 @@ struct OwnFunction {
     place: [usize; 2],
 }
 
-impl condyle_optimal::robot::ResidualFunction for OwnFunction {
+impl ResidualFunction for OwnFunction {
     fn size(&self) -> usize {
         2
     }
@@ -266,12 +268,114 @@ impl condyle_optimal::robot::ResidualFunction for OwnFunction {
     }
 }
 
+/// The cost ℓ = 1 − cos q₁ + ½ q₂ u₁² + u₁ v₃ of the arm.
+struct OwnCost {
+    hessian: bool,
+}
+
+impl ResidualFunction for OwnCost {
+    fn size(&self) -> usize {
+        1
+    }
+
+    fn calc(&self, _: usize, x: &[f64], u: &[f64], r: &mut [f64]) {
+        r[0] = 1.0 - x[0].cos() + 0.5 * x[1] * u[0] * u[0] + u[0] * x[9];
+    }
+
+    fn calc_diff(&self, _: usize, x: &[f64], u: &[f64], by_x: &mut [f64], by_u: &mut [f64]) {
+        (by_x[0], by_x[1], by_x[9]) = (x[0].sin(), 0.5 * u[0] * u[0], u[0]);
+        by_u[0] = x[1] * u[0] + x[9];
+    }
+
+    fn has_hessian(&self) -> bool {
+        self.hessian
+    }
+
+    fn calc_hessian(
+        &self,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        d: &[f64],
+        [by_x, by_u]: [&mut [f64]; 2],
+        hessian: &mut Hessian,
+    ) {
+        self.calc_diff(t, x, u, by_x, by_u);
+        hessian.xx[(0, 0)] = d[0] * x[0].cos();
+        hessian.xu[(1, 0)] = d[0] * u[0];
+        hessian.xu[(9, 0)] = d[0];
+        hessian.uu[(0, 0)] = d[0] * x[1];
+    }
+}
+
+/// A cost of one's own has its own gradient and Hessian in the node, times Δt and the weight; with another activation than
+/// the sum, here ½ r², the whole Hessian of that.
+#[test]
+fn a_cost_of_ones_own_has_its_hessian() {
+    let (arm, mut rng) = (Arc::new(robots::arm7()), StdRng::seed_from_u64(31));
+    let (x, u) = (random(14, 1.0, &mut rng), random(7, 1.0, &mut rng));
+    for activation in [Activation::Sum, Activation::Quadratic] {
+        let node = |hessian: bool| {
+            let own = Residual::Own(OwnResidual::new(OwnCost { hessian }));
+            let costs = vec![
+                Cost::new("own", 0.7, own.clone(), activation.clone()),
+                Cost::new("same", 0.3, own, activation.clone()),
+                Cost::new("rest", 1.0, Residual::State { reference: vec![0.0; 14] }, Activation::Quadratic),
+                Cost::new("effort", 1.0, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic),
+            ];
+            let mut action = FreeDynamics::running(arm.clone(), DT, costs).unwrap();
+            let (mut node, mut numeric) = (LqNode::zeros(14, 7), LqNode::zeros(14, 7));
+            action.calc_diff(0, &x, &u, &mut node);
+            NumDiff(action).calc_diff(0, &x, &u, &mut numeric);
+            assert!((&node.q - &numeric.q).amax() < DIFFERENCES && (&node.r - &numeric.r).amax() < DIFFERENCES);
+            node
+        };
+        let (own, gauss_newton) = (node(true), node(false));
+        let mut r = [0.0];
+        OwnCost { hessian: true }.calc(0, &x, &u, &mut r);
+        let (mut expected, slope) = (gauss_newton.clone(), if activation == Activation::Sum { DT } else { DT * r[0] });
+        expected.Q[(0, 0)] += slope * x[0].cos();
+        expected.S[(1, 0)] += slope * u[0];
+        expected.S[(9, 0)] += slope;
+        expected.R[(0, 0)] += slope * x[1];
+        for (name, a, b) in [("Q", &own.Q, &expected.Q), ("S", &own.S, &expected.S), ("R", &own.R, &expected.R)] {
+            assert!(largest_difference(a.as_slice(), b.as_slice()) < 1e-14, "{name} of {activation:?}");
+        }
+    }
+}
+
+/// Iterates do not depend on the setting of the knots' form, and the optimum not on the Hessian.
+#[test]
+fn a_cost_of_ones_own_in_a_solve() {
+    let arm = Arc::new(robots::arm7());
+    let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    let solve = |hessian: bool, form: bool| {
+        let own = Residual::Own(OwnResidual::new(OwnCost { hessian }));
+        let costs = vec![
+            Cost::new("own", 1e-2, own, Activation::Sum),
+            Cost::new("rest", 1.0, Residual::State { reference: vec![0.1; 14] }, Activation::Quadratic),
+            Cost::new("effort", 1e-1, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic),
+        ];
+        let knot = FreeDynamics::running(arm.clone(), DT, costs).unwrap();
+        let end = Box::new(FreeDynamics::terminal(arm.clone(), vec![]).unwrap());
+        let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 10], end).unwrap();
+        let us = problem.quasi_static(&x0.repeat(11)).unwrap();
+        let mut solver = Fddp::new(&problem);
+        solver.settings.inverse_dynamics_form = form;
+        solver.solve(&mut problem, &x0.repeat(11), &us).unwrap().clone()
+    };
+    let [with, without, gauss_newton] = [solve(true, true), solve(true, false), solve(false, true)];
+    assert_eq!(with.trace.len(), without.trace.len());
+    assert!((with.cost - without.cost).abs() < 1e-10 * (1.0 + with.cost.abs()));
+    assert!((with.cost - gauss_newton.cost).abs() < 1e-7 * (1.0 + with.cost.abs()), "one optimum");
+}
+
 /// The derivatives of a residual of one's own are those of differences, and the solver's iterates do not depend on the form
 /// of its knots.
 #[test]
 fn a_residual_of_ones_own_is_one_among_others() {
     use condyle_dynamics::ContactConstraint;
-    use condyle_optimal::robot::{Contact, ContactDynamics, OwnResidual};
+    use condyle_optimal::robot::{Contact, ContactDynamics};
     let model = Arc::new(robots::quadruped());
     let (nq, nv) = (model.nq(), model.nv());
     let mut q = condyle_dynamics::neutral(&model);

@@ -12,7 +12,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rust::robot::{self, Actuation, ControlBounds, Dynamics, Integrator, Knot};
+use rust::robot::{self, Actuation, ControlBounds, ControlPolynomial, Dynamics, Integrator, Knot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -26,6 +26,16 @@ pub(super) fn integrator(name: &str) -> PyResult<Integrator> {
             let allowed = "'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'";
             Err(wrong_word("integrator", allowed, other))
         }
+    }
+}
+
+/// How controls go through the time of a knot.
+pub(super) fn polynomial(name: &str) -> PyResult<ControlPolynomial> {
+    match name {
+        "constant" => Ok(ControlPolynomial::Constant),
+        "linear" => Ok(ControlPolynomial::Linear),
+        "quadratic" => Ok(ControlPolynomial::Quadratic),
+        other => Err(wrong_word("controls", "'constant', 'linear' or 'quadratic'", other)),
     }
 }
 
@@ -82,12 +92,13 @@ fn knot(
     (costs, costs_at): (&[PyRef<'_, Cost>], At<'_, Cost>),
     (all, limits_at): (Limits<'_>, At<'_, Limit>),
     bounds: Option<[Vec<f64>; 2]>,
+    controls: ControlPolynomial,
 ) -> Knot {
     let costs_at = costs_at.into_iter().flatten().map(|(t, costs)| (t, terms(model, &costs))).collect();
     let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(model, Some(those)))).collect();
     let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
     let (costs, limits) = (terms(model, costs), limits(model, all));
-    Knot { dynamics, costs, costs_at, limits, limits_at, bounds }
+    Knot { dynamics, costs, costs_at, limits, limits_at, bounds, controls }
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.
@@ -104,6 +115,9 @@ fn knot(
 /// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 /// limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
 /// limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
+/// controls: how they go through the knot's time: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times nu
+///     controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt (by 'runge_kutta_3' 0, Δt/3 and 2 Δt/3);
+///     bounds hold at each of them.
 ///
 /// Raises `ProblemError` for a cost, a limit or drives that do not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
@@ -114,7 +128,7 @@ impl FreeDynamics {
     #[new]
     #[pyo3(signature = (
         model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None,
-        limits=None, limits_at=None
+        limits=None, limits_at=None, controls="constant"
     ))]
     fn new(
         model: &Bound<'_, Model>,
@@ -127,6 +141,7 @@ impl FreeDynamics {
         upper: Option<&Bound<'_, PyAny>>,
         limits: Limits<'_>,
         limits_at: At<'_, Limit>,
+        controls: &str,
     ) -> PyResult<Self> {
         let Some(dt) = dt else {
             let kept = kept_at(model.py(), &costs, &None, &limits, &None);
@@ -135,12 +150,12 @@ impl FreeDynamics {
             };
             return Ok(Self(RobotAction::new(model, kept, end)?));
         };
-        let integrator = self::integrator(integrator)?;
+        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
         let kept = kept_at(model.py(), &costs, &costs_at, &limits, &limits_at);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let (actuation, nu) = self::actuation(model, actuation)?;
             let dynamics = Dynamics::Free { actuation, integrator, dt };
-            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
+            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?, controls))
         })?))
     }
 
@@ -174,7 +189,7 @@ impl FreeDynamics {
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`.
 /// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-/// costs_at, actuation, integrator, lower, upper, limits, limits_at: as of `FreeDynamics`.
+/// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
 /// damping.
@@ -191,7 +206,7 @@ impl ContactDynamics {
     #[new]
     #[pyo3(signature = (
         model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler",
-        lower=None, upper=None, limits=None, limits_at=None
+        lower=None, upper=None, limits=None, limits_at=None, controls="constant"
     ))]
     fn new(
         model: &Bound<'_, Model>,
@@ -206,13 +221,14 @@ impl ContactDynamics {
         upper: Option<&Bound<'_, PyAny>>,
         limits: Limits<'_>,
         limits_at: At<'_, Limit>,
+        controls: &str,
     ) -> PyResult<Self> {
-        let integrator = self::integrator(integrator)?;
+        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
         let kept = kept_at(model.py(), &costs, &costs_at, &limits, &limits_at);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let ((actuation, nu), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);
             let dynamics = Dynamics::Contact { contacts, damping, actuation, integrator, dt };
-            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?))
+            Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?, controls))
         })?))
     }
 
@@ -270,7 +286,7 @@ impl ImpulseDynamics {
         Ok(Self(RobotAction::new(model, kept, |model| {
             let contacts = self::contacts(model, contacts)?;
             let dynamics = Dynamics::Impulse { contacts, restitution, damping };
-            Ok(knot(model, dynamics, (&costs, None), (limits, None), None))
+            Ok(knot(model, dynamics, (&costs, None), (limits, None), None, ControlPolynomial::Constant))
         })?))
     }
 
@@ -302,7 +318,7 @@ impl ImpulseDynamics {
 /// model: the robot.
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
-/// integrator, lower, upper, limits: as of `FreeDynamics`.
+/// integrator, lower, upper, limits, controls: as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a cost or a limit that does not fit.
 #[pyclass(frozen, module = "condyle.optimal")]
@@ -311,7 +327,9 @@ pub(crate) struct InverseDynamics(pub(super) RobotAction<robot::InverseDynamics>
 #[pymethods]
 impl InverseDynamics {
     #[new]
-    #[pyo3(signature = (model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None, limits=None))]
+    #[pyo3(signature = (
+        model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None, limits=None, controls="constant"
+    ))]
     fn new(
         model: &Bound<'_, Model>,
         dt: f64,
@@ -320,12 +338,13 @@ impl InverseDynamics {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
         limits: Limits<'_>,
+        controls: &str,
     ) -> PyResult<Self> {
-        let integrator = self::integrator(integrator)?;
+        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
         let kept = kept_at(model.py(), &costs, &None, &limits, &None);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let bounds = bounds(model.nv(), lower, upper)?;
-            Ok(knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds))
+            Ok(knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds, controls))
         })?))
     }
 

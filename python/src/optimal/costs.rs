@@ -44,6 +44,12 @@ impl Activation {
         Ok(Self(robot::Activation::WeightedBarrier { lower, upper, weights }))
     }
 
+    /// The sum Σ rᵢ, for residuals that are costs by themselves: see `Residual.own_cost`.
+    #[staticmethod]
+    fn sum() -> Self {
+        Self(robot::Activation::Sum)
+    }
+
     /// The smooth cost Σ √(ε + rᵢ²), nearly Σ |rᵢ|.
     #[staticmethod]
     #[pyo3(signature = (epsilon=1.0))]
@@ -80,8 +86,8 @@ impl Activation {
 /// name: what `Problem.set_weight` and errors call it.
 /// weight: finite and at least 0; a term whose weight is 0 is not computed.
 /// residual: a `Residual`.
-/// activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, and quadratic
-///     for other residuals.
+/// activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, the sum for
+///     `Residual.own_cost`, and quadratic for other residuals.
 ///
 /// >>> from condyle.optimal import Cost, Residual
 /// >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
@@ -119,6 +125,7 @@ impl Cost {
         let activation = match (activation, residual.get().bounds()) {
             (Some(activation), _) => activation.get().0.clone(),
             (None, Some((lower, upper))) => robot::Activation::Barrier { lower, upper },
+            (None, None) if residual.get().is_number() => robot::Activation::Sum,
             (None, None) => robot::Activation::Quadratic,
         };
         Self { name, weight, residual: residual.clone().unbind(), activation }

@@ -32,6 +32,9 @@ enum Kind {
     /// A function, written in Python, with the number of its entries.
     #[serde(skip)]
     Own(usize, Functions),
+    /// A number, a cost by itself, written in Python.
+    #[serde(skip)]
+    Number(Functions),
 }
 
 impl From<robot::Residual> for Residual {
@@ -131,7 +134,7 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
-    /// The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 3 or 6
+    /// The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 1, 2, 3 or 6
     /// numbers; target has 6.
     #[staticmethod]
     #[pyo3(signature = (contact, target=None))]
@@ -182,6 +185,23 @@ impl Residual {
         Ok(Self(Kind::Own(within("size", size, 0, MOST_SIZE)?, Functions::new(calc, calc_diff))))
     }
 
+    /// A cost that is written in Python, a number ℓ(t, x, u) of a knot t with a Hessian of its own, as a residual of one
+    /// entry; a `Cost` of it is weight · ℓ, by `Activation.sum()`, which it has by default.
+    ///
+    /// calc: a function of (t, x, u) that returns ℓ; x = (q, v), and at the end u is empty.
+    /// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among q, r, Q, S, R: the gradient and the
+    ///     Hessian of ℓ by x, in the tangent space of the state, and by u. Without it, those of calc, as for `Action`.
+    ///
+    /// Knots with such a cost are solved by their controls, not in inverse-dynamics form.
+    ///
+    /// >>> from condyle.optimal import Cost, Residual
+    /// >>> swing = Cost("swing", 2.0, Residual.own_cost(lambda t, x, u: 1.0 - np.cos(x[0])))
+    #[staticmethod]
+    #[pyo3(signature = (calc, calc_diff=None))]
+    fn own_cost(calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> Self {
+        Self(Kind::Number(Functions::new(calc, calc_diff)))
+    }
+
     /// The residual as the JSON of a problem has it.
     fn __repr__(&self) -> String {
         match &self.0 {
@@ -190,6 +210,7 @@ impl Residual {
                 format!("<condyle.optimal.Residual {json}>")
             }
             Kind::Own(size, _) => format!("<condyle.optimal.Residual of one's own, {size} numbers>"),
+            Kind::Number(_) => "<condyle.optimal.Residual of one's own, a cost>".to_owned(),
         }
     }
 
@@ -200,6 +221,10 @@ impl Residual {
             Kind::Own(size, functions) => {
                 let [calc, calc_diff] = functions.clones(py);
                 (make("own")?, (*size, calc, calc_diff)).into_pyobject(py)?.into_any()
+            }
+            Kind::Number(functions) => {
+                let [calc, calc_diff] = functions.clones(py);
+                (make("own_cost")?, (calc, calc_diff)).into_pyobject(py)?.into_any()
             }
             given => {
                 let text = serde_json::to_string(given).expect("is made of numbers and words");
@@ -216,13 +241,13 @@ impl Residual {
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
         match &self.0 {
-            Kind::Own(_, functions) => functions.traverse(&visit),
+            Kind::Own(_, functions) | Kind::Number(functions) => functions.traverse(&visit),
             Kind::Given(_) => Ok(()),
         }
     }
 
     fn __clear__(&self) {
-        if let Kind::Own(_, functions) = &self.0 {
+        if let Kind::Own(_, functions) | Kind::Number(functions) = &self.0 {
             functions.clear();
         }
     }
@@ -231,19 +256,23 @@ impl Residual {
 impl Residual {
     /// The residual for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Residual {
-        match &self.0 {
-            Kind::Given(inner) => inner.clone(),
-            Kind::Own(size, functions) => {
-                let (space, functions) = (Space::Robot(model.clone()), functions.clone());
-                let own = OwnFunction { size: *size, functions, space, way: Way::default(), fault: Fault::default() };
-                robot::Residual::Own(robot::OwnResidual::new(own))
-            }
-        }
+        let (size, functions, number) = match &self.0 {
+            Kind::Given(inner) => return inner.clone(),
+            Kind::Own(size, functions) => (*size, functions.clone(), false),
+            Kind::Number(functions) => (1, functions.clone(), true),
+        };
+        let (space, way, fault) = (Space::Robot(model.clone()), Way::default(), Fault::default());
+        robot::Residual::Own(robot::OwnResidual::new(OwnFunction { size, number, functions, space, way, fault }))
     }
 
     /// Whether it is written in Python.
     pub(super) fn is_own(&self) -> bool {
-        matches!(self.0, Kind::Own(..))
+        matches!(self.0, Kind::Own(..) | Kind::Number(_))
+    }
+
+    /// Whether it is a cost by itself.
+    pub(super) fn is_number(&self) -> bool {
+        matches!(self.0, Kind::Number(_))
     }
 
     /// The bounds that a residual has of its own: those of a cone, or of a centre of pressure.

@@ -294,3 +294,102 @@ def test_control_gravity():
     mine, total = costs(r, r.nu, gravity, "quadratic")
     dynamics = crocoddyl.DifferentialActionModelFreeFwdDynamics(r.state, r.drives, total)
     same_iterates(r, FreeDynamics(r.ours, DT, mine), crocoddyl.IntegratedActionModelEuler(dynamics, DT))
+
+
+def partial_contacts(r, kind, axes):
+    """Contacts of both feet along a line or in a plane, in both libraries."""
+    contacts, ours = crocoddyl.ContactModelMultiple(r.state, r.nu), {}
+    word, R, x = "local" if axes == pin.LOCAL else "local_world_aligned", placement().rotation, 0.1
+    for foot in r.feet:
+        if kind == "line":
+            gains, at = np.array([5.0, 10.0]), pin.SE3(np.eye(3), R @ [0.0, 0.0, x]).homogeneous
+            made = crocoddyl.ContactModel1D(r.state, r.frame(foot), x, axes, R, r.nu, gains)
+            constraint = condyle.ContactConstraint(foot, kind, None, word, *gains, at, axes=R.T)
+        else:
+            # without kp: Crocoddyl takes the error of position along the world's axes whatever the frame's are
+            gains = np.array([0.0, 10.0])
+            made = crocoddyl.ContactModel2D(r.state, r.frame(foot), np.zeros(2), r.nu, gains)
+            constraint = condyle.ContactConstraint(foot, kind, kd=10.0)
+        contacts.addContact(foot, made)
+        ours[foot] = constraint
+    return ours, contacts
+
+
+def partial_force(rows):
+    def make(r, nu):
+        foot, target = r.feet[0], np.linspace(0.5, 1.0, 6)
+        made = crocoddyl.ResidualModelContactForce(r.state, r.frame(foot), pin.Force(target), rows, nu, True)
+        return made, 1e-3, Residual.contact_force(foot, target), rows
+
+    return make
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    ("kind", "axes", "term"),
+    [
+        ("line", pin.LOCAL, partial_force(1)),
+        ("line", pin.LOCAL_WORLD_ALIGNED, partial_force(1)),
+        ("line", pin.LOCAL_WORLD_ALIGNED, acceleration),
+        ("plane", pin.LOCAL, partial_force(2)),
+        ("plane", pin.LOCAL, friction),
+        ("plane", pin.LOCAL, acceleration),
+    ],
+)
+def test_contacts_along_axes(robot, kind, axes, term):
+    r = ROBOTS[robot]
+    mine, total = costs(r, r.nu, term, "quadratic")
+    ours, theirs = partial_contacts(r, kind, axes)
+    dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, theirs, total, 0.0, True)
+    knot = ContactDynamics(r.ours, ours, DT, mine)
+    same_iterates(r, knot, crocoddyl.IntegratedActionModelEuler(dynamics, DT))
+    # what holds the robot still
+    x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
+    np.testing.assert_allclose(knot.quasi_static(x), dynamics.quasiStatic(dynamics.createData(), x), atol=1e-7)
+
+
+POLYNOMIALS = {
+    "constant": lambda nu, kind: crocoddyl.ControlParametrizationModelPolyZero(nu),
+    "linear": lambda nu, kind: crocoddyl.ControlParametrizationModelPolyOne(nu),
+    "quadratic": crocoddyl.ControlParametrizationModelPolyTwoRK,
+}
+STAGES = {
+    "semi_implicit_euler": None,
+    "runge_kutta_2": crocoddyl.RKType.two,
+    "runge_kutta_3": crocoddyl.RKType.three,
+    "runge_kutta_4": crocoddyl.RKType.four,
+}
+
+
+@pytest.mark.parametrize("controls", POLYNOMIALS)
+@pytest.mark.parametrize("integrator", STAGES)
+@pytest.mark.parametrize("robot", ["arm7", "quadruped"])
+def test_control_polynomial(robot, integrator, controls):
+    r, kind = ARM if robot == "arm7" else ROBOTS[robot], STAGES[integrator]
+    mine, total = costs(r, r.nu, translation, "quadratic")
+    free = robot == "arm7"
+    contacts, held = ({}, None) if free else r.contacts()
+    dynamics = (
+        crocoddyl.DifferentialActionModelFreeFwdDynamics(r.state, r.drives, total)
+        if free
+        else crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, held, total, 0.0, True)
+    )
+    # a quadratic needs a rule of three or four stages in Crocoddyl; by others its nodes are those of four
+    of = kind if kind == crocoddyl.RKType.three else crocoddyl.RKType.four
+    polynomial = POLYNOMIALS[controls](r.nu, of)
+    if kind is None:
+        theirs = crocoddyl.IntegratedActionModelEuler(dynamics, polynomial, DT)
+    else:
+        theirs = crocoddyl.IntegratedActionModelRK(dynamics, polynomial, kind, DT)
+    made = {"integrator": integrator, "controls": controls}
+    ours = FreeDynamics(r.ours, DT, mine, **made) if free else ContactDynamics(r.ours, contacts, DT, mine, **made)
+    data, w = theirs.createData(), RNG.uniform(-1.0, 1.0, theirs.nu)
+    theirs.calc(data, r.x0, w)
+    problem = Problem(r.x0, [ours], [0], FreeDynamics(r.ours, None, []))
+    at = problem.evaluate(np.array([r.x0, data.xnext]), w[None])
+    np.testing.assert_allclose(at.next_states[0], data.xnext, atol=1e-11)
+    np.testing.assert_allclose(at.costs[0], data.cost, rtol=1e-11)
+    x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
+    np.testing.assert_allclose(ours.quasi_static(x), theirs.quasiStatic(theirs.createData(), x), atol=1e-7)
+    if free and integrator != "runge_kutta_3":  # otherwise Crocoddyl's derivatives are off, see test_runge_kutta
+        same_iterates(r, ours, theirs)

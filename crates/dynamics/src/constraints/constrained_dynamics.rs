@@ -11,6 +11,7 @@
 //! Source: Udwadia and Kalaba, *A new perspective on constrained motion* (1992); Carpentier, Budhiraja, Mansard, *Proximal
 //! and sparse resolution of constrained dynamic equations* (2021).
 
+use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::crba;
@@ -20,7 +21,7 @@ use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use condyle_spatial::{Act, Cross, Force, Inertia, Mat3, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
 /// In the world's frame.
@@ -146,15 +147,22 @@ impl<S: Scalar> ConstraintSet<S> {
         residual
     }
 
-    /// The force of constraint k as the last call left it, at the origin of its frame, along the axes of its rows; of a
-    /// point without moment. It acts on the body of the frame, its opposite on the other body or the world.
+    /// The force of constraint k as the last call left it, at the origin of its frame, along the axes of its reference; of
+    /// all but rigid ones without moment. It acts on the body of the frame, its opposite on the other body or the world.
     ///
     /// # Panics
     /// If there is no such constraint.
     pub fn force(&self, k: usize) -> Force<S> {
         let mut f = [S::zero(); 6];
-        let range = self.range(k);
-        f[..range.len()].copy_from_slice(&self.lambda[range]);
+        let (plan, lambda) = (&self.plans[k], &self.lambda[self.range(k)]);
+        let axes: Mat3<S> = plan.axes.lift();
+        match plan.kind {
+            ConstraintKind::Line => return Force::new(axes.z.scale(lambda[0]), Vec3::zero()),
+            ConstraintKind::Plane => {
+                return Force::new(axes.x.scale(lambda[0]) + axes.z.scale(lambda[1]), Vec3::zero());
+            }
+            _ => f[..lambda.len()].copy_from_slice(lambda),
+        }
         f.into()
     }
 }

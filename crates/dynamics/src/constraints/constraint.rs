@@ -3,7 +3,7 @@
 use crate::passes::frames::ReferenceFrame;
 use condyle_model::Error;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Motion, Scalar, Se3};
+use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3};
 use core::any::Any;
 use serde::{Deserialize, Serialize};
 
@@ -13,14 +13,20 @@ use serde::{Deserialize, Serialize};
 pub enum ConstraintKind {
     /// The origin of a frame: three rows, a force.
     Point,
+    /// The origin of a frame along one axis, the third of [`axes`](ContactConstraint::axes): one row.
+    Line,
+    /// The origin of a frame along two axes, the first and the third of [`axes`](ContactConstraint::axes): two rows.
+    Plane,
     /// A frame: six rows, a force and a moment, linear first.
     Rigid,
 }
 
 impl ConstraintKind {
-    /// 3 or 6.
+    /// 1 (line), 2 (plane), 3 (point) or 6 (rigid).
     pub fn rows(self) -> usize {
         match self {
+            Self::Line => 1,
+            Self::Plane => 2,
             Self::Point => 3,
             Self::Rigid => 6,
         }
@@ -31,7 +37,8 @@ impl ConstraintKind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Target<S> {
-    /// The wanted pose of the frame in the other frame (the world for a contact); of a point, the translation alone.
+    /// The wanted pose of the frame in the other frame (the world for a contact); of all but rigid ones, the translation
+    /// alone.
     pub placement: Se3<S>,
     /// The wanted velocity relative to the other frame, in the reference frame (m/s, rad/s).
     pub velocity: Motion<S>,
@@ -87,6 +94,11 @@ impl<S: Scalar> Target<S> {
 /// Signs, gains and axes are those of Pinocchio's `RigidConstraintModel` (whose second placement is the other frame's
 /// times the target) and, for contacts, of Crocoddyl's `ContactModel3D` and `ContactModel6D`.
 ///
+/// A contact along a line or in a plane has some rows of a point's, along the columns e₁, e₂, e₃ of `axes`, which stand in
+/// the axes of `reference`: e₃ (line), or e₁ and e₃ (plane); the other directions are free. Crocoddyl's `ContactModel1D`
+/// with a `rotation` and a reference x* is the line with `axes` = rotationᵀ and the target rotation · (0, 0, x*); its
+/// `ContactModel2D` is the plane in `Local` (with kp, it takes the error of position along the world's x and z).
+///
 /// Source: Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems* (1972).
 ///
 /// ```
@@ -104,8 +116,11 @@ pub struct ContactConstraint {
     pub frame: usize,
     /// The number of the frame that it is held to; the world if there is none.
     pub other: Option<usize>,
-    /// A point or the whole frame.
+    /// A point, some directions of it, or the whole frame.
     pub kind: ConstraintKind,
+    /// The axes of a line or a plane, as columns along those of `reference`; 1 for all others.
+    #[serde(default = "Mat3::identity")]
+    pub axes: Mat3<f64>,
     /// Along which axes the rows and λ are: `Local` or `LocalWorldAligned`.
     pub reference: ReferenceFrame,
     /// How fast an error of position decays (1/s²).
@@ -122,7 +137,18 @@ impl ContactConstraint {
     pub fn point(frame: usize) -> Self {
         let reference = ReferenceFrame::Local;
         let target = Target::identity();
-        Self { frame, other: None, kind: ConstraintKind::Point, reference, kp: 0.0, kd: 0.0, target }
+        let axes = Mat3::identity();
+        Self { frame, other: None, kind: ConstraintKind::Point, axes, reference, kp: 0.0, kd: 0.0, target }
+    }
+
+    /// A contact of a frame's origin with the world along the frame's z alone, without stabilisation.
+    pub fn line(frame: usize) -> Self {
+        Self { kind: ConstraintKind::Line, ..Self::point(frame) }
+    }
+
+    /// A contact of a frame's origin with the world along the frame's x and z, without stabilisation.
+    pub fn plane(frame: usize) -> Self {
+        Self { kind: ConstraintKind::Plane, ..Self::point(frame) }
     }
 
     /// A rigid contact of a frame with the world, in `Local`, without stabilisation.
@@ -154,7 +180,14 @@ impl ContactConstraint {
         if let Some(what) = self.target.wrong() {
             return wrong(what.to_owned());
         }
-        let same = |c: &Self| (c.frame, c.other) == (self.frame, self.other) && c.kind == self.kind;
+        if !self.axes.is_rotation() {
+            return wrong("its axes are no rotation: expected three unit vectors at right angles".to_owned());
+        }
+        if matches!(self.kind, ConstraintKind::Point | ConstraintKind::Rigid) && self.axes != Mat3::identity() {
+            return wrong("its axes must be the identity: only lines and planes have axes of their own".to_owned());
+        }
+        let what = |c: &Self| (c.frame, c.other, c.kind, c.axes);
+        let same = |c: &Self| what(c) == what(self);
         if let Some(twin) = before.iter().position(same) {
             return wrong(format!("it holds frame `{}` as constraint {twin} does already", frame.name));
         }

@@ -63,9 +63,11 @@ pub(crate) struct ConstraintLanes {
 }
 
 impl ConstraintLanes {
-    /// The lanes for a robot with limbs on which no joint follows another.
+    /// The lanes for a robot with limbs on which no joint follows another, and constraints of points and frames.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>, plans: &[Plan]) -> Option<Box<Self>> {
-        if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() {
+        // rows come by threes
+        let whole = plans.iter().all(|plan| plan.rows().is_multiple_of(3));
+        if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() || !whole {
             return None;
         }
         let alone = model.nodes().iter().skip(1).filter(|node| node.parent == 0).count() == 1;

@@ -8,6 +8,8 @@
 //! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)            u, α: velocity, acceleration of points
 //! ```
 //!
+//! and of a line or a plane the part of a point's along some axes, e₃ᵀ (…) or [e₁ e₃]ᵀ (…).
+//!
 //! When coordinate e moves a body, ∂v and ∂a are those in the head of `rnea_derivatives.rs`; a point p of the body with
 //! s = S_e at p and Ψ̇, Ψ̈ taken there too then has
 //!
@@ -22,7 +24,7 @@ use crate::constraints::constraint::{ConstraintKind, Target};
 use crate::constraints::plan::Plan;
 use crate::passes::kinematics::World;
 use condyle_spatial::lie::{Quaternion, jlog6, log6};
-use condyle_spatial::{Act, Cross, Motion, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Cross, Mat3, Motion, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
 /// The poses of the two frames of a constraint and the motions of their bodies, in the world's frame.
@@ -103,6 +105,30 @@ impl<S: Scalar> FramePair<S> {
         if plan.aligned() { x } else { self.x1.rotation.transpose_mul(x) }
     }
 
+    /// The rows of what a point's rows would be: its part along the constraint's axes.
+    #[inline(always)]
+    fn held(plan: &Plan, x: Vec3<S>) -> Motion<S> {
+        let axes: Mat3<S> = plan.axes.lift();
+        let linear = match plan.kind {
+            ConstraintKind::Line => Vec3::new(axes.z.dot(x), S::zero(), S::zero()),
+            ConstraintKind::Plane => Vec3::new(axes.x.dot(x), axes.z.dot(x), S::zero()),
+            _ => x,
+        };
+        Motion::new(linear, Vec3::zero())
+    }
+
+    /// A column of J of the points, along the axes of `reference`, as `column`.
+    #[inline(always)]
+    pub(crate) fn point_column(&self, plan: &Plan, s: Motion<S>, first: bool, second: bool) -> Vec3<S> {
+        let (s1, s2) = (at(s, self.x1.translation), at(s, self.x2.translation));
+        let linear = match (first, second) {
+            (true, true) => s1 - s2,
+            (true, false) => s1,
+            (false, _) => -s2,
+        };
+        self.along(plan, linear)
+    }
+
     /// A motion along the axes of frame 1 as the constraint's rows express it.
     #[inline(always)]
     pub(crate) fn outward(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
@@ -123,15 +149,7 @@ impl<S: Scalar> FramePair<S> {
         match plan.kind {
             ConstraintKind::Rigid if first == second => Motion::zero(),
             ConstraintKind::Rigid => self.express(plan, if first { s } else { -s }),
-            ConstraintKind::Point => {
-                let (s1, s2) = (at(s, self.x1.translation), at(s, self.x2.translation));
-                let linear = match (first, second) {
-                    (true, true) => s1 - s2,
-                    (true, false) => s1,
-                    (false, _) => -s2,
-                };
-                Motion::new(self.along(plan, linear), Vec3::zero())
-            }
+            _ => Self::held(plan, self.point_column(plan, s, first, second)),
         }
     }
 
@@ -155,15 +173,15 @@ impl<S: Scalar> FramePair<S> {
     pub(crate) fn acceleration(&self, plan: &Plan, target: &Target<S>) -> Motion<S> {
         let (kp, kd) = (S::splat(plan.kp), S::splat(plan.kd));
         let wanted = target.velocity.scale_add(kd, target.acceleration);
-        let value = match plan.kind {
+        match plan.kind {
             ConstraintKind::Rigid => {
                 let m = self.express(plan, self.rigid(plan, kd));
                 // Without kp no logarithm, which is not smooth at half turns.
-                if plan.kp > 0.0 { m + self.outward(plan, self.error().scale(kp)) } else { m }
+                let m = if plan.kp > 0.0 { m + self.outward(plan, self.error().scale(kp)) } else { m };
+                m - wanted
             }
-            ConstraintKind::Point => Motion::new(self.along(plan, self.point(kp, kd)), Vec3::zero()),
-        };
-        value - wanted
+            _ => Self::held(plan, self.along(plan, self.point(kp, kd)) - wanted.linear),
+        }
     }
 
     /// a₁ − a₂ + Δv × v₂ + kd Δv.
@@ -206,7 +224,7 @@ impl<S: Scalar> FramePair<S> {
     ) {
         match plan.kind {
             ConstraintKind::Rigid => self.rigid_derivatives(plan, target, w, error, dq, dv),
-            ConstraintKind::Point => self.point_derivatives(plan, w, dq, dv),
+            _ => self.point_derivatives(plan, w, dq, dv),
         }
     }
 
@@ -292,8 +310,9 @@ impl<S: Scalar> FramePair<S> {
                 by_q -= s.angular.cross(held);
             }
             let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
-            let (by_q, by_v) = (self.along(plan, by_q).to_array(), self.along(plan, by_v).to_array());
-            for r in 0..3 {
+            let by_q = Self::held(plan, self.along(plan, by_q)).to_array();
+            let by_v = Self::held(plan, self.along(plan, by_v)).to_array();
+            for r in 0..plan.rows() {
                 dq[(row + r, column)] += by_q[r] * ratio;
                 dv[(row + r, column)] += by_v[r] * ratio;
             }
@@ -329,7 +348,7 @@ impl<S: Scalar> FramePair<S> {
                     }
                     m
                 }
-                ConstraintKind::Point => {
+                _ => {
                     let (u1, u2) = (at(v1, p1), at(v2, p2));
                     let mut u = Vec3::zero();
                     if first {
@@ -341,7 +360,7 @@ impl<S: Scalar> FramePair<S> {
                     if first && !plan.aligned() {
                         u -= s.angular.cross(u1 - u2);
                     }
-                    Motion::new(self.along(plan, u), Vec3::zero())
+                    Self::held(plan, self.along(plan, u))
                 }
             };
             let change = change.scale(S::splat(touch.ratio)).to_array();

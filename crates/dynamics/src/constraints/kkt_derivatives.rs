@@ -41,7 +41,7 @@ impl<S: Scalar> ConstraintSet<S> {
         let f = self.local_force(i, ends);
         match self.plans[i].kind {
             ConstraintKind::Rigid => ends.x1.act(f),
-            ConstraintKind::Point => {
+            _ => {
                 let linear = ends.x1.rotation * f.linear;
                 Force::new(linear, ends.x2.translation.cross(linear))
             }
@@ -75,7 +75,7 @@ impl<S: Scalar> ConstraintSet<S> {
                     let s = world.S[e.column];
                     let change = match plan.kind {
                         ConstraintKind::Rigid => s.cross(f),
-                        ConstraintKind::Point => {
+                        _ => {
                             let linear = s.angular.cross(f.linear);
                             Force::new(linear, ends.x2.translation.cross(linear))
                         }
@@ -91,11 +91,26 @@ impl<S: Scalar> ConstraintSet<S> {
             }
             if plan.aligned() {
                 let f = self.force(i);
+                let ends = match plan.kind {
+                    ConstraintKind::Line | ConstraintKind::Plane => {
+                        Some(FramePair::at_rest(plan, &self.targets[i], world))
+                    }
+                    _ => None,
+                };
                 for e in &plan.touches {
                     if !e.first {
                         continue;
                     }
                     let w = world.S[e.column].angular.scale(S::splat(e.ratio));
+                    // the turned force leaves the axes of a line or a plane: all rows of the point
+                    if let Some(ends) = &ends {
+                        let turned = w.cross(f.linear); // ω × λ
+                        for j in &plan.touches {
+                            let column = ends.point_column(plan, world.S[j.column], j.first, j.second);
+                            r[(j.coordinate, e.coordinate)] += column.dot(turned) * S::splat(j.ratio); // Jᵀ (ω × λ)
+                        }
+                        continue;
+                    }
                     let turned = Motion::new(w.cross(f.linear), w.cross(f.angular)).to_array(); // ω × λ
                     for k in 0..plan.rows() {
                         let J = &self.J[plan.range(k)];

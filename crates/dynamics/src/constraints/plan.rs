@@ -9,7 +9,7 @@ use crate::passes::frames::ReferenceFrame;
 use condyle_linalg::elimination_tree::{EliminationTree, NONE};
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::{Error, Model};
-use condyle_spatial::{Se3, Vec3};
+use condyle_spatial::{Mat3, Se3, Vec3};
 use core::ops::Range;
 use std::collections::BTreeSet;
 
@@ -54,6 +54,8 @@ pub(crate) struct SupportColumn {
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub kind: ConstraintKind,
+    /// The axes of a line or a plane, along those of `reference`.
+    pub axes: Mat3<f64>,
     pub reference: ReferenceFrame,
     pub kp: f64,
     pub kd: f64,
@@ -124,6 +126,7 @@ impl Plan {
                 |k: usize| Se3::new(model.nodes()[bodies[k]].axis_rotation.transpose(), Vec3::zero()) * placements[k];
             let mut plan = Plan {
                 kind: constraint.kind,
+                axes: constraint.axes,
                 reference: constraint.reference,
                 kp: constraint.kp,
                 kd: constraint.kd,

@@ -2,7 +2,7 @@
 
 use super::{State, all_models, normal3, random_pose, rng};
 use condyle_dynamics::{
-    ConstraintKind, ConstraintSet, ContactConstraint, Data, Model, Motion, ReferenceFrame, Target,
+    ConstraintKind, ConstraintSet, ContactConstraint, Data, Mat3, Model, Motion, ReferenceFrame, Target,
     constrained_dynamics_derivatives,
 };
 use rand::RngExt;
@@ -11,15 +11,24 @@ use rand::rngs::StdRng;
 /// Sets whose Λ has a greater condition number say nothing about the algorithm.
 const WORST_CONDITION: f64 = 1e4;
 
-/// A contact or loop, a point or a frame, in either reference, with any gains and targets.
+const KINDS: [ConstraintKind; 4] =
+    [ConstraintKind::Point, ConstraintKind::Rigid, ConstraintKind::Line, ConstraintKind::Plane];
+
+/// A contact or loop, of a point, along some axes or of a frame, in either reference, with any gains and targets.
 pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConstraint {
     let frames = model.frames().len();
     let motion = |rng: &mut StdRng| Motion::new(normal3(rng), normal3(rng));
     let gain = |rng: &mut StdRng| if rng.random::<bool>() { 5.0 * rng.random::<f64>() } else { 0.0 };
+    let kind = KINDS[rng.random_range(0..KINDS.len())];
+    let axes = match kind {
+        ConstraintKind::Line | ConstraintKind::Plane => random_pose(rng).rotation,
+        _ => Mat3::identity(),
+    };
     ContactConstraint {
         frame: rng.random_range(0..frames),
         other: rng.random::<bool>().then(|| rng.random_range(0..frames)),
-        kind: if rng.random::<bool>() { ConstraintKind::Point } else { ConstraintKind::Rigid },
+        kind,
+        axes,
         reference: if rng.random::<bool>() { ReferenceFrame::Local } else { ReferenceFrame::LocalWorldAligned },
         kp: gain(rng),
         kd: gain(rng),

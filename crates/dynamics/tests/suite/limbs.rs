@@ -182,7 +182,8 @@ fn constrained_dynamics_of_body_after_body() {
     for (seed, model) in models.enumerate().filter(|(_, model)| model.singular_joints().is_empty()) {
         let mut rng = rng(seed as u64);
         let state = State::random(&model, &mut rng);
-        let constraints = random_constraints(&model, &state, &mut rng);
+        let mut constraints = random_constraints(&model, &state, &mut rng);
+        constraints.retain(|c| c.kind.rows() >= 3); // lines and planes have no lanes
         for proximal in [Proximal::default(), Proximal { mu: 1e-6, iterations: 3 }] {
             compare_constrained(&model, &constraints, proximal, &mut worst, &state);
         }

@@ -164,4 +164,9 @@ impl Hessian {
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }
     }
+
+    /// Sets all entries to x.
+    pub fn fill(&mut self, x: f64) {
+        [&mut self.xx, &mut self.xu, &mut self.uu].into_iter().for_each(|part| part.fill(x));
+    }
 }

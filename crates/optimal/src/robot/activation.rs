@@ -40,6 +40,9 @@ pub enum Activation {
         /// w, numbers of at least 0.
         weights: Vec<f64>,
     },
+    /// Σ rᵢ: of a number that is a cost by itself. Its Gauss–Newton Hessian is zero: what there is comes from the residual
+    /// ([`ResidualFunction::calc_hessian`](crate::robot::ResidualFunction::calc_hessian)).
+    Sum,
     /// Σ √(ε + rᵢ²): nearly Σ |rᵢ|.
     Smooth1 {
         /// ε, above 0; 1 in Crocoddyl unless given.
@@ -95,6 +98,7 @@ impl Activation {
             Self::WeightedBarrier { lower, upper, weights: w } => {
                 entries.for_each(|i| visit(i, beyond(i, lower, upper).map(|x| w[i] * x)));
             }
+            Self::Sum => entries.for_each(|i| visit(i, [r[i], 1.0, 0.0])),
             Self::Smooth1 { epsilon } => entries.for_each(|i| {
                 let a = (epsilon + r[i] * r[i]).sqrt();
                 visit(i, [a, r[i] / a, epsilon / (a * a * a)]);
@@ -126,7 +130,7 @@ impl Activation {
             lengths.or_else(|| ordered(lower, upper))
         };
         match self {
-            Self::Quadratic => None,
+            Self::Quadratic | Self::Sum => None,
             Self::Weighted(w) => weighting(w),
             Self::Barrier { lower, upper } => bounds(lower, upper),
             Self::WeightedBarrier { lower, upper, weights } => bounds(lower, upper).or_else(|| weighting(weights)),

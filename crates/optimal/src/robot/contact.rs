@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it
 /// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its stabilisation.
 /// Crocoddyl's `ContactModel3D` and `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is `LocalWorldAligned`
-/// here.
+/// here. Its `ContactModel1D` and `ContactModel2D` are [`ContactConstraint::line`] and [`ContactConstraint::plane`].
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};
@@ -87,9 +87,11 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
             continue; // a loop
         }
         // Two contacts on one body are singular: even two points leave only five rows of six that say something, and
-        // points on a line never hold the turn about it. Damping shares the forces.
+        // points on a line never hold the turn about it. Damping shares the forces. Single directions may fit together.
+        let directions = |c: &ContactConstraint| c.kind.rows() < 3;
         let same = |other: &&Contact| {
             other.constraint.other.is_none()
+                && !(directions(c) || directions(&other.constraint))
                 && model.frames().get(other.constraint.frame).is_some_and(|f| f.body == frame.body)
         };
         if let Some(twin) = before.iter().find(same).filter(|_| damping == 0.0) {

@@ -167,7 +167,7 @@ impl HorizonTerms {
         if active {
             objective.multipliers.begin(t);
         }
-        scratch.rows.clear();
+        scratch.clear();
         let mut view = ResidualView { model, t, state, kinematics: first, scratch };
         for diagonal in [false, true] {
             view.kinematics = first;
@@ -176,7 +176,7 @@ impl HorizonTerms {
             view.kinematics = second;
             limits.differentiate(&mut view, sensitivities, &mut objective, diagonal, node);
             if !diagonal {
-                view.scratch.rows.write(node);
+                view.scratch.write(node);
             }
         }
     }

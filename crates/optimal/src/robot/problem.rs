@@ -9,7 +9,7 @@ use super::dynamics::free::{FreeAcceleration, FreeDynamics};
 use super::dynamics::impulse::ImpulseDynamics;
 use super::dynamics::inverse::ControlledAcceleration;
 use super::dynamics::knots::HasRobot;
-use super::integrators::{Integrated, Integrator};
+use super::integrators::{ControlPolynomial, Integrated, Integrator};
 use super::limits::Limit;
 use crate::ActionModel;
 use crate::read::optional_matrix;
@@ -77,9 +77,12 @@ pub struct Knot {
     /// Bounds on the controls, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bounds: Option<ControlBounds>,
+    /// How the controls go through the knot's time; constant at an impact and at the end, which have none.
+    #[serde(default, skip_serializing_if = "ControlPolynomial::is_constant")]
+    pub controls: ControlPolynomial,
 }
 
-/// Bounds on the controls of a knot, nu numbers each, infinite where there is none.
+/// Bounds on the controls of a knot, nu numbers each, infinite where there is none; of polynomials, at each of their nodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControlBounds {
@@ -155,13 +158,15 @@ impl Knot {
     /// A knot with these costs wherever it serves, without limits and bounds.
     pub fn new(dynamics: Dynamics, costs: Vec<Cost>) -> Self {
         let (costs_at, limits_at) = (BTreeMap::new(), BTreeMap::new());
-        Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None }
+        let controls = ControlPolynomial::Constant;
+        Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None, controls }
     }
 
     /// The action. Allocates.
     ///
     /// # Errors
-    /// Those of its constructor; [`Error::Length`] for bounds of another length than nu.
+    /// Those of its constructor; [`Error::Length`] for bounds of another length than nu; [`Error::Actuation`] for controls that
+    /// are not constant where there are none.
     pub fn build(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
         let (model, costs) = (model.clone(), self.costs.clone());
         let drives = |actuation: &Option<DMatrix<f64>>| match actuation {
@@ -184,10 +189,12 @@ impl Knot {
             Dynamics::Impulse { contacts, restitution, damping } => {
                 let action = ImpulseDynamics::new(model.clone(), contacts, *restitution, *damping, costs)?;
                 self.check_bounds(0)?;
+                self.check_no_controls()?;
                 Ok(Box::new(self.complete(action)?))
             }
             Dynamics::End => {
                 self.check_bounds(0)?;
+                self.check_no_controls()?;
                 Ok(Box::new(self.complete(FreeDynamics::terminal(model, costs)?)?))
             }
         }
@@ -215,9 +222,18 @@ impl Knot {
         Ok(())
     }
 
+    fn check_no_controls(&self) -> Result<(), Error> {
+        match self.controls.is_constant() {
+            true => Ok(()),
+            false => {
+                Err(Error::Actuation { what: "controls: a knot without duration has none to be a polynomial".into() })
+            }
+        }
+    }
+
     fn bounded<M: ContinuousModel + HasRobot>(&self, action: Integrated<M>) -> Result<Box<dyn ActionModel>, Error> {
-        let action = self.complete(action)?;
-        self.check_bounds(action.nu())?;
+        let action = self.complete(action)?.with_controls(self.controls);
+        self.check_bounds(action.inner().nu())?;
         Ok(match &self.bounds {
             Some(ControlBounds { lower, upper }) => Box::new(action.with_bounds(lower.clone(), upper.clone())),
             None => Box::new(action),

@@ -1,9 +1,10 @@
 //! Problems in files.
 
-use super::{DT, contact_costs, feet, random, random_state};
-use condyle_dynamics::{ReferenceFrame, Vec3, robots};
+use super::{DT, contact_costs, feet, random, random_state, rotation};
+use condyle_dynamics::{ConstraintKind, ReferenceFrame, Vec3, robots};
 use condyle_optimal::robot::{
-    Activation, ControlBounds, Cost, Dynamics, FrameName, FrictionCone, Integrator, Knot, Limit, Residual, RobotProblem,
+    Activation, ControlBounds, ControlPolynomial, Cost, Dynamics, FrameName, FrictionCone, Integrator, Knot, Limit,
+    Residual, RobotProblem,
 };
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -28,7 +29,9 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     let actuation = Some(DMatrix::from_fn(nv, 3, |_, _| rng.random()));
     let free = Dynamics::Free { actuation, integrator: Integrator::RungeKutta4, dt: DT };
     let inverse = Dynamics::Inverse { integrator: Integrator::SemiImplicitEuler, dt: 0.1 };
-    let impulse = Dynamics::Impulse { contacts: contacts.clone(), restitution: 0.2, damping };
+    let mut touch = contacts.clone();
+    (touch[0].constraint.kind, touch[0].constraint.axes) = (ConstraintKind::Line, rotation(rng));
+    let impulse = Dynamics::Impulse { contacts: touch, restitution: 0.2, damping };
     let integrator = Integrator::RungeKutta2;
     let stance_foot = contacts[1].name.clone();
     let contact = Dynamics::Contact { contacts, damping, actuation: None, integrator, dt: DT };
@@ -54,7 +57,7 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
             knot(free, still(3), bounds(vec![-1.0; 3], vec![f64::INFINITY; 3])),
             stance,
             knot(impulse, vec![landing], None),
-            knot(inverse, still(nv), None),
+            Knot { controls: ControlPolynomial::Quadratic, ..knot(inverse, still(nv), None) },
         ],
         stages: vec![0, 1, 1, 2, 3, 0],
         terminal: end,
@@ -106,6 +109,15 @@ fn what_is_wrong_in_a_file_is_said() {
         built(&|data| data.knots[2].bounds = Some(ControlBounds { lower: vec![0.0], upper: vec![1.0] })),
         "`lower`: expected length 0, found 1"
     );
+    assert_eq!(
+        built(&|data| data.knots[2].controls = ControlPolynomial::Linear),
+        "actuation: controls: a knot without duration has none to be a polynomial"
+    );
+    let bent = |data: &mut RobotProblem| {
+        let Dynamics::Impulse { contacts, .. } = &mut data.knots[2].dynamics else { unreachable!("it is an impact") };
+        contacts[0].constraint.axes.x.x = 2.0;
+    };
+    assert!(built(&bent).contains("its axes are no rotation"));
     assert!(built(&|data| data.stages[1] = 7).contains("there is no action model 7"));
     assert_eq!(
         built(&|data| data.knots[0] = Knot::new(Dynamics::End, vec![])),

@@ -10,8 +10,9 @@ use condyle_dynamics::{
     forward_velocities, integrate, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FrameName, FreeAcceleration,
-    FreeDynamics, FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Limit, Residual, WrenchCone,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, ControlPolynomial, Cost, FrameName,
+    FreeAcceleration, FreeDynamics, FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Limit,
+    Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;
@@ -179,6 +180,38 @@ fn derivatives_in_contact_are_those_of_the_action() {
     }
 }
 
+/// Lines and planes, also two lines on one body.
+#[test]
+fn derivatives_in_contact_along_axes_are_those_of_the_action() {
+    let mut rng = StdRng::seed_from_u64(29);
+    let model = Arc::new(robots::quadruped());
+    for reference in [ReferenceFrame::Local, ReferenceFrame::LocalWorldAligned] {
+        for second in [ContactConstraint::line, ContactConstraint::plane] {
+            let make = |name: &str, make: fn(usize) -> ContactConstraint, frame: &str, rng: &mut StdRng| {
+                let axes = rotation(rng);
+                let frame = model.frame(frame).unwrap();
+                Contact::new(name, ContactConstraint { reference, axes, kp: 20.0, kd: 30.0, ..make(frame) })
+            };
+            let contacts = [
+                make("along", ContactConstraint::line, "LF_foot", &mut rng),
+                make("RH_foot", second, "RH_foot", &mut rng),
+                make("across", ContactConstraint::line, "LF_foot", &mut rng),
+            ];
+            let mut costs = contact_costs(&model, &contacts, 12, &mut rng);
+            let at_frame =
+                |cost: &Cost| !matches!(cost.residual, Residual::FrameRotation { .. } | Residual::FrameVelocity { .. });
+            costs.retain(at_frame); // contacts[0] is called otherwise than its frame
+            let what = format!("{:?} {reference:?}", contacts[1].constraint.kind);
+            let action = ContactDynamics::running(model.clone(), &contacts, DT, costs.clone()).unwrap();
+            check_derivatives(&what, action, &model, 5.0, &mut rng);
+            let kept = ["state", "com", "momentum", "force", "cone"];
+            costs.retain(|cost| kept.contains(&cost.name.as_str()));
+            let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.3, 0.0, costs).unwrap();
+            check_derivatives(&format!("impact, {what}"), impact, &model, 0.0, &mut rng);
+        }
+    }
+}
+
 #[test]
 fn derivatives_with_damping_and_other_drives_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(12);
@@ -259,11 +292,14 @@ fn inverse_and_forward_dynamics_have_one_optimum() {
 }
 
 #[test]
-fn derivatives_of_runge_kutta_are_those_of_the_action() {
+fn derivatives_of_integrators_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(14);
+    let polynomials = [ControlPolynomial::Constant, ControlPolynomial::Linear, ControlPolynomial::Quadratic];
+    let of = |method: Integrator| polynomials.map(|controls| (method, controls));
     let methods = [Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4];
+    let methods = [methods.map(of).concat(), of(Integrator::SemiImplicitEuler).into()].concat();
     for model in [robots::arm7(), robots::quadruped()].map(Arc::new) {
-        for method in methods {
+        for &(method, controls) in &methods {
             let drives = Actuation::joints(&model);
             let nu = drives.nu();
             let frame = model.frames().last().unwrap().into();
@@ -284,8 +320,47 @@ fn derivatives_of_runge_kutta_are_those_of_the_action() {
                 Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
             ];
             let inner = FreeAcceleration::new(model.clone(), drives, costs).unwrap();
-            let action = FreeDynamics::new(inner, method, DT).unwrap();
-            check_derivatives(&format!("{method:?} of {}", model.name()), action, &model, 0.3, &mut rng);
+            let action = FreeDynamics::new(inner, method, DT).unwrap().with_controls(controls);
+            let what = format!("{method:?} of {}, {controls:?}", model.name());
+            check_derivatives(&what, action, &model, 0.3, &mut rng);
+        }
+    }
+}
+
+/// Controls that are the same at all nodes of a polynomial are constant: the step, its cost and its derivatives by them.
+#[test]
+fn equal_controls_of_a_polynomial_are_constant() {
+    let mut rng = StdRng::seed_from_u64(23);
+    let arm = Arc::new(robots::arm7());
+    let costs = || vec![Cost::new("effort", 0.1, Residual::Control { reference: vec![0.5; 7] }, Activation::Quadratic)];
+    for method in
+        [Integrator::SemiImplicitEuler, Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4]
+    {
+        let knot = |controls: ControlPolynomial| {
+            let inner = FreeAcceleration::new(arm.clone(), Actuation::joints(&arm), costs()).unwrap();
+            FreeDynamics::new(inner, method, DT)
+                .unwrap()
+                .with_bounds(vec![-1.0; 7], vec![1.0; 7])
+                .with_controls(controls)
+        };
+        let (x, u) = (random_state(&arm, &mut rng), random(7, 1.0, &mut rng));
+        let (mut constant, mut expected, mut same) =
+            (knot(ControlPolynomial::Constant), [0.0; 14], LqNode::zeros(14, 7));
+        let cost = constant.calc(0, &x, &u, &mut expected);
+        constant.calc_diff(0, &x, &u, &mut same);
+        for controls in [ControlPolynomial::Linear, ControlPolynomial::Quadratic] {
+            let (mut action, n) = (knot(controls), controls.nodes());
+            let (w, mut next, mut node) = (u.repeat(n), [0.0; 14], LqNode::zeros(14, 7 * n));
+            assert_eq!((action.nu(), action.hold(0, &x)), (7 * n, constant.hold(0, &x).repeat(n)));
+            assert_eq!(action.bounds(0), Some((&vec![-1.0; 7 * n][..], &vec![1.0; 7 * n][..])));
+            let same_cost = (action.calc(0, &x, &w, &mut next) - cost).abs() < ROUNDING;
+            assert!(same_cost && largest_difference(&next, &expected) < ROUNDING, "{method:?} {controls:?}");
+            action.calc_diff(0, &x, &w, &mut node);
+            let by_all: DMatrix<f64> = (0..n).map(|k| node.B.columns(7 * k, 7).into_owned()).sum(); // ∂w/∂u = [1; 1; 1]
+            assert!(largest_difference(by_all.as_slice(), same.B.as_slice()) < ROUNDING, "{method:?} {controls:?}");
+            let blocks = (0..n * n).map(|k| node.R.view((7 * (k % n), 7 * (k / n)), (7, 7)).into_owned());
+            let R: DMatrix<f64> = blocks.sum();
+            assert!(largest_difference(R.as_slice(), same.R.as_slice()) < ROUNDING, "{method:?} {controls:?}");
         }
     }
 }

@@ -150,6 +150,74 @@ impl Differentiated<'_> {
         })
     }
 
+    /// Writes gradient and Hessian of a number at a knot; says whether it did.
+    pub(super) fn number(
+        &self,
+        py: Python<'_>,
+        way: &Way,
+        t: usize,
+        at: [&[f64]; 2],
+        node: &mut LqNode,
+    ) -> PyResult<bool> {
+        let d = self.directions(true);
+        way.descend(py, |way| match way {
+            TOGETHER | ALONE => {
+                let cost = Expansion::read("calc", &self.expand(py, d, &[t], at)?, d, 1, 1)?;
+                write_cost(node, d, cost[0].knot(0));
+                Ok(())
+            }
+            _ => (0..d.n).try_for_each(|i| {
+                (0..=i).try_for_each(|j| {
+                    let cost = Hyper::read_one("calc", &self.hyper_result(py, t, at, [i, j])?)?;
+                    write_curvature(node, i, j, cost.curvature());
+                    if i == j {
+                        write_gradient(node, i, cost.slopes()[0]);
+                    }
+                    Ok(())
+                })
+            }),
+        })
+    }
+
+    /// Writes the derivatives of accelerations at a knot, as `dynamics`, and the second ones of μᵀ a as those of a cost; says
+    /// whether it did.
+    pub(super) fn curvature(
+        &self,
+        py: Python<'_>,
+        way: &Way,
+        t: usize,
+        at: [&[f64]; 2],
+        mu: &[f64],
+        slopes: &mut [f64],
+        node: &mut LqNode,
+    ) -> PyResult<bool> {
+        let d = self.directions(true);
+        way.descend(py, |way| match way {
+            TOGETHER | ALONE => {
+                let (a, _) = next_and_cost(&self.expand(py, d, &[t], at)?)?;
+                let a = Expansion::read("calc, the accelerations", &a, d, mu.len(), 1)?;
+                for (row, y) in slopes.chunks_exact_mut(d.n).zip(&a) {
+                    row.copy_from_slice(&y.knot(0)[1..=d.n]);
+                }
+                for i in 0..d.n {
+                    for j in 0..=i {
+                        let sum = a.iter().zip(mu).map(|(y, mu)| mu * y.knot(0)[d.place(i, j)]).sum();
+                        write_curvature(node, i, j, sum);
+                    }
+                }
+                Ok(())
+            }
+            _ => self.hyper_pairs(py, t, at, |[i, j], a, _| {
+                let a = Hyper::read::<numpy::Ix1>("calc, the accelerations", &a, &[mu.len()])?;
+                write_curvature(node, i, j, a.iter().zip(mu).map(|(y, mu)| mu * y.curvature()).sum());
+                if i == j {
+                    slopes.chunks_exact_mut(d.n).zip(&a).for_each(|(row, y)| row[i] = y.slopes()[0]);
+                }
+                Ok(())
+            }),
+        })
+    }
+
     /// The result at some knots, with its derivatives.
     fn expand<'py>(
         &self,
@@ -299,7 +367,7 @@ fn write_gradient(node: &mut LqNode, i: usize, slope: f64) {
 }
 
 /// Writes ∂²ℓ/∂zᵢ∂zⱼ, j ≤ i.
-fn write_curvature(node: &mut LqNode, i: usize, j: usize, curvature: f64) {
+pub(super) fn write_curvature(node: &mut LqNode, i: usize, j: usize, curvature: f64) {
     let ndx = node.q.len();
     match (i < ndx, j < ndx) {
         (true, _) => (node.Q[(i, j)], node.Q[(j, i)]) = (curvature, curvature),

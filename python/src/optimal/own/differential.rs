@@ -15,8 +15,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rust::robot::{ContinuousModel, Derivatives, Integrated, Integrator, KnotInput};
-use rust::{ActionModel, LqNode};
+use rust::robot::{ContinuousModel, ControlPolynomial, Derivatives, Integrated, Integrator, KnotInput};
+use rust::{ActionModel, Hessian, LqNode};
 use std::ops::Range;
 
 /// An action of accelerations and a cost per second that are written in Python, in steps of a time.
@@ -28,10 +28,13 @@ use std::ops::Range;
 ///     accelerations may be None.
 /// dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
 /// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among da_dq, da_dv, da_du, the derivatives of
-///     the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`.
+///     the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`. Second
+///     derivatives of the accelerations, for a solver's `second_order`, are always those of calc, and zero where it cannot
+///     be differentiated by numbers; those of ⊕ are zero.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
 /// model: a robot whose positions q are, with its ⊕; None for vectors of nv numbers.
+/// controls: 'constant', 'linear' or 'quadratic', as of `FreeDynamics`.
 ///
 /// Raises `ProblemError` if dt is not above 0.
 ///
@@ -49,6 +52,7 @@ pub(crate) struct DifferentialAction {
     bounds: Option<[Vec<f64>; 2]>,
     /// None at the end.
     step: Option<(Integrator, f64)>,
+    controls: ControlPolynomial,
     model: Option<Py<Model>>,
 }
 
@@ -67,7 +71,8 @@ struct Written {
 impl DifferentialAction {
     #[new]
     #[pyo3(signature = (
-        nv, nu, calc, dt, calc_diff=None, integrator="semi_implicit_euler", lower=None, upper=None, model=None
+        nv, nu, calc, dt, calc_diff=None, integrator="semi_implicit_euler", lower=None, upper=None, model=None,
+        controls="constant"
     ))]
     #[allow(clippy::too_many_arguments)]
     fn new(
@@ -80,6 +85,7 @@ impl DifferentialAction {
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
         model: Option<Bound<'_, Model>>,
+        controls: &str,
     ) -> PyResult<Self> {
         let (nv, nu) = (within("nv", nv, 0, MOST_SIZE / 2)?, within("nu", nu, 0, MOST_SIZE)?);
         let space = match &model {
@@ -95,7 +101,8 @@ impl DifferentialAction {
         }
         let step = dt.map(|dt| Ok::<_, PyErr>((crate::optimal::actions::integrator(integrator)?, dt))).transpose()?;
         let written = Written { nv, nu, functions: Functions::new(calc, calc_diff), space, way: Way::default() };
-        let action = Self { written, bounds: bounds(nu, lower, upper)?, step, model: model.map(Bound::unbind) };
+        let (bounds, controls) = (bounds(nu, lower, upper)?, crate::optimal::actions::polynomial(controls)?);
+        let action = Self { written, bounds, step, controls, model: model.map(Bound::unbind) };
         action.boxed(&Fault::default())?;
         Ok(action)
     }
@@ -119,7 +126,8 @@ impl DifferentialAction {
         let (lower, upper) = this.bounds.clone().map(|[lower, upper]| (lower, upper)).unzip();
         let model = this.model.as_ref().map(|model| model.clone_ref(py));
         let (nv, nu, dt) = (this.written.nv, this.written.nu, this.step.map(|(_, dt)| dt));
-        let arguments = (nv, nu, calc, dt, calc_diff, integrator, lower, upper, model);
+        let controls = format!("{:?}", this.controls).to_lowercase();
+        let arguments = (nv, nu, calc, dt, calc_diff, integrator, lower, upper, model, controls);
         Ok((slf.get_type(), arguments).into_pyobject(py)?.into_any())
     }
 
@@ -152,7 +160,7 @@ impl DifferentialAction {
             da_du: vec![0.0; nv * nu],
         };
         let Some((integrator, dt)) = self.step else { return Ok(Box::new(Integrated::end(inner))) };
-        let action = Integrated::new(inner, integrator, dt).map_err(problem_error)?;
+        let action = Integrated::new(inner, integrator, dt).map_err(problem_error)?.with_controls(self.controls);
         Ok(match self.bounds.clone() {
             Some([lower, upper]) => Box::new(action.with_bounds(lower, upper)),
             None => Box::new(action),
@@ -310,6 +318,20 @@ impl ContinuousModel for OwnDynamics {
         node.q *= scale;
         node.r *= scale;
         Derivatives { a: &self.a, da_dq: &self.da_dq, da_dv: &self.da_dv, da_du: &self.da_du }
+    }
+
+    fn hessian(&mut self, input: KnotInput<'_>, mu: &[f64], hessian: &mut Hessian) -> Option<Derivatives<'_>> {
+        let (KnotInput { t, x, u, .. }, fault) = (input, self.fault.clone());
+        self.value(t, x, u);
+        let Written { nv, nu, functions, space, way } = &self.written;
+        let all = Differentiated { functions, space, nu: *nu, batch: false, terminal: false };
+        let (n, mut node) = (2 * nv + nu, LqNode::zeros(2 * nv, *nu));
+        let mut slopes = vec![0.0; nv * n];
+        unless_failed(&fault, |py| all.curvature(py, way, t, [x, u], mu, &mut slopes, &mut node))
+            .filter(|done| *done)?;
+        self.set_slopes(|i, k| slopes[i * n + k]);
+        (hessian.xx, hessian.xu, hessian.uu) = (node.Q, node.S, node.R);
+        Some(Derivatives { a: &self.a, da_dq: &self.da_dq, da_dv: &self.da_dv, da_du: &self.da_du })
     }
 
     fn groups(&self) -> &[Range<usize>] {

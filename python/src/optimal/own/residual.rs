@@ -1,19 +1,28 @@
-//! Residuals that are written in Python.
+//! Residuals, and costs, that are written in Python.
 
-use super::automatic::{Differentiated, Way};
+use super::automatic::{Differentiated, Way, write_curvature};
 use super::functions::{Fault, Functions, unless_failed};
+use super::lqr::write;
 use super::space::Space;
 use crate::arrays::{matrix, vector};
 use condyle::optimal::robot::{Cost, Knot, Limit, Residual, ResidualFunction};
+use condyle::optimal::{Hessian, LqNode};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::any::Any;
 
 /// The step of central differences, about ε^⅓.
 const STEP: f64 = 6e-6;
 
+/// The step of central differences of central differences, about ε^¼.
+const SECOND_STEP: f64 = 1e-4;
+
 /// A residual of a robot that is written in Python.
 pub(in crate::optimal) struct OwnFunction {
     pub size: usize,
+    /// Whether it is a number with a gradient and a Hessian.
+    pub number: bool,
     pub functions: Functions,
     pub space: Space,
     pub way: Way,
@@ -37,6 +46,12 @@ pub(in crate::optimal) fn faults(knot: &Knot) -> Vec<Fault> {
 impl OwnFunction {
     fn try_calc(&self, py: Python<'_>, t: usize, x: &[f64], u: &[f64], r: &mut [f64]) -> PyResult<()> {
         let value = self.functions.at(py, 0, t, x, u)?;
+        if self.number {
+            let found = value.get_type();
+            let wrong = |_| PyTypeError::new_err(format!("the cost: expected a number, found {found}"));
+            r[0] = value.extract().map_err(wrong)?;
+            return Ok(());
+        }
         r.copy_from_slice(&vector("the residual", &value, r.len())?);
         Ok(())
     }
@@ -49,10 +64,16 @@ impl OwnFunction {
         [by_x, by_u]: [&mut [f64]; 2],
     ) -> PyResult<()> {
         let (ndx, nu) = (self.space.ndx(), u.len());
-        if self.functions.has(1) {
+        if self.functions.has(1) && !self.number {
             let (x, u): (Bound<'_, PyAny>, Bound<'_, PyAny>) = self.functions.at(py, 1, t, x, u)?.extract()?;
             by_x.copy_from_slice(&matrix("∂r/∂x", &x, [self.size, ndx])?);
             by_u.copy_from_slice(&matrix("∂r/∂u", &u, [self.size, nu])?);
+            return Ok(());
+        }
+        if self.number {
+            let node = self.try_number(py, t, [x, u])?;
+            by_x.copy_from_slice(node.q.as_slice());
+            by_u.copy_from_slice(node.r.as_slice());
             return Ok(());
         }
         let mut slopes = vec![0.0; self.size * (ndx + nu)];
@@ -64,6 +85,62 @@ impl OwnFunction {
         for (i, row) in slopes.chunks_exact((ndx + nu).max(1)).enumerate() {
             by_x[i * ndx..][..ndx].copy_from_slice(&row[..ndx]);
             by_u[i * nu..][..nu].copy_from_slice(&row[ndx..]);
+        }
+        Ok(())
+    }
+
+    /// Gradient and Hessian of a number: q, r, Q, S, R.
+    fn try_number(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2]) -> PyResult<LqNode> {
+        let (ndx, nu) = (self.space.ndx(), u.len());
+        let mut node = LqNode::zeros(ndx, nu);
+        if self.functions.has(1) {
+            let given = self.functions.at(py, 1, t, x, u)?;
+            let found = given.get_type();
+            let given = given.cast::<PyDict>().map_err(|_| {
+                PyTypeError::new_err(format!("calc_diff of a cost: expected a dict of q, r, Q, S, R, found {found}"))
+            })?;
+            for (name, entry) in given.iter() {
+                match name.extract::<String>()?.as_str() {
+                    name @ ("q" | "r" | "Q" | "S" | "R") => write(&mut node, name, &entry)?,
+                    other => {
+                        let what = format!("calc_diff of a cost: expected q, r, Q, S or R, found '{other}'");
+                        return Err(PyValueError::new_err(what));
+                    }
+                }
+            }
+            return Ok(node);
+        }
+        let all = Differentiated { functions: &self.functions, space: &self.space, nu, batch: false, terminal: false };
+        if !all.number(py, &self.way, t, [x, u], &mut node)? {
+            let mut slopes = vec![0.0; ndx + nu];
+            self.differ(py, t, [x, u], &mut slopes)?;
+            node.q.copy_from_slice(&slopes[..ndx]);
+            node.r.copy_from_slice(&slopes[ndx..]);
+            self.differ_twice(py, t, [x, u], &mut node)?;
+        }
+        Ok(node)
+    }
+
+    /// The Hessian of a number by central differences.
+    fn differ_twice(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], node: &mut LqNode) -> PyResult<()> {
+        let (ndx, n) = (self.space.ndx(), self.space.ndx() + u.len());
+        let mut moved = x.to_vec();
+        let mut at = |steps: [(usize, f64); 2]| {
+            let mut z = vec![0.0; n];
+            steps.iter().for_each(|(k, step)| z[*k] += step);
+            self.space.integrate(x, &z[..ndx], &mut moved, &self.fault);
+            let u: Vec<f64> = u.iter().zip(&z[ndx..]).map(|(u, z)| u + z).collect();
+            let mut value = [0.0];
+            self.try_calc(py, t, &moved, &u, &mut value)?;
+            Ok::<_, PyErr>(value[0])
+        };
+        let h = SECOND_STEP;
+        for i in 0..n {
+            for j in 0..=i {
+                let same = at([(i, h), (j, h)])? + at([(i, -h), (j, -h)])?;
+                let curvature = (same - at([(i, h), (j, -h)])? - at([(i, -h), (j, h)])?) / (4.0 * h * h);
+                write_curvature(node, i, j, curvature);
+            }
         }
         Ok(())
     }
@@ -103,5 +180,29 @@ impl ResidualFunction for OwnFunction {
         if done.is_none() {
             by_x.fill(f64::NAN);
         }
+    }
+
+    fn has_hessian(&self) -> bool {
+        self.number
+    }
+
+    fn calc_hessian(
+        &self,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        d: &[f64],
+        [by_x, by_u]: [&mut [f64]; 2],
+        hessian: &mut Hessian,
+    ) {
+        let Some(node) = unless_failed(&self.fault, |py| self.try_number(py, t, [x, u])) else {
+            by_x.fill(f64::NAN);
+            return;
+        };
+        by_x.copy_from_slice(node.q.as_slice());
+        by_u.copy_from_slice(node.r.as_slice());
+        hessian.xx.copy_from(&(node.Q * d[0]));
+        hessian.xu.copy_from(&(node.S * d[0]));
+        hessian.uu.copy_from(&(node.R * d[0]));
     }
 }

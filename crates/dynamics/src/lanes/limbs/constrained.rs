@@ -56,8 +56,8 @@ impl ConstraintLanes {
             ends.v = [left.velocity(one), left.velocity(other)];
             of.begin(plan, &ends, ends.acceleration(plan, target).to_array());
             match plan.kind {
-                ConstraintKind::Point => of.carry::<Four, 1>(plan, left, [Y, YD], all, &mut set.J),
                 ConstraintKind::Rigid => of.carry::<V, N>(plan, left, [Y, YD], all, &mut set.J),
+                _ => of.carry::<Four, 1>(plan, left, [Y, YD], all, &mut set.J),
             }
         }
         all.carry_on::<V, N>(&set.plans, left, &mut set.J);
@@ -70,8 +70,8 @@ impl ConstraintLanes {
                 for r in (0..other.rows()).step_by(3) {
                     let (columns, G) = ((&rows[*j], r), &mut G[(other.row + r) * stride + plan.row..]);
                     match plan.kind {
-                        ConstraintKind::Point => of.multiply::<Four, 1>(columns, runs, [Y, YD], G, stride),
                         ConstraintKind::Rigid => of.multiply::<V, N>(columns, runs, [Y, YD], G, stride),
+                        _ => of.multiply::<Four, 1>(columns, runs, [Y, YD], G, stride),
                     }
                 }
             }

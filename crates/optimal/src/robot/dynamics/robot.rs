@@ -284,7 +284,9 @@ impl RobotDynamics {
 
     /// As [`ContinuousModel::inverse_dynamics_form`](crate::robot::ContinuousModel::inverse_dynamics_form).
     pub(crate) fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
-        Some([self.work.made()?.elimination.as_ref()?.most_dependent(), self.terms.layout().rows[0]])
+        let layout = self.terms.layout(); // Hessians that are no rows stand in Q, S and R, by the controls
+        let elimination = self.work.made()?.elimination.as_ref()?;
+        (!layout.curved).then_some([elimination.most_dependent(), layout.rows[0]])
     }
 
     /// As [`ActionModel::outputs`](crate::ActionModel::outputs), of a knot that was prepared.

@@ -1,5 +1,6 @@
 //! Integrators: from accelerations to the next state, and knots of some duration.
 
+mod controls;
 mod curvature;
 mod euler;
 mod retraction;
@@ -12,6 +13,8 @@ use crate::Error;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use crate::problem::{Visit, hold};
+pub use controls::ControlPolynomial;
+use controls::widen;
 use curvature::Curvature;
 use retraction::Retraction;
 use runge_kutta::RungeKutta;
@@ -43,6 +46,7 @@ pub enum Integrator {
 pub struct Integrated<M> {
     inner: M,
     method: Method,
+    controls: ControlPolynomial,
     /// The least and the greatest controls.
     bounds: Option<[Vec<f64>; 2]>,
     work: OnDemand<Work>,
@@ -64,6 +68,8 @@ struct Work {
     retraction: Retraction,
     curvature: Curvature,
     runge_kutta: Option<RungeKutta>,
+    /// A step by its first controls, where there are others.
+    first: Option<Box<LqNode>>,
 }
 
 impl<M: ContinuousModel> Integrated<M> {
@@ -81,7 +87,8 @@ impl<M: ContinuousModel> Integrated<M> {
             Integrator::RungeKutta3 => Method::RungeKutta(dt, 3),
             Integrator::RungeKutta4 => Method::RungeKutta(dt, 4),
         };
-        Ok(Self { inner: model, method, bounds: None, work: OnDemand::default() })
+        let (controls, work) = (ControlPolynomial::Constant, OnDemand::default());
+        Ok(Self { inner: model, method, controls, bounds: None, work })
     }
 
     /// The end of a horizon, for a model without controls.
@@ -90,32 +97,48 @@ impl<M: ContinuousModel> Integrated<M> {
     /// If the model has controls.
     pub fn end(model: M) -> Self {
         assert!(model.nu() == 0, "model: a terminal one has no controls, found {}", model.nu());
-        Self { inner: model, method: Method::Still, bounds: None, work: OnDemand::default() }
+        let (controls, work) = (ControlPolynomial::Constant, OnDemand::default());
+        Self { inner: model, method: Method::Still, controls, bounds: None, work }
     }
 
     /// The model, the rule of a step, and its memory.
     fn parts(&mut self) -> (&mut M, Method, &mut Work) {
-        let Self { inner, method, work, .. } = self;
+        let Self { inner, method, controls, work, .. } = self;
         let work = work.get(|| {
             let runge_kutta = match *method {
-                Method::RungeKutta(_, stages) => Some(RungeKutta::new(stages, inner)),
+                Method::RungeKutta(_, stages) => Some(RungeKutta::new(stages, inner, *controls)),
                 _ => None,
             };
             let (retraction, curvature) = (Retraction::new(inner.nv()), Curvature::new(inner));
-            Work { retraction, curvature, runge_kutta }
+            let first = (!controls.is_constant() && runge_kutta.is_none())
+                .then(|| Box::new(LqNode::zeros(2 * inner.nv(), inner.nu())));
+            Work { retraction, curvature, runge_kutta, first }
         });
         (inner, *method, work)
     }
 
-    /// The same knot with bounds on the controls, infinite where there is none.
+    /// The same knot with controls that follow a polynomial through its time; the end has no controls and stays as it is.
+    /// Bounds, also those given before, hold at each node of the polynomial.
+    #[must_use]
+    pub fn with_controls(mut self, controls: ControlPolynomial) -> Self {
+        if self.method != Method::Still {
+            (self.controls, self.work) = (controls, OnDemand::default());
+        }
+        let (nu, nodes) = (self.inner.nu(), self.controls.nodes());
+        self.bounds = self.bounds.map(|bounds| bounds.map(|bound| bound[..nu].repeat(nodes)));
+        self
+    }
+
+    /// The same knot with bounds on the controls u of its model, infinite where there is none.
     ///
     /// # Panics
-    /// If there are not nu numbers of each.
+    /// If there are not as many numbers of each as the model has controls.
     #[must_use]
     pub fn with_bounds(mut self, lower: Vec<f64>, upper: Vec<f64>) -> Self {
         assert_length("lower", lower.len(), self.inner.nu());
         assert_length("upper", upper.len(), self.inner.nu());
-        self.bounds = Some([lower, upper]);
+        let nodes = self.controls.nodes();
+        self.bounds = Some([lower.repeat(nodes), upper.repeat(nodes)]);
         self
     }
 
@@ -145,13 +168,20 @@ impl<M: ContinuousModel> Integrated<M> {
         for from in (0..knots.len()).step_by(lanes) {
             let to = (from + lanes).min(knots.len());
             if !matches!(self.method, Method::RungeKutta(..)) {
-                self.inner.prepare(&knots[from..to], &xs[from * nx..to * nx], &us[from * nu..to * nu], wanted);
+                let controls = &us[from * nu..][..(to - from) * self.inner.nu()]; // one knot, unless they are constant
+                self.inner.prepare(&knots[from..to], &xs[from * nx..to * nx], controls, wanted);
             }
             for i in from..to {
                 let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
+                let u = if matches!(self.method, Method::RungeKutta(..)) { u } else { &u[..self.inner.nu()] }; // u(0)
                 visit(self, KnotInput { lane: i - from, t: knots[i], x, u }, i);
             }
         }
+    }
+
+    /// Whether a step is one of semi-implicit Euler with controls that stay the same.
+    fn is_simple_step(&self) -> bool {
+        matches!(self.method, Method::Euler(_)) && self.controls.is_constant()
     }
 
     /// Writes the next state of a prepared one; returns the cost.
@@ -168,6 +198,10 @@ impl<M: ContinuousModel> Integrated<M> {
     /// Writes the derivatives at a prepared state.
     fn differentiate(&mut self, input: KnotInput<'_>, node: &mut LqNode) {
         match self.parts() {
+            (inner, Method::Euler(dt), Work { retraction, first: Some(first), .. }) => {
+                euler::calc_diff(inner, input, dt, retraction, first);
+                widen(first, node);
+            }
             (inner, Method::Euler(dt), work) => euler::calc_diff(inner, input, dt, &mut work.retraction, node),
             (inner, Method::RungeKutta(dt, _), Work { runge_kutta: Some(method), retraction, .. }) => {
                 method.calc_diff(inner, input, dt, retraction, node);
@@ -187,7 +221,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
     }
 
     fn nu(&self) -> usize {
-        self.inner.nu()
+        self.controls.nodes() * self.inner.nu()
     }
 
     fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
@@ -199,7 +233,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
     }
 
     fn lanes(&self) -> usize {
-        if let Method::Euler(_) = self.method { self.inner.lanes() } else { 1 }
+        if self.is_simple_step() { self.inner.lanes() } else { 1 }
     }
 
     fn shift(&mut self) {
@@ -214,7 +248,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
     fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
         let other: &mut dyn Any = other;
         let Some(other) = other.downcast_mut::<Self>() else { return false };
-        (self.method, &self.bounds) == (other.method, &other.bounds) && self.inner.merge(&mut other.inner)
+        let rule = |one: &Self| (one.method, one.controls);
+        rule(self) == rule(other) && self.bounds == other.bounds && self.inner.merge(&mut other.inner)
     }
 
     fn choose(&mut self, model: usize) {
@@ -226,13 +261,13 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
     }
 
     fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
-        if let Method::Euler(_) = self.method { self.inner.inverse_dynamics_form() } else { None }
+        if self.is_simple_step() { self.inner.inverse_dynamics_form() } else { None }
     }
 
     fn fork(&self) -> Option<Box<dyn ActionModel>> {
-        let Self { inner, method, bounds, work } = self;
+        let Self { inner, method, controls, bounds, work } = self;
         let (inner, bounds, work) = (inner.fork()?, bounds.clone(), work.clone());
-        Some(Box::new(Self { inner, method: *method, bounds, work }))
+        Some(Box::new(Self { inner, method: *method, controls: *controls, bounds, work }))
     }
 
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
@@ -264,13 +299,17 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
 
     fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         if self.method != Method::Still {
+            let u = &u[..self.inner.nu()]; // u(0)
             self.inner.prepare(&[t], x, u, Wanted::Motion);
             self.inner.outputs(KnotInput { lane: 0, t, x, u }, show);
         }
     }
 
     fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
-        self.inner.hold(x).unwrap_or_else(|| hold::newton(self, t, x))
+        match self.inner.hold(x) {
+            Some(u) => u.repeat(self.controls.nodes()),
+            None => hold::newton(self, t, x),
+        }
     }
 
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
@@ -279,9 +318,11 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         }
     }
 
-    /// Second derivatives by semi-implicit Euler: see `curvature.rs`.
+    /// Second derivatives by semi-implicit Euler, of constant controls: see `curvature.rs`.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
-        let (inner, Method::Euler(dt), Work { retraction, curvature, .. }) = self.parts() else { return false };
+        let (inner, Method::Euler(dt), Work { retraction, curvature, first: None, .. }) = self.parts() else {
+            return false;
+        };
         curvature.run(inner, dt, KnotInput { lane: 0, t, x, u }, lambda, retraction, hessian)
     }
 

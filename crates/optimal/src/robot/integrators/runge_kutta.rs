@@ -1,13 +1,17 @@
-//! Runge–Kutta methods with constant controls, as Crocoddyl's `IntegratedActionModelRK`.
+//! Runge–Kutta methods, as Crocoddyl's `IntegratedActionModelRK`.
 //!
 //! ```text
-//! y₀ = x,   kᵢ = (vᵢ, a(yᵢ, u)),   yᵢ₊₁ = x ⊕ cᵢ₊₁ Δt kᵢ,   x⁺ = x ⊕ Δt Σ bᵢ kᵢ,   cost = Δt Σ bᵢ ℓ(yᵢ, u)
+//! y₀ = x,   kᵢ = (vᵢ, a(yᵢ, uᵢ)),   yᵢ₊₁ = x ⊕ cᵢ₊₁ Δt kᵢ,   x⁺ = x ⊕ Δt Σ bᵢ kᵢ,   cost = Δt Σ bᵢ ℓ(yᵢ, uᵢ)
 //! ```
+//!
+//! with uᵢ = u(cᵢ) of the controls' polynomial, u(s) = Σ lₖ(s) wₖ; derivatives are taken by all w.
 //!
 //! Limits hold at y₀.
 //!
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), section II.1.
 
+use super::Integrator;
+use super::controls::ControlPolynomial;
 use super::retraction::Retraction;
 use crate::lq::LqNode;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted, activate_limits, limit_term};
@@ -18,36 +22,49 @@ pub(super) struct RungeKutta {
     /// The times of the stages in the step, and their weights.
     c: &'static [f64],
     b: &'static [f64],
+    /// The weights of the controls w in those of each stage.
+    l: [[f64; 3]; 4],
+    /// The controls of a stage. Shape: nu.
+    u: Vec<f64>,
     /// The state y of a stage. Shape: nq + nv.
     y: Vec<f64>,
     /// k of a stage, the step to the next one, and Σ b k. Shape: 2 nv.
     k: Vec<f64>,
     dx: Vec<f64>,
     sum: Vec<f64>,
-    /// ∂y/∂(x, u), ∂k/∂(x, u), ∂(Σ b k)/∂(x, u). Shape: 2 nv × (2 nv + nu).
+    /// ∂y/∂(x, w), ∂k/∂(x, w), ∂(Σ b k)/∂(x, w). Shape: 2 nv × (2 nv + nw).
     dy: DMatrix<f64>,
     dk: DMatrix<f64>,
     dsum: DMatrix<f64>,
     /// The cost at a stage.
     stage: LqNode,
-    /// Products with the stage's Hessian. Shape: (2 nv + nu) × (2 nv + nu) and 2 nv × (2 nv + nu).
+    /// Products with the stage's Hessian. Shape: (2 nv + nw) × (2 nv + nw) and 2 nv × (2 nv + nw).
     H: DMatrix<f64>,
     W: DMatrix<f64>,
 }
 
 impl RungeKutta {
     /// A method of two, three or four stages.
-    pub(super) fn new<M: ContinuousModel>(stages: usize, model: &M) -> Self {
+    pub(super) fn new<M: ContinuousModel>(stages: usize, model: &M, controls: ControlPolynomial) -> Self {
         let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
         let (c, b): (&[f64], &[f64]) = match stages {
             2 => (&[0.0, 0.5], &[0.0, 1.0]),
             3 => (&[0.0, 1.0 / 3.0, 2.0 / 3.0], &[0.25, 0.0, 0.75]),
             _ => (&[0.0, 0.5, 0.5, 1.0], &[1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]),
         };
-        let (n, wide) = (2 * nv, DMatrix::zeros(2 * nv, 2 * nv + nu));
+        let rule = match stages {
+            2 => Integrator::RungeKutta2,
+            3 => Integrator::RungeKutta3,
+            _ => Integrator::RungeKutta4,
+        };
+        let (n, nw) = (2 * nv, controls.nodes() * nu);
+        let wide = DMatrix::zeros(n, n + nw);
+        let l = core::array::from_fn(|i| controls.weights(rule, c.get(i).copied().unwrap_or(0.0)));
         Self {
             c,
             b,
+            l,
+            u: vec![0.0; nu],
             y: vec![0.0; nq + nv],
             k: vec![0.0; n],
             dx: vec![0.0; n],
@@ -56,7 +73,7 @@ impl RungeKutta {
             dk: wide.clone(),
             dsum: wide.clone(),
             stage: LqNode::zeros(n, nu),
-            H: DMatrix::zeros(n + nu, n + nu),
+            H: DMatrix::zeros(n + nw, n + nw),
             W: wide,
         }
     }
@@ -69,11 +86,20 @@ impl RungeKutta {
         (0..nv).for_each(|i| self.y[nq + i] = x[nq + i] + self.dx[nv + i]);
     }
 
-    /// Writes the next state; returns the cost.
+    /// Computes the controls of stage i, uᵢ = Σ lₖ wₖ.
+    fn set_controls(&mut self, i: usize, w: &[f64]) {
+        let Self { l, u, .. } = self;
+        u.fill(0.0);
+        for (l, w) in l[i].iter().zip(w.chunks_exact(u.len().max(1))) {
+            u.iter_mut().zip(w).for_each(|(u, w)| *u += l * w);
+        }
+    }
+
+    /// Writes the next state, for u = w; returns the cost.
     pub(super) fn calc<M: ContinuousModel>(
         &mut self,
         model: &mut M,
-        KnotInput { t, x, u, .. }: KnotInput<'_>,
+        KnotInput { t, x, u: w, .. }: KnotInput<'_>,
         dt: f64,
         next: &mut [f64],
     ) -> f64 {
@@ -82,8 +108,9 @@ impl RungeKutta {
         self.k.fill(0.0);
         for i in 0..self.b.len() {
             self.advance(model, x, self.c[i] * dt);
-            model.prepare(&[t], &self.y, u, Wanted::Motion);
-            let (a, rate) = model.calc(KnotInput { lane: 0, t, x: &self.y, u });
+            self.set_controls(i, w);
+            model.prepare(&[t], &self.y, &self.u, Wanted::Motion);
+            let (a, rate) = model.calc(KnotInput { lane: 0, t, x: &self.y, u: &self.u });
             cost += self.b[i] * rate;
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
@@ -99,17 +126,17 @@ impl RungeKutta {
         dt * cost + term
     }
 
-    /// Writes the derivatives of a step, by the chain rule through the stages.
+    /// Writes the derivatives of a step, by the chain rule through the stages, for u = w.
     pub(super) fn calc_diff<M: ContinuousModel>(
         &mut self,
         model: &mut M,
-        KnotInput { t, x, u, .. }: KnotInput<'_>,
+        KnotInput { t, x, u: w, .. }: KnotInput<'_>,
         dt: f64,
         step: &mut Retraction,
         node: &mut LqNode,
     ) {
         let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
-        let n = 2 * nv;
+        let (n, nw) = (2 * nv, w.len());
         for field in [&mut node.Q, &mut node.S, &mut node.R] {
             field.fill(0.0);
         }
@@ -127,26 +154,28 @@ impl RungeKutta {
             step.delta.copy_from_slice(&self.dx[..nv]);
             step.differentiate(model);
             step.chain(model.groups(), &mut self.dy);
-            model.prepare(&[t], &self.y, u, Wanted::Derivatives);
-            let input = KnotInput { lane: 0, t, x: &self.y, u };
+            self.set_controls(i, w);
+            model.prepare(&[t], &self.y, &self.u, Wanted::Derivatives);
+            let input = KnotInput { lane: 0, t, x: &self.y, u: &self.u };
             let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, weight, &mut self.stage);
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
-            for j in 0..n + nu {
+            for j in 0..n + nw {
+                let own = j.checked_sub(n).map(|j| (self.l[i][j / nu], &da_du[(j % nu) * nv..]));
                 for r in 0..nv {
-                    let mut slope = if j < n { 0.0 } else { da_du[(j - n) * nv + r] };
+                    let mut slope = own.map_or(0.0, |(l, da_du)| l * da_du[r]);
                     for s in 0..nv {
                         slope += da_dq[(r, s)] * self.dy[(s, j)] + da_dv[(r, s)] * self.dy[(nv + s, j)];
                     }
                     self.dk[(r, j)] = self.dy[(nv + r, j)]; // ∂v
-                    self.dk[(nv + r, j)] = slope; // a_x ∂y + a_u
+                    self.dk[(nv + r, j)] = slope; // a_x ∂y + a_u ∂u
                 }
             }
             (0..n).for_each(|j| self.sum[j] += weight * self.k[j]);
             let limited = i == 0 && activate_limits(model, false);
             if weight != 0.0 || limited {
                 self.dk.iter().zip(self.dsum.iter_mut()).for_each(|(dk, sum)| *sum += weight * dk);
-                self.add_cost(node, n, nu);
+                self.add_cost(node, i, n, nu);
             }
         }
         activate_limits(model, true);
@@ -154,12 +183,14 @@ impl RungeKutta {
         step.differentiate(model);
         step.chain(model.groups(), &mut self.dsum);
         node.A.copy_from(&self.dsum.columns(0, n));
-        node.B.copy_from(&self.dsum.columns(n, nu));
+        node.B.copy_from(&self.dsum.columns(n, nw));
     }
 
-    /// Adds the cost of a stage, a function of y and u, as one of x and u: H += Yᵀ Q Y + …, with Y = ∂y/∂(x, u).
-    fn add_cost(&mut self, node: &mut LqNode, n: usize, nu: usize) {
-        let Self { dy: Y, stage, H, W, .. } = self;
+    /// Adds the cost of stage i, a function of y and uᵢ, as one of x and w: H += Yᵀ Q Y + …, with Y = ∂y/∂(x, w) and
+    /// ∂uᵢ/∂wₖ = lₖ.
+    fn add_cost(&mut self, node: &mut LqNode, i: usize, n: usize, nu: usize) {
+        let Self { l, dy: Y, stage, H, W, .. } = self;
+        let (l, nw) = (l[i], Y.ncols() - n);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (q, S) = (stage.q.as_slice(), stage.S.as_slice());
         for (j, (y, w)) in Y.as_slice().chunks_exact(n).zip(W.as_mut_slice().chunks_exact_mut(n)).enumerate() {
@@ -167,23 +198,27 @@ impl RungeKutta {
                 *w = dot(Q_r, y); // Q Y
             }
             if j >= n {
-                w.iter_mut().zip(&S[(j - n) * n..]).for_each(|(w, s)| *w += s); // + [0 S]
+                let (l, m) = (l[(j - n) / nu], (j - n) % nu);
+                w.iter_mut().zip(&S[m * n..]).for_each(|(w, s)| *w += l * s); // + [0 S ∂u]
             }
             for (i, y) in Y.as_slice().chunks_exact(n).enumerate() {
-                H[(i, j)] = dot(y, w); // Yᵀ (Q Y + [0 S])
+                H[(i, j)] = dot(y, w); // Yᵀ (Q Y + [0 S ∂u])
             }
             for (k, S_k) in S.chunks_exact(n).enumerate() {
-                let own = if j < n { 0.0 } else { stage.R[(k, j - n)] };
-                H[(n + k, j)] += dot(S_k, y) + own; // + [0; Sᵀ Y + R]
+                let own = if j < n { 0.0 } else { l[(j - n) / nu] * stage.R[(k, (j - n) % nu)] };
+                let row = dot(S_k, y) + own;
+                for at in 0..nw / nu {
+                    H[(n + at * nu + k, j)] += l[at] * row; // + ∂uᵀ [0; Sᵀ Y + R ∂u]
+                }
             }
             if j < n {
                 node.q[j] += dot(q, y);
             } else {
-                node.r[j - n] += dot(q, y) + stage.r[j - n];
+                node.r[j - n] += dot(q, y) + l[(j - n) / nu] * stage.r[(j - n) % nu];
             }
         }
         node.Q += H.view((0, 0), (n, n));
-        node.S += H.view((0, n), (n, nu));
-        node.R += H.view((n, n), (nu, nu));
+        node.S += H.view((0, n), (n, nw));
+        node.R += H.view((n, n), (nw, nw));
     }
 }

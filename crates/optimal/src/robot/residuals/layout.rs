@@ -53,8 +53,9 @@ pub(crate) struct KnotLayout {
     pub kinematic: usize,
     /// Whether a residual looks at forces.
     pub forces: bool,
-    /// Whether a residual is a user's own.
+    /// Whether a residual is a user's own, and whether one has second derivatives.
     pub own: bool,
+    pub curved: bool,
     pub requirements: Requirements,
 }
 
@@ -70,7 +71,8 @@ impl KnotLayout {
         let forces = residual.output() == Some(Output::Force);
         let requirements = Requirements::of(residual, plan.in_contact);
         let own = matches!(residual, Residual::Own(_));
-        Self { longest: plan.n, rows, kinematic, forces, own, requirements }
+        let curved = matches!(residual, Residual::Own(own) if own.has_hessian());
+        Self { longest: plan.n, rows, kinematic, forces, own, curved, requirements }
     }
 
     /// The layout that serves both of two knots.
@@ -92,6 +94,7 @@ impl Add for KnotLayout {
             kinematic: self.kinematic + other.kinematic,
             forces: self.forces | other.forces,
             own: self.own | other.own,
+            curved: self.curved | other.curved,
             requirements: self.requirements | other.requirements,
         }
     }

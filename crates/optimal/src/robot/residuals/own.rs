@@ -1,5 +1,6 @@
 //! Residuals of one's own: any function of the state and the control.
 
+use crate::lq::Hessian;
 use core::fmt;
 use core::ops::Deref;
 use std::any::Any;
@@ -15,6 +16,27 @@ pub trait ResidualFunction: Any + Send + Sync {
 
     /// ∂r/∂x in the tangent space of the state, size × ndx, and ∂r/∂u, size × nu, row after row. Both hold zeros before.
     fn calc_diff(&self, t: usize, x: &[f64], u: &[f64], by_x: &mut [f64], by_u: &mut [f64]);
+
+    /// Whether [`calc_hessian`](Self::calc_hessian) gives second derivatives. Not by default: the Hessian of the cost is then
+    /// Gauss–Newton's, (∂r)ᵀ a″ ∂r.
+    fn has_hessian(&self) -> bool {
+        false
+    }
+
+    /// As [`calc_diff`](Self::calc_diff), with Σ dᵢ ∂²rᵢ too, for size numbers d, the slopes of what r is worth: they come to
+    /// the Gauss–Newton Hessian. Of positions on groups it is the Hessian of r(x ⊕ δ) at δ = 0. All hold zeros before.
+    fn calc_hessian(
+        &self,
+        t: usize,
+        x: &[f64],
+        u: &[f64],
+        d: &[f64],
+        [by_x, by_u]: [&mut [f64]; 2],
+        hessian: &mut Hessian,
+    ) {
+        let _ = (d, hessian);
+        self.calc_diff(t, x, u, by_x, by_u);
+    }
 }
 
 /// A [`ResidualFunction`] as a residual. Two are equal if they are one object.
@@ -38,6 +60,10 @@ pub trait ResidualFunction: Any + Send + Sync {
 /// let power = Residual::Own(OwnResidual::new(Power { nv: 7 }));
 /// # assert_eq!(power, power.clone());
 /// ```
+///
+/// A cost of one's own that is a number and no residual has one entry, the activation
+/// [`Sum`](crate::robot::Activation::Sum), and second derivatives, if it has any, in
+/// [`calc_hessian`](ResidualFunction::calc_hessian).
 #[derive(Clone)]
 pub struct OwnResidual(Arc<dyn ResidualFunction>);
 

@@ -75,15 +75,16 @@ pub enum Residual {
         /// The frame in which both are expressed.
         reference: ReferenceFrame,
     },
-    /// λ − λ_ref, the force or impulse of a contact along the axes of its rows: 3 or 6 numbers, linear first.
+    /// λ − λ_ref, the force or impulse of a contact along the axes of its rows: 1, 2, 3 or 6 numbers, linear first.
     ContactForce {
         /// The contact's name.
         contact: String,
-        /// The wanted force; of a point without moment.
+        /// The wanted force along the contact's axes; only what its rows hold is read, of a point no moment, of a line z, of
+        /// a plane x and z.
         target: Force<f64>,
     },
-    /// A f, for a contact's force f: a number for each side of the cone, and the normal force. See
-    /// [`FrictionCone::bounds`].
+    /// A f, for a contact's force f along its axes (of a line (0, 0, λ), of a plane (λ₁, 0, λ₂)): a number for each side of
+    /// the cone, and the normal force. See [`FrictionCone::bounds`].
     FrictionCone {
         /// The contact's name.
         contact: String,
@@ -111,6 +112,16 @@ pub enum Residual {
     /// A function of one's own. It cannot be put into a file.
     #[serde(skip)]
     Own(OwnResidual),
+}
+
+/// Which numbers of a wrench along a contact's axes are those of its rows, for so many rows: a line has z, a plane x and z.
+pub(super) fn held(rows: usize) -> &'static [usize] {
+    match rows {
+        1 => &[2],
+        2 => &[0, 2],
+        3 => &[0, 1, 2],
+        _ => &[0, 1, 2, 3, 4, 5],
+    }
 }
 
 /// The part of the Hessian of a residual that has entries.
@@ -284,7 +295,8 @@ impl Residual {
         match self {
             Self::ContactForce { .. } => (0..rows * rows).map(|k| f64::from(u8::from(k % rows == k / rows))).collect(),
             Self::FrictionCone { cone, .. } => {
-                let pad = |row: &[f64; 3]| (0..rows).map(|k| row.get(k).copied().unwrap_or(0.0)).collect::<Vec<_>>();
+                let pad =
+                    |row: &[f64; 3]| held(rows).iter().map(|&k| row.get(k).copied().unwrap_or(0.0)).collect::<Vec<_>>();
                 cone.rows().iter().flat_map(pad).collect()
             }
             Self::WrenchCone { cone, .. } => cone.rows().concat(),

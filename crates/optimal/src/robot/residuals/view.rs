@@ -3,9 +3,9 @@
 
 use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::OwnResidual;
-use super::residual::{Part, Residual};
+use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
-use crate::lq::LqNode;
+use crate::lq::{Hessian, LqNode};
 use crate::robot::capabilities::Output;
 use crate::robot::knot::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::state::{groups, state_difference};
@@ -28,6 +28,8 @@ pub(crate) struct Scratch {
     groups: Vec<Range<usize>>,
     /// ∂r/∂x and ∂r/∂u of a user's own residual, row after row.
     own: [Vec<f64>; 2],
+    /// Second derivatives of a user's own residual, and the sum of those of all, where there are any.
+    hessians: Option<Box<[Hessian; 2]>>,
 }
 
 impl Scratch {
@@ -36,7 +38,27 @@ impl Scratch {
         let (nv, numbers) = (model.nv(), || vec![0.0; layout.longest]);
         let (rows, D) = (Rows::new(nv, nu, layout.rows), DMatrix::zeros(nv, nv));
         let own = [2 * nv, nu].map(|n| vec![0.0; if layout.own { layout.longest * n } else { 0 }]);
-        Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model), own }
+        let hessians = layout.curved.then(|| Box::new([(); 2].map(|()| Hessian::zeros(2 * nv, nu))));
+        Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model), own, hessians }
+    }
+
+    /// Forgets all rows and second derivatives.
+    pub(crate) fn clear(&mut self) {
+        self.rows.clear();
+        if let Some(hessians) = &mut self.hessians {
+            hessians[1].fill(0.0);
+        }
+    }
+
+    /// Writes q, r, Q, S and R from all rows and second derivatives.
+    pub(crate) fn write(&mut self, node: &mut LqNode) {
+        self.rows.write(node);
+        if let Some(hessians) = &self.hessians {
+            let [_, Hessian { xx, xu, uu }] = &**hessians;
+            node.Q += xx;
+            node.S += xu;
+            node.R += uu;
+        }
     }
 }
 
@@ -69,7 +91,10 @@ impl ResidualView<'_> {
             Residual::JointAcceleration { reference } => minus(r, &data.a, reference),
             Residual::ImpulseCenterOfMass => r.copy_from_slice(&data.residuals.com_change),
             Residual::Own(own) => own.calc(*t, x, u, r),
-            Residual::ContactForce { target, .. } => minus(r, &data.lambda[plan.rows.clone()], &target.to_array()),
+            Residual::ContactForce { target, .. } => {
+                let (lambda, target) = (&data.lambda[plan.rows.clone()], target.to_array());
+                (0..r.len()).for_each(|k| r[k] = lambda[k] - target[held(lambda.len())[k]]);
+            }
             Residual::FrictionCone { .. } | Residual::WrenchCone { .. } | Residual::CenterOfPressure { .. } => {
                 let f = &data.lambda[plan.rows.clone()];
                 for (r, row) in r.iter_mut().zip(plan.W.chunks_exact(f.len())) {
@@ -113,12 +138,21 @@ impl ResidualView<'_> {
 
     /// Pushes the rows of a user's own residual of n numbers.
     fn push_own_rows(&mut self, own: &OwnResidual, n: usize, sensitivities: &dyn Sensitivities) {
-        let Scratch { rows, d, dd, own: [by_x, by_u], .. } = &mut *self.scratch;
+        let Scratch { rows, d, dd, own: [by_x, by_u], hessians, .. } = &mut *self.scratch;
         let (KnotState { x, u, .. }, nv) = (self.state, self.model.nv());
         let (by_x, by_u) = (&mut by_x[..n * 2 * nv], &mut by_u[..n * u.len()]);
         by_x.fill(0.0);
         by_u.fill(0.0);
-        own.calc_diff(self.t, x, u, by_x, by_u);
+        match hessians.as_deref_mut().filter(|_| own.has_hessian()) {
+            Some([hessian, sum]) => {
+                hessian.fill(0.0);
+                own.calc_hessian(self.t, x, u, &d[..n], [&mut *by_x, &mut *by_u], hessian);
+                sum.xx += &hessian.xx;
+                sum.xu += &hessian.xu;
+                sum.uu += &hessian.uu;
+            }
+            None => own.calc_diff(self.t, x, u, by_x, by_u),
+        }
         for i in (0..n).filter(|&i| [d[i], dd[i]] != [0.0, 0.0]) {
             let g = &mut rows.push([d[i], dd[i]]);
             let (by_q, by_v) = by_x[i * 2 * nv..][..2 * nv].split_at(nv);

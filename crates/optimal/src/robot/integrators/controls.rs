@@ -1,0 +1,82 @@
+//! Control polynomials: how the controls of a knot go through its time.
+#![allow(non_snake_case)] // B, S, R
+
+use super::Integrator;
+use crate::lq::LqNode;
+use serde::{Deserialize, Serialize};
+
+/// The polynomial u(s) that the controls of a knot follow, at the time s of its Δt, from 0 to 1.
+///
+/// The controls of the knot are then w, the values of u at some nodes of the polynomial, one after the other:
+///
+/// ```text
+/// constant    u(s) = w                                             nu numbers
+/// linear      u(s) = (1 − 2 s) w₀ + 2 s w₁                         at s = 0 and ½
+/// quadratic   u(s) = Σ lₖ(s) wₖ, Lagrange's polynomials            at s = 0, ½, 1; by `RungeKutta3` at 0, ⅓, ⅔
+/// ```
+///
+/// Dynamics and costs are taken at the stages of the [`Integrator`], each at its own u(s). Semi-implicit Euler has one, at
+/// s = 0, so that w₁ and w₂ do nothing there, and only regularisation or [`Constrained`](crate::Constrained) terms hold
+/// them. These are Crocoddyl's `ControlParametrizationModelPolyZero`, `PolyOne` and `PolyTwoRK`.
+///
+/// ```
+/// use condyle_optimal::robot::{ControlPolynomial, Integrator};
+/// let [a, b, c] = ControlPolynomial::Quadratic.weights(Integrator::RungeKutta4, 0.5);
+/// assert_eq!([a, b, c], [0.0, 1.0, 0.0]); // w₁ is the control in the middle
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ControlPolynomial {
+    /// The same controls all the time.
+    #[default]
+    Constant,
+    /// Of first degree.
+    Linear,
+    /// Of second degree.
+    Quadratic,
+}
+
+impl ControlPolynomial {
+    /// The number of nodes: a knot has so many times nu controls.
+    pub fn nodes(self) -> usize {
+        match self {
+            Self::Constant => 1,
+            Self::Linear => 2,
+            Self::Quadratic => 3,
+        }
+    }
+
+    /// The weights of w₀, w₁, w₂ in u(s), zeros where there is no such node.
+    pub fn weights(self, integrator: Integrator, s: f64) -> [f64; 3] {
+        match (self, integrator) {
+            (Self::Constant, _) => [1.0, 0.0, 0.0],
+            (Self::Linear, _) => [1.0 - 2.0 * s, 2.0 * s, 0.0],
+            (Self::Quadratic, Integrator::RungeKutta3) => {
+                [(4.5 * s - 4.5) * s + 1.0, (6.0 - 9.0 * s) * s, (4.5 * s - 1.5) * s]
+            }
+            (Self::Quadratic, _) => [(2.0 * s - 1.0) * (s - 1.0), 4.0 * s * (1.0 - s), (2.0 * s - 1.0) * s],
+        }
+    }
+
+    /// Whether the controls stay the same.
+    pub(crate) fn is_constant(&self) -> bool {
+        *self == Self::Constant
+    }
+}
+
+/// Writes the derivatives of a step by u = w₀ as those by all w, the others zero.
+pub(super) fn widen(from: &LqNode, node: &mut LqNode) {
+    let (n, nu) = (from.ndx(), from.nu());
+    let LqNode { A, B, Q, S, R, q, r, .. } = node;
+    for part in [&mut *B, &mut *S, &mut *R] {
+        part.fill(0.0);
+    }
+    r.fill(0.0);
+    A.copy_from(&from.A);
+    Q.copy_from(&from.Q);
+    q.copy_from(&from.q);
+    B.view_mut((0, 0), (n, nu)).copy_from(&from.B);
+    S.view_mut((0, 0), (n, nu)).copy_from(&from.S);
+    R.view_mut((0, 0), (nu, nu)).copy_from(&from.R);
+    r.rows_mut(0, nu).copy_from(&from.r);
+}
