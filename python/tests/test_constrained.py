@@ -121,7 +121,7 @@ def test_what_is_refused(quadruped: Robot) -> None:
     ):
         ConstraintSet(model, [point, point])
     with pytest.raises(ValueError, match="^kind: expected 'point', 'line', 'plane' or 'rigid', found 'edge'$"):
-        ConstraintSet(model, [point._replace(kind="line")])  # type: ignore[arg-type]
+        ConstraintSet(model, [point._replace(kind="edge")])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="^mu: expected a number of at least 0, found -1$"):
         ConstraintSet(model, [point], mu=-1.0)
     with pytest.raises(ValueError, match=r"^velocity: expected shape \(6,\), found \(3,\)$"):

@@ -164,8 +164,8 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     }
     #[inline(always)]
     fn force(&self, f_ext: &[Force<S>], i: usize) -> Option<Force<S>> {
-        let axis_rotation = Se3::new(self.nodes[i].axis_rotation, Vec3::zero());
-        f_ext.get(i).map(|&f| axis_rotation.lift().act_inv(f))
+        let &f = f_ext.get(i)?; // not by `map`, which would not be inlined
+        Some(Se3::new(self.nodes[i].axis_rotation, Vec3::zero()).lift().act_inv(f))
     }
 
     #[inline(always)]

@@ -152,6 +152,7 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Panics
     /// If there is no such constraint.
+    #[inline(always)]
     pub fn force(&self, k: usize) -> Force<S> {
         let mut f = [S::zero(); 6];
         let (plan, lambda) = (&self.plans[k], &self.lambda[self.range(k)]);

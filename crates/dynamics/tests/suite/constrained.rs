@@ -301,8 +301,9 @@ fn gauss_principle() {
         let free = DVector::from_row_slice(aba(&model, &mut data, &s.q, &s.v, &s.tau, &s.f_ext));
         let any = normal(&mut rng(3), model.nv());
         let allowed = DVector::from_row_slice(impulse_dynamics(&model, &mut data, &mut set, &s.q, &any, 0.0).v);
-        let work = allowed.dot(&(crba(&model, &mut data, &s.q) * (a - free)));
-        worst.see(&model, &[work], &[0.0]);
+        let force = crba(&model, &mut data, &s.q) * (a - free);
+        let size = 1.0 + allowed.norm() * force.norm();
+        worst.see(&model, &[allowed.dot(&force) / size], &[0.0]);
     }
 }
 
