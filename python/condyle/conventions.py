@@ -185,7 +185,7 @@ class Coordinates:
             name, means = library.lower(), LIBRARIES[library.lower()]
         else:
             name, means = "", library
-        self.model, self.library = model, means
+        self.model, self.convention = model, means
         other: dict[str, list[str]] = {"pinocchio": [], "drake": ["planar", "spherical"]}
         refused = other.get(name, ["planar"])
         for joint, kind in zip(model.names, model.joint_types, strict=True):
@@ -198,7 +198,7 @@ class Coordinates:
         nq = 0
         columns = zip(model.joint_types, model.idx_qs, model.nqs, model.idx_vs, model.nvs, strict=True)
         for kind, at_q, nq_here, at_v, nv_here in columns:
-            there = 1 if kind == "continuous" and self.library.angle else nq_here
+            there = 1 if kind == "continuous" and self.convention.angle else nq_here
             self._joints.append((kind, _run(at_q, nq_here), _run(nq, there), _run(at_v, nv_here)))
             nq += there
         self.nq = nq
@@ -211,12 +211,12 @@ class Coordinates:
         for kind, mine, its, _ in self._joints:
             x = q[..., mine]
             if kind == "free_flyer":
-                quaternion = x[..., 3:] if self.library.w_last else wxyz(x[..., 3:])
+                quaternion = x[..., 3:] if self.convention.w_last else wxyz(x[..., 3:])
                 parts = [x[..., :3], quaternion]
-                x = np.concatenate(parts if self.library.position_first else parts[::-1], -1)
-            elif kind == "spherical" and not self.library.w_last:
+                x = np.concatenate(parts if self.convention.position_first else parts[::-1], -1)
+            elif kind == "spherical" and not self.convention.w_last:
                 x = wxyz(x)
-            elif kind == "continuous" and self.library.angle:
+            elif kind == "continuous" and self.convention.angle:
                 x = np.arctan2(x[..., 1], x[..., 0])[..., None]
             theirs[..., its] = x
         return theirs
@@ -229,12 +229,12 @@ class Coordinates:
             x = q[..., its]
             if kind == "free_flyer":
                 place, quaternion = (
-                    (x[..., :3], x[..., 3:]) if self.library.position_first else (x[..., 4:], x[..., :4])
+                    (x[..., :3], x[..., 3:]) if self.convention.position_first else (x[..., 4:], x[..., :4])
                 )
-                x = np.concatenate([place, quaternion if self.library.w_last else xyzw(quaternion)], -1)
-            elif kind == "spherical" and not self.library.w_last:
+                x = np.concatenate([place, quaternion if self.convention.w_last else xyzw(quaternion)], -1)
+            elif kind == "spherical" and not self.convention.w_last:
                 x = xyzw(x)
-            elif kind == "continuous" and self.library.angle:
+            elif kind == "continuous" and self.convention.angle:
                 x = np.concatenate([np.cos(x), np.sin(x)], -1)
             ours[..., mine] = x
         return ours
@@ -276,10 +276,10 @@ class Coordinates:
         for mine, at in self._free():
             R = rotation(q[..., mine][..., 3:])
             linear, angular = x[..., at][..., :3], x[..., at][..., 3:]
-            linear = _turn(R, linear) if self.library.linear == "world" else linear
-            angular = _turn(R, angular) if self.library.angular == "world" else angular
+            linear = _turn(R, linear) if self.convention.linear == "world" else linear
+            angular = _turn(R, angular) if self.convention.angular == "world" else angular
             parts = np.broadcast_arrays(linear, angular)
-            out[..., at] = np.concatenate(parts if self.library.linear_first else parts[::-1], -1)
+            out[..., at] = np.concatenate(parts if self.convention.linear_first else parts[::-1], -1)
         return out
 
     def _back(self, q: _Array, x: _Array) -> _Array:
@@ -287,9 +287,9 @@ class Coordinates:
         for mine, at in self._free():
             R = rotation(q[..., mine][..., 3:])
             first, second = x[..., at][..., :3], x[..., at][..., 3:]
-            linear, angular = (first, second) if self.library.linear_first else (second, first)
-            linear = _turn_back(R, linear) if self.library.linear == "world" else linear
-            angular = _turn_back(R, angular) if self.library.angular == "world" else angular
+            linear, angular = (first, second) if self.convention.linear_first else (second, first)
+            linear = _turn_back(R, linear) if self.convention.linear == "world" else linear
+            angular = _turn_back(R, angular) if self.convention.angular == "world" else angular
             out[..., at] = np.concatenate(np.broadcast_arrays(linear, angular), -1)
         return out
 
@@ -297,7 +297,7 @@ class Coordinates:
         """Accelerations with ± ω × v on free joints, if the library has linear velocities along the world's axes."""
         a = np.array(np.broadcast_to(a, np.broadcast_shapes(v.shape, a.shape)))
         for _, at in self._free():
-            if self.library.linear == "world":
+            if self.convention.linear == "world":
                 linear, omega = v[..., at][..., :3], v[..., at][..., 3:]
                 a[..., at.start : at.start + 3] += sign * np.cross(omega, linear)
         return a

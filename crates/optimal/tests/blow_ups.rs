@@ -1,0 +1,152 @@
+//! Solves that blow up give back their best iterate, and go on from there.
+#![allow(non_snake_case)] // K
+
+use condyle_dynamics::{Vec3, robots};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle_optimal::{AugmentedLagrangian, Fddp, Problem, Status, Sweep};
+use std::sync::Arc;
+
+/// An arm reaches for a point in 50 knots, and nothing but a tiny weight keeps its efforts small, and bounds that are far away.
+fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Problem, Vec<f64>) {
+    let arm = Arc::new(robots::arm7());
+    let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+    let there = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
+    let effort = Cost::new("effort", effort, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
+    let point = Cost::new("point", point, there, Activation::Quadratic);
+    let mut knot = FreeDynamics::running(arm.clone(), dt, vec![effort]).unwrap();
+    if let Some(bound) = bound {
+        knot = knot.with_bounds(vec![-bound; 7], vec![bound; 7]);
+    }
+    let end = FreeDynamics::terminal(arm, vec![point]).unwrap();
+    let problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 50], Box::new(end)).unwrap();
+    (problem, x0.repeat(51))
+}
+
+/// Time steps, weights of efforts and of the point. Which of them blow up depends on the last digit of sums, hence on the
+/// processor's vectors; some do on each.
+const RECKLESS: [(f64, f64, f64); 12] = [
+    (0.02, 1e-6, 1e2),
+    (0.02, 1e-6, 1e4),
+    (0.02, 1e-4, 1e2),
+    (0.02, 1e-4, 1e4),
+    (0.02, 1e-3, 1e4),
+    (0.05, 1e-6, 1e2),
+    (0.05, 1e-6, 1e4),
+    (0.05, 1e-4, 1e2),
+    (0.05, 1e-4, 1e4),
+    (0.05, 1e-3, 1e2),
+    (0.05, 1e-3, 1e4),
+    (0.05, 1e-2, 1e4),
+];
+
+/// Crocoddyl's rules accept a step into an iterate that costs 1e16 times as much, where nothing can be computed any more:
+/// the trace says so, but the solution is the iterate before it, and the next solve begins there.
+#[test]
+fn a_solve_that_blows_up_returns_its_best_iterate() {
+    let mut blown_up = 0;
+    for (dt, effort, point) in RECKLESS {
+        let run = |threads: usize| {
+            let (mut problem, xs) = reckless_reach(dt, effort, point, None);
+            let mut solver = Fddp::new(&problem);
+            solver.settings.threads = threads;
+            let first = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+            let next = solver.resume(&mut problem).unwrap().clone();
+            (first, next, problem)
+        };
+        let (solution, next, mut problem) = run(1);
+        let trace = &solution.trace;
+        let explodes = |i: &usize| trace[*i].cost > 1e8 * (1.0 + trace[0].cost);
+        let Some(before) = (1..trace.len()).find(explodes).filter(|_| solution.status == Status::NotFinite) else {
+            continue;
+        };
+        blown_up += 1;
+        let last = trace.last().unwrap();
+        assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
+        // the iterate before the blow-up: its cost and gap are in the trace, one record apart
+        assert!(solution.cost < 1e5, "{}", solution.cost);
+        assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
+        let (mut nodes, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
+        problem.calc(&solution.xs, &solution.us, &mut nodes, &mut numbers);
+        assert!((numbers.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
+        assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
+        assert!(solution.k.iter().any(|k| k.amax() > 0.0));
+        // a resume begins there and ends no worse
+        assert!(next.gap <= solution.gap && next.cost.is_finite(), "{} {}", next.gap, next.cost);
+        assert!(next.trace.first().is_some_and(|first| first.gap == solution.gap));
+        let (other, again, _) = run(2);
+        assert!(other.xs == solution.xs && other.us == solution.us && other.K == solution.K && other.k == solution.k);
+        assert!(again.xs == next.xs && again.trace == next.trace);
+    }
+    assert!(blown_up > 0);
+}
+
+/// The same with bounds on the controls, whose steps are quadratic programs: the solve accepts an iterate that costs more than
+/// a hundred times as much, no direction can be found there, and it goes back.
+#[test]
+fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
+    let mut blown_up = 0;
+    for (dt, effort, point) in RECKLESS {
+        let (mut problem, xs) = reckless_reach(dt, effort, point, Some(1e6));
+        let mut solver = Fddp::new(&problem);
+        let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+        let (first, last) = (&solution.trace[0], solution.trace.last().unwrap());
+        if solution.status != Status::NotFinite || last.cost < 1e2 * (1.0 + first.cost) {
+            continue;
+        }
+        blown_up += 1;
+        assert!(last.accepted, "{last:?}");
+        let most = solution.trace.iter().map(|i| i.gap).fold(0.0, f64::max);
+        assert!(solution.cost < last.cost && solution.gap < most, "{} {}", solution.cost, solution.gap);
+        assert!(solution.us.iter().all(|u| u.abs() <= 1e6));
+        let (mut next, mut costs) = (vec![0.0; 50 * 14], vec![0.0; 51]);
+        problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
+        assert!((costs.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
+        assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
+        let next = solver.resume(&mut problem).unwrap();
+        assert!(next.trace[0].gap == solution.gap && next.gap <= solution.gap && next.cost.is_finite());
+    }
+    assert!(blown_up > 0);
+}
+
+/// The feedback of a solution that a solve went back to is that of the sweep there.
+#[test]
+fn the_feedback_is_that_of_the_iterate() {
+    let mut blown_up = RECKLESS.into_iter().filter_map(|(dt, effort, point)| {
+        let (mut problem, xs) = reckless_reach(dt, effort, point, None);
+        let mut solver = Fddp::new(&problem);
+        let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+        (solution.status == Status::NotFinite).then_some((problem, solver, solution))
+    });
+    let (mut problem, solver, solution) = blown_up.next().expect("one of them blows up");
+    let (mut nodes, mut next, mut costs) = (problem.nodes(), vec![0.0; 50 * 14], vec![0.0; 51]);
+    problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
+    problem.calc_diff(&solution.xs, &solution.us, &mut nodes);
+    for (t, node) in nodes.iter_mut().enumerate() {
+        for (i, f) in node.f.iter_mut().enumerate() {
+            *f = if t < 50 { next[14 * t + i] - solution.x(t + 1)[i] } else { 0.0 };
+        }
+    }
+    let mut sweep = Sweep::new(&nodes);
+    sweep.run(&nodes, solver.settings.regularisation_start).unwrap();
+    for (t, knot) in sweep.knots()[..50].iter().enumerate() {
+        assert!((&knot.K - &solution.K[t]).amax() < 1e-6 * (1.0 + knot.K.amax()), "knot {t}");
+        assert!((&knot.k - &solution.k[t]).amax() < 1e-6 * (1.0 + knot.k.amax()), "knot {t}");
+    }
+}
+
+/// What blows up within the augmented Lagrangian leaves it its best iterate too, measured.
+#[test]
+fn a_constrained_solve_that_blows_up_says_how_far_its_best_iterate_is() {
+    let mut blown_up = RECKLESS.into_iter().filter_map(|(dt, effort, point)| {
+        let (mut problem, xs) = reckless_reach(dt, effort, point, None);
+        let mut solver = AugmentedLagrangian::new(&problem);
+        let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
+        (solution.status == Status::NotFinite).then_some((problem, solver, solution))
+    });
+    let (mut problem, mut solver, solution) = blown_up.next().expect("one of them blows up");
+    let outcome = solver.outcome().clone();
+    assert!(solution.cost < 1e5 && solution.gap < 1.0, "{} {}", solution.cost, solution.gap);
+    assert!(outcome.primal == solution.gap && outcome.dual.is_finite() && (outcome.cost - solution.cost).abs() < 1e-9);
+    let next = solver.resume(&mut problem).unwrap();
+    assert!(next.gap <= solution.gap && next.cost.is_finite());
+}
