@@ -148,7 +148,18 @@ def test_check(name: str) -> None:
 def test_budget(name: str) -> None:
     report = run("budget", name, "--knots", "4", "--repetitions", "1", "--cores", "2")
     assert len(report["algorithms"]) == 6
+    assert {row["name"] for row in report["iterations"]} == {"free"}
     assert all(row["finite"] for row in report["iterations"])
+
+
+@pytest.mark.parametrize("name", list(ROBOTS))
+def test_budget_in_contact(name: str) -> None:
+    last = run("inspect", name)["bodies"][-1]["name"]
+    for kind in ("--contacts", "--rigid-contacts"):
+        report = run("budget", name, "--knots", "4", "--repetitions", "1", kind, last)
+        assert last in str(report["contacts"])
+        assert {row["name"] for row in report["iterations"]} == {"free", "in contact"}
+        assert all(row["finite"] for row in report["iterations"])
 
 
 MOST_TRIANGLES = 60_000
