@@ -17,7 +17,7 @@ use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use crate::robot::residuals::surplus::Surplus;
 use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
-    constrained_dynamics_equations, rnea, rnea_derivatives,
+    constrained_equations_at, rnea, rnea_derivatives,
 };
 use condyle_spatial::block::{Block, gather_rows, scatter};
 use nalgebra::DMatrix;
@@ -58,6 +58,7 @@ pub(crate) struct KnotBatch<S> {
     /// The output that the controls drive: τ, or q̈.
     tau: Vec<S>,
     a: Vec<S>,
+    lambda: Vec<S>,
     linear: LinearEquations<S>,
     /// Whether the last pass was at q.
     visited: bool,
@@ -80,8 +81,9 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         };
         let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
+        let lambda = zeros(if let Pass::Contact(set, _) = &pass { set.rows() } else { 0 });
         let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Arc::default());
-        Self { data, pass, surplus, residuals, q, v, tau, a, linear, visited: false }
+        Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Makes room for the equations of knots in inverse-dynamics form.
@@ -155,15 +157,15 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// Accelerations and forces, and the equations that they satisfy, in which limbs are solved.
+    /// The equations that accelerations and forces satisfy, which are known, with the limbs solved.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
-        let Self { data, pass, q, v, tau, a, linear, .. } = self;
+        let Self { data, pass, q, v, a, lambda, linear, .. } = self;
+        pack(to.len(), |k| &to[k].a, a);
         match pass {
             Pass::Contact(set, J) => {
+                pack(to.len(), |k| &to[k].lambda, lambda);
                 let mu = set.proximal.mu;
-                let d = constrained_dynamics_equations(model, data, set, q, v, tau, &[]);
-                a.copy_from_slice(d.a);
-                unpack(d.lambda, to, |to| &mut to.lambda);
+                let d = constrained_equations_at(model, data, set, q, v, a, lambda);
                 let LinearEquations { size, tableau, .. } = linear;
                 write_motion(*size, d.M, d.dtau_dv, d.dtau_dq, tableau);
                 write_drift(*size, d.dgamma_dv, d.dgamma_dq, mu, tableau);
@@ -171,13 +173,11 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 write_jacobian(*size, J, tableau);
             }
             _ => {
-                a.copy_from_slice(aba(model, data, q, v, tau, &[]));
                 let d = rnea_derivatives(model, data, q, v, a, &[]);
                 write_motion(linear.size, d.dtau_da, d.dtau_dv, d.dtau_dq, &mut linear.tableau);
             }
         }
         linear.solve_limbs(to);
-        unpack(a, to, |to| &mut to.a);
         self.visited = true;
     }
 
