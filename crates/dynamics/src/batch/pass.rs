@@ -7,6 +7,7 @@ use crate::calls::inertia::{crba, minv};
 use crate::calls::inverse_dynamics::{gravity, nonlinear_effects, rnea};
 use crate::data::Data;
 use crate::workspace::{filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::threads;
 use condyle_model::Model;
 use condyle_spatial::Force;

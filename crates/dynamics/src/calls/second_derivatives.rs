@@ -6,6 +6,7 @@ use super::inverse_dynamics::check_arguments;
 use crate::data::Data;
 use crate::derivatives::{aba_hessian as aba, rnea_hessian as rnea};
 use crate::workspace::{filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};

@@ -15,6 +15,7 @@
 
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::sparsity::NonzeroRows;

@@ -17,6 +17,7 @@ use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::crba;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};

@@ -19,6 +19,7 @@ use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_linalg::axpy::axpy;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};

@@ -11,6 +11,7 @@ use crate::derivatives::tree_solve::{self, minus_solve};
 use crate::passes::aba::{self};
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_spatial::Scalar;
 use condyle_spatial::kernel;

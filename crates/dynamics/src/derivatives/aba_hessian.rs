@@ -14,6 +14,7 @@
 use crate::derivatives::aba_derivatives::{self};
 use crate::derivatives::rnea_hessian;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::minus_product;
 use condyle_spatial::Scalar;

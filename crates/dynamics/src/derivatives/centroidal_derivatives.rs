@@ -16,6 +16,7 @@ use crate::passes::centroidal::{about, add};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;

@@ -33,6 +33,7 @@ use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;

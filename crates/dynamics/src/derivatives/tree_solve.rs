@@ -8,6 +8,7 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::selection::solve_by_tree;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 

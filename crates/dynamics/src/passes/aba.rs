@@ -7,6 +7,7 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;

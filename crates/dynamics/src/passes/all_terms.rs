@@ -8,6 +8,7 @@ use crate::passes::coriolis::Coriolis;
 use crate::passes::frames::{ReferenceFrame, Velocities, classical};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;

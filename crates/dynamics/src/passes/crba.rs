@@ -5,6 +5,7 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::kernel;

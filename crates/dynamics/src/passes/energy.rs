@@ -3,6 +3,7 @@
 use crate::passes::frames::{Placements, Velocities};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;

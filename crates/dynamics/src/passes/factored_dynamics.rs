@@ -1,6 +1,7 @@
 //! Forward dynamics by the method that is fastest for the model.
 
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_linalg::Cholesky;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;

@@ -2,6 +2,7 @@
 //! be asked is in `frames.rs`.
 
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;

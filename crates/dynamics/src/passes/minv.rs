@@ -9,6 +9,7 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::selection::inverse_by_factor;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_model::Model;

@@ -12,6 +12,7 @@
 //! the form y makes the 6 × 10 matrices of that paper superfluous.
 
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_spatial::{Cross, Motion, Scalar};
 use nalgebra::DMatrix;
 

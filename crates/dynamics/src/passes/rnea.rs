@@ -20,6 +20,7 @@
 
 use crate::passes::kinematics::{PlacementCache, World};
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};

@@ -3,6 +3,7 @@
 use super::{Input, Status, acceleration};
 use crate::data::Data;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_spatial::{Constant, Scalar};

@@ -19,6 +19,7 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};

@@ -12,6 +12,7 @@
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_model::joint::GroupJacobian;

@@ -26,6 +26,7 @@ use crate::data::Data;
 use crate::passes::kinematics::place;
 use crate::passes::passive::{passive_torque, passive_torque_derivative};
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::integrate;

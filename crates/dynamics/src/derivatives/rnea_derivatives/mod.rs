@@ -26,6 +26,7 @@ use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
 use crate::selection::pairs_by_rows;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;

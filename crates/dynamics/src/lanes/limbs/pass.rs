@@ -8,6 +8,8 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::passes::rnea;
 use crate::workspace::{Size, filled};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::limbs::steps::Source;
 use condyle_spatial::block::lanes;
