@@ -35,6 +35,10 @@ pub use calls::constrained_dynamics::{
     Constrained, ConstrainedDerivatives, ConstrainedEquations, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_dynamics_equations,
 };
+pub use calls::constrained_inverse::{
+    ConstrainedInverse, ConstrainedInverseDerivatives, constrained_inverse_dynamics,
+    constrained_inverse_dynamics_derivatives,
+};
 pub use calls::derivatives::{
     AbaDerivatives, CoriolisDerivatives, RneaDerivatives, aba_derivatives, centroidal_derivatives,
     coriolis_derivatives, energy_derivatives, rnea_derivatives, static_torque_derivative,
