@@ -220,6 +220,21 @@ kernel! {
 }
 
 kernel! {
+    /// J and J q̈ + γ, for bodies whose velocities and accelerations are known.
+    pub(crate) fn evaluate<S>(world: &World<S>, set: &mut ConstraintSet<S>, v: &[Motion<S>], a: &[Motion<S>]) {
+        for (i, plan) in set.plans.iter().enumerate() {
+            let target = &set.targets[i];
+            let ends = FramePair::new(plan, target, world, v, a);
+            ends.jacobian(plan, &world.S, &mut set.J);
+            let acceleration = ends.acceleration(plan, target).to_array();
+            for r in 0..plan.rows() {
+                set.error[plan.row + r] = acceleration[r];
+            }
+        }
+    }
+}
+
+kernel! {
     /// λ and the acceleration x for an effort.
     pub(crate) fn solve<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
         set.solve(factor, effort, x);
