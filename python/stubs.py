@@ -43,8 +43,8 @@ ALIASES = {
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
     "_Polynomial": 'Literal["constant", "linear", "quadratic"]',
     "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
-    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Unicycle | Action"
-    " | DifferentialAction | ConstrainedAction",
+    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | ContactInverseDynamics"
+    " | Lqr | Unicycle | Action | DifferentialAction | ConstrainedAction",
 }
 
 # The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
@@ -143,7 +143,7 @@ ARGUMENTS = {
 RESULTS = {
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
-        InverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
+        InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Problem.rollout Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration

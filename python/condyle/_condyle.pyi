@@ -55,6 +55,7 @@ __all__ = [
     "ConstrainedAction",
     "ConstraintSet",
     "ContactDynamics",
+    "ContactInverseDynamics",
     "ControllerError",
     "Cost",
     "Data",
@@ -199,6 +200,7 @@ _Action: TypeAlias = (
     | ContactDynamics
     | ImpulseDynamics
     | InverseDynamics
+    | ContactInverseDynamics
     | Lqr
     | Unicycle
     | Action
@@ -2344,6 +2346,55 @@ class ContactDynamics:
     def _from_json(model: Model, text: str) -> ContactDynamics: ...
 
 @final
+class ContactInverseDynamics:
+    """A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), τ = M q̈
+    + h − Jᵀλ; otherwise as `FreeDynamics`.
+
+    Of itself it has a `Limit` to zero on the efforts that nothing drives, Nᵀτ = 0 with Nᵀ S = 0 (`undriven efforts`; of a
+    floating base the first 6), and on each contact's J q̈ + γ = 0 (`contact …`): `AugmentedLagrangian` holds them, to `Fddp`
+    alone they are costs. Nothing is inverted: contacts may be redundant. These are the rules of Crocoddyl's
+    `DifferentialActionModelContactInvDynamics`, and without contacts of `DifferentialActionModelFreeInvDynamics`.
+
+    model: the robot.
+    contacts: a dict of `ContactConstraint`s by name, the order of which is that of λ. May be empty.
+    dt: Δt in seconds.
+    costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.contact_force` at λ.
+    costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`; the actuation says
+        which efforts there are, bounds are of all nv + rows controls.
+
+    Raises `ProblemError` for a contact, cost, limit or drives that do not fit.
+
+    >>> from condyle.optimal import ContactInverseDynamics
+    >>> quadruped = condyle.robots.quadruped()
+    >>> feet = {foot: condyle.ContactConstraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
+    >>> ContactInverseDynamics(quadruped, feet, 0.02, [])
+    <condyle.optimal.ContactInverseDynamics of 'quadruped', 0.02 s, nu 24, contacts LF_foot RH_foot>
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        contacts: dict[str, ContactConstraint],
+        dt: float,
+        costs: Sequence[Cost],
+        costs_at: dict[int, Sequence[Cost]] | None = None,
+        actuation: ArrayLike | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+        limits_at: dict[int, Sequence[Limit]] | None = None,
+        controls: _Polynomial = "constant",
+    ) -> ContactInverseDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """No accelerations, and the forces among the smallest efforts and forces that hold the robot still at the state x:
+        nv zeros and λ.
+        """
+
+    @staticmethod
+    def _from_json(model: Model, text: str) -> ContactInverseDynamics: ...
+
+@final
 class Cost:
     """A term of a cost: weight times an activation of a residual.
 
@@ -2595,7 +2646,7 @@ class InverseDynamics:
 
     model: the robot.
     dt: Δt in seconds.
-    costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
+    costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.undriven_effort` at its part that nothing drives.
     integrator, lower, upper, limits, controls: as of `FreeDynamics`.
 
     Raises `ProblemError` for a cost or a limit that does not fit.
@@ -2669,8 +2720,8 @@ class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Action`,
-        `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
+        `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
     stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
         model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
     terminal: the model of the end, without controls.
@@ -2761,9 +2812,9 @@ class Problem:
 class Residual:
     """A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 
-    A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics` or
-    `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it looks at the frame of that
-    name, or is refused.
+    A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics`,
+    `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it
+    looks at the frame of that name, or is refused.
     A target that is not given is zero, a rotation the identity.
 
     >>> from condyle.optimal import Residual
@@ -2786,6 +2837,18 @@ class Residual:
     @staticmethod
     def joint_effort(reference: ArrayLike) -> Residual:
         """The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
+
+    @staticmethod
+    def undriven_effort() -> Residual:
+        """The efforts that inverse dynamics finds where nothing drives the robot, r = Nᵀτ with Nᵀ S = 0; of a floating base the 6
+        numbers of the force on it. They are 0 in a motion that is possible.
+        """
+
+    @staticmethod
+    def contact_acceleration(contact: str) -> Residual:
+        """The acceleration of a contact where accelerations are controls, r = J q̈ + γ along the axes of its rows: 1, 2, 3 or 6
+        numbers, 0 while it holds.
+        """
 
     @staticmethod
     def joint_acceleration(reference: ArrayLike) -> Residual:

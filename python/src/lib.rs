@@ -105,9 +105,9 @@ mod _condyle {
     use model::{Model, model_from_bytes};
     #[pymodule_export]
     use optimal::{
-        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, DifferentialAction, Fddp,
-        FreeDynamics, FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, Sweep, Unicycle,
-        WrenchCone,
+        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics, Cost,
+        DifferentialAction, Fddp, FreeDynamics, FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem,
+        Residual, Sweep, Unicycle, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

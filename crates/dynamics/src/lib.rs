@@ -46,8 +46,12 @@ pub use calls::constrained_dynamics::{
     Constrained, ConstrainedDerivatives, ConstrainedEquations, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_dynamics_equations,
 };
+pub use calls::constrained_inverse::{
+    ConstrainedInverse, ConstrainedInverseDerivatives, constrained_inverse_dynamics,
+    constrained_inverse_dynamics_derivatives,
+};
 #[doc(hidden)]
-pub use calls::constrained_dynamics::{EquationsAt, constrained_equations_at};
+pub use calls::constrained_inverse::{EquationsAt, constrained_equations_at};
 pub use calls::derivatives::{
     AbaDerivatives, CoriolisDerivatives, RneaDerivatives, aba_derivatives, centroidal_derivatives,
     coriolis_derivatives, energy_derivatives, rnea_derivatives, static_torque_derivative,

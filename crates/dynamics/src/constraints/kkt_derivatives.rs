@@ -138,20 +138,6 @@ kernel! {
 }
 
 kernel! {
-    /// J, and J q̈ + γ for bodies whose motion with q̈ is known.
-    pub(crate) fn place<S>(world: &World<S>, bodies: &rnea_derivatives::Bodies<S>, set: &mut ConstraintSet<S>) {
-        for (plan, target) in set.plans.iter().zip(&set.targets) {
-            let ends = FramePair::new(plan, target, world, &bodies.v, &bodies.a);
-            ends.jacobian(plan, &world.S, &mut set.J);
-            let error = ends.acceleration(plan, target).to_array();
-            for r in 0..plan.rows() {
-                set.error[plan.row + r] = error[r];
-            }
-        }
-    }
-}
-
-kernel! {
     /// r_q, from the derivative for forces that are fixed in their bodies.
     pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &DMatrix<S>, r: &mut DMatrix<S>) {
         r.as_mut_slice().copy_from_slice(fixed.as_slice());

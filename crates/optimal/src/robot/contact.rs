@@ -39,6 +39,9 @@ impl Contact {
     }
 }
 
+/// A damping for contacts whose forces are given, which may share them as they like: it is not used.
+pub(super) const SHARED: f64 = 1.0;
+
 /// The constraints of some contacts, with the damping μ of J M⁻¹ Jᵀ + μ 1.
 pub(super) fn constraint_set<S: Scalar>(
     model: &Model,

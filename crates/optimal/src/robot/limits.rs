@@ -122,6 +122,8 @@ impl LimitSet {
 #[derive(Clone, Debug)]
 pub struct Limits {
     sets: PerModel<PerKnot<LimitSet>>,
+    /// Those that the dynamics ask for at every knot, before those that are given.
+    own: Vec<Limit>,
     /// No limits, where they do not count.
     none: Terms<Limit>,
     multipliers: Multipliers,
@@ -135,7 +137,12 @@ impl Limits {
     /// No limits.
     pub(super) fn none() -> Self {
         let (sets, none) = (PerModel::new(PerKnot::new(LimitSet::default())), Terms::default());
-        Self { sets, none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
+        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
+    }
+
+    /// The same with the limits that the dynamics ask for at every knot.
+    pub(super) fn asked_for(own: Vec<Limit>) -> Self {
+        Self { own, ..Self::none() }
     }
 
     /// Sets the limits of knot t, or of all knots without limits of their own. Forgets multipliers.
@@ -146,7 +153,8 @@ impl Limits {
         t: Option<usize>,
         limits: Vec<Limit>,
     ) -> Result<(), Error> {
-        self.sets.chosen_mut().set(t, LimitSet::new(model, capabilities, limits, t)?);
+        let all = self.own.iter().cloned().chain(limits).collect();
+        self.sets.chosen_mut().set(t, LimitSet::new(model, capabilities, all, t)?);
         self.multipliers = Multipliers::new(self.most());
         Ok(())
     }

@@ -8,6 +8,7 @@ use super::dynamics::contact::ContactAcceleration;
 use super::dynamics::free::{FreeAcceleration, FreeDynamics};
 use super::dynamics::impulse::ImpulseDynamics;
 use super::dynamics::inverse::ControlledAcceleration;
+use super::dynamics::inverse_contact::ControlledContactAcceleration;
 use super::dynamics::knots::HasRobot;
 use super::integrators::{ControlPolynomial, Integrated, Integrator};
 use super::limits::Limit;
@@ -142,6 +143,19 @@ pub enum Dynamics {
         /// Δt (s).
         dt: f64,
     },
+    /// [`ContactInverseDynamics`](super::ContactInverseDynamics).
+    ContactInverse {
+        /// The contacts that hold.
+        contacts: Vec<Contact>,
+        /// S.
+        #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
+        actuation: Option<DMatrix<f64>>,
+        /// The integrator.
+        integrator: Integrator,
+        /// Δt (s).
+        dt: f64,
+    },
     /// [`FreeDynamics::terminal`], after the last knot.
     End,
 }
@@ -188,6 +202,10 @@ impl Knot {
             }
             Dynamics::Inverse { integrator, dt } => {
                 let inner = ControlledAcceleration::new(model.clone(), costs)?;
+                self.bounded(Integrated::new(inner, *integrator, *dt)?)
+            }
+            Dynamics::ContactInverse { contacts, actuation, integrator, dt } => {
+                let inner = ControlledContactAcceleration::new(model.clone(), drives(actuation)?, contacts, costs)?;
                 self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Impulse { contacts, restitution, damping } => {

@@ -9,7 +9,8 @@ use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
     LimbElimination, invert_limbs, restore, solve_limbs, write_drift, write_jacobian, write_motion,
 };
-use crate::robot::contact::{Contact, constraint_set};
+use crate::robot::actuation::Actuation;
+use crate::robot::contact::{Contact, SHARED, constraint_set};
 use crate::robot::continuous::Wanted;
 use crate::robot::horizon_terms::HorizonTerms;
 use crate::robot::knot::{KnotData, WIDEST, unpack};
@@ -17,7 +18,8 @@ use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use crate::robot::residuals::surplus::Surplus;
 use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
-    constrained_equations_at, rnea, rnea_derivatives,
+    constrained_equations_at, constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, rnea,
+    rnea_derivatives,
 };
 use condyle_spatial::block::{Block, gather_rows, scatter};
 use nalgebra::DMatrix;
@@ -34,6 +36,8 @@ pub(crate) enum Law {
     Contact(Vec<Contact>, f64),
     /// The controls: q̈ = u, and τ = M q̈ + h follows.
     Inverse,
+    /// The controls: (q̈, λ) = u, and τ = M q̈ + h − Jᵀλ follows, for these contacts and drives.
+    ContactInverse(Vec<Contact>, Actuation),
 }
 
 /// A law with the scratch that it takes.
@@ -44,6 +48,8 @@ pub(crate) enum Pass<S> {
     /// The constraints, and J. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, DMatrix<S>),
     Inverse,
+    /// The constraints, J, and λ. Shape: rows.
+    ContactInverse(Box<ConstraintSet<S>>, DMatrix<S>, Vec<S>),
 }
 
 /// The dynamics of as many knots as a scalar has lanes.
@@ -78,6 +84,11 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 Pass::Contact(set, J)
             }
             Law::Inverse => Pass::Inverse,
+            Law::ContactInverse(contacts, _) => {
+                let set = Box::new(constraint_set(model, contacts, SHARED).expect("was checked when it was given"));
+                let (rows, o) = (set.rows(), S::zero());
+                Pass::ContactInverse(set, DMatrix::from_element(rows, nv, o), vec![o; rows])
+            }
         };
         let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
@@ -104,6 +115,9 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     ) {
         self.pack(model, xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
+        if let Pass::ContactInverse(.., lambda) = &mut self.pass {
+            pack(to.len(), |k| &to[k].lambda, lambda);
+        }
         match wanted {
             Wanted::Equations => self.run_equations(model, to),
             _ => self.run_pass(model, wanted == Wanted::Derivatives, terms.layout().forces, to),
@@ -151,6 +165,24 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                     let d = rnea_derivatives(model, data, q, v, a, &[]);
                     unpack_matrices([d.dtau_dq, d.dtau_dv, d.dtau_da], to, |to| &mut to.dtau);
                 }
+            }
+            Pass::ContactInverse(set, _, lambda) if !derivatives => {
+                a.copy_from_slice(tau);
+                let d = constrained_inverse_dynamics(model, data, set, q, v, a, lambda, &[]);
+                unpack(d.tau, to, |to| &mut to.tau);
+                unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
+            }
+            Pass::ContactInverse(set, J, lambda) => {
+                a.copy_from_slice(tau);
+                let d = constrained_inverse_dynamics_derivatives(model, data, set, q, v, a, lambda, &[]);
+                unpack(d.tau, to, |to| &mut to.tau);
+                unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
+                unpack_matrices([d.dtau_dq, d.dtau_dv, d.M], to, |to| &mut to.dtau);
+                for (k, from) in [d.dacceleration_dq, d.dacceleration_dv].into_iter().enumerate() {
+                    unpack(from.as_slice(), to, |to| to.dcontact_acceleration[k].as_mut_slice());
+                }
+                set.jacobian(J);
+                unpack(J.as_slice(), to, |to| to.dcontact_acceleration[2].as_mut_slice());
             }
         }
         unpack(a, to, |to| &mut to.a);

@@ -325,6 +325,7 @@ impl Sensitivities for Unknowns<'_> {
         let KktElimination { tableau, passive, place, forces, .. } = self.elimination;
         let per_step = c / self.dt; // δa = (y − δv) / Δt
         match (output, row) {
+            (Output::ContactAcceleration, _) => {} // J q̈ + γ = 0
             (Output::Effort, row) if row < *passive => {}
             (Output::Effort, row) => self.add(&self.form.efforts, row - passive, c, g),
             (Output::Acceleration, row) => match place[row] {

@@ -4,6 +4,7 @@ use super::contact::{ContactAcceleration, ContactDynamics};
 use super::free::{FreeAcceleration, FreeDynamics};
 use super::impulse::ImpulseDynamics;
 use super::inverse::{ControlledAcceleration, InverseDynamics};
+use super::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
@@ -97,7 +98,7 @@ macro_rules! robot_knots {
         }
     )*};
 }
-robot_knots!(FreeDynamics, ContactDynamics, InverseDynamics, ImpulseDynamics);
+robot_knots!(FreeDynamics, ContactDynamics, InverseDynamics, ContactInverseDynamics, ImpulseDynamics);
 
 /// Continuous models of a robot.
 macro_rules! robot_models {
@@ -122,7 +123,7 @@ macro_rules! robot_models {
             }
 
             fn nu(&self) -> usize {
-                self.0.actuation.nu()
+                self.0.nu()
             }
 
             fn lanes(&self) -> usize {
@@ -224,4 +225,4 @@ macro_rules! robot_models {
         }
     )*};
 }
-robot_models!(FreeAcceleration, ContactAcceleration, ControlledAcceleration);
+robot_models!(FreeAcceleration, ContactAcceleration, ControlledAcceleration, ControlledContactAcceleration);
