@@ -35,6 +35,8 @@ pub use calls::constrained_dynamics::{
     Constrained, ConstrainedDerivatives, ConstrainedEquations, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_dynamics_equations,
 };
+#[doc(hidden)]
+pub use calls::constrained_dynamics::{EquationsAt, constrained_equations_at};
 pub use calls::constrained_inverse::{
     ConstrainedInverse, ConstrainedInverseDerivatives, constrained_inverse_dynamics,
     constrained_inverse_dynamics_derivatives,

@@ -48,10 +48,11 @@ impl Size {
     }
 }
 
-/// An array of n equal entries. It is not inlined: a workspace has dozens of them.
+/// An array of n equal entries. It is not inlined, as a workspace has dozens of them, and copies entries whole, where `vec!`
+/// would clone them number by number.
 #[inline(never)]
 pub(crate) fn filled<T: Copy>(entry: T, n: usize) -> Vec<T> {
-    vec![entry; n]
+    (0..n).map(|_| entry).collect()
 }
 
 /// A matrix of zeros.

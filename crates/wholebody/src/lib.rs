@@ -48,6 +48,7 @@ mod least_squares;
 mod levels;
 mod lifted;
 mod limits;
+mod memory;
 mod objective;
 mod plan;
 mod references;

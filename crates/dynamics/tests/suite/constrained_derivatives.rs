@@ -6,8 +6,9 @@ use common::contacts::cases;
 use common::{State, Worst, dual, eps, lift, lift_forces, moved, unit};
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, Force, Model, Scalar, constrained_dynamics,
-    constrained_dynamics_derivatives, constrained_dynamics_equations, constrained_inverse_dynamics,
-    constrained_inverse_dynamics_derivatives, crba, impulse_dynamics, impulse_dynamics_derivatives,
+    constrained_dynamics_derivatives, constrained_dynamics_equations, constrained_equations_at,
+    constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, crba, impulse_dynamics,
+    impulse_dynamics_derivatives,
 };
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
@@ -172,6 +173,7 @@ fn derivatives_of_constrained_dynamics() {
 fn equations_of_constrained_dynamics() {
     let names = ["r, c for q", "r, c for v", "for τ"];
     let mut worst = names.map(|name| Worst::new(name, CONDITIONED));
+    let mut known = Worst::new("where the motion is known", EXACT);
     for (model, s, constraints) in cases(TREES) {
         let mut data = Data::new(&model);
         let mut set = ConstraintSet::new(&model, &constraints).unwrap();
@@ -179,8 +181,10 @@ fn equations_of_constrained_dynamics() {
             let (nv, rows) = (model.nv(), set.rows());
             let duals = by_duals::<Dynamics>(&model, &s, &constraints, f_ext);
             let d = constrained_dynamics_equations(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+            let motion = (d.a.to_vec(), d.lambda.to_vec());
             let nothing = DMatrix::zeros(nv + rows, nv);
             let blocks = [stack(d.dtau_dq, d.dgamma_dq), stack(d.dtau_dv, d.dgamma_dv), nothing];
+            let matrices = [d.M, d.dtau_dq, d.dtau_dv, d.dgamma_dq, d.dgamma_dv].map(DMatrix::clone);
             let mut K = DMatrix::zeros(nv + rows, nv + rows);
             K.view_mut((0, 0), (nv, nv)).copy_from(d.M);
             let mut J = DMatrix::zeros(rows, nv);
@@ -192,6 +196,17 @@ fn equations_of_constrained_dynamics() {
             for k in 0..3 {
                 let expected = if k < 2 { -(&K * &duals[k]) } else { efforts.clone() - &K * &duals[k] };
                 worst[k].see(&model, blocks[k].as_slice(), expected.as_slice());
+            }
+            if f_ext.is_empty() {
+                let (other, s) = (&mut Data::new(&model), &s);
+                let d = constrained_equations_at(&model, other, &mut set, &s.q, &s.v, &motion.0, &motion.1);
+                let at = [d.M, d.dtau_dq, d.dtau_dv, d.dgamma_dq, d.dgamma_dv];
+                at.into_iter()
+                    .zip(&matrices)
+                    .for_each(|(at, there)| known.see(&model, at.as_slice(), there.as_slice()));
+                let mut again = DMatrix::zeros(rows, nv);
+                set.jacobian(&mut again);
+                known.see(&model, again.as_slice(), J.as_slice());
             }
         }
     }

@@ -18,7 +18,7 @@ use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use crate::robot::residuals::surplus::Surplus;
 use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
-    constrained_dynamics_equations, constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, rnea,
+    constrained_equations_at, constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, rnea,
     rnea_derivatives,
 };
 use condyle_spatial::block::{Block, gather_rows, scatter};
@@ -48,8 +48,8 @@ pub(crate) enum Pass<S> {
     /// The constraints, and J. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, DMatrix<S>),
     Inverse,
-    /// The constraints, J, and λ. Shape: rows.
-    ContactInverse(Box<ConstraintSet<S>>, DMatrix<S>, Vec<S>),
+    /// As [`Self::Contact`].
+    ContactInverse(Box<ConstraintSet<S>>, DMatrix<S>),
 }
 
 /// The dynamics of as many knots as a scalar has lanes.
@@ -64,6 +64,7 @@ pub(crate) struct KnotBatch<S> {
     /// The output that the controls drive: τ, or q̈.
     tau: Vec<S>,
     a: Vec<S>,
+    lambda: Vec<S>,
     linear: LinearEquations<S>,
     /// Whether the last pass was at q.
     visited: bool,
@@ -85,14 +86,16 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
             Law::Inverse => Pass::Inverse,
             Law::ContactInverse(contacts, _) => {
                 let set = Box::new(constraint_set(model, contacts, SHARED).expect("was checked when it was given"));
-                let (rows, o) = (set.rows(), S::zero());
-                Pass::ContactInverse(set, DMatrix::from_element(rows, nv, o), vec![o; rows])
+                let J = DMatrix::from_element(set.rows(), nv, S::zero());
+                Pass::ContactInverse(set, J)
             }
         };
         let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
+        let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
+        let lambda = zeros(rows);
         let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Arc::default());
-        Self { data, pass, surplus, residuals, q, v, tau, a, linear, visited: false }
+        Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Makes room for the equations of knots in inverse-dynamics form.
@@ -113,9 +116,6 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     ) {
         self.pack(model, xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
-        if let Pass::ContactInverse(.., lambda) = &mut self.pass {
-            pack(to.len(), |k| &to[k].lambda, lambda);
-        }
         match wanted {
             Wanted::Equations => self.run_equations(model, to),
             _ => self.run_pass(model, wanted == Wanted::Derivatives, terms.layout().forces, to),
@@ -133,7 +133,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 
     /// Accelerations and forces, and their derivatives; those of forces only if they are looked at.
     fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
-        let Self { data, pass, q, v, tau, a, .. } = self;
+        let Self { data, pass, q, v, tau, a, lambda, .. } = self;
         match pass {
             Pass::None => return,
             Pass::Free if !derivatives => a.copy_from_slice(aba(model, data, q, v, tau, &[])),
@@ -164,14 +164,16 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                     unpack_matrices([d.dtau_dq, d.dtau_dv, d.dtau_da], to, |to| &mut to.dtau);
                 }
             }
-            Pass::ContactInverse(set, _, lambda) if !derivatives => {
+            Pass::ContactInverse(set, _) if !derivatives => {
                 a.copy_from_slice(tau);
+                pack(to.len(), |k| &to[k].lambda, lambda);
                 let d = constrained_inverse_dynamics(model, data, set, q, v, a, lambda, &[]);
                 unpack(d.tau, to, |to| &mut to.tau);
                 unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
             }
-            Pass::ContactInverse(set, J, lambda) => {
+            Pass::ContactInverse(set, J) => {
                 a.copy_from_slice(tau);
+                pack(to.len(), |k| &to[k].lambda, lambda);
                 let d = constrained_inverse_dynamics_derivatives(model, data, set, q, v, a, lambda, &[]);
                 unpack(d.tau, to, |to| &mut to.tau);
                 unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
@@ -187,15 +189,15 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// Accelerations and forces, and the equations that they satisfy, in which limbs are solved.
+    /// The equations that accelerations and forces satisfy, which are known, with the limbs solved.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
-        let Self { data, pass, q, v, tau, a, linear, .. } = self;
+        let Self { data, pass, q, v, a, lambda, linear, .. } = self;
+        pack(to.len(), |k| &to[k].a, a);
         match pass {
             Pass::Contact(set, J) => {
+                pack(to.len(), |k| &to[k].lambda, lambda);
                 let mu = set.proximal.mu;
-                let d = constrained_dynamics_equations(model, data, set, q, v, tau, &[]);
-                a.copy_from_slice(d.a);
-                unpack(d.lambda, to, |to| &mut to.lambda);
+                let d = constrained_equations_at(model, data, set, q, v, a, lambda);
                 let LinearEquations { size, tableau, .. } = linear;
                 write_motion(*size, d.M, d.dtau_dv, d.dtau_dq, tableau);
                 write_drift(*size, d.dgamma_dv, d.dgamma_dq, mu, tableau);
@@ -203,13 +205,11 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 write_jacobian(*size, J, tableau);
             }
             _ => {
-                a.copy_from_slice(aba(model, data, q, v, tau, &[]));
                 let d = rnea_derivatives(model, data, q, v, a, &[]);
                 write_motion(linear.size, d.dtau_da, d.dtau_dv, d.dtau_dq, &mut linear.tableau);
             }
         }
         linear.solve_limbs(to);
-        unpack(a, to, |to| &mut to.a);
         self.visited = true;
     }
 

@@ -150,6 +150,18 @@ macro_rules! robot_models {
                 self.0.inverse_dynamics_form()
             }
 
+            fn motion_size(&self) -> usize {
+                self.0.motion_size()
+            }
+
+            fn motion(&self, lane: usize, to: &mut [f64]) {
+                self.0.motion(lane, to);
+            }
+
+            fn set_motion(&mut self, lane: usize, from: &[f64]) {
+                self.0.set_motion(lane, from);
+            }
+
             fn shift(&mut self) {
                 self.0.terms.shift();
             }

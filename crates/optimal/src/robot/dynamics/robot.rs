@@ -296,6 +296,32 @@ impl RobotDynamics {
         (!layout.curved).then_some([elimination.most_dependent(), layout.rows[0]])
     }
 
+    /// As [`ContinuousModel::motion_size`](crate::robot::ContinuousModel::motion_size).
+    pub(crate) fn motion_size(&self) -> usize {
+        match self.inverse_dynamics_form() {
+            Some(_) => self.model.nv() + self.capabilities.rows(),
+            None => 0,
+        }
+    }
+
+    /// As [`ContinuousModel::motion`](crate::robot::ContinuousModel::motion).
+    pub(crate) fn motion(&self, lane: usize, to: &mut [f64]) {
+        let Some(work) = self.work.made() else { return };
+        let KnotData { a, lambda, .. } = &work.data[lane];
+        let (to_a, to_lambda) = to.split_at_mut(a.len());
+        to_a.copy_from_slice(a);
+        to_lambda[..lambda.len()].copy_from_slice(lambda);
+    }
+
+    /// As [`ContinuousModel::set_motion`](crate::robot::ContinuousModel::set_motion).
+    pub(crate) fn set_motion(&mut self, lane: usize, from: &[f64]) {
+        let KnotData { a, lambda, .. } = &mut self.parts().work.data[lane];
+        let (from_a, from_lambda) = from.split_at(a.len());
+        a.copy_from_slice(from_a);
+        let rows = lambda.len();
+        lambda.copy_from_slice(&from_lambda[..rows]);
+    }
+
     /// As [`ActionModel::outputs`](crate::ActionModel::outputs), of a knot that was prepared.
     pub(crate) fn outputs(&mut self, lane: usize, show: &mut dyn FnMut(&str, &[f64])) {
         let Parts { capabilities, work, .. } = self.parts();

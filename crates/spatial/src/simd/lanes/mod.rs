@@ -44,6 +44,9 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn store(a: Self) -> [T; N];
     /// x in every lane.
     fn splat(x: T) -> Self;
+    /// 0 in every lane: bits, where [`splat`](Self::splat) is an instruction. Workspaces are filled with it by code that is
+    /// compiled for any processor, where an instruction of these registers would be a call.
+    fn zero() -> Self;
     /// a + b.
     fn add(a: Self, b: Self) -> Self;
     /// a − b.
@@ -207,6 +210,10 @@ impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     #[inline(always)]
     fn splat(x: f64) -> Self {
         Self(T::Register::splat(T::splat(x)))
+    }
+    #[inline(always)]
+    fn zero() -> Self {
+        Self(T::Register::zero())
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
