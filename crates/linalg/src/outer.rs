@@ -5,6 +5,7 @@ use crate::compiled::compiled;
 use crate::registers::Vector;
 use crate::tile::{SLACK, add_outer, next_strip};
 use crate::vectors::copy_scaled;
+use alloc::vec::Vec;
 
 /// Rows of numbers, one after the other, and for each row which of its blocks are not zero (see [`mask`]).
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -182,7 +183,7 @@ impl OuterProducts {
         let (k, size) = (self.count, self.size);
         let gradient = 1 << (size / block(x.len()));
         if dd > 0.0 {
-            let root = dd.sqrt();
+            let root = condyle_spatial::Scalar::sqrt(dd);
             self.push::<V>(x, root)[size] = d / root;
             self.multiply([k, k], [mask | gradient, mask]);
         } else if d != 0.0 || dd != 0.0 {

@@ -7,8 +7,11 @@ use crate::limbs::Plan;
 use crate::model::Model;
 use crate::tree::Tree;
 use crate::validate::{CoordinateNumbers, check_body, check_frame};
+use alloc::borrow::ToOwned;
+use alloc::collections::BTreeSet;
+use alloc::string::String;
+use alloc::vec::Vec;
 use condyle_spatial::{Act, Inertia, Se3, Vec3};
-use std::collections::HashSet;
 
 /// The name of a body of a builder. [`WORLD`] is the one that is always there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,6 +167,7 @@ impl ModelBuilder {
     }
 
     /// Scales all masses and inertias.
+    #[cfg(feature = "loaders")]
     pub(crate) fn scale_inertias(&mut self, by: f64) {
         for draft in &mut self.drafts {
             draft.body.inertia = draft.body.inertia.scale(by);
@@ -282,7 +286,7 @@ impl ModelBuilder {
 
     /// Checks names, bodies, joints and frames, and makes axes unit vectors.
     fn check(&mut self) -> Result<(), Error> {
-        let (mut bodies, mut joints, mut frames) = (HashSet::new(), HashSet::new(), HashSet::new());
+        let (mut bodies, mut joints, mut frames) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
         let mimics: Vec<bool> = self.drafts.iter().map(|d| d.mimic.is_some()).collect();
         let kinds: Vec<Joint> = self.drafts.iter().map(|d| d.body.joint).collect();
         for Draft { body, options, mimic, .. } in &mut self.drafts {

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::joint::Joint;
 use crate::layout::Single;
 use crate::model::Model;
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_spatial::{Inertia, Se3, Vec3};
 

@@ -6,6 +6,7 @@ use crate::limbs::Plan;
 use crate::magnitude::check_gravity;
 use crate::model::Model;
 use crate::real::{real_inertia, real_vector};
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
 use core::any::Any;

@@ -9,6 +9,7 @@
 
 mod pass;
 use crate::workspace::Gate;
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::Force;
@@ -63,7 +64,7 @@ impl<T: Real> Batch<T> {
     pub const MOST_THREADS: usize = 1024;
 
     /// The most states, of which there may be less memory for.
-    pub const MOST_STATES: usize = 1 << 32;
+    pub const MOST_STATES: usize = 1 << (usize::BITS / 2);
 
     /// Room for up to `states` states at once, on `threads` threads.
     ///
@@ -79,7 +80,7 @@ impl<T: Real> Batch<T> {
             states,
             lanes: match level() {
                 Level::Baseline => InLanes::Single(Group::new(model, states, threads)),
-                Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
+                Level::Simd128 | Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
                 Level::Avx512 => InLanes::Long(Group::new(model, states, threads)),
             },
             vectors: vec![T::zero(); states * model.nv()],

@@ -7,6 +7,7 @@ use crate::calls::inertia::{crba, minv};
 use crate::calls::inverse_dynamics::{gravity, nonlinear_effects, rnea};
 use crate::data::Data;
 use crate::workspace::{filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::threads;
 use condyle_model::Model;
 use condyle_spatial::Force;
@@ -50,9 +51,9 @@ impl<S: Block> Worker<S> {
     fn new(model: &Model) -> Self {
         Self {
             data: Data::new(model),
-            q: filled(S::zero(), model.nq()),
-            v: filled(S::zero(), model.nv()),
-            x: filled(S::zero(), model.nv()),
+            q: filled(S::zero, model.nq()),
+            v: filled(S::zero, model.nv()),
+            x: filled(S::zero, model.nv()),
             f_ext: Vec::with_capacity(model.nodes().len()),
         }
     }

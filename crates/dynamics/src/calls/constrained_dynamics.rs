@@ -2,7 +2,7 @@
 
 use super::limbs_constrained;
 use crate::constraints::constrained_derivatives::{invert, respond_to_q, respond_to_v};
-use crate::constraints::constrained_dynamics::{Inputs, constrain, equations, evaluate, factorize, solve};
+use crate::constraints::constrained_dynamics::{Inputs, constrain, equations, factorize, solve};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::kkt_derivatives::{differentiate_motion, load, turn};
 use crate::data::{Data, check_forces};
@@ -199,64 +199,6 @@ pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     rnea_derivatives::run(model, world, id, inputs.v, qdd, &d.forces, &[]);
     turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
     differentiate_motion(constraints, world, &id.bodies);
-}
-
-/// The matrices of [`ConstrainedEquations`].
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug)]
-pub struct EquationsAt<'d, S> {
-    pub M: &'d DMatrix<S>,
-    pub dtau_dq: &'d DMatrix<S>,
-    pub dtau_dv: &'d DMatrix<S>,
-    pub dgamma_dq: &'d DMatrix<S>,
-    pub dgamma_dv: &'d DMatrix<S>,
-}
-
-/// The matrices of [`constrained_dynamics_equations`] where q̈ and λ are known: nothing is factorised. For the knots of an
-/// optimal control problem, whose rollout has found them.
-#[doc(hidden)]
-pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &'d mut Data<S>,
-    constraints: &'d mut ConstraintSet<S>,
-    q: &[S],
-    v: &[S],
-    a: &[S],
-    lambda: &[S],
-) -> EquationsAt<'d, S> {
-    data.check(model);
-    constraints.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    check("a", a.len(), model.nv());
-    check("lambda", lambda.len(), constraints.lambda.len());
-    differentiate_at(model, data, constraints, [q, v, a, lambda], &[]);
-    let (d, id) = (&data.constrained_derivatives, &data.rnea_derivatives);
-    EquationsAt {
-        M: &id.dtau_da,
-        dtau_dq: &d.dtau_dq,
-        dtau_dv: &id.dtau_dv,
-        dgamma_dq: &constraints.dgamma_dq,
-        dgamma_dv: &constraints.dgamma_dv,
-    }
-}
-
-/// J, J q̈ + γ and the equations differentiated at any q̈ and λ, for arguments that fit.
-pub(crate) fn differentiate_at<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &mut Data<S>,
-    constraints: &mut ConstraintSet<S>,
-    [q, v, a, lambda]: [&[S]; 4],
-    f_ext: &[Force<S>],
-) {
-    positions(model, &mut data.world, q);
-    constraints.lambda.copy_from_slice(lambda);
-    let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
-    load(model, constraints, &data.world, f_ext, &mut d.forces);
-    rnea_derivatives::run(model, &data.world, id, v, a, &d.forces, &[]);
-    evaluate(&data.world, constraints, &id.bodies.v, &id.bodies.a);
-    turn(constraints, &data.world, &id.dtau_dq, &mut d.dtau_dq);
-    differentiate_motion(constraints, &data.world, &id.bodies);
 }
 
 /// What [`constrained_dynamics_derivatives`] gives. The blocks of K⁻¹ are ∂q̈/∂τ, −∂λ/∂τ (transposed) and −Λ.

@@ -1,11 +1,11 @@
 //! Inverse dynamics under constraints: the efforts and the constraints' accelerations for a motion and forces that are
 //! given, and their derivatives.
 
-use super::constrained_dynamics::differentiate_at;
 use crate::constraints::constrained_dynamics::evaluate;
 use crate::constraints::constraint_set::ConstraintSet;
-use crate::constraints::kkt_derivatives::load;
+use crate::constraints::kkt_derivatives::{differentiate_motion, load, turn};
 use crate::data::{Data, check_forces};
+use crate::derivatives::rnea_derivatives;
 use crate::passes::kinematics::{accelerations, positions, velocities};
 use crate::passes::rnea;
 use condyle_linalg::check;
@@ -61,9 +61,7 @@ pub fn constrained_inverse_dynamics<'d, S: Scalar, R: Constant<S>>(
     velocities(model, &data.world, &mut data.moving, v);
     accelerations(model, &data.world, &mut data.moving, a);
     evaluate(&data.world, constraints, &data.moving.v, &data.moving.a);
-    constraints.lambda.copy_from_slice(lambda);
-    load(model, constraints, &data.world, f_ext, &mut data.constrained_derivatives.forces);
-    rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, &data.constrained_derivatives.forces);
+    inverse(model, data, constraints, [q, v, a, lambda], f_ext);
     ConstrainedInverse { tau: &data.rnea.tau, acceleration: &constraints.error }
 }
 
@@ -117,7 +115,7 @@ pub fn constrained_inverse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> ConstrainedInverseDerivatives<'d, S> {
     check_arguments(model, data, constraints, [q, v, a, lambda], f_ext);
-    differentiate_at(model, data, constraints, [q, v, a, lambda], f_ext);
+    differentiate(model, data, constraints, [q, v, a, lambda], f_ext);
     rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, &data.constrained_derivatives.forces);
     ConstrainedInverseDerivatives {
         tau: &data.rnea.tau,
@@ -128,6 +126,71 @@ pub fn constrained_inverse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
         dacceleration_dq: &constraints.dgamma_dq,
         dacceleration_dv: &constraints.dgamma_dv,
     }
+}
+
+/// The matrices of [`ConstrainedInverseDerivatives`].
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct EquationsAt<'d, S> {
+    pub M: &'d DMatrix<S>,
+    pub dtau_dq: &'d DMatrix<S>,
+    pub dtau_dv: &'d DMatrix<S>,
+    pub dgamma_dq: &'d DMatrix<S>,
+    pub dgamma_dv: &'d DMatrix<S>,
+}
+
+/// [`constrained_inverse_dynamics_derivatives`] without the values: for the knots of an optimal control problem, whose rollout
+/// has found q̈ and λ.
+#[doc(hidden)]
+pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &'d mut Data<S>,
+    constraints: &'d mut ConstraintSet<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+    lambda: &[S],
+) -> EquationsAt<'d, S> {
+    check_arguments(model, data, constraints, [q, v, a, lambda], &[]);
+    differentiate(model, data, constraints, [q, v, a, lambda], &[]);
+    EquationsAt {
+        M: &data.rnea_derivatives.dtau_da,
+        dtau_dq: &data.constrained_derivatives.dtau_dq,
+        dtau_dv: &data.rnea_derivatives.dtau_dv,
+        dgamma_dq: &constraints.dgamma_dq,
+        dgamma_dv: &constraints.dgamma_dv,
+    }
+}
+
+/// The derivatives, for arguments that fit.
+fn differentiate<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    [q, v, a, lambda]: [&[S]; 4],
+    f_ext: &[Force<S>],
+) {
+    positions(model, &mut data.world, q);
+    let (world, d, id) = (&data.world, &mut data.constrained_derivatives, &mut data.rnea_derivatives);
+    constraints.lambda.copy_from_slice(lambda);
+    load(model, constraints, world, f_ext, &mut d.forces);
+    rnea_derivatives::run(model, world, id, v, a, &d.forces, &[]);
+    evaluate(world, constraints, &id.bodies.v, &id.bodies.a);
+    turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
+    differentiate_motion(constraints, world, &id.bodies);
+}
+
+/// τ, for bodies that are placed.
+fn inverse<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    constraints: &mut ConstraintSet<S>,
+    [q, v, a, lambda]: [&[S]; 4],
+    f_ext: &[Force<S>],
+) {
+    constraints.lambda.copy_from_slice(lambda);
+    load(model, constraints, &data.world, f_ext, &mut data.constrained_derivatives.forces);
+    rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, &data.constrained_derivatives.forces);
 }
 
 /// Panics unless the arguments fit.

@@ -6,6 +6,7 @@
 //! sparsity in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
 
 use crate::constraints::plan::{Plan, Proximal};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::{axpy, dot};
 use condyle_spatial::Scalar;

@@ -18,6 +18,7 @@ use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::divide_conquer::mimic::Ties;
 use crate::divide_conquer::scratch::{Body, Dof, Part};
+use alloc::vec::Vec;
 use condyle_linalg::{check, threads};
 use condyle_model::Model;
 use condyle_model::joint::Joint;

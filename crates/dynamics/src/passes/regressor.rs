@@ -12,6 +12,7 @@
 //! the form y makes the 6 × 10 matrices of that paper superfluous.
 
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_spatial::{Cross, Motion, Scalar};
 use nalgebra::DMatrix;
 
@@ -34,8 +35,8 @@ impl<S: Scalar> Workspace<S> {
         let parameters = PARAMETERS * (size.bodies - 1);
         Self {
             torque: zero_matrix(size.nv, parameters),
-            kinetic: filled(S::zero(), parameters),
-            potential: filled(S::zero(), parameters),
+            kinetic: filled(S::zero, parameters),
+            potential: filled(S::zero, parameters),
         }
     }
 }

@@ -11,8 +11,8 @@ use super::solution::{Iteration, Solution, Status, Timings};
 use crate::error::Error;
 use crate::lq::{LqNode, Sweep, SweepError};
 use crate::problem::Problem;
+use crate::time::Instant;
 use condyle_linalg::max_abs;
-use std::time::Instant;
 
 /// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`]), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they

@@ -8,8 +8,8 @@ use super::settings::{DdpMethod, Settings};
 use super::solution::{Solution, Status};
 use crate::lq::LqKnot;
 use crate::problem::Problem;
+use crate::time::Instant;
 use condyle_linalg::{View, add_scaled_product, dot};
-use std::time::Instant;
 
 /// The number of step lengths that are tried side by side when the first one fails: one of the next few is mostly good, and
 /// each has a cost of its own beside dynamics in lanes.

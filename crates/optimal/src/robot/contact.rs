@@ -4,7 +4,6 @@ use crate::Error;
 use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, Proximal};
 use condyle_spatial::Scalar;
 use core::ops::Range;
-use serde::{Deserialize, Serialize};
 
 /// A contact of a frame with the world, and the name by which residuals call it.
 ///
@@ -23,8 +22,9 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(contact.constraint.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Contact {
     /// The name by which residuals call it.
     pub name: String,

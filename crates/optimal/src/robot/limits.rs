@@ -9,7 +9,6 @@ use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
 use crate::Error;
 use crate::problem::{Bounded, Multipliers, Visit, leave_a_value};
 use condyle_dynamics::Model;
-use serde::{Deserialize, Serialize};
 
 /// A residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
 ///
@@ -41,18 +40,19 @@ use serde::{Deserialize, Serialize};
 /// assert!(solution.us.iter().all(|u| u.abs() < 30.0 + 1e-6));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Limit {
     /// The name by which errors call it.
     pub name: String,
     /// The residual r.
     pub residual: Residual,
     /// The least values; −∞ for none. Empty, as is `upper`, where r = 0.
-    #[serde(with = "condyle_spatial::finite::lower")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
     /// The greatest values; ∞ for none.
-    #[serde(with = "condyle_spatial::finite::upper")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
 

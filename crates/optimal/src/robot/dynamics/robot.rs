@@ -92,7 +92,7 @@ struct VectorBatches {
 fn lanes(law: &Law) -> usize {
     match (law, level()) {
         (Law::None, _) | (_, Level::Baseline) => 1,
-        (_, Level::Neon | Level::Avx2) => Short::LANES,
+        (_, Level::Simd128 | Level::Neon | Level::Avx2) => Short::LANES,
         (_, Level::Avx512) => Long::LANES,
     }
 }

@@ -18,26 +18,26 @@ use controls::widen;
 use curvature::Curvature;
 use retraction::Retraction;
 use runge_kutta::RungeKutta;
-use serde::{Deserialize, Serialize};
 use std::any::Any;
 
 /// The rule by which a knot steps through its time.
 ///
 /// The stages of the Runge–Kutta methods add velocities of different points as if positions were a vector space, as
 /// Crocoddyl's do; for a free-flyer they are therefore of first order in its rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Integrator {
     /// v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): one evaluation; symplectic. Crocoddyl's `IntegratedActionModelEuler`.
     SemiImplicitEuler,
     /// The midpoint rule, 2 evaluations.
-    #[serde(rename = "runge_kutta_2")]
+    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_2"))]
     RungeKutta2,
     /// Heun's rule of third order, 3 evaluations.
-    #[serde(rename = "runge_kutta_3")]
+    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_3"))]
     RungeKutta3,
     /// The classical rule, 4 evaluations.
-    #[serde(rename = "runge_kutta_4")]
+    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_4"))]
     RungeKutta4,
 }
 

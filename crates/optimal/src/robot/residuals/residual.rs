@@ -5,13 +5,13 @@ use super::frame_name::FrameName;
 use super::own::OwnResidual;
 use crate::robot::capabilities::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
-use serde::{Deserialize, Serialize};
 
 /// A residual: a vector r(x, u) that should be small.
 ///
 /// Frames are called by their names in the robot, contacts and impulses by those that the action gives them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 pub enum Residual {
     /// x ⊖ x_ref, 2 nv numbers.
     State {
@@ -119,7 +119,7 @@ pub enum Residual {
     /// J_c (v⁺ − v), 3 numbers in the world: by how much an impact changes the velocity of the centre of mass (m/s).
     ImpulseCenterOfMass,
     /// A function of one's own. It cannot be put into a file.
-    #[serde(skip)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     Own(OwnResidual),
 }
 
