@@ -30,7 +30,7 @@ AT_THE_END = {
     "ResidualModelContactWrenchCone",
     "ResidualModelContactCoPPosition",
 }
-"""Residuals that Crocoddyl takes to be zero where there are no controls."""
+"""Residuals that do not depend on anything in Crocoddyl's models of the end: zero, or efforts less their reference."""
 
 
 def kind(theirs: Any) -> str:
@@ -95,7 +95,17 @@ class Terms:
         return [self._limit(item) for item in counts if not self._vanishes(item.constraint)]
 
     def _vanishes(self, term: Any) -> bool:
-        return self.end and kind(getattr(term, "residual", None)) in AT_THE_END
+        """Whether a term is zero at the end, where its residual is; what is constant there counts in the whole cost."""
+        residual: Any = getattr(term, "residual", None)
+        if not self.end or kind(residual) not in AT_THE_END:
+            return False
+        r = np.zeros(residual.nr) - (residual.reference if kind(residual) == "ResidualModelJointEffort" else 0.0)
+        if hasattr(term, "activation"):  # as costs have it, and constraints do not
+            data = term.activation.createData()
+            term.activation.calc(data, r)
+            if data.a_value:
+                raise NoCounterpartError(f"{kind(residual)} (a constant cost at the end)")
+        return True
 
     def _cost(self, item: Any) -> Cost:
         if kind(item.cost) not in ("CostModelResidual", "CostModelAbstract") or not hasattr(item.cost, "residual"):
@@ -129,9 +139,15 @@ class Terms:
         make = _RESIDUALS.get(kind(theirs))
         if kind(theirs) == "ResidualModelJointEffort":
             return self._efforts(theirs)
-        if make is None or (self.end and "Grav" in kind(theirs)):
+        if make is None or not self._means_the_same(kind(theirs)):
             raise NoCounterpartError(kind(theirs))
         return make(self, theirs), (np.arange(theirs.nr), theirs.nr)
+
+    def _means_the_same(self, name: str) -> bool:
+        """Whether a residual is the same here: not the one of gravity in contact, nor that of a jump at the end."""
+        if name == "ResidualModelControlGrav":
+            return self.drives is None and not self.end and not self.names
+        return not (self.end and name == "ResidualModelImpulseCoM")
 
     def _efforts(self, theirs: Any) -> tuple[Residual, tuple[_Array, int]]:
         """The efforts of drives: controls, or those of inverse dynamics."""
@@ -164,7 +180,6 @@ _RESIDUALS: dict[str, Callable[[Terms, Any], Residual]] = {
     "ResidualModelState": lambda terms, theirs: Residual.state(theirs.reference),
     "ResidualModelControl": lambda terms, theirs: Residual.control(theirs.reference),
     "ResidualModelControlGrav": lambda terms, theirs: Residual.control_gravity(),
-    "ResidualModelContactControlGrav": lambda terms, theirs: Residual.control_gravity(),
     "ResidualModelJointAcceleration": lambda terms, theirs: Residual.joint_acceleration(theirs.reference),
     "ResidualModelCoMPosition": lambda terms, theirs: Residual.center_of_mass(theirs.reference),
     "ResidualModelCentroidalMomentum": lambda terms, theirs: Residual.centroidal_momentum(theirs.reference),

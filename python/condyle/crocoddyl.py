@@ -58,9 +58,10 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
 
     Ours are then these knots: Euler and Runge–Kutta steps, with controls as polynomials, of free and contact dynamics,
     forward and inverse; impulses; LQR; the unicycle. In them may be drives τ = S u of any kind, contacts of 1, 2, 3 and
-    6 dimensions, all residuals, activations that are quadratic, weighted, smooth or barriers, and constraints of
-    residuals. A knot with anything else in it, for example an action or a cost that is written in Python, is computed
-    by Crocoddyl, called by our solver; a warning names what it is.
+    6 dimensions, all residuals but ResidualModelContactControlGrav (which leaves the forces out in version 3.2.1),
+    activations that are quadratic, weighted, smooth or barriers, and constraints of residuals. A knot with anything
+    else in it, for example an action or a cost that is written in Python, is computed by Crocoddyl, called by our
+    solver; a warning names what it is.
 
     Constraints become limits, which `AugmentedLagrangian` holds; so do the equations of inverse dynamics.
 

@@ -134,7 +134,7 @@ def test_costs_of_controls_vanish_at_the_end():
     residuals = [
         crocoddyl.ResidualModelControl(state, np.ones(nu)),
         crocoddyl.ResidualModelJointAcceleration(state, np.ones(state.nv), nu),
-        crocoddyl.ResidualModelJointEffort(state, drives, np.ones(nu), nu),
+        crocoddyl.ResidualModelJointEffort(state, drives, np.zeros(nu), nu),
         crocoddyl.ResidualModelContactForce(state, foot, force, 6, nu, True),
         crocoddyl.ResidualModelContactFrictionCone(state, foot, cone, nu, True),
         crocoddyl.ResidualModelContactWrenchCone(state, foot, wrench, nu, True),
@@ -142,17 +142,51 @@ def test_costs_of_controls_vanish_at_the_end():
             state, foot, crocoddyl.CoPSupport(np.eye(3), np.array([0.2, 0.1])), nu, True
         ),
     ]
+    u = np.linspace(-1.0, 2.0, nu)
     for residual in residuals:
         total = crocoddyl.CostModelSum(state, nu)
         total.addCost("term", crocoddyl.CostModelResidual(state, residual), 1.0)
         dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(state, drives, contacts, total, 0.0, True)
         end = crocoddyl.IntegratedActionModelEuler(dynamics, 0.0)
         data, x = end.createData(), state.integrate(state.zero(), np.full(state.ndx, 0.3))
-        end.calc(data, x, np.ones(nu))  # what it was before is not what it is
         end.calc(data, x)
         problem = crocoddyl.ShootingProblem(x, [crocoddyl.IntegratedActionModelEuler(dynamics, 0.1)], end)
-        ours = condyle.crocoddyl.problem(problem, strict=True).evaluate(np.array([x, x]), np.ones((1, nu)))
+        ours = condyle.crocoddyl.problem(problem, strict=True).evaluate(np.array([x, x]), u[None])
         assert ours.costs[1] == data.cost == 0.0, residual
+        problem.calc([x, x], [u])
+        assert ours.costs[0] == pytest.approx(problem.runningDatas[0].cost, rel=1e-9) and ours.costs[0] > 0.0, residual
+    # one that is constant stays theirs
+    total = crocoddyl.CostModelSum(state, nu)
+    effort = crocoddyl.ResidualModelJointEffort(state, drives, np.ones(nu), nu)
+    total.addCost("term", crocoddyl.CostModelResidual(state, effort), 1.0)
+    dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(state, drives, contacts, total, 0.0, True)
+    step, end = (crocoddyl.IntegratedActionModelEuler(dynamics, dt) for dt in (0.1, 0.0))
+    with pytest.warns(
+        UserWarning, match=r"^ResidualModelJointEffort \(a constant cost at the end\) has no counterpart"
+    ):
+        problem = condyle.crocoddyl.problem(crocoddyl.ShootingProblem(x, [step], end))
+    assert problem.evaluate(np.array([x, x]), u[None]).costs[1] == 0.5 * nu
+
+
+def test_a_residual_that_means_something_else_stays_theirs():
+    """Crocoddyl's residual of gravity in contact is without the forces that it is said to have."""
+    model = pin.buildModelFromXML(condyle.robots.HUMANOID, pin.JointModelFreeFlyer())
+    state = crocoddyl.StateMultibody(model)
+    drives = crocoddyl.ActuationModelFloatingBase(state)
+    contacts, total = crocoddyl.ContactModelMultiple(state, drives.nu), crocoddyl.CostModelSum(state, drives.nu)
+    sole = crocoddyl.ContactModel3D(
+        state, model.getFrameId("left_sole"), np.zeros(3), pin.LOCAL, drives.nu, np.zeros(2)
+    )
+    contacts.addContact("sole", sole)
+    gravity = crocoddyl.ResidualModelContactControlGrav(state, drives.nu)
+    total.addCost("gravity", crocoddyl.CostModelResidual(state, gravity), 1.0)
+    dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(state, drives, contacts, total, 0.0, True)
+    step = crocoddyl.IntegratedActionModelEuler(dynamics, 0.1)
+    x, us = state.integrate(state.zero(), np.full(state.ndx, 0.3)), np.ones((1, drives.nu))
+    theirs = crocoddyl.ShootingProblem(x, [step], step)
+    with pytest.warns(UserWarning, match="^ResidualModelContactControlGrav of cost `gravity` has no counterpart here"):
+        problem = condyle.crocoddyl.problem(theirs)
+    assert problem.evaluate(np.array([x, x]), us).cost == pytest.approx(theirs.calc([x, x], list(us)), rel=1e-12)
 
 
 def test_constraints_become_limits():
