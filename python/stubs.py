@@ -179,6 +179,7 @@ RESULTS = {
     "Settings": "WholeBodyController.settings",
     "References": "WholeBodyController.hold",
     "Command": "WholeBodyController.command WholeBodyController.step",
+    "Optimality": "WholeBodyController.optimality",
     "None": """
         _casadi_release AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic

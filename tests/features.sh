@@ -1,10 +1,8 @@
 #!/usr/bin/env bash
-# Checks that each feature can be left out: all are off, and all but one. `full` also leaves out one at a time, of each crate,
-# and runs the unit tests of what needs no standard library without it.
+# Checks that each feature of each crate can be left out: none is on, one is, all but one are. Then it runs the unit tests of what
+# needs no standard library without it (dynamics runs without it in tests/embedded.sh).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-
-full=${1:-}
 
 # $1: a crate; $2: a feature that it must have, or none; $3, …: features that it may have.
 check() {
@@ -12,11 +10,8 @@ check() {
     shift 2
     combinations=("$needed")
     for feature in "$@"; do
-        combinations+=("$needed,$feature")
-        if [ "$full" = full ]; then
-            others=$(printf '%s\n' "$@" | grep -vx "$feature" | paste -sd ,)
-            combinations+=("$needed,$others")
-        fi
+        others=$(printf '%s\n' "$@" | grep -vx "$feature" | paste -sd ,)
+        combinations+=("$needed,$feature" "$needed,$others")
     done
     while read -r combination; do
         echo "$crate: ${combination:-none}"
@@ -24,18 +19,15 @@ check() {
     done < <(printf '%s\n' "${combinations[@]}" | sed 's/^,//; s/,$//' | sort -u)
 }
 
-# with them the crates that they stand on
+check condyle-spatial libm serde std
+check condyle-linalg libm std threads
+check condyle-model libm loaders serde std threads
 check condyle-dynamics libm loaders serde std threads
+check condyle-optimal "" loaders serde threads
+check condyle-wholebody "" loaders threads
 check condyle "" loaders serde threads
 
-if [ "$full" = full ]; then
-    check condyle-spatial libm serde std
-    check condyle-linalg libm std threads
-    check condyle-model libm loaders serde std threads
-    check condyle-optimal "" loaders serde threads
-    check condyle-wholebody "" loaders threads
-    for crate in spatial linalg model dynamics; do
-        cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
-    done
-    cargo test --locked --package condyle-linalg --no-default-features --features std
-fi
+for crate in spatial linalg model; do
+    cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
+done
+cargo test --locked --package condyle-linalg --no-default-features --features std

@@ -66,13 +66,13 @@ def agreeing(ours, theirs):
     return n if same.all() else int(np.argmin(same))
 
 
-def compare(spec, robot, solver):
-    """Both solves of a problem with one of its solvers, and what there is to say of them."""
+def compare(spec, robot, solver, make=Ours):
+    """Both solves of a problem with one of its solvers, ours as it is made here, and what there is to say of them."""
     case = (spec["name"], solver)
     if case in INCOMPARABLE:
         raise NotRunError("Crocoddyl does not repeat itself")
     theirs, result = Theirs(spec, robot, solver), {"name": spec["name"], "solver": solver}
-    ours = Ours(spec, robot, solver)
+    ours = make(spec, robot, solver)
     xs, us = theirs.warm_start()
     a, b = ours.solve(xs, us), theirs.solve(xs, us)
     same = agreeing(a.rows, b.rows)

@@ -72,8 +72,8 @@ Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_ene
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
 Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
-    (poses, motions, forces), `conventions` (other libraries' numbers), `casadi` and
-    `pinocchio` (its spelling; both imported by themselves)
+    (poses, motions, forces), `conventions` (other libraries' numbers), `casadi`,
+    `pinocchio` (its spelling) and `crocoddyl` (its problems; all three imported by themselves)
 """
 
 from . import algebra, conventions, inertial_parameters, optimal, robots, simulation, wholebody

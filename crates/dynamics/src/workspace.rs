@@ -49,10 +49,11 @@ impl Size {
     }
 }
 
-/// An array of n equal entries. It is not inlined, as a workspace has dozens of them, and copies entries whole, where `vec!`
-/// would clone them number by number.
+/// An array of n equal entries. It is not inlined, and makes the entry itself, as a workspace has dozens of arrays; entries are
+/// copied whole, where `vec!` would clone them number by number.
 #[inline(never)]
-pub(crate) fn filled<T: Copy>(entry: T, n: usize) -> Vec<T> {
+pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Vec<T> {
+    let entry = entry();
     (0..n).map(|_| entry).collect()
 }
 

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import condyle
+import condyle.crocoddyl
 from condyle.optimal import (
     Activation,
     AugmentedLagrangian,
@@ -211,6 +211,28 @@ def test_quasi_static(name):
     assert not landing.quasiStatic(landing.createData(), x).size
 
 
+def test_quasi_static_of_steps_and_other_actions():
+    """Of Runge-Kutta steps with controls that are polynomials in time, of the unicycle, and of linear dynamics."""
+    robot, kinds = Robot("arm7"), crocoddyl.RKType.four
+    x = np.r_[robot.x[:7], np.zeros(7)]
+    dynamics = crocoddyl.DifferentialActionModelFreeFwdDynamics(
+        robot.state, robot.drives, crocoddyl.CostModelSum(robot.state, 7)
+    )
+    for controls, made in (
+        ("constant", crocoddyl.ControlParametrizationModelPolyZero(7)),
+        ("linear", crocoddyl.ControlParametrizationModelPolyOne(7)),
+        ("quadratic", crocoddyl.ControlParametrizationModelPolyTwoRK(7, kinds)),
+    ):
+        theirs = crocoddyl.IntegratedActionModelRK(dynamics, made, kinds, DT)
+        ours = FreeDynamics(robot.ours, DT, [], integrator="runge_kutta_4", controls=controls)
+        close(ours.quasi_static(x), theirs.quasiStatic(theirs.createData(), x))
+    for model in (crocoddyl.ActionModelUnicycle(), crocoddyl.ActionModelLQR.Random(4, 2)):
+        x = np.linspace(0.3, 0.6, model.state.nx)
+        expected = model.quasiStatic(model.createData(), x)
+        problem = condyle.crocoddyl.problem(crocoddyl.ShootingProblem(x, [model], model), strict=True)
+        np.testing.assert_allclose(problem.quasi_static([x, x])[0], expected, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("name", "knots"), [("quadruped", 10), ("arm7", 10)])
 def test_optimum(name, knots):
     """A motion over feet that stand, and one of an arm, by Crocoddyl's solver of equations and by ours of limits."""
@@ -234,4 +256,10 @@ def test_optimum(name, knots):
     found = solver.solve(np.tile(x0, (knots + 1, 1)), problem.quasi_static(np.tile(x0, (knots + 1, 1))))
     assert found.status == "converged"
     np.testing.assert_allclose(solver.outcome.cost, theirs.cost, rtol=OPTIMUM)
+    converted = condyle.crocoddyl.problem(shooting, strict=True)
+    for one, other in zip(
+        converted.derivatives(found.xs, found.us), problem.derivatives(found.xs, found.us), strict=True
+    ):
+        for a, b in zip(one, other, strict=True):
+            close(a, b)
     np.testing.assert_allclose(found.xs, np.array(theirs.xs), rtol=0, atol=1e-3)

@@ -51,9 +51,9 @@ impl<S: Block> Worker<S> {
     fn new(model: &Model) -> Self {
         Self {
             data: Data::new(model),
-            q: filled(S::zero(), model.nq()),
-            v: filled(S::zero(), model.nv()),
-            x: filled(S::zero(), model.nv()),
+            q: filled(S::zero, model.nq()),
+            v: filled(S::zero, model.nv()),
+            x: filled(S::zero, model.nv()),
             f_ext: Vec::with_capacity(model.nodes().len()),
         }
     }

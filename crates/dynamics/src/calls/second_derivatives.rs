@@ -88,7 +88,7 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
     /// Memory for the tensors of a model.
     pub fn new<R>(model: &Model<R>) -> Self {
         let zeros = || vec![zero_matrix(model.nv(), model.nv()); model.nv()];
-        let lambda = filled(S::zero(), model.nv());
+        let lambda = filled(S::zero, model.nv());
         Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
     }
 }

@@ -43,7 +43,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         Self {
-            forces: filled(Force::zero(), size.bodies),
+            forces: filled(Force::zero, size.bodies),
             P: square.clone(),
             dtau_dq: square.clone(),
             da_dq: square.clone(),

@@ -50,14 +50,14 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         Self {
-            v: filled(Motion::zero(), size.bodies),
-            a: filled(Motion::zero(), size.bodies),
-            IC: filled(Inertia::zero(), size.bodies),
-            F: filled(Force::zero(), size.bodies),
+            v: filled(Motion::zero, size.bodies),
+            a: filled(Motion::zero, size.bodies),
+            IC: filled(Inertia::zero, size.bodies),
+            F: filled(Force::zero, size.bodies),
             M: zero_matrix(size.nv, size.nv),
             factor: Ltdl::new(model),
-            effort: filled(S::zero(), size.nv),
-            qdd: filled(S::zero(), size.nv),
+            effort: filled(S::zero, size.nv),
+            qdd: filled(S::zero, size.nv),
         }
     }
 }

@@ -45,11 +45,11 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            v_after: filled(S::zero(), size.nv),
-            w: filled(S::zero(), size.nv),
-            velocity: filled(Motion::zero(), size.bodies),
-            Psid: filled(Motion::zero(), size.columns),
-            zero: filled(S::zero(), size.nv),
+            v_after: filled(S::zero, size.nv),
+            w: filled(S::zero, size.nv),
+            velocity: filled(Motion::zero, size.bodies),
+            Psid: filled(Motion::zero, size.columns),
+            zero: filled(S::zero, size.nv),
         }
     }
 }

@@ -33,7 +33,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         let solve = tree_solve::Workspace::new(model.columns(), size.nv);
-        Self { a: filled(S::zero(), size.nv), da_dq: square.clone(), da_dv: square, solve }
+        Self { a: filled(S::zero, size.nv), da_dq: square.clone(), da_dv: square, solve }
     }
 }
 

@@ -54,9 +54,9 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = || zero_matrix(size.nv, size.nv);
         Self {
-            mu: filled(S::zero(), size.nv),
-            transpose: filled(S::zero(), size.nv * size.nv),
-            product: filled(S::zero(), size.nv * size.nv),
+            mu: filled(S::zero, size.nv),
+            transpose: filled(S::zero, size.nv * size.nv),
+            product: filled(S::zero, size.nv * size.nv),
             dqdq: square(),
             dvdq: square(),
             dvdv: square(),

@@ -66,10 +66,10 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         Self {
-            w: filled(Motion::zero(), size.bodies),
-            W: filled(Motion::zero(), size.columns),
-            PD: filled(Coriolis::zero(), size.bodies),
-            Q: filled(Vec3::zero(), size.bodies),
+            w: filled(Motion::zero, size.bodies),
+            W: filled(Motion::zero, size.columns),
+            PD: filled(Coriolis::zero, size.bodies),
+            Q: filled(Vec3::zero, size.bodies),
             dqdq: square.clone(),
             dvdq: square.clone(),
             dvdv: square.clone(),

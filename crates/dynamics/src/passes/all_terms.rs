@@ -34,10 +34,10 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            a: filled(Motion::zero(), size.bodies),
-            f: filled(Force::zero(), size.bodies),
+            a: filled(Motion::zero, size.bodies),
+            f: filled(Force::zero, size.bodies),
             M: zero_matrix(size.nv, size.nv),
-            h: filled(S::zero(), size.nv),
+            h: filled(S::zero, size.nv),
             twice: S::zero(),
         }
     }

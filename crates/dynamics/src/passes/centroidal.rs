@@ -40,10 +40,10 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            IC: filled(Inertia::zero(), size.bodies),
-            BC: filled(Coriolis::zero(), size.bodies),
-            F: filled(Force::zero(), size.columns),
-            dF: filled(Force::zero(), size.columns),
+            IC: filled(Inertia::zero, size.bodies),
+            BC: filled(Coriolis::zero, size.bodies),
+            F: filled(Force::zero, size.columns),
+            dF: filled(Force::zero, size.columns),
             Ag: zero_matrix(6, size.nv),
             dAg: zero_matrix(6, size.nv),
             Jcom: zero_matrix(3, size.nv),

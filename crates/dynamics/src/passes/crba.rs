@@ -23,7 +23,7 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        Self { IC: filled(Inertia::zero(), size.bodies), M: zero_matrix(size.nv, size.nv) }
+        Self { IC: filled(Inertia::zero, size.bodies), M: zero_matrix(size.nv, size.nv) }
     }
 }
 

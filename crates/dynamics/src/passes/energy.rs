@@ -81,10 +81,10 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let zeros = || filled(S::zero(), size.nv);
+        let zeros = || filled(S::zero, size.nv);
         Self {
-            IC: filled(Inertia::zero(), size.bodies),
-            h: filled(Force::zero(), size.bodies),
+            IC: filled(Inertia::zero, size.bodies),
+            h: filled(Force::zero, size.bodies),
             dT_dq: zeros(),
             dT_dv: zeros(),
             dV_dq: zeros(),

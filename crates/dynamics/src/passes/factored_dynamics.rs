@@ -38,8 +38,8 @@ impl<S: Scalar> Workspace<S> {
         Self {
             sparse: Ltdl::new(model),
             dense: Cholesky::new(model.nv()),
-            qdd: filled(S::zero(), model.nv()),
-            zero: filled(S::zero(), model.nv()),
+            qdd: filled(S::zero, model.nv()),
+            zero: filled(S::zero, model.nv()),
         }
     }
 }

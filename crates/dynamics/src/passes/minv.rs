@@ -40,8 +40,8 @@ impl<S: Scalar> Workspace<S> {
         Self {
             by_factor: inverse_by_factor(model, factor.nonzeros()),
             factor,
-            P: filled(S::zero(), 6 * size.columns),
-            A: filled(S::zero(), (1 + size.depth) * 6 * size.columns),
+            P: filled(S::zero, 6 * size.columns),
+            A: filled(S::zero, (1 + size.depth) * 6 * size.columns),
             Minv: zero_matrix(size.nv, size.nv),
         }
     }

@@ -35,8 +35,8 @@ impl<S: Scalar> Workspace<S> {
         let parameters = PARAMETERS * (size.bodies - 1);
         Self {
             torque: zero_matrix(size.nv, parameters),
-            kinetic: filled(S::zero(), parameters),
-            potential: filled(S::zero(), parameters),
+            kinetic: filled(S::zero, parameters),
+            potential: filled(S::zero, parameters),
         }
     }
 }

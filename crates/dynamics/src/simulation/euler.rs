@@ -18,7 +18,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        Self { effort: filled(S::zero(), model.nv()), way: filled(S::zero(), model.nv()) }
+        Self { effort: filled(S::zero, model.nv()), way: filled(S::zero, model.nv()) }
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = filled(S::zero(), model.nv());
+        let zero = filled(S::zero, model.nv());
         Self {
             effort: zero.clone(),
             xi: zero.clone(),

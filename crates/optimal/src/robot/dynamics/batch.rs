@@ -48,8 +48,8 @@ pub(crate) enum Pass<S> {
     /// The constraints, and J. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, DMatrix<S>),
     Inverse,
-    /// The constraints, J, and λ. Shape: rows.
-    ContactInverse(Box<ConstraintSet<S>>, DMatrix<S>, Vec<S>),
+    /// As [`Self::Contact`].
+    ContactInverse(Box<ConstraintSet<S>>, DMatrix<S>),
 }
 
 /// The dynamics of as many knots as a scalar has lanes.
@@ -86,13 +86,14 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
             Law::Inverse => Pass::Inverse,
             Law::ContactInverse(contacts, _) => {
                 let set = Box::new(constraint_set(model, contacts, SHARED).expect("was checked when it was given"));
-                let (rows, o) = (set.rows(), S::zero());
-                Pass::ContactInverse(set, DMatrix::from_element(rows, nv, o), vec![o; rows])
+                let J = DMatrix::from_element(set.rows(), nv, S::zero());
+                Pass::ContactInverse(set, J)
             }
         };
         let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
-        let lambda = zeros(if let Pass::Contact(set, _) = &pass { set.rows() } else { 0 });
+        let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
+        let lambda = zeros(rows);
         let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Arc::default());
         Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
@@ -115,9 +116,6 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     ) {
         self.pack(model, xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
-        if let Pass::ContactInverse(.., lambda) = &mut self.pass {
-            pack(to.len(), |k| &to[k].lambda, lambda);
-        }
         match wanted {
             Wanted::Equations => self.run_equations(model, to),
             _ => self.run_pass(model, wanted == Wanted::Derivatives, terms.layout().forces, to),
@@ -135,7 +133,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 
     /// Accelerations and forces, and their derivatives; those of forces only if they are looked at.
     fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
-        let Self { data, pass, q, v, tau, a, .. } = self;
+        let Self { data, pass, q, v, tau, a, lambda, .. } = self;
         match pass {
             Pass::None => return,
             Pass::Free if !derivatives => a.copy_from_slice(aba(model, data, q, v, tau, &[])),
@@ -166,14 +164,16 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                     unpack_matrices([d.dtau_dq, d.dtau_dv, d.dtau_da], to, |to| &mut to.dtau);
                 }
             }
-            Pass::ContactInverse(set, _, lambda) if !derivatives => {
+            Pass::ContactInverse(set, _) if !derivatives => {
                 a.copy_from_slice(tau);
+                pack(to.len(), |k| &to[k].lambda, lambda);
                 let d = constrained_inverse_dynamics(model, data, set, q, v, a, lambda, &[]);
                 unpack(d.tau, to, |to| &mut to.tau);
                 unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
             }
-            Pass::ContactInverse(set, J, lambda) => {
+            Pass::ContactInverse(set, J) => {
                 a.copy_from_slice(tau);
+                pack(to.len(), |k| &to[k].lambda, lambda);
                 let d = constrained_inverse_dynamics_derivatives(model, data, set, q, v, a, lambda, &[]);
                 unpack(d.tau, to, |to| &mut to.tau);
                 unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
