@@ -128,12 +128,14 @@ fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
     state[..function.inputs.len()].to_vec()
 }
 
-/// The functions that compilers are given for a robot: all with `CONDYLE_ALL_CODE`, which keeps them busy for some minutes, else
-/// those of which the code is not long.
+/// The functions that compilers are given for a robot: those of which the code is not long, and with `CONDYLE_ALL_CODE`, which
+/// keeps them busy for some minutes, nearly all.
 fn for_compilers(robot: &str) -> Vec<&'static str> {
+    let is_all = std::env::var_os("CONDYLE_ALL_CODE").is_some();
     let short = ["rnea", "aba", "crba", "gravity", "nonlinear_effects", "frames", "centroidal"];
     match robot {
-        _ if std::env::var_os("CONDYLE_ALL_CODE").is_some() => FUNCTIONS.to_vec(),
+        "arm" | "quadruped" if is_all => FUNCTIONS.to_vec(),
+        "humanoid" if is_all => [&short[..], &["minv", "rnea_derivatives", "aba_derivatives"]].concat(),
         "arm" => FUNCTIONS.into_iter().filter(|&name| name != "aba_hessian").collect(),
         "quadruped" => [&short[..], &["minv", "rnea_derivatives", "constrained_dynamics", "impulse_dynamics"]].concat(),
         _ => short[..4].to_vec(),
@@ -197,7 +199,7 @@ fn rust_computes_what_the_library_does() {
     // rustc takes ten times as long as the compilers of C
     let short = |robot: &str| -> Vec<&'static str> {
         let all = for_compilers(robot);
-        all.into_iter().filter(|name| !name.contains(if robot == "arm" { "hessian" } else { "_d" })).collect()
+        all.into_iter().filter(|name| !name.contains("hessian") && (robot == "arm" || !name.contains("_d"))).collect()
     };
     let mut programs = std::collections::HashMap::new();
     check("Rust", short, |robot, all, inputs| {
