@@ -58,7 +58,7 @@ ARGUMENTS = {
     "Data": "data",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "str": "contact function joint_name name prefix text FrictionContact.frame Task.frame",
+    "str": "_generate.language contact function joint_name name prefix text FrictionContact.frame Task.frame",
     "str | int": "body frame",
     "int": """
         facets grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
@@ -69,7 +69,7 @@ ARGUMENTS = {
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt",
-    "bool": """batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
+    "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal""",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
@@ -136,11 +136,15 @@ ARGUMENTS = {
     "References": "references",
     "Any": "_casadi_hold_knot.of",
     "int | None": "_casadi_hold_knot.t",
+    "list[str]": "names _generate.frames inputs",
+    "list[ContactConstraint]": "_generate.constraints",
 }
 
 # The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
 # returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
 RESULTS = {
+    "tuple[str, list[tuple[str, str]], "
+    "list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]": "_generate",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
