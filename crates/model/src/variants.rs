@@ -148,7 +148,7 @@ impl Model {
     #[doc(hidden)]
     #[must_use]
     pub fn without_residues(mut self) -> Self {
-        let whole = |x: f64| if (x - x.round()).abs() < RESIDUE { x.round() } else { x };
+        let whole = |x: f64| [0.0, 1.0, -1.0].into_iter().find(|whole| (x - whole).abs() < RESIDUE).unwrap_or(x);
         let small = |x: f64, scale: f64| if x.abs() < RESIDUE * scale { 0.0 } else { x };
         let vector = |v: Vec3<f64>, scale: f64| Vec3::from(v.to_array().map(|x| small(x, scale)));
         let rotation = |R: Mat3<f64>| {
