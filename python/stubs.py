@@ -58,7 +58,7 @@ ARGUMENTS = {
     "Data": "data",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "str": "contact function joint_name name prefix text FrictionContact.frame Task.frame",
+    "str": "_generate.language contact function joint_name name prefix text FrictionContact.frame Task.frame",
     "str | int": "body frame Model.with_mimic.follower Model.with_mimic.leader",
     "str | int | None": "Model.append.frame",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
@@ -71,7 +71,7 @@ ARGUMENTS = {
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt",
-    "bool": """batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
+    "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal""",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
@@ -138,11 +138,15 @@ ARGUMENTS = {
     "References": "references",
     "Any": "_casadi_hold_knot.of Model.from_pinocchio.model",
     "int | None": "_casadi_hold_knot.t",
+    "list[str]": "names _generate.frames inputs",
+    "list[ContactConstraint]": "_generate.constraints",
 }
 
 # The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
 # returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
 RESULTS = {
+    "tuple[str, list[tuple[str, str]], "
+    "list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]": "_generate",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds what runs without an operating system, and runs the example of it on a Cortex-M4 that qemu plays, where there is what
-# this takes:
+# Checks that what runs without an operating system compiles for two processors, and runs the example of it on a Cortex-M4 that
+# qemu plays, where there is what this takes:
 #
 # - `rustup target add thumbv7em-none-eabihf riscv32imac-unknown-none-elf`;
 # - qemu-system-arm.

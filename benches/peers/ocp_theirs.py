@@ -227,7 +227,7 @@ class Theirs:
         return Solve(np.array(rows), float(solver.cost), np.array(list(solver.xs)), {})
 
     def time(self, xs, us, iterations, trials):
-        """Seconds of a solve, and of its phases at the optimum times how often a solve runs them, each called before."""
+        """Seconds of a solve, and of its phases at the optimum times how often a solve runs them, called before."""
         solver = self.solver()
         self.run(solver, xs, us)
         begin = time.perf_counter()

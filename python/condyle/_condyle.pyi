@@ -92,6 +92,7 @@ __all__ = [
     "_casadi_hold",
     "_casadi_hold_knot",
     "_casadi_release",
+    "_generate",
     "_model_from_bytes",
     "aba",
     "aba_derivatives",
@@ -650,6 +651,18 @@ def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
 
     q: nq numbers.
     """
+
+def _generate(
+    model: Model,
+    names: list[str],
+    language: str,
+    *,
+    frames: list[str] = ...,
+    constraints: list[ContactConstraint] = ...,
+    external_forces: bool = False,
+    inputs: list[str] = ...,
+) -> tuple[str, list[tuple[str, str]], list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]:
+    """The code of functions of a robot: its name, its files, and its functions with their arguments and results."""
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
     """The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.

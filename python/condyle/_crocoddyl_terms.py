@@ -34,8 +34,10 @@ AT_THE_END = {
 
 
 def kind(theirs: Any) -> str:
-    """The name of an object's class."""
-    return type(theirs).__name__
+    """The name of an object's class; of one that is not Crocoddyl's own with its module, whatever it is called."""
+    made = type(theirs)
+    own = made.__module__.split(".")[0] == "crocoddyl"
+    return made.__name__ if own else f"{made.__module__}.{made.__name__}"
 
 
 def bounds(numbers: Any) -> _Array:

@@ -8,6 +8,7 @@
 //! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
 //!   `regressors`, `simulation`: the library's functions and types, one to one;
+//! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
 //! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
 //!
 //! The doc comments here are the docstrings that Python sees; `stubs.py` writes them into `condyle/_condyle.pyi`.
@@ -21,6 +22,7 @@ mod builder;
 mod cached;
 mod casadi;
 mod centroidal;
+mod codegen;
 mod configuration;
 mod constrained;
 mod data;
@@ -64,6 +66,8 @@ mod _condyle {
         centroidal_map, centroidal_map_rate, centroidal_momentum, centroidal_momentum_rate, com, com_acceleration,
         com_jacobian, com_velocity, compute_all_terms, kinetic_energy, mechanical_energy, potential_energy,
     };
+    #[pymodule_export]
+    use codegen::generate;
     #[pymodule_export]
     use configuration::{
         difference, difference_jacobian, distance, integrate, integrate_jacobian, interpolate, neutral, normalize,

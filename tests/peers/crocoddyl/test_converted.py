@@ -227,6 +227,16 @@ def test_lqr():
     np.testing.assert_allclose(found.K, -np.array([np.array(K) for K in solver.K]), atol=1e-8)
 
 
+class ActivationModelQuad(crocoddyl.ActivationModelQuad):
+    """A class of one's own with a name of Crocoddyl's, which is not taken for it: Σ r²."""
+
+    def calc(self, data, r):
+        data.a_value = float(r @ r)
+
+    def calcDiff(self, data, r):
+        data.Ar[:], data.Arr[:, :] = 2.0 * r, 2.0 * np.eye(len(r))
+
+
 class Odd(crocoddyl.ActivationModelAbstract):
     """An activation of one's own: Σ r⁴ / 4."""
 
@@ -253,11 +263,13 @@ def test_what_has_no_counterpart_is_named():
     running, odd = costs(effort=crocoddyl.ResidualModelControl(state, 7)), Odd(14)
     running.addCost("odd", crocoddyl.CostModelResidual(state, odd, rest), 1.0)
     theirs = shooting(state, drives, running, costs(rest=rest))
-    with pytest.raises(ProblemError, match="^Odd of cost `odd` has no counterpart here$"):
+    with pytest.raises(ProblemError, match=r"^test_converted\.Odd of cost `odd` has no counterpart here$"):
         condyle.crocoddyl.problem(theirs, strict=True)
-    with pytest.raises(ProblemError, match="^Odd of cost `odd` has no counterpart here$"):
+    with pytest.raises(ProblemError, match=r"^test_converted\.Odd of cost `odd` has no counterpart here$"):
         condyle.crocoddyl.differential_action(theirs.runningModels[0].differential)
-    with pytest.warns(UserWarning, match="^Odd of cost `odd` has no counterpart here: Crocoddyl computes") as seen:
+    with pytest.warns(
+        UserWarning, match=r"^test_converted\.Odd of cost `odd` has no counterpart here: Crocoddyl"
+    ) as seen:
         problem = condyle.crocoddyl.problem(theirs)
     assert len(seen) == 1 and seen[0].filename == __file__
     solver = crocoddyl.SolverFDDP(theirs)
@@ -343,11 +355,23 @@ def test_an_action_of_ones_own_on_a_manifold():
     solver = crocoddyl.SolverFDDP(theirs)
     solver.setCallbacks([log := crocoddyl.CallbackLogger()])
     solver.solve([x0] * 21, list(us), 20, False)
-    with pytest.warns(UserWarning, match="^Turns has no counterpart here"):
+    with pytest.warns(UserWarning, match=r"^test_converted\.Turns has no counterpart here"):
         problem = condyle.crocoddyl.problem(theirs)
     found = Fddp(problem, max_iterations=20, tolerance=solver.th_stop).solve(np.tile(x0, (21, 1)), us)
     np.testing.assert_allclose([i.cost for i in found.trace], log.costs[-len(found.trace) :], rtol=1e-9)
     np.testing.assert_allclose(found.xs, np.array(solver.xs), rtol=0, atol=1e-7)
+
+
+def test_a_class_of_ones_own_is_not_taken_for_another():
+    _, state, drives, costs = arm()
+    running, rest = costs(), crocoddyl.ResidualModelState(state, X0, 7)
+    twice = ActivationModelQuad(14)
+    running.addCost("rest", crocoddyl.CostModelResidual(state, twice, rest), 1.0)
+    theirs = shooting(state, drives, running, costs(rest=rest))
+    with pytest.raises(
+        ProblemError, match=r"^test_converted\.ActivationModelQuad of cost `rest` has no counterpart here$"
+    ):
+        condyle.crocoddyl.problem(theirs, strict=True)
 
 
 def test_drives_of_any_kind():

@@ -29,6 +29,9 @@ impl States {
     }
 }
 
+/// What two ways of rounding leave, relative to the largest entry: some hundred roundings of a matrix of condition 1e3.
+const ROUNDING: f64 = 1e-11;
+
 /// Matrices that are written by rows have the entries of those of each state, in groups that are full and one that is not.
 #[test]
 fn matrices_by_rows() {
@@ -41,7 +44,10 @@ fn matrices_by_rows() {
                 let mut rows = vec![f64::NAN; states * n * n];
                 matrices.write_rows(&mut rows);
                 for (M, rows) in matrices.iter().zip(rows.chunks_exact(n * n)) {
-                    assert_eq!(M.transpose().as_slice(), rows, "{model}");
+                    // what is symmetric may be written by columns, which then are rows up to rounding
+                    let size = M.amax();
+                    let same = |(x, y): (&f64, &f64)| (x - y).abs() <= ROUNDING * size;
+                    assert!(M.transpose().iter().zip(rows).all(same), "{model}");
                 }
             }
         };
