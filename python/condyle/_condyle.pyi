@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._inertia import Inertia
 from ._types import (
     AbaDerivatives,
     AbaHessian,
@@ -28,7 +29,6 @@ from ._types import (
     Frame,
     Impulse,
     ImpulseDerivatives,
-    Inertia,
     Iteration,
     Limits,
     LqNode,
@@ -40,7 +40,7 @@ from ._types import (
     Solution,
     SweepResult,
 )
-from ._wholebody import Command, Gains, References, Settings
+from ._wholebody import Command, Gains, Optimality, References, Settings
 
 __all__ = [
     "ARM7",
@@ -479,8 +479,14 @@ class ModelBuilder:
     def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
         """Adds inertia to a body, given in a frame that is at `placement` in the body's frame."""
 
-    def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
-        """Adds a frame at `placement` in the body's frame."""
+    def frame(
+        self,
+        name: str,
+        body: BodyId,
+        placement: ArrayLike | None = None,
+        kind: Literal["link", "joint", "user"] = "user",
+    ) -> None:
+        """Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user', of which each may have the same name."""
 
     def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
         """Makes a joint follow another one, instead of having a coordinate of its own: its position is ratio q + offset.
@@ -1566,6 +1572,10 @@ class Joint:
     def nv(self) -> int:
         """The number of its degrees of freedom: of the numbers in its velocity."""
 
+    @property
+    def pitch(self) -> float | None:
+        """The metres along the axis for each radian about it; None if the joint is no screw."""
+
     @staticmethod
     def revolute(axis: ArrayLike) -> Joint:
         """A joint with one angle about an axis: q = [θ], v = [θ̇]."""
@@ -2014,6 +2024,24 @@ class Model:
         6
         """
 
+    @staticmethod
+    def from_pinocchio(model: Any) -> Model:
+        """A model from Pinocchio's, a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that numbers are
+        equal; `to_pinocchio` is the way back.
+
+        Composite, universal and spherical ZYX joints become several ones, with bodies without mass between them. Limits of
+        quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+
+        Raises `ModelError` if its joints do not stand depth first, as Pinocchio's readers of files number them, or are of a
+        kind that is not here.
+        """
+
+    def to_pinocchio(self) -> Any:
+        """The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
+
+        What follows another joint does so there too, unless it turns without limits.
+        """
+
     def frame(self, name: str) -> int:
         """The number of the frame with this name: a link's, else the user's, else a joint's.
 
@@ -2081,6 +2109,60 @@ class Model:
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
 
         Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
+        """
+
+    def append(
+        self, frame: str | int | None, model: Model, placement: ArrayLike | None | None = None, prefix: str = ""
+    ) -> Model:
+        """This robot with another one on a frame of it, as a new model.
+
+        Its bodies are numbered behind all that the body which carries them has carried before, as Pinocchio's `appendModel` does;
+        name and gravity are this one's.
+
+        frame: the name or number of a frame; None is the world.
+        model: the other robot.
+        placement: its world in the frame, a homogeneous (4, 4) matrix; None is the identity.
+        prefix: put before all its names.
+
+        >>> quadruped, arm = condyle.robots.quadruped(), condyle.robots.arm7()
+        >>> quadruped.append("trunk", arm, prefix="arm_").names[13:16]
+        ['RH_KFE', 'arm_joint1', 'arm_joint2']
+
+        Raises `ModelError`: two bodies, joints or frames of one name.
+        """
+
+    def with_mimic(self, follower: str | int, leader: str | int, ratio: float = 1.0, offset: float = 0.0) -> Model:
+        """The same robot with one more joint that follows another one, its position being ratio q + offset, in place of a
+        coordinate of its own. Its limits are those of the one that it follows.
+
+        follower, leader: the joints' names, or the numbers of their bodies.
+
+        >>> arm = condyle.robots.arm7()
+        >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
+        6
+
+        Raises `ModelError` if they are not of one degree of freedom, or a joint would follow one that follows.
+        """
+
+    def reference_configurations(self, path: _Path, strict: bool = False) -> dict[str, _Array]:
+        """The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.
+
+        Joints that a state does not mention stay as in `neutral`; a joint that turns without limits may have its angle. States
+        of one name, of several groups, are one position. All else in the file is ignored.
+
+        path: a path, as text or `os.PathLike`.
+        strict: whether joints that the robot has not are errors; SRDFs are often shared by robots with fewer joints.
+
+        Raises `ParseError`, with file, line and element.
+        """
+
+    def reference_configurations_str(self, text: str, strict: bool = False) -> dict[str, _Array]:
+        """The named positions of an SRDF in a string; see `reference_configurations`.
+
+        >>> joint = '<joint name="joint4" value="-1.2"/>'
+        >>> srdf = f'<robot name="arm7"><group_state name="bent" group="arm">{joint}</group_state></robot>'
+        >>> condyle.robots.arm7().reference_configurations_str(srdf)
+        {'bent': array([ 0. ,  0. ,  0. , -1.2,  0. ,  0. ,  0. ])}
         """
 
     def tree(self, frames: bool = False) -> str:
@@ -3537,6 +3619,15 @@ class WholeBodyController:
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
         """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
         Other threads run meanwhile.
+
+        q: nq numbers; v: nv.
+        references: `References` of this controller.
+        """
+
+    def optimality(self, q: ArrayLike, v: ArrayLike, references: References) -> Optimality:
+        """How far the step at this state, for these references, is from the optimum of its program of the first priority:
+        errors of the conditions of Karush, Kuhn and Tucker, below 1e-6 at the default tolerance, as `Optimality`. It must be the
+        last step. For tests: it assembles the program anew.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.

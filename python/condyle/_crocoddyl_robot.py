@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._condyle import WORLD, Joint, ModelBuilder
-from ._types import Inertia
+from ._inertia import Inertia
 
 _Array = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 //! The space of positions, and its tangent vectors.
 
-use crate::arrays::Give;
+use crate::arrays::{Computed, Give};
 use crate::exceptions::wrong_word;
 use crate::functions::functions;
 use crate::model::Model;
@@ -45,18 +45,14 @@ fn neutral(model;) {
 /// >>> np.allclose(condyle.difference(quadruped, q0, q1), 0.1)
 /// True
 fn integrate(model; q: Position, v: Tangent; out) {
-    let mut moved = vec![Scalar::zero(); model.nq()];
-    condyle::integrate(model, &q, &v, &mut moved);
-    moved
+    Computed::new([model.nq()], |moved| condyle::integrate(model, &q, &v, moved))
 }
 
 /// The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
 ///
 /// q0, q1: nq numbers.
 fn difference(model; q0: Position, q1: Position; out) {
-    let mut v = vec![Scalar::zero(); model.nv()];
-    condyle::difference(model, &q0, &q1, &mut v);
-    v
+    Computed::new([model.nv()], |v| condyle::difference(model, &q0, &q1, v))
 }
 
 /// The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.

@@ -63,6 +63,8 @@ pub use calls::inverse_dynamics::{coriolis_matrix, gravity, nonlinear_effects, r
 pub use calls::kinematics::{
     body_jacobian, forward_accelerations, forward_kinematics, forward_velocities, frame_jacobian,
 };
+#[doc(hidden)]
+pub use calls::kinematics::{body_jacobian_strided, frame_jacobian_strided};
 pub use calls::parameter_derivatives::Input;
 pub use calls::regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
 pub use calls::second_derivatives::{

@@ -162,7 +162,8 @@ impl ModelBuilder {
         self.frame_of_kind(name, FrameKind::User, body, placement);
     }
 
-    pub(crate) fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
+    /// Adds a frame that stands for a link, for a joint, or for itself: two of different kinds may have one name.
+    pub fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
         self.frames.push(Frame { name: name.to_owned(), kind, body: body.0, placement });
     }
 

@@ -1,4 +1,4 @@
-//! Files of robots: URDF, MJCF, SDF, and those of serde.
+//! Files of robots: URDF, MJCF, SDF, SRDF, and those of serde.
 
 #[cfg(feature = "serde")]
 mod description;
@@ -8,6 +8,8 @@ pub(crate) mod mjcf;
 mod packages;
 #[cfg(feature = "loaders")]
 pub(crate) mod sdf;
+#[cfg(feature = "loaders")]
+mod srdf;
 #[cfg(feature = "loaders")]
 pub(crate) mod urdf;
 #[cfg(feature = "loaders")]

@@ -34,6 +34,9 @@ pub(super) const DTAU: [usize; 3] = [2, 3, 4];
 
 pub(super) const DA: [usize; 2] = [5, 6];
 
+/// The kinds that are symmetric: the two numbers of a pair differ by rounding at most, and either may stand for both.
+const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
+
 const KINDS: usize = 7;
 
 /// The scratch of a thread.
@@ -288,8 +291,11 @@ impl<S: Block> Group<S> {
                 each[states] = to;
                 states += 1;
             }
-            let matrix = Strided { vectors, strides: [1, n], shape: [n, n], negative: false };
-            scatter_matrix(&matrix, &mut each[..states], n);
+            let (strides, shape) = match SYMMETRIC.contains(&kind) {
+                true => ([n * n, 1], [1, n * n]), // its columns are its rows
+                false => ([1, n], [n, n]),
+            };
+            scatter_matrix(&Strided { vectors, strides, shape, negative: false }, &mut each[..states], n);
         }
     }
 }
