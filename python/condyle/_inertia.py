@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._types import _repr
+
 _Array = NDArray[np.float64]
 
 
@@ -101,6 +103,10 @@ class Inertia(NamedTuple):
         mass, rotational = self.mass + other.mass, self.rotational + other.rotational
         com = (self.mass * self.com + other.mass * other.com) / (mass or 1.0)
         return type(self)(mass, com, rotational - parallel_axes(mass, com), rotational)
+
+
+setattr(Inertia, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced
+Inertia.__module__ = "condyle"
 
 
 def _solid(mass: float, moments: _Array) -> Inertia:

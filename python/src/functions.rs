@@ -80,6 +80,7 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
 
     /// The doubles (S) for one of many states, or for the only one; `at_once` if all arguments could be read at once.
     #[inline(always)]
+    #[allow(clippy::extra_unused_type_parameters)] // it is called as `duals` is
     pub(crate) fn numbers<S>(
         &mut self,
         name: &str,

@@ -6,7 +6,7 @@ use crate::references::References;
 use nalgebra::{DVector, DVectorView};
 
 /// How far a step is from the optimum of its program of the first priority: errors of the conditions of Karush, Kuhn and Tucker.
-/// At the default [`tolerance`](crate::Settings::tolerance) the first three are below 1e-7 and the last below 1e-6: the solver's
+/// At the default [`tolerance`](crate::Settings::tolerance) the first three are below 1e-7 and the last below 1e-5: the solver's
 /// own is of numbers that are scaled to size one, where here forces of 1000 N stand beside accelerations of 1 m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optimality {

@@ -46,11 +46,9 @@ pub(crate) fn place<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let Some(out) = out else {
         if shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE) {
-            // SAFETY: any bits are a double, and whoever asks for a new array fills it.
-            #[allow(unsafe_code)]
-            return Ok(unsafe { PyArray::<f64, _>::new(py, shape, false) });
+            return Ok(PyArray::<f64, _>::zeros(py, shape, false));
         }
-        return Ok(py.import("numpy")?.call_method1("empty", (shape.to_vec(),))?.cast_into()?); // or a `MemoryError`
+        return Ok(py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?.cast_into()?); // or a `MemoryError`
     };
     let wanted = || format!("expected a writable C-contiguous float64 array of shape {}", tuple(shape));
     let array = out
@@ -119,7 +117,7 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
     }
 }
 
-/// A square matrix that is symmetric to the last bit: its columns are its rows.
+/// A square matrix that is symmetric up to rounding, so that its columns stand for its rows.
 pub(crate) struct Symmetric<'a, N>(pub(crate) &'a DMatrix<N>);
 
 impl<N: Number> Array for Symmetric<'_, N> {

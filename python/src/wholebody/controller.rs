@@ -150,7 +150,7 @@ impl WholeBodyController {
     }
 
     /// How far the step at this state, for these references, is from the optimum of its program of the first priority:
-    /// errors of the conditions of Karush, Kuhn and Tucker, below 1e-6 at the default tolerance, as `Optimality`. It must be the
+    /// errors of the conditions of Karush, Kuhn and Tucker, below 1e-5 at the default tolerance, as `Optimality`. It must be the
     /// last step. For tests: it assembles the program anew.
     ///
     /// q: nq numbers; v: nv.
