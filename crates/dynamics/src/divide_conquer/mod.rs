@@ -140,11 +140,7 @@ impl<S: Scalar> DivideConquer<S> {
         let Self { assembly, bodies, dofs, handles, ties, zero, qdd, .. } = self;
         let all = Part { pieces: &assembly.pieces, links: &assembly.links, bodies, dofs, handles };
         let job = Job { l: &l, q, qd: v, f_ext, world, parallel };
-        if parallel {
-            threads::enter(|| job.run(all, ties, zero)); // enters the pool once, not three times
-        } else {
-            job.run(all, ties, zero);
-        }
+        job.run(all, ties, zero);
         let mut dofs = dofs.iter();
         for link in &assembly.links {
             let node = &model.nodes()[link.body];
