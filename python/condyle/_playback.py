@@ -73,6 +73,8 @@ class Player:
                     self.arrows.visible = len(points) > 0
                     if len(points):
                         self.arrows.points = points.astype(np.float32)
+        if round(self.slider.value / self.dt) != self.knot:
+            self.slider.value = self.knot * self.dt
 
     def play(self) -> None:
         """Plays on from the knot that is shown, again and again, until `pause`."""
@@ -101,7 +103,6 @@ class Player:
                 gone = int((time.perf_counter() - begin) / self.dt)
                 knot = (first + gone) % len(self._poses)
                 if knot != self.knot:
-                    self.slider.value = knot * self.dt  # which shows it
                     self.show(knot)
                 time.sleep(min(self.dt, 1.0 / 60.0))
 
@@ -109,7 +110,7 @@ class Player:
         """Where the page looks from, so that all of the motion is seen."""
         points = poses[:, 1:, :3, 3].reshape(-1, 3)
         low, high = points.min(0), points.max(0)
-        middle, far = (low + high) / 2.0, 0.8 + 1.2 * np.linalg.norm(high - low)
+        middle, far = (low + high) / 2.0, 0.6 + 0.9 * np.linalg.norm(high - low)
         self.server.initial_camera.look_at = tuple(middle)
         self.server.initial_camera.position = tuple(middle + far * np.array([0.75, -0.8, 0.35]))
 
