@@ -49,6 +49,7 @@ fn integrate(model; q: Position, v: Tangent; out) {
     condyle::integrate(model, &q, &v, &mut moved);
     moved
 }
+each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved) }
 
 /// The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
 ///
@@ -58,6 +59,7 @@ fn difference(model; q0: Position, q1: Position; out) {
     condyle::difference(model, &q0, &q1, &mut v);
     v
 }
+each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1, v) }
 
 /// The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
 ///
@@ -70,12 +72,18 @@ fn interpolate(model; q0: Position, q1: Position, t: Real; out) {
     condyle::interpolate(model, &q0, &q1, t, &mut tangent, &mut q);
     q
 }
+each(q0: Position, q1: Position; t: Real) -> [nq] |q| {
+    condyle::interpolate(model, q0, q1, t, &mut vec![0.0; model.nv()], q)
+}
 
 /// The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
 ///
 /// q0, q1: nq numbers.
 fn distance(model; q0: Position, q1: Position) {
     condyle::distance(model, &q0, &q1, &mut vec![Scalar::zero(); model.nv()])
+}
+each(q0: Position, q1: Position) -> [] |to| {
+    to[0] = condyle::distance(model, q0, q1, &mut vec![0.0; model.nv()])
 }
 
 /// The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
@@ -92,6 +100,10 @@ fn normalize(model; q: Position; out) {
     let mut q = q.to_vec();
     condyle::normalize(model, &mut q);
     q
+}
+each(q: Position) -> [nq] |to| {
+    to.copy_from_slice(q);
+    condyle::normalize(model, to)
 }
 
 /// The columns of X, tangent vectors at q ⊕ v, moved to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
