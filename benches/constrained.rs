@@ -2,7 +2,8 @@
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, constrained_dynamics, constrained_dynamics_derivatives,
-    impulse_dynamics, impulse_dynamics_derivatives, random_configuration, robots,
+    constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, impulse_dynamics,
+    impulse_dynamics_derivatives, random_configuration, robots,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;
@@ -32,12 +33,20 @@ fn states(model: &Model) -> Vec<State> {
 
 fn algorithms(c: &mut Criterion) {
     type Algorithm = fn(&Model, &mut Data<f64>, &mut ConstraintSet<f64>, &State);
-    let algorithms: [(&str, Algorithm); 4] = [
+    let algorithms: [(&str, Algorithm); 6] = [
         ("constrained_dynamics", |m, d, c, s| {
             black_box(constrained_dynamics(m, d, c, &s.q, &s.v, &s.tau, &[]));
         }),
         ("constrained_dynamics_derivatives", |m, d, c, s| {
             black_box(constrained_dynamics_derivatives(m, d, c, &s.q, &s.v, &s.tau, &[]));
+        }),
+        ("constrained_inverse_dynamics", |m, d, c, s| {
+            let lambda = &[1.0; 12][..c.rows()];
+            black_box(constrained_inverse_dynamics(m, d, c, &s.q, &s.v, &s.tau, lambda, &[]));
+        }),
+        ("constrained_inverse_dynamics_derivatives", |m, d, c, s| {
+            let lambda = &[1.0; 12][..c.rows()];
+            black_box(constrained_inverse_dynamics_derivatives(m, d, c, &s.q, &s.v, &s.tau, lambda, &[]));
         }),
         ("impulse_dynamics", |m, d, c, s| _ = black_box(impulse_dynamics(m, d, c, &s.q, &s.v, 0.0))),
         ("impulse_dynamics_derivatives", |m, d, c, s| {

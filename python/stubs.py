@@ -43,8 +43,8 @@ ALIASES = {
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
     "_Polynomial": 'Literal["constant", "linear", "quadratic"]',
     "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
-    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | Lqr | Unicycle | Action"
-    " | DifferentialAction | ConstrainedAction",
+    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | ContactInverseDynamics"
+    " | Lqr | Unicycle | Action | DifferentialAction | ConstrainedAction",
 }
 
 # The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
@@ -53,13 +53,15 @@ ARGUMENTS = {
         A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
         Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints""",
-    "ArrayLike | None": "ModelBuilder.append.placement ModelBuilder.merge.placement",
+    "ArrayLike | None": "Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "str": "contact function joint_name name prefix text FrictionContact.frame Task.frame",
-    "str | int": "body frame",
+    "str": "_generate.language contact function joint_name name prefix text FrictionContact.frame Task.frame",
+    "str | int": "body frame Model.with_mimic.follower Model.with_mimic.leader",
+    "str | int | None": "Model.append.frame",
+    'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
         facets grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
         Plan.contact""",
@@ -69,7 +71,7 @@ ARGUMENTS = {
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt",
-    "bool": """batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
+    "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal""",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
@@ -134,16 +136,20 @@ ARGUMENTS = {
     "Settings": "WholeBodyController.settings",
     "Plan": "plan",
     "References": "references",
-    "Any": "_casadi_hold_knot.of",
+    "Any": "_casadi_hold_knot.of Model.from_pinocchio.model",
     "int | None": "_casadi_hold_knot.t",
+    "list[str]": "names _generate.frames inputs",
+    "list[ContactConstraint]": "_generate.constraints",
 }
 
 # The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
 # returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
 RESULTS = {
+    "tuple[str, list[tuple[str, str]], "
+    "list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]": "_generate",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
-        InverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
+        InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Problem.rollout Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
@@ -157,7 +163,7 @@ RESULTS = {
         HyperDual.eps1 HyperDual.eps1eps2 HyperDual.eps2 HyperDual.re Model.total_mass Simulation.time
         distance kinetic_energy mechanical_energy potential_energy
         FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation Task.weight""",
-    "float | None": "FrictionContact.yaw_friction",
+    "float | None": "FrictionContact.yaw_friction Joint.pitch",
     "tuple[float, float]": "Plan.span",
     "int": """
         ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame Model.joint
@@ -175,6 +181,7 @@ RESULTS = {
     "Settings": "WholeBodyController.settings",
     "References": "WholeBodyController.hold",
     "Command": "WholeBodyController.command WholeBodyController.step",
+    "Optimality": "WholeBodyController.optimality",
     "None": """
         _casadi_release AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
@@ -186,9 +193,12 @@ RESULTS = {
     "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__",
     "HyperDual": "HyperDual",
     "Model": """
-        Model.__copy__ Model.__deepcopy__ Model.lock Model.with_armature Model.with_gravity
-        Model.with_inertias Model.with_limits ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
+        Model.__copy__ Model.__deepcopy__ Model.append Model.from_pinocchio Model.lock Model.with_armature
+        Model.with_gravity Model.with_inertias Model.with_limits Model.with_mimic
+        ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
+    "Any": "Model.to_pinocchio",
+    "dict[str, _Array]": "Model.reference_configurations Model.reference_configurations_str",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",
     "list[Joint | None]": "Model.joints",
@@ -370,7 +380,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
     words = set(re.findall(r"\w+", re.sub(r'"""(.|\n)*?"""', "", body + aliases)))
     exported = set(module.__all__)
     imports = []
-    for part in (types, *others):
+    for part in sorted((types, *others), key=lambda part: part.__name__):
         own = [name for name, item in sorted(vars(part).items()) if type(item) is type and name in words - exported]
         head = f"from .{part.__name__.split('.')[-1]} import "
         line = head + ", ".join(own)
@@ -401,9 +411,9 @@ from numpy.typing import ArrayLike, NDArray
 def main() -> None:
     """Writes the file, or compares it."""
     sys.path.pop(0)  # the folder of the sources, where the module is not built
-    from condyle import _condyle, _types, _wholebody
+    from condyle import _condyle, _inertia, _types, _wholebody
 
-    text = stub(_condyle, _types, [_wholebody])
+    text = stub(_condyle, _types, [_inertia, _wholebody])
     if sys.argv[1:] != ["--check"]:
         FILE.write_text(text, encoding="utf-8")
     elif FILE.read_text(encoding="utf-8") != text:

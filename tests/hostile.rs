@@ -50,6 +50,11 @@ fn sdf() {
 }
 
 #[test]
+fn srdf() {
+    run(Kind::Srdf, 10_000);
+}
+
+#[test]
 fn models() {
     run(Kind::Model, 10_000);
 }

@@ -6,7 +6,8 @@
 Each problem is built in both libraries from the same JSON: problems of a folder (with the robots in its `robots`), or
 else those that `ocp_problems.py` makes. Compared are the costs of all iterations (to 1e-6 of each), their step lengths
 and regularisations, and the optimum; the stopping value, which loses its digits near the optimum, is only shown. Both
-are timed in turn, round after round, on one core: figures are medians of milliseconds in an iteration, for the whole
+are timed in turn, round after round, on one core, each right after the same solve not timed, as in a loop of control
+that solves again and again: figures are medians of milliseconds in an iteration, for the whole
 solve and for its phases. Needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment, which `./test` makes.
 """
 
@@ -65,13 +66,13 @@ def agreeing(ours, theirs):
     return n if same.all() else int(np.argmin(same))
 
 
-def compare(spec, robot, solver):
-    """Both solves of a problem with one of its solvers, and what there is to say of them."""
+def compare(spec, robot, solver, make=Ours):
+    """Both solves of a problem with one of its solvers, ours as it is made here, and what there is to say of them."""
     case = (spec["name"], solver)
     if case in INCOMPARABLE:
         raise NotRunError("Crocoddyl does not repeat itself")
     theirs, result = Theirs(spec, robot, solver), {"name": spec["name"], "solver": solver}
-    ours = Ours(spec, robot, solver)
+    ours = make(spec, robot, solver)
     xs, us = theirs.warm_start()
     a, b = ours.solve(xs, us), theirs.solve(xs, us)
     same = agreeing(a.rows, b.rows)
@@ -96,6 +97,7 @@ def time_both(ours, theirs, start, iterations, trials, rounds):
     names = ("total", "derivatives", "sweep", "rollout")
     rows = []
     for _ in range(rounds):
+        ours.solve(*start)
         a = ours.solve(*start).phases
         b = theirs.time(*start, iterations, trials)
         rows.append({n: (1e3 * a[n] / iterations, 1e3 * b[n] / iterations) for n in names})

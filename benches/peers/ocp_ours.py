@@ -103,17 +103,26 @@ class Ours:
     """A problem of a JSON in Condyle, for what Crocoddyl's solver of some name does."""
 
     def __init__(self, spec, robot, solver):
-        self.spec, bounded = spec, solver.startswith("box")
+        self.spec = spec
+        self.solver = optimal.Fddp(self.made(robot, solver), **self.settings(solver))
+
+    def made(self, robot, solver):
+        """The problem itself."""
+        spec, bounded = self.spec, solver.startswith("box")
         model = our_robot(robot) if robot else None
         models, stages = self.phases(model, bounded)
         terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, bounded, terminal=True)
-        self.problem = optimal.Problem(spec["x0"], models, stages, terminal)
+        return optimal.Problem(spec["x0"], models, stages, terminal)
+
+    def settings(self, solver):
+        """What our solver is told to do as Crocoddyl's of this name does."""
+        spec = self.spec
         settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
         if spec["init_reg"] is not None:
             settings["regularisation_start"] = spec["init_reg"]
         if spec["th_stop"] is not None:
             settings["tolerance"] = settings["tolerance_bounded"] = spec["th_stop"]
-        self.solver = optimal.Fddp(self.problem, **settings)
+        return settings
 
     def phases(self, model, bounded):
         """An action for all knots with the same dynamics, which may differ in their costs; and which serves a knot."""

@@ -5,13 +5,13 @@
 
 Without robots: panda and talos. Needs the packages of tests/peers/pinocchio/requirements.txt and a release build of
 ours (`./test` makes both), and Rust for `--no-rust`'s opposite: it builds benches/peers/ours.rs. Everything runs on
-one core, in turn; a figure is the least of all rounds, since what else a machine does only ever adds. Four tables:
+one core, in turn; a figure is the least of all rounds, since what else a machine does only ever adds. Five tables:
 
 - single calls: the time of a call, Pinocchio's, and their quotient;
+- Pinocchio's spelling: the time of a call through `condyle.pinocchio`, that of ours, and their quotient;
 - attributes of a model: the time of an access;
-- batches of 1000 states, `out` reused: the time for each state, that of a loop of Pinocchio's calls, and of what a
-batch
-  must cost: our library's own batch of as many states and 1.3 times what it takes to write the results once;
+- batches of 1000 states, `out` reused: the time for each state, that of a loop of Pinocchio's calls, and what a batch
+  may cost: our library's own batch of as many states and 1.3 times what it takes to write the results once;
 - the whole: `import`, beyond NumPy's; a solve by FDDP, beyond what the solver itself measures.
 """
 
@@ -32,6 +32,7 @@ from example_robot_data.robots_loader import ROBOTS as LOADERS
 from example_robot_data.robots_loader import getModelPath
 
 import condyle
+import condyle.pinocchio as spelling
 from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
 
 STATES = 1000
@@ -109,6 +110,50 @@ class Robot:
                 lambda: condyle.difference(m, q, self.q[1]),
                 lambda: pin.difference(pm, q, self.q[1]),
             ),
+        }
+
+    def spelled(self) -> dict[str, tuple[Call, Call]]:
+        """Calls for one state in Pinocchio's spelling, and ours."""
+        m, d, sm = self.model, self.data, spelling.Model(self.model)
+        sd, q, v, a, tau = sm.createData(), self.q[0], self.v[0], self.a[0], self.tau[0]
+        frame = len(m.frames) - 1
+        spelling.forwardKinematics(sm, sd, q, v, a)
+        axes, aligned = spelling.LOCAL_WORLD_ALIGNED, "local_world_aligned"
+        return {
+            "rnea": (lambda: spelling.rnea(sm, sd, q, v, a), lambda: condyle.rnea(m, d, q, v, a)),
+            "aba": (lambda: spelling.aba(sm, sd, q, v, tau), lambda: condyle.aba(m, d, q, v, tau)),
+            "crba": (lambda: spelling.crba(sm, sd, q), lambda: condyle.crba(m, d, q)),
+            "computeMinverse": (lambda: spelling.computeMinverse(sm, sd, q), lambda: condyle.minv(m, d, q)),
+            "computeRNEADerivatives": (
+                lambda: spelling.computeRNEADerivatives(sm, sd, q, v, a),
+                lambda: condyle.rnea_derivatives(m, d, q, v, a),
+            ),
+            "computeABADerivatives": (
+                lambda: spelling.computeABADerivatives(sm, sd, q, v, tau),
+                lambda: condyle.aba_derivatives(m, d, q, v, tau),
+            ),
+            "forwardKinematics": (
+                lambda: spelling.forwardKinematics(sm, sd, q),
+                lambda: condyle.forward_kinematics(m, d, q),
+            ),
+            "framesForwardKinematics": (
+                lambda: spelling.framesForwardKinematics(sm, sd, q),
+                lambda: condyle.forward_kinematics(m, d, q),
+            ),
+            "getFrameVelocity": (
+                lambda: spelling.getFrameVelocity(sm, sd, frame + 1, axes),
+                lambda: condyle.frame_velocity(m, d, q, v, frame, aligned),
+            ),
+            "computeFrameJacobian": (
+                lambda: spelling.computeFrameJacobian(sm, sd, q, frame + 1, axes),
+                lambda: condyle.frame_jacobian(m, d, q, frame, aligned),
+            ),
+            "centerOfMass": (lambda: spelling.centerOfMass(sm, sd, q), lambda: condyle.com(m, d, q)),
+            "computeCentroidalMomentum": (
+                lambda: spelling.computeCentroidalMomentum(sm, sd, q, v),
+                lambda: condyle.centroidal_momentum(m, d, q, v),
+            ),
+            "integrate": (lambda: spelling.integrate(sm, q, v), lambda: condyle.integrate(m, q, v)),
         }
 
     def check(self) -> None:
@@ -203,6 +248,9 @@ def measure(robot: Robot, program: Path | None, rounds: int) -> list[dict]:
     for name, calls in robot.singles().items():
         ours, theirs = least(list(calls), rounds)
         rows.append({"table": "single", "robot": robot.name, "name": name, "ours_us": ours, "theirs_us": theirs})
+    for name, calls in robot.spelled().items():
+        spelled, ours = least(list(calls), rounds)
+        rows.append({"table": "spelling", "robot": robot.name, "name": name, "ours_us": spelled, "plain_us": ours})
     for name, call in robot.attributes().items():
         rows.append({"table": "attribute", "robot": robot.name, "name": name, "ours_us": least([call], rounds)[0]})
     rust = robot.rust(program, rounds) if program else {}
@@ -222,6 +270,8 @@ def show(rows: list[dict]) -> None:
                 print(
                     f"{head}   beside {row['theirs_us']:9.3f} µs of Pinocchio: {row['ours_us'] / row['theirs_us']:.2f}"
                 )
+            case "spelling":
+                print(f"{head}   beside {row['plain_us']:9.3f} µs of condyle: {row['ours_us'] / row['plain_us']:.2f}")
             case "attribute":
                 print(f"{head}   an access")
             case "batch":

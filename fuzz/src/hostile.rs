@@ -30,6 +30,8 @@ pub enum Kind {
     Problem,
     /// A model as pickles have it.
     Pickle,
+    /// An SRDF.
+    Srdf,
 }
 
 macro_rules! file {
@@ -41,7 +43,7 @@ macro_rules! file {
 impl Kind {
     /// The seeds: all good.
     pub fn seeds(self) -> Vec<Vec<u8>> {
-        static SEEDS: [OnceLock<Vec<Vec<u8>>>; 6] = [const { OnceLock::new() }; 6];
+        static SEEDS: [OnceLock<Vec<Vec<u8>>>; 7] = [const { OnceLock::new() }; 7];
         SEEDS[self as usize].get_or_init(|| self.new_seeds()).clone()
     }
 
@@ -60,6 +62,7 @@ impl Kind {
                 vec![arm, file!("quadruped.xml").to_owned(), file!("gripper.xml").to_owned()]
             }
             Self::Sdf => vec![file!("linkage.sdf").to_owned()],
+            Self::Srdf => vec![file!("quadruped.srdf").to_owned()],
             Self::Model => {
                 models().iter().map(|m| serde_json::to_string(m).expect("is made of numbers and words")).collect()
             }
@@ -92,6 +95,10 @@ impl Kind {
             Self::Sdf => {
                 let options = SdfOptions { root_joint, mimic: other, ..SdfOptions::default() };
                 Model::from_sdf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
+            }
+            Self::Srdf => {
+                let positions = robots::quadruped().reference_configurations_str(&text, some);
+                positions.map(|all| use_positions(&all)).map_err(|e| e.to_string())
             }
             Self::Model => serde_json::from_str(&text).map(|model: Model| use_model(&model)).map_err(|e| e.to_string()),
             Self::Pickle => {
@@ -175,6 +182,11 @@ fn use_model(model: &Model) {
     if model.singular_joints().is_empty() {
         assert!(finite(aba(model, &mut data, &q, &zeros, &zeros, &[])), "aba: {model}");
     }
+}
+
+/// Named positions are numbers, as many as the quadruped has coordinates.
+fn use_positions(all: &[(String, Vec<f64>)]) {
+    assert!(all.iter().all(|(_, q)| q.len() == 19 && q.iter().all(|x| x.is_finite())), "{all:?}");
 }
 
 /// A problem that can be built can be rolled out: to numbers, or to an error.

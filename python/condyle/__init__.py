@@ -45,7 +45,7 @@ By theme; `help(condyle.rnea)` says more of each:
 
 Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mimic`, `BodyId`, `WORLD`, `Frame`,
 `Limits`,
-    `robots`, `inertial_parameters`; `Data`, the scratch
+    `load` (by a robot's name), `robots`, `inertial_parameters`; `Data`, the scratch
 Dynamics: `rnea`, `aba`, `crba`, `minv`, `nonlinear_effects`, `gravity`, `static_torque`, `coriolis_matrix`,
     `forward_dynamics`, `compute_all_terms` (`AllTerms`), `passive_torque`; `DivideConquer` (`AssemblySize`)
 Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivatives` (`AbaDerivatives`),
@@ -72,8 +72,8 @@ Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_ene
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
 Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
-    (poses, motions, forces), `conventions` (other libraries' numbers), `casadi` and
-    `pinocchio` (its spelling; both imported by themselves)
+    (poses, motions, forces), `conventions` (other libraries' numbers), `casadi`, `pinocchio` (its spelling),
+    `crocoddyl` (its problems) and `viz` (pictures; all four imported by themselves)
 """
 
 from . import algebra, conventions, inertial_parameters, optimal, robots, simulation, wholebody
@@ -165,6 +165,8 @@ from ._condyle import (
     transport,
 )
 from ._differentiate import gradient, hessian, jacobian
+from ._inertia import Inertia
+from ._load import load
 from ._types import (
     AbaDerivatives,
     AbaHessian,
@@ -182,7 +184,6 @@ from ._types import (
     Frame,
     Impulse,
     ImpulseDerivatives,
-    Inertia,
     Limits,
     Mimic,
     RneaDerivatives,
@@ -286,6 +287,7 @@ __all__ = [
     "joint_torque_regressor",
     "kinetic_energy",
     "kinetic_energy_regressor",
+    "load",
     "mechanical_energy",
     "minv",
     "neutral",

@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._inertia import Inertia
 from ._types import (
     AbaDerivatives,
     AbaHessian,
@@ -28,7 +29,6 @@ from ._types import (
     Frame,
     Impulse,
     ImpulseDerivatives,
-    Inertia,
     Iteration,
     Limits,
     LqNode,
@@ -40,7 +40,7 @@ from ._types import (
     Solution,
     SweepResult,
 )
-from ._wholebody import Command, Gains, References, Settings
+from ._wholebody import Command, Gains, Optimality, References, Settings
 
 __all__ = [
     "ARM7",
@@ -55,6 +55,7 @@ __all__ = [
     "ConstrainedAction",
     "ConstraintSet",
     "ContactDynamics",
+    "ContactInverseDynamics",
     "ControllerError",
     "Cost",
     "Data",
@@ -91,6 +92,7 @@ __all__ = [
     "_casadi_hold",
     "_casadi_hold_knot",
     "_casadi_release",
+    "_generate",
     "_model_from_bytes",
     "aba",
     "aba_derivatives",
@@ -199,6 +201,7 @@ _Action: TypeAlias = (
     | ContactDynamics
     | ImpulseDynamics
     | InverseDynamics
+    | ContactInverseDynamics
     | Lqr
     | Unicycle
     | Action
@@ -476,8 +479,14 @@ class ModelBuilder:
     def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
         """Adds inertia to a body, given in a frame that is at `placement` in the body's frame."""
 
-    def frame(self, name: str, body: BodyId, placement: ArrayLike | None = None) -> None:
-        """Adds a frame at `placement` in the body's frame."""
+    def frame(
+        self,
+        name: str,
+        body: BodyId,
+        placement: ArrayLike | None = None,
+        kind: Literal["link", "joint", "user"] = "user",
+    ) -> None:
+        """Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user', of which each may have the same name."""
 
     def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
         """Makes a joint follow another one, instead of having a coordinate of its own: its position is ratio q + offset.
@@ -642,6 +651,18 @@ def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
 
     q: nq numbers.
     """
+
+def _generate(
+    model: Model,
+    names: list[str],
+    language: str,
+    *,
+    frames: list[str] = ...,
+    constraints: list[ContactConstraint] = ...,
+    external_forces: bool = False,
+    inputs: list[str] = ...,
+) -> tuple[str, list[tuple[str, str]], list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]:
+    """The code of functions of a robot: its name, its files, and its functions with their arguments and results."""
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
     """The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
@@ -1551,6 +1572,10 @@ class Joint:
     def nv(self) -> int:
         """The number of its degrees of freedom: of the numbers in its velocity."""
 
+    @property
+    def pitch(self) -> float | None:
+        """The metres along the axis for each radian about it; None if the joint is no screw."""
+
     @staticmethod
     def revolute(axis: ArrayLike) -> Joint:
         """A joint with one angle about an axis: q = [θ], v = [θ̇]."""
@@ -1999,6 +2024,24 @@ class Model:
         6
         """
 
+    @staticmethod
+    def from_pinocchio(model: Any) -> Model:
+        """A model from Pinocchio's, a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that numbers are
+        equal; `to_pinocchio` is the way back.
+
+        Composite, universal and spherical ZYX joints become several ones, with bodies without mass between them. Limits of
+        quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+
+        Raises `ModelError` if its joints do not stand depth first, as Pinocchio's readers of files number them, or are of a
+        kind that is not here.
+        """
+
+    def to_pinocchio(self) -> Any:
+        """The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
+
+        What follows another joint does so there too, unless it turns without limits.
+        """
+
     def frame(self, name: str) -> int:
         """The number of the frame with this name: a link's, else the user's, else a joint's.
 
@@ -2066,6 +2109,60 @@ class Model:
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
 
         Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
+        """
+
+    def append(
+        self, frame: str | int | None, model: Model, placement: ArrayLike | None | None = None, prefix: str = ""
+    ) -> Model:
+        """This robot with another one on a frame of it, as a new model.
+
+        Its bodies are numbered behind all that the body which carries them has carried before, as Pinocchio's `appendModel` does;
+        name and gravity are this one's.
+
+        frame: the name or number of a frame; None is the world.
+        model: the other robot.
+        placement: its world in the frame, a homogeneous (4, 4) matrix; None is the identity.
+        prefix: put before all its names.
+
+        >>> quadruped, arm = condyle.robots.quadruped(), condyle.robots.arm7()
+        >>> quadruped.append("trunk", arm, prefix="arm_").names[13:16]
+        ['RH_KFE', 'arm_joint1', 'arm_joint2']
+
+        Raises `ModelError`: two bodies, joints or frames of one name.
+        """
+
+    def with_mimic(self, follower: str | int, leader: str | int, ratio: float = 1.0, offset: float = 0.0) -> Model:
+        """The same robot with one more joint that follows another one, its position being ratio q + offset, in place of a
+        coordinate of its own. Its limits are those of the one that it follows.
+
+        follower, leader: the joints' names, or the numbers of their bodies.
+
+        >>> arm = condyle.robots.arm7()
+        >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
+        6
+
+        Raises `ModelError` if they are not of one degree of freedom, or a joint would follow one that follows.
+        """
+
+    def reference_configurations(self, path: _Path, strict: bool = False) -> dict[str, _Array]:
+        """The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.
+
+        Joints that a state does not mention stay as in `neutral`; a joint that turns without limits may have its angle. States
+        of one name, of several groups, are one position. All else in the file is ignored.
+
+        path: a path, as text or `os.PathLike`.
+        strict: whether joints that the robot has not are errors; SRDFs are often shared by robots with fewer joints.
+
+        Raises `ParseError`, with file, line and element.
+        """
+
+    def reference_configurations_str(self, text: str, strict: bool = False) -> dict[str, _Array]:
+        """The named positions of an SRDF in a string; see `reference_configurations`.
+
+        >>> joint = '<joint name="joint4" value="-1.2"/>'
+        >>> srdf = f'<robot name="arm7"><group_state name="bent" group="arm">{joint}</group_state></robot>'
+        >>> condyle.robots.arm7().reference_configurations_str(srdf)
+        {'bent': array([ 0. ,  0. ,  0. , -1.2,  0. ,  0. ,  0. ])}
         """
 
     def tree(self, frames: bool = False) -> str:
@@ -2344,6 +2441,55 @@ class ContactDynamics:
     def _from_json(model: Model, text: str) -> ContactDynamics: ...
 
 @final
+class ContactInverseDynamics:
+    """A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), τ = M q̈
+    + h − Jᵀλ; otherwise as `FreeDynamics`.
+
+    Of itself it has a `Limit` to zero on the efforts that nothing drives, Nᵀτ = 0 with Nᵀ S = 0 (`undriven efforts`; of a
+    floating base the first 6), and on each contact's J q̈ + γ = 0 (`contact …`): `AugmentedLagrangian` holds them, to `Fddp`
+    alone they are costs. Nothing is inverted: contacts may be redundant. These are the rules of Crocoddyl's
+    `DifferentialActionModelContactInvDynamics`, and without contacts of `DifferentialActionModelFreeInvDynamics`.
+
+    model: the robot.
+    contacts: a dict of `ContactConstraint`s by name, the order of which is that of λ. May be empty.
+    dt: Δt in seconds.
+    costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.contact_force` at λ.
+    costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`; the actuation says
+        which efforts there are, bounds are of all nv + rows controls.
+
+    Raises `ProblemError` for a contact, cost, limit or drives that do not fit.
+
+    >>> from condyle.optimal import ContactInverseDynamics
+    >>> quadruped = condyle.robots.quadruped()
+    >>> feet = {foot: condyle.ContactConstraint(foot, "point", kd=50.0) for foot in ("LF_foot", "RH_foot")}
+    >>> ContactInverseDynamics(quadruped, feet, 0.02, [])
+    <condyle.optimal.ContactInverseDynamics of 'quadruped', 0.02 s, nu 24, contacts LF_foot RH_foot>
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        contacts: dict[str, ContactConstraint],
+        dt: float,
+        costs: Sequence[Cost],
+        costs_at: dict[int, Sequence[Cost]] | None = None,
+        actuation: ArrayLike | None = None,
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+        limits_at: dict[int, Sequence[Limit]] | None = None,
+        controls: _Polynomial = "constant",
+    ) -> ContactInverseDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """No accelerations, and the forces among the smallest efforts and forces that hold the robot still at the state x:
+        nv zeros and λ.
+        """
+
+    @staticmethod
+    def _from_json(model: Model, text: str) -> ContactInverseDynamics: ...
+
+@final
 class Cost:
     """A term of a cost: weight times an activation of a residual.
 
@@ -2595,7 +2741,7 @@ class InverseDynamics:
 
     model: the robot.
     dt: Δt in seconds.
-    costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
+    costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.undriven_effort` at its part that nothing drives.
     integrator, lower, upper, limits, controls: as of `FreeDynamics`.
 
     Raises `ProblemError` for a cost or a limit that does not fit.
@@ -2669,8 +2815,8 @@ class Problem:
     """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Action`,
-        `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
+        `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
     stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
         model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
     terminal: the model of the end, without controls.
@@ -2761,9 +2907,9 @@ class Problem:
 class Residual:
     """A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 
-    A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics` or
-    `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it looks at the frame of that
-    name, or is refused.
+    A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics`,
+    `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it
+    looks at the frame of that name, or is refused.
     A target that is not given is zero, a rotation the identity.
 
     >>> from condyle.optimal import Residual
@@ -2786,6 +2932,18 @@ class Residual:
     @staticmethod
     def joint_effort(reference: ArrayLike) -> Residual:
         """The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
+
+    @staticmethod
+    def undriven_effort() -> Residual:
+        """The efforts that inverse dynamics finds where nothing drives the robot, r = Nᵀτ with Nᵀ S = 0; of a floating base the 6
+        numbers of the force on it. They are 0 in a motion that is possible.
+        """
+
+    @staticmethod
+    def contact_acceleration(contact: str) -> Residual:
+        """The acceleration of a contact where accelerations are controls, r = J q̈ + γ along the axes of its rows: 1, 2, 3 or 6
+        numbers, 0 while it holds.
+        """
 
     @staticmethod
     def joint_acceleration(reference: ArrayLike) -> Residual:
@@ -3461,6 +3619,15 @@ class WholeBodyController:
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
         """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
         Other threads run meanwhile.
+
+        q: nq numbers; v: nv.
+        references: `References` of this controller.
+        """
+
+    def optimality(self, q: ArrayLike, v: ArrayLike, references: References) -> Optimality:
+        """How far the step at this state, for these references, is from the optimum of its program of the first priority:
+        errors of the conditions of Karush, Kuhn and Tucker, below 1e-5 at the default tolerance, as `Optimality`. It must be the
+        last step. For tests: it assembles the program anew.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.

@@ -360,34 +360,6 @@ class Frame(NamedTuple):
     """Its pose in the body's frame, a homogeneous (4, 4) matrix."""
 
 
-class Inertia(NamedTuple):
-    """The inertia of a body, along the axes of its frame."""
-
-    mass: float
-    """The mass (kg)."""
-    com: _Array
-    """The centre of mass in the body's frame (m), 3 numbers; zeros if there is no mass."""
-    about_com: _Array
-    """The rotational inertia about the centre of mass (kg m²), (3, 3), as a URDF gives it."""
-    rotational: _Array
-    """The rotational inertia about the origin of the body's frame (kg m²), (3, 3): of the two, the one that is read."""
-
-    @classmethod
-    def from_com(cls, mass: float, com: ArrayLike, about_com: ArrayLike) -> "Inertia":
-        """The inertia of a body with this mass (kg), centre of mass (m), and rotational inertia about it (kg m²).
-
-        >>> condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3)).rotational[0, 0].item()
-        0.6
-        """
-        com, about_com = np.array(com, np.float64), np.array(about_com, np.float64)
-        if com.shape != (3,):
-            raise ValueError(f"com: expected shape (3,), found {com.shape}")
-        if about_com.shape != (3, 3):
-            raise ValueError(f"about_com: expected shape (3, 3), found {about_com.shape}")
-        # Ī = I_c + m (c·c 1 − c cᵀ)
-        return cls(mass, com, about_com, about_com + mass * (com @ com * np.eye(3) - np.outer(com, com)))
-
-
 class AssemblySize(NamedTuple):
     """The work of the assembly of a `DivideConquer`, counted."""
 

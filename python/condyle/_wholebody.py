@@ -101,6 +101,19 @@ class Settings(NamedTuple):
     """The time after which a step fails (s). What depends on it depends on the machine's load."""
 
 
+class Optimality(NamedTuple):
+    """The errors of the conditions of Karush, Kuhn and Tucker at a step."""
+
+    stationarity: float
+    """The gradient of the Lagrangian, relative to the largest of its terms."""
+    primal: float
+    """The violation of the worst equality, bound or cone, relative to its row and the unknowns."""
+    dual: float
+    """How far the multipliers are outside of their cones, relative to themselves."""
+    complementarity: float
+    """The sum of the products of slacks and multipliers, relative to 1 and the terms of the objective."""
+
+
 class Command(NamedTuple):
     """What the robot should do now: finite, and within the limits of the torques, whatever the status says.
 

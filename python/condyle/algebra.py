@@ -1,4 +1,4 @@
-"""Poses, motions, forces, and the exponentials of SO(3) and SE(3), in NumPy and for batches.
+"""Poses, motions, forces, inertias, and the exponentials of SO(3) and SE(3), in NumPy and for batches.
 
 Numbers are Pinocchio's: linear parts first. A `SE3` is the pose aXb of frame b in frame a: it takes what is written in
 b to a. Motions and forces are different types, so that a change of frame uses each one's own rule, and a motion is not
@@ -16,16 +16,35 @@ True
 True
 """
 
-from typing import Any, Union, overload
+from typing import Any, TypeVar, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SE3", "Force", "Motion", "exp3", "exp6", "jexp3", "jexp6", "jlog3", "jlog6", "log3", "log6", "skew"]
+from ._inertia import Inertia, parallel_axes
+
+__all__ = [
+    "SE3",
+    "Force",
+    "Inertia",
+    "Motion",
+    "exp3",
+    "exp6",
+    "jexp3",
+    "jexp6",
+    "jlog3",
+    "jlog6",
+    "log3",
+    "log6",
+    "quaternion",
+    "skew",
+]
 
 _Array = NDArray[np.float64]
-_CLOSE = 1e-12
-"""What `==` lets pass: some roundings, relative to 1 and to the larger number."""
+_new = object.__new__
+_S = TypeVar("_S", bound="_Spatial")
+_P = TypeVar("_P", bound="SE3")
+_CLOSE = 1e-12  # what `==` lets pass: some roundings, relative to 1 and to the larger number
 
 
 def skew(x: ArrayLike) -> _Array:
@@ -52,6 +71,13 @@ class _Spatial:
         """Of six numbers, linear first, (…, 6)."""
         vector = _shaped(vector, "vector", 6)
         return cls(vector[..., :3], vector[..., 3:])
+
+    @classmethod
+    def _of(cls: type[_S], vector: _Array) -> _S:
+        """Of six numbers that nobody else changes, as they are."""
+        x = _new(cls)
+        x.vector = vector
+        return x
 
     @classmethod
     def zero(cls) -> Any:
@@ -93,6 +119,14 @@ class Motion(_Spatial):
     """A velocity or an acceleration: (v, ω), of the point at the frame's origin."""
 
     __slots__ = ()
+
+    def __rmul__(self, factor: Any) -> Any:
+        """The momentum I v = (m v + ω × m c, Ī ω + m c × v), for an inertia on the left; or a multiple."""
+        if not isinstance(factor, Inertia):
+            return self * factor
+        h = np.asarray(factor.mass)[..., None] * factor.com
+        linear = np.asarray(factor.mass)[..., None] * self.linear + np.cross(self.angular, h)
+        return Force(linear, _times(factor.rotational, self.angular) + np.cross(h, self.linear))
 
     def dot(self, force: "Force") -> _Array:
         """The power vᵀ f + ωᵀ n, of shape (…)."""
@@ -154,6 +188,13 @@ class SE3:
         self.translation: _Array = p
 
     @classmethod
+    def _of(cls: type[_P], X: _Array) -> _P:
+        """Of a homogeneous matrix that nobody else changes, as it is."""
+        x = _new(cls)
+        x.rotation, x.translation = X[..., :3, :3], X[..., :3, 3]
+        return x
+
+    @classmethod
     def identity(cls) -> "SE3":
         """The pose of a frame in itself."""
         return cls(np.eye(3), np.zeros(3))
@@ -198,10 +239,16 @@ class SE3:
     @overload
     def act(self, x: Force) -> Force: ...
     @overload
+    def act(self, x: Inertia) -> Inertia: ...
+    @overload
     def act(self, x: ArrayLike) -> _Array: ...
     def act(self, x: Any) -> Any:
-        """What is written in b, in a: a pose, a motion, a force, or points (…, 3)."""
+        """What is written in b, in a: a pose, a motion, a force, an inertia, or points (…, 3)."""
         R, p = self.rotation, self.translation
+        if isinstance(x, Inertia):
+            com = _times(R, x.com) + p
+            about_com = R @ (x.rotational - parallel_axes(x.mass, x.com)) @ R.swapaxes(-1, -2)
+            return Inertia(x.mass, com, about_com, about_com + parallel_axes(x.mass, com))
         if isinstance(x, SE3):
             return type(self)(R @ x.rotation, _times(R, x.translation) + p)
         if isinstance(x, Motion):
@@ -241,7 +288,7 @@ def exp3(w: ArrayLike) -> _Array:
 
 def log3(R: ArrayLike) -> _Array:
     """The rotation vector w, |w| ≤ π, with exp ŵ = R, by the quaternion of R, which is exact near 0 and near π."""
-    q = _quaternion(R)
+    q = quaternion(R)
     xyz, w = q[..., :3], q[..., 3:]
     n = np.linalg.norm(xyz, axis=-1, keepdims=True)
     small = n < 1e-9
@@ -314,8 +361,8 @@ def jlog6(X: SE3 | ArrayLike) -> _Array:
     return np.asarray(np.linalg.inv(jexp6(log6(X))), float)
 
 
-def _quaternion(R: ArrayLike) -> _Array:
-    """x, y, z, w ≥ 0, its largest component computed first (Shepperd 1978)."""
+def quaternion(R: ArrayLike) -> _Array:
+    """The quaternion (x, y, z, w), w ≥ 0, of a rotation, its largest component computed first (Shepperd 1978)."""
     R = np.asarray(R, float)
     if R.shape[-2:] != (3, 3):
         raise ValueError(f"R: expected shape (…, 3, 3), found {R.shape}")
@@ -323,13 +370,9 @@ def _quaternion(R: ArrayLike) -> _Array:
     x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
     # four times the products of one component with all four
-    rows = [
-        (1 + a - b - c, xy, xz, x),
-        (xy, 1 - a + b - c, yz, y),
-        (xz, yz, 1 - a - b + c, z),
-        (x, y, z, 1 + a + b + c),
-    ]
-    products = np.stack([np.stack(row, -1) for row in rows], -2)
+    by_x, by_y = (1 + a - b - c, xy, xz, x), (xy, 1 - a + b - c, yz, y)
+    by_z, by_w = (xz, yz, 1 - a - b + c, z), (x, y, z, 1 + a + b + c)
+    products = np.stack([np.stack(row, -1) for row in (by_x, by_y, by_z, by_w)], -2)
     best = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), -1)
     row: _Array = np.take_along_axis(products, best[..., None, None], -2)[..., 0, :]
     q = row / np.linalg.norm(row, axis=-1, keepdims=True)

@@ -35,6 +35,7 @@ from ._condyle import (
     Action,
     ConstrainedAction,
     ContactDynamics,
+    ContactInverseDynamics,
     FreeDynamics,
     ImpulseDynamics,
     InverseDynamics,
@@ -141,7 +142,15 @@ def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint])
 
 
 _Knot = (
-    ConstrainedAction | ContactDynamics | FreeDynamics | ImpulseDynamics | InverseDynamics | Lqr | Problem | Unicycle
+    ConstrainedAction
+    | ContactDynamics
+    | ContactInverseDynamics
+    | FreeDynamics
+    | ImpulseDynamics
+    | InverseDynamics
+    | Lqr
+    | Problem
+    | Unicycle
 )
 
 

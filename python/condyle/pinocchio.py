@@ -17,187 +17,50 @@ visualisers, and what else is not here, raise an AttributeError that says so. Fo
 """
 
 from collections.abc import Sequence
-from enum import Enum
-from typing import Any, NamedTuple
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _condyle as ours
 from . import algebra
+from ._pinocchio_batches import ModelPool as ModelPool
+from ._pinocchio_batches import abaInParallel as abaInParallel
+from ._pinocchio_batches import omp_get_max_threads as omp_get_max_threads
+from ._pinocchio_batches import rneaInParallel as rneaInParallel
+from ._pinocchio_build import appendModel as appendModel
+from ._pinocchio_build import buildModelFromMJCF as buildModelFromMJCF
+from ._pinocchio_build import buildModelFromUrdf as buildModelFromUrdf
+from ._pinocchio_build import buildModelFromXML as buildModelFromXML
+from ._pinocchio_build import buildReducedModel as buildReducedModel
+from ._pinocchio_build import buildSampleModelHumanoid as buildSampleModelHumanoid
+from ._pinocchio_build import buildSampleModelManipulator as buildSampleModelManipulator
+from ._pinocchio_build import loadReferenceConfigurations as loadReferenceConfigurations
+from ._pinocchio_build import loadReferenceConfigurationsFromXML as loadReferenceConfigurationsFromXML
+from ._pinocchio_build import transformJointIntoMimic as transformJointIntoMimic
+from ._spelling import SE3 as SE3
+from ._spelling import Data as Data
+from ._spelling import Force as Force
+from ._spelling import Frame as Frame
+from ._spelling import Jexp3 as Jexp3
+from ._spelling import Jexp6 as Jexp6
+from ._spelling import Jlog3 as Jlog3
+from ._spelling import Jlog6 as Jlog6
+from ._spelling import JointModelFreeFlyer as JointModelFreeFlyer
+from ._spelling import Model as Model
+from ._spelling import Motion as Motion
+from ._spelling import ReferenceFrame as ReferenceFrame
+from ._spelling import exp3 as exp3
+from ._spelling import exp6 as exp6
+from ._spelling import log as log
+from ._spelling import log3 as log3
+from ._spelling import log6 as log6
+from ._spelling import skew as skew
+from ._spelling import utils as utils
 
 _Array = NDArray[np.float64]
-
-
-class ReferenceFrame(Enum):
-    """The axes and the origin of a velocity or a Jacobian."""
-
-    WORLD = "world"
-    LOCAL = "local"
-    LOCAL_WORLD_ALIGNED = "local_world_aligned"
-
-
 WORLD, LOCAL = ReferenceFrame.WORLD, ReferenceFrame.LOCAL
 LOCAL_WORLD_ALIGNED = ReferenceFrame.LOCAL_WORLD_ALIGNED
-
-
-class Motion(algebra.Motion):
-    """`condyle.algebra.Motion`, also of six numbers, with Pinocchio's names."""
-
-    __slots__ = ()
-
-    def __init__(self, linear: ArrayLike, angular: ArrayLike | None = None) -> None:
-        x = np.asarray(linear, float)
-        super().__init__(*((x[..., :3], x[..., 3:]) if angular is None else (x, angular)))
-
-    @classmethod
-    def Zero(cls) -> "Motion":
-        """Six zeros."""
-        return cls(np.zeros(6))
-
-
-class Force(algebra.Force):
-    """`condyle.algebra.Force`, also of six numbers, with Pinocchio's names."""
-
-    __slots__ = ()
-
-    def __init__(self, linear: ArrayLike, angular: ArrayLike | None = None) -> None:
-        x = np.asarray(linear, float)
-        super().__init__(*((x[..., :3], x[..., 3:]) if angular is None else (x, angular)))
-
-    @classmethod
-    def Zero(cls) -> "Force":
-        """Six zeros."""
-        return cls(np.zeros(6))
-
-
-class SE3(algebra.SE3):
-    """`condyle.algebra.SE3`, also of a matrix (4, 4), with Pinocchio's names."""
-
-    __slots__ = ()
-
-    def __init__(self, rotation: ArrayLike, translation: ArrayLike | None = None) -> None:
-        X = np.asarray(rotation, float)
-        super().__init__(*((X[..., :3, :3], X[..., :3, 3]) if translation is None else (X, translation)))
-
-    @classmethod
-    def Identity(cls) -> "SE3":
-        """The pose of a frame in itself."""
-        return cls(np.eye(4))
-
-    def actInv(self, x: Any) -> Any:
-        """What is written in a, in b."""
-        return self.act_inv(x)
-
-    @property
-    def dualAction(self) -> _Array:
-        """aXb* of forces, (6, 6)."""
-        return self.dual_action
-
-
-class Frame(NamedTuple):
-    """A frame: its name, the joint that moves it, and its pose in that joint's body."""
-
-    name: str
-    parentJoint: int  # noqa: N815
-    placement: SE3
-
-
-class JointModelFreeFlyer:
-    """The root joint of a robot that moves freely."""
-
-
-class Model:
-    """A `condyle.Model` with Pinocchio's names."""
-
-    def __init__(self, model: ours.Model) -> None:
-        limits = model.limits
-        self.ours = model
-        self.name, self.nq, self.nv, self.njoints = model.name, model.nq, model.nv, model.nbodies
-        self.names, self.parents = list(model.names), list(model.parents)
-        self.idx_qs, self.idx_vs = list(model.idx_qs), list(model.idx_vs)
-        self.nqs, self.nvs = list(model.nqs), list(model.nvs)
-        self.armature = model.armature
-        self.lowerPositionLimit, self.upperPositionLimit = limits.lower, limits.upper
-        self.velocityLimit, self.effortLimit = limits.velocity, limits.effort
-        self.frames = [Frame("universe", 0, SE3.Identity())]
-        self.frames += [Frame(f.name, f.body, SE3(f.placement)) for f in model.frames]
-        self.nframes = len(self.frames)
-
-    def createData(self) -> "Data":
-        """Scratch, and the place where results are left."""
-        return Data(self)
-
-    def getFrameId(self, name: str) -> int:
-        """The frame's number, or the number of frames if there is none."""
-        return next((k for k, frame in enumerate(self.frames) if frame.name == name), self.nframes)
-
-    def existFrame(self, name: str) -> bool:
-        """Whether there is a frame of this name."""
-        return self.getFrameId(name) < self.nframes
-
-    def getJointId(self, name: str) -> int:
-        """The joint's number, or the number of joints if there is none."""
-        return self.names.index(name) if name in self.names else self.njoints
-
-    def existJointName(self, name: str) -> bool:
-        """Whether there is a joint of this name."""
-        return name in self.names
-
-
-class Data:
-    """Where results are left: oMi, oMf, v, a, tau, ddq, M, com, hg, …, each from when a function has made it."""
-
-    oMi: list[SE3]  # noqa: N815
-    oMf: list[SE3]  # noqa: N815
-    v: list[Motion]
-    a: list[Motion]
-    hg: Force
-    com: list[_Array]
-    vcom: list[_Array]
-    acom: list[_Array]
-    tau: _Array
-    ddq: _Array
-    M: _Array
-    Minv: _Array
-    C: _Array
-    nle: _Array
-    g: _Array
-    Ag: _Array
-    Jcom: _Array
-    dtau_dq: _Array
-    dtau_dv: _Array
-    ddq_dq: _Array
-    ddq_dv: _Array
-    kinetic_energy: float
-    potential_energy: float
-
-    def __init__(self, model: Model) -> None:
-        self._ours = ours.Data(model.ours)
-        self._q = self._v = self._a = np.zeros(0)
-
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"data.{name}: no function has made it yet, or it is not part of this layer")
-
-
-def buildModelFromUrdf(path: str, root_joint: JointModelFreeFlyer | None = None, mimic: bool = False) -> Model:
-    """A robot from a URDF."""
-    return Model(ours.Model.from_urdf(path, root_joint="free_flyer" if root_joint else None, mimic=mimic))
-
-
-def buildModelFromXML(text: str, root_joint: JointModelFreeFlyer | None = None, mimic: bool = False) -> Model:
-    """A robot from a URDF's text."""
-    return Model(ours.Model.from_urdf_str(text, root_joint="free_flyer" if root_joint else None, mimic=mimic))
-
-
-def buildModelFromMJCF(path: str) -> Model:
-    """A robot from an MJCF."""
-    return Model(ours.Model.from_mjcf(path))
-
-
-def buildReducedModel(model: Model, joints: Sequence[int], q: ArrayLike) -> Model:
-    """The robot with joints held where q has them."""
-    return Model(model.ours.lock([model.names[joint] for joint in joints], q))
 
 
 def neutral(model: Model) -> _Array:
@@ -205,9 +68,14 @@ def neutral(model: Model) -> _Array:
     return ours.neutral(model.ours)
 
 
-def randomConfiguration(model: Model) -> _Array:
-    """A random position within the limits."""
-    return ours.random_configuration(model.ours)
+def randomConfiguration(model: Model, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> _Array:
+    """A random position within the limits, those of the model or others, and within ±3 where there are none."""
+    q = ours.random_configuration(model.ours)
+    low = np.ravel(model.lowerPositionLimit if lower is None else lower)
+    high = np.ravel(model.upperPositionLimit if upper is None else upper)
+    given = model._lengths & np.isfinite(low) & np.isfinite(high)
+    q[given] = low[given] + np.random.random(int(given.sum())) * (high - low)[given]
+    return q
 
 
 def integrate(model: Model, q: ArrayLike, v: ArrayLike) -> _Array:
@@ -230,131 +98,181 @@ def normalize(model: Model, q: ArrayLike) -> _Array:
     return ours.normalize(model.ours, q)
 
 
-def _forces(fext: Sequence[algebra.Force] | None) -> _Array | None:
-    return None if fext is None else np.array([f.vector for f in fext])
+def _forces(fext: Sequence[algebra.Force]) -> _Array:
+    return np.array([f.vector for f in fext])
+
+
+def _flat(*states: ArrayLike) -> tuple[_Array, _Array, _Array]:
+    """States, of which some are columns, as vectors; raises what was raised if none is a column."""
+    q, v, x = (np.asarray(state, float) for state in states)
+    if not any(array.ndim == 2 and array.shape[1] == 1 for array in (q, v, x)):
+        raise
+    return q.ravel(), v.ravel(), x.ravel()
 
 
 def rnea(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> _Array:
     """τ, also data.tau."""
-    data.tau = ours.rnea(model.ours, data._ours, q, v, a, _forces(fext))
-    return data.tau
+    try:
+        data.tau = out = ours.rnea(model.ours, data._ours, q, v, a, None if fext is None else _forces(fext))
+    except ValueError:
+        return rnea(model, data, *_flat(q, v, a), fext)
+    return out
 
 
 def aba(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, tau: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> _Array:
     """q̈, also data.ddq."""
-    data.ddq = ours.aba(model.ours, data._ours, q, v, tau, _forces(fext))
-    return data.ddq
+    try:
+        data.ddq = out = ours.aba(model.ours, data._ours, q, v, tau, None if fext is None else _forces(fext))
+    except ValueError:
+        return aba(model, data, *_flat(q, v, tau), fext)
+    return out
 
 
 def crba(model: Model, data: Data, q: ArrayLike) -> _Array:
     """M, both triangles, also data.M."""
-    data.M = ours.crba(model.ours, data._ours, q)
-    return data.M
+    data.M = M = ours.crba(model.ours, data._ours, q)
+    return M
 
 
 def computeMinverse(model: Model, data: Data, q: ArrayLike) -> _Array:
     """M⁻¹, also data.Minv."""
-    data.Minv = ours.minv(model.ours, data._ours, q)
-    return data.Minv
+    data.Minv = Minv = ours.minv(model.ours, data._ours, q)
+    return Minv
 
 
 def nonLinearEffects(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
     """C v + g, also data.nle."""
-    data.nle = ours.nonlinear_effects(model.ours, data._ours, q, v)
-    return data.nle
+    data.nle = nle = ours.nonlinear_effects(model.ours, data._ours, q, v)
+    return nle
 
 
 def computeGeneralizedGravity(model: Model, data: Data, q: ArrayLike) -> _Array:
     """g, also data.g."""
-    data.g = ours.gravity(model.ours, data._ours, q)
-    return data.g
+    data.g = g = ours.gravity(model.ours, data._ours, q)
+    return g
 
 
 def computeCoriolisMatrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
     """C with C v + g = h and Ṁ − 2 C skew-symmetric, also data.C."""
-    data.C = ours.coriolis_matrix(model.ours, data._ours, q, v)
-    return data.C
+    data.C = C = ours.coriolis_matrix(model.ours, data._ours, q, v)
+    return C
 
 
 def computeRNEADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
     """∂τ/∂q, ∂τ/∂v, M; also data.dtau_dq, dtau_dv, M."""
-    data.dtau_dq, data.dtau_dv, data.M = ours.rnea_derivatives(model.ours, data._ours, q, v, a, _forces(fext))
-    return data.dtau_dq, data.dtau_dv, data.M
+    given = None if fext is None else _forces(fext)
+    try:
+        data.dtau_dq, data.dtau_dv, data.M = d = ours.rnea_derivatives(model.ours, data._ours, q, v, a, given)
+    except ValueError:
+        return computeRNEADerivatives(model, data, *_flat(q, v, a), fext)
+    return d[:]
 
 
 def computeABADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, tau: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
     """∂q̈/∂q, ∂q̈/∂v, M⁻¹; also data.ddq_dq, ddq_dv, Minv, ddq."""
-    data.ddq, data.ddq_dq, data.ddq_dv, data.Minv = ours.aba_derivatives(
-        model.ours, data._ours, q, v, tau, _forces(fext)
-    )
-    return data.ddq_dq, data.ddq_dv, data.Minv
+    given = None if fext is None else _forces(fext)
+    try:
+        d = ours.aba_derivatives(model.ours, data._ours, q, v, tau, given)
+    except ValueError:
+        return computeABADerivatives(model, data, *_flat(q, v, tau), fext)
+    data.ddq, data.ddq_dq, data.ddq_dv, data.Minv = d
+    return d[1:]
 
 
 def forwardKinematics(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
 ) -> None:
     """data.oMi; with v and a also data.v and data.a, in the bodies' frames."""
-    still = np.zeros(model.nv)
-    data._q, data._v, data._a = (np.array(x, float) for x in (q, still if v is None else v, still if a is None else a))
-    data.oMi = [SE3(X) for X in ours.forward_kinematics(model.ours, data._ours, q)]
-    if v is not None:
-        data.v = [getVelocity(model, data, i) for i in range(model.njoints)]
-    if a is not None:
-        data.a = [getAcceleration(model, data, i) for i in range(model.njoints)]
+    data._poses = ours.forward_kinematics(model.ours, data._ours, q)
+    data._q = q.copy() if isinstance(q, np.ndarray) else np.array(q, float)
+    data._v = model._still if v is None else np.array(v, float).ravel()
+    data._a = model._still if a is None else np.array(a, float).ravel()
 
 
 def updateFramePlacements(model: Model, data: Data) -> None:
     """data.oMf of the last forwardKinematics."""
-    data.oMf = [SE3((data.oMi[f.parentJoint] * f.placement).homogeneous) for f in model.frames]
+    data._frame_poses = data._poses
 
 
 def framesForwardKinematics(model: Model, data: Data, q: ArrayLike) -> None:
     """data.oMi and data.oMf."""
-    forwardKinematics(model, data, q)
-    updateFramePlacements(model, data)
+    data._poses = data._frame_poses = ours.forward_kinematics(model.ours, data._ours, q)
+    data._q = q.copy() if isinstance(q, np.ndarray) else np.array(q, float)
+    data._v = data._a = model._still
 
 
 def getVelocity(model: Model, data: Data, joint: int, frame: ReferenceFrame = LOCAL) -> Motion:
     """The velocity of a joint's body at the last forwardKinematics."""
-    return Motion(ours.body_velocity(model.ours, data._ours, data._q, data._v, joint, frame.value))
+    return Motion._of(ours.body_velocity(model.ours, data._ours, data._q, data._v, joint, frame._value_))
 
 
 def getAcceleration(model: Model, data: Data, joint: int, frame: ReferenceFrame = LOCAL) -> Motion:
     """The spatial acceleration of a joint's body at the last forwardKinematics."""
-    return Motion(ours.body_acceleration(model.ours, data._ours, data._q, data._v, data._a, joint, frame.value))
+    return Motion._of(ours.body_acceleration(model.ours, data._ours, data._q, data._v, data._a, joint, frame._value_))
 
 
 def getClassicalAcceleration(model: Model, data: Data, joint: int, frame: ReferenceFrame = LOCAL) -> Motion:
     """r̈ and ω̇ of a joint's body at the last forwardKinematics."""
-    return Motion(
-        ours.body_classical_acceleration(model.ours, data._ours, data._q, data._v, data._a, joint, frame.value)
+    return Motion._of(
+        ours.body_classical_acceleration(model.ours, data._ours, data._q, data._v, data._a, joint, frame._value_)
     )
 
 
 def getFrameVelocity(model: Model, data: Data, frame_id: int, frame: ReferenceFrame = LOCAL) -> Motion:
     """The velocity of a frame at the last forwardKinematics."""
-    at = _frame(model, frame_id)
-    return Motion(ours.frame_velocity(model.ours, data._ours, data._q, data._v, at, frame.value))
+    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
+    return Motion._of(ours.frame_velocity(model.ours, data._ours, data._q, data._v, at, frame._value_))
 
 
 def getFrameAcceleration(model: Model, data: Data, frame_id: int, frame: ReferenceFrame = LOCAL) -> Motion:
     """The spatial acceleration of a frame at the last forwardKinematics."""
-    at = _frame(model, frame_id)
-    return Motion(ours.frame_acceleration(model.ours, data._ours, data._q, data._v, data._a, at, frame.value))
+    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
+    return Motion._of(ours.frame_acceleration(model.ours, data._ours, data._q, data._v, data._a, at, frame._value_))
 
 
 def getFrameClassicalAcceleration(model: Model, data: Data, frame_id: int, frame: ReferenceFrame = LOCAL) -> Motion:
     """r̈ and ω̇ of a frame at the last forwardKinematics."""
-    at = _frame(model, frame_id)
-    return Motion(ours.frame_classical_acceleration(model.ours, data._ours, data._q, data._v, data._a, at, frame.value))
+    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
+    return Motion._of(
+        ours.frame_classical_acceleration(model.ours, data._ours, data._q, data._v, data._a, at, frame._value_)
+    )
+
+
+def computeForwardKinematicsDerivatives(model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> None:
+    """What getJointVelocityDerivatives and its like then read."""
+    forwardKinematics(model, data, q, v, a)
+
+
+def getJointVelocityDerivatives(model: Model, data: Data, joint: int, frame: ReferenceFrame) -> tuple[_Array, _Array]:
+    """∂v/∂q and ∂v/∂q̇ of a joint's body, (6, nv); in LOCAL_WORLD_ALIGNED at a place that stays."""
+    dv_dq = ours.body_velocity_derivative(model.ours, data._ours, data._q, data._v, joint, frame._value_)
+    J = ours.body_jacobian(model.ours, data._ours, data._q, joint, frame._value_)
+    return _at_rest(dv_dq, getVelocity(model, data, joint, frame), J, frame), J
+
+
+def _at_rest(by_q: _Array, motion: Motion, J: _Array, frame: ReferenceFrame) -> _Array:
+    """∂/∂q of a motion as it is seen at a place that stays: without ω × J, by which the frame's origin moves."""
+    if frame is LOCAL_WORLD_ALIGNED:
+        by_q[:3] -= np.cross(motion.angular, J[:3], axisb=0).T
+    return by_q
+
+
+def getJointAccelerationDerivatives(
+    model: Model, data: Data, joint: int, frame: ReferenceFrame
+) -> tuple[_Array, _Array, _Array, _Array]:
+    """∂v/∂q, and ∂a/∂q, ∂a/∂q̇, ∂a/∂q̈ of a joint's body, (6, nv)."""
+    dv_dq, da_da = getJointVelocityDerivatives(model, data, joint, frame)
+    state = (model.ours, data._ours, data._q, data._v, data._a)
+    da_dq, da_dv = ours.body_acceleration_derivatives(*state, joint, frame._value_)
+    return dv_dq, _at_rest(da_dq, getAcceleration(model, data, joint, frame), da_da, frame), da_dv, da_da
 
 
 def computeJointJacobians(model: Model, data: Data, q: ArrayLike) -> None:
@@ -364,12 +282,13 @@ def computeJointJacobians(model: Model, data: Data, q: ArrayLike) -> None:
 
 def getJointJacobian(model: Model, data: Data, joint: int, frame: ReferenceFrame) -> _Array:
     """The Jacobian of a joint's body at the last computeJointJacobians, (6, nv)."""
-    return ours.body_jacobian(model.ours, data._ours, data._q, joint, frame.value)
+    return ours.body_jacobian(model.ours, data._ours, data._q, joint, frame._value_)
 
 
 def getFrameJacobian(model: Model, data: Data, frame_id: int, frame: ReferenceFrame) -> _Array:
     """The Jacobian of a frame at the last computeJointJacobians, (6, nv)."""
-    return ours.frame_jacobian(model.ours, data._ours, data._q, _frame(model, frame_id), frame.value)
+    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
+    return ours.frame_jacobian(model.ours, data._ours, data._q, at, frame._value_)
 
 
 def computeJointJacobian(model: Model, data: Data, q: ArrayLike, joint: int) -> _Array:
@@ -381,55 +300,57 @@ def computeFrameJacobian(
     model: Model, data: Data, q: ArrayLike, frame_id: int, frame: ReferenceFrame = LOCAL
 ) -> _Array:
     """The Jacobian of a frame, (6, nv)."""
-    return ours.frame_jacobian(model.ours, data._ours, q, _frame(model, frame_id), frame.value)
+    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
+    return ours.frame_jacobian(model.ours, data._ours, q, at, frame._value_)
 
 
 def centerOfMass(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
 ) -> _Array:
     """c, also data.com[0]; with v and a also data.vcom[0] and data.acom[0]."""
-    data.com = [ours.com(model.ours, data._ours, q)]
+    com = ours.com(model.ours, data._ours, q)
+    data.com = [com]
     if v is not None:
         data.vcom = [ours.com_velocity(model.ours, data._ours, q, v)]
         if a is not None:
             data.acom = [ours.com_acceleration(model.ours, data._ours, q, v, a)]
-    return data.com[0]
+    return com
 
 
 def jacobianCenterOfMass(model: Model, data: Data, q: ArrayLike) -> _Array:
     """∂c/∂q, (3, nv), also data.Jcom."""
-    data.Jcom = ours.com_jacobian(model.ours, data._ours, q)
-    return data.Jcom
+    data.Jcom = Jcom = ours.com_jacobian(model.ours, data._ours, q)
+    return Jcom
 
 
 def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
     """Ag, (6, nv), also data.Ag; data.hg and data.com."""
-    data.Ag, _, com, data.Jcom = ours.centroidal_map(model.ours, data._ours, q)
-    data.hg, data.com = Force(data.Ag @ np.asarray(v, float)), [com]
-    return data.Ag
+    Ag, _, com, data.Jcom = ours.centroidal_map(model.ours, data._ours, q)
+    data.Ag, data.hg, data.com = Ag, Force._of(Ag @ np.asarray(v, float)), [com]
+    return Ag
 
 
 def computeCentroidalMomentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> Force:
     """hg, also data.hg."""
-    data.hg = Force(ours.centroidal_momentum(model.ours, data._ours, q, v))
-    return data.hg
+    data.hg = hg = Force._of(ours.centroidal_momentum(model.ours, data._ours, q, v))
+    return hg
 
 
 def computeKineticEnergy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
     """½ vᵀ M v, also data.kinetic_energy."""
-    data.kinetic_energy = ours.kinetic_energy(model.ours, data._ours, q, v)
-    return data.kinetic_energy
+    data.kinetic_energy = energy = ours.kinetic_energy(model.ours, data._ours, q, v)
+    return energy
 
 
 def computePotentialEnergy(model: Model, data: Data, q: ArrayLike) -> float:
     """−Σ m g·c, also data.potential_energy."""
-    data.potential_energy = ours.potential_energy(model.ours, data._ours, q)
-    return data.potential_energy
+    data.potential_energy = energy = ours.potential_energy(model.ours, data._ours, q)
+    return energy
 
 
 def computeTotalMass(model: Model) -> float:
     """The mass of all bodies that move (kg)."""
-    return sum(inertia.mass for inertia in model.ours.inertias[1:])
+    return model._moving_mass
 
 
 def dIntegrate(model: Model, q: ArrayLike, v: ArrayLike) -> tuple[_Array, _Array]:
@@ -443,29 +364,11 @@ def dDifference(model: Model, q0: ArrayLike, q1: ArrayLike) -> tuple[_Array, _Ar
     return ours.difference_jacobian(model.ours, d, "from"), ours.difference_jacobian(model.ours, d, "to")
 
 
-def exp6(m: ArrayLike | algebra.Motion) -> SE3:
-    """exp of a motion."""
-    return SE3(algebra.exp6(m).homogeneous)
+nle = nonLinearEffects
 
 
-def log6(X: algebra.SE3 | ArrayLike) -> Motion:
-    """The motion whose exponential X is."""
-    return Motion(algebra.log6(X).vector)
-
-
-def Jlog3(R: ArrayLike) -> _Array:
-    """∂ log3(R exp δ)/∂δ."""
-    return algebra.jlog3(log3(R))
-
-
-exp3, log3, skew = algebra.exp3, algebra.log3, algebra.skew
-Jexp3, Jexp6, Jlog6 = algebra.jexp3, algebra.jexp6, algebra.jlog6
-
-
-def _frame(model: Model, frame_id: int) -> int:
-    if not 0 < frame_id < model.nframes:
-        raise ValueError(f"frame_id: expected 1 to {model.nframes - 1}, found {frame_id}; universe does not move")
-    return frame_id - 1
+def _unknown(model: Model, frame_id: int) -> NoReturn:
+    raise ValueError(f"frame_id: expected 1 to {model.nframes - 1}, found {frame_id}; universe does not move")
 
 
 def __getattr__(name: str) -> Any:

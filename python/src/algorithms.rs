@@ -2,13 +2,26 @@
 //!
 //! A call for one state takes microseconds and keeps the interpreter's lock; one for many releases it.
 
-use crate::arrays::named_tuples;
+use crate::arrays::{Give, Number, Symmetric, give_named};
 use crate::functions::{any, functions, regular};
 use pyo3::prelude::*;
 
-named_tuples! {
-    RneaDerivatives<'_> { dtau_dq, dtau_dv, dtau_da }
-    AbaDerivatives<'_> { a, da_dq, da_dv, da_dtau }
+impl<S: Number> Give for condyle::RneaDerivatives<'_, S> {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        let dtau_da = Symmetric(self.dtau_da);
+        give_named!(py, out, "RneaDerivatives", {
+            "dtau_dq" => self.dtau_dq, "dtau_dv" => self.dtau_dv, "dtau_da" => dtau_da
+        })
+    }
+}
+
+impl<S: Number> Give for condyle::AbaDerivatives<'_, S> {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        let da_dtau = Symmetric(self.da_dtau);
+        give_named!(py, out, "AbaDerivatives", {
+            "a" => self.a, "da_dq" => self.da_dq, "da_dv" => self.da_dv, "da_dtau" => da_dtau
+        })
+    }
 }
 
 functions! {
@@ -74,7 +87,7 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; method: M
 /// >>> bool(np.linalg.eigvalsh(M).min() > 0.0)
 /// True
 fn crba(model, data; q: Position; out) {
-    condyle::crba(model, data, &q)
+    Symmetric(condyle::crba(model, data, &q))
 }
 batch b: any(q: Position) -> One { b.crba(model, q) }
 
@@ -88,7 +101,7 @@ batch b: any(q: Position) -> One { b.crba(model, q) }
 /// True
 fn minv(model, data; q: Position; out) {
     regular(model)?;
-    condyle::minv(model, data, &q)
+    Symmetric(condyle::minv(model, data, &q))
 }
 batch b: regular(q: Position) -> One { b.minv(model, q) }
 

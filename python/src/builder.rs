@@ -1,11 +1,11 @@
 //! Models made body by body.
 
 use crate::arrays::{pose, three};
-use crate::exceptions::exception;
+use crate::exceptions::{exception, wrong_word};
 use crate::inertial_parameters::read_inertia;
 use crate::joint::Joint;
 use crate::model::Model;
-use condyle::{Inertia, JointOptions, Mimic, Se3};
+use condyle::{FrameKind, Inertia, JointOptions, Mimic, Se3};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -197,11 +197,23 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a frame at `placement` in the body's frame.
-    #[pyo3(signature = (name, body, placement=None))]
-    fn frame(&mut self, name: &str, body: &Bound<'_, BodyId>, placement: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    /// Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user', of which each may have the same name.
+    #[pyo3(signature = (name, body, placement=None, kind="user"))]
+    fn frame(
+        &mut self,
+        name: &str,
+        body: &Bound<'_, BodyId>,
+        placement: Option<&Bound<'_, PyAny>>,
+        kind: &str,
+    ) -> PyResult<()> {
         let (body, placement) = (self.body_of("body", body)?, placed("placement", placement)?);
-        self.builder()?.frame(name, body, placement);
+        let kind = match kind {
+            "link" => FrameKind::Link,
+            "joint" => FrameKind::Joint,
+            "user" => FrameKind::User,
+            other => return Err(wrong_word("kind", "'link', 'joint' or 'user'", other)),
+        };
+        self.builder()?.frame_of_kind(name, kind, body, placement);
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! The space of positions, and its tangent vectors.
 
-use crate::arrays::Give;
+use crate::arrays::{Computed, Give};
 use crate::exceptions::wrong_word;
 use crate::functions::functions;
 use crate::model::Model;
@@ -45,9 +45,7 @@ fn neutral(model;) {
 /// >>> np.allclose(condyle.difference(quadruped, q0, q1), 0.1)
 /// True
 fn integrate(model; q: Position, v: Tangent; out) {
-    let mut moved = vec![Scalar::zero(); model.nq()];
-    condyle::integrate(model, &q, &v, &mut moved);
-    moved
+    Computed::new([model.nq()], |moved| condyle::integrate(model, &q, &v, moved))
 }
 each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved) }
 
@@ -55,9 +53,7 @@ each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, 
 ///
 /// q0, q1: nq numbers.
 fn difference(model; q0: Position, q1: Position; out) {
-    let mut v = vec![Scalar::zero(); model.nv()];
-    condyle::difference(model, &q0, &q1, &mut v);
-    v
+    Computed::new([model.nv()], |v| condyle::difference(model, &q0, &q1, v))
 }
 each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1, v) }
 

@@ -23,7 +23,7 @@
 //! share, what kind of results there are, and the call of the library's `Batch`; `batch b, constraints: …` has constraints. A
 //! function without `Data` has a line of `each` instead, with the sizes of its result, and is called state after state.
 
-use crate::arrays::Number;
+use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
 use crate::exceptions::{ModelError, wrong_word};
 use crate::hyper_dual;
@@ -33,6 +33,7 @@ use nalgebra::DMatrix;
 use numpy::{Ix1, Ix2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::{PyInt, PyString};
 
 /// A kind of argument.
 pub(crate) trait Argument<'a, 'py> {
@@ -42,6 +43,11 @@ pub(crate) trait Argument<'a, 'py> {
     type Read<S: Number>;
     /// The value that the library takes for many states.
     type All;
+    /// Reads the argument if it is of the simplest form for a single state, a double array in C order, or a word, so that nothing
+    /// written in Python runs; none if it is anything else, or wrong.
+    fn at_once(_given: &Self::Given, _model: &Model) -> Option<Self::Read<f64>> {
+        None
+    }
     /// Reads the argument of this name of a function of this model.
     fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read<f64>> {
         Self::read_at(name, &given, model, None)
@@ -61,6 +67,53 @@ pub(crate) trait Argument<'a, 'py> {
     fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize, copy: bool) -> PyResult<Self::All>;
 }
 
+/// An argument of a call, and its numbers if it could be read at once.
+pub(crate) struct Given<'a, 'py: 'a, K: Argument<'a, 'py>> {
+    pub(crate) given: K::Given,
+    read: Option<K::Read<f64>>,
+}
+
+impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
+    #[inline(always)]
+    pub(crate) fn new(given: K::Given, model: &Model) -> Self {
+        let read = K::at_once(&given, model);
+        Self { given, read }
+    }
+
+    /// Whether it was read.
+    #[inline(always)]
+    pub(crate) fn is_read(&self) -> bool {
+        self.read.is_some()
+    }
+
+    /// The doubles (S) for one of many states, or for the only one; `at_once` if all arguments could be read at once.
+    #[inline(always)]
+    #[allow(clippy::extra_unused_type_parameters)] // it is called as `duals` is
+    pub(crate) fn numbers<S>(
+        &mut self,
+        name: &str,
+        model: &Model,
+        state: Option<usize>,
+        at_once: bool,
+    ) -> PyResult<K::Read<f64>> {
+        match self.read.take() {
+            Some(read) if at_once => Ok(read),
+            _ => K::read_at(name, &self.given, model, state),
+        }
+    }
+
+    /// The numbers as hyper-dual ones.
+    pub(crate) fn duals<S: Number>(
+        &mut self,
+        name: &str,
+        model: &Model,
+        state: Option<usize>,
+        _at_once: bool,
+    ) -> PyResult<K::Read<S>> {
+        K::read_at(name, &self.given, model, state)
+    }
+}
+
 /// Kinds of argument that are one vector a state, with the length of the vector.
 macro_rules! vectors {
     ($($(#[$doc:meta])* $kind:ident: $length:ident),*) => {$(
@@ -71,6 +124,10 @@ macro_rules! vectors {
             type Given = &'a Bound<'py, PyAny>;
             type Read<S: Number> = S::Input<'py, Ix1>;
             type All = batch::Rows<'py>;
+            #[inline(always)]
+            fn at_once(given: &Self::Given, model: &Model) -> Option<Self::Read<f64>> {
+                arrays::at_once(given, &[model.$length()])
+            }
             fn read_at<S: Number>(
                 name: &str,
                 given: &Self::Given,
@@ -112,6 +169,11 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     type Given = Option<&'a Bound<'py, PyAny>>;
     type Read<S: Number> = Vec<Force<S>>;
     type All = Vec<Force<f64>>;
+    #[inline(always)]
+    fn at_once(given: &Self::Given, model: &Model) -> Option<Self::Read<f64>> {
+        let Some(given) = given else { return Some(Vec::new()) };
+        Some(batch::forces(&arrays::at_once::<Ix2>(given, &[model.bodies().len(), 6])?))
+    }
     fn read_at<S: Number>(
         name: &str,
         given: &Self::Given,
@@ -136,7 +198,8 @@ macro_rules! shared {
     ($(
         $(#[$doc:meta])*
         $kind:ident<$S:ident>: $given:ty => $read:ty {
-            |$name:pat_param, $from:pat_param, $model:pat_param| $body:expr $(, $is_dual:expr)?
+            |$name:pat_param, $from:pat_param, $model:pat_param| $body:expr
+            $(, dual if $is_dual:expr)? $(, at once if $is_simple:expr)?
         }
     )*) => {$(
         $(#[$doc])*
@@ -146,6 +209,12 @@ macro_rules! shared {
             type Given = $given;
             type Read<$S: Number> = $read;
             type All = ();
+            $(
+                #[inline(always)]
+                fn at_once(given: &Self::Given, model: &Model) -> Option<Self::Read<f64>> {
+                    if $is_simple(given) { Self::read_at::<f64>("", given, model, None).ok() } else { None }
+                }
+            )?
             fn read_at<$S: Number>(
                 $name: &str,
                 $from: &Self::Given,
@@ -166,15 +235,15 @@ macro_rules! shared {
 shared! {
     /// Tangent vectors side by side: a matrix of nv rows.
     Tangents<S>: &'a Bound<'py, PyAny> => DMatrix<S> { |name, given, model| rows(name, given, model.nv()),
-        |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
+        dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
     /// The name or number of a frame.
-    FrameOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| frame_index(model, given) }
+    FrameOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| frame_index(model, given), at once if is_plain }
 
     /// The name of a joint or the number of a body.
     BodyOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| {
         body_index("body: expected a joint's name", model, given, 0)
-    } }
+    }, at once if is_plain }
 
     /// The axes and the point of a motion: a word.
     Reference<S>: &'a str => ReferenceFrame { |name, given, _| match *given {
@@ -182,7 +251,7 @@ shared! {
         "world" => Ok(ReferenceFrame::World),
         "local_world_aligned" => Ok(ReferenceFrame::LocalWorldAligned),
         other => Err(wrong_word(name, "'local', 'world' or 'local_world_aligned'", other)),
-    } }
+    }, at once if |_| true }
 
     /// The method of forward dynamics: a word, or None.
     MethodOf<S>: Option<&'a str> => Option<ForwardDynamicsMethod> { |name, given, _| match *given {
@@ -191,7 +260,7 @@ shared! {
         Some("dense") => Ok(Some(ForwardDynamicsMethod::Dense)),
         Some("sparse") => Ok(Some(ForwardDynamicsMethod::Sparse)),
         Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
-    } }
+    }, at once if |_| true }
 
     /// An input of the dynamics beside q, v, a and τ: a word, or a word with a body or a number.
     InputOf<S>: &'a Bound<'py, PyAny> => condyle::Input { |name, given, model| {
@@ -218,16 +287,21 @@ shared! {
 
     /// A number.
     Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
-        |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
+        dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
     /// A number that belongs to no state.
-    Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given) }
+    Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given), at once if |_| true }
 
     /// A positive speed.
     Speed<S>: f64 => f64 { |name, given, _| positive_speed(name, *given) }
 
     /// A word, which the function itself understands.
-    Word<S>: &'a str => &'a str { |_, given, _| Ok(*given) }
+    Word<S>: &'a str => &'a str { |_, given, _| Ok(*given), at once if |_| true }
+}
+
+/// Whether a name or a number is one of Python's own, which runs nothing when it is read.
+fn is_plain(given: &&Bound<'_, PyAny>) -> bool {
+    given.is_exact_instance_of::<PyString>() || given.is_exact_instance_of::<PyInt>()
 }
 
 /// A number that is checked to be a positive speed.
@@ -289,14 +363,20 @@ macro_rules! functions {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            let looks: &[(&str, batch::Look)] =
-                &[$((stringify!($arg), <kinds::$kind as Argument<'_, '_>>::look(stringify!($arg), &$arg, $model)?)),*];
-            let dual = looks.iter().any(|(_, look)| look.dual);
-            let states = batch::agreed(looks)?;
+            // most calls are for one state in arrays of doubles; whatever else there is, is looked at before it is read
+            $(let mut $arg = kinds::Given::<kinds::$kind>::new($arg, $model);)*
+            let at_once = true $(&& $arg.is_read())*;
+            let (dual, states) = if at_once { (false, None) } else {
+                let looks: &[(&str, batch::Look)] = &[$((
+                    stringify!($arg),
+                    <kinds::$kind as Argument<'_, '_>>::look(stringify!($arg), &$arg.given, $model)?,
+                )),*];
+                (looks.iter().any(|(_, look)| look.dual), batch::agreed(looks)?)
+            };
             $(if let (Some(states), false) = (states, dual) {
                 $check($model)?;
                 let copy = out.is_some();
-                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all, $model, states, copy)?;)*
+                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all.given, $model, states, copy)?;)*
                 $(let $all = &$all[..];)*
                 $($(let $shared = <kinds::$shared_kind as Argument>::read(stringify!($shared), $shared, $model)?;)*)?
                 let lanes = data.batch($model, states);
@@ -318,23 +398,19 @@ macro_rules! functions {
             })?
             // the same source for doubles and for hyper-dual numbers
             macro_rules! call {
-                ($S:ty, $state:expr, $to:expr) => {{
+                ($S:ty, $read:ident, $state:expr, $to:expr) => {{
                     $(
                         let $data = Holds::<$S>::held(&mut *data, $model)?;
                         $(let $scratch = Holds::<$S>::held(&mut *scratch, $model)?;)?
                     )?
-                    let result = {
-                        $(let $arg = <kinds::$kind as Argument<'_, '_>>::read_at::<$S>(
-                            stringify!($arg), &$arg, $model, $state,
-                        )?;)*
-                        $body
-                    };
+                    $(let $arg = $arg.$read::<$S>(stringify!($arg), $model, $state, at_once)?;)*
+                    let result = $body;
                     result.give(py, $to)
                 }};
             }
             #[allow(unused_mut, unused_variables)] // by functions without a `Data` or without arguments
             let mut call = |state: Option<usize>, out: Option<&Bound<'py, PyAny>>| {
-                if dual { call!($crate::hyper_dual::Hyper, state, out) } else { call!(f64, state, out) }
+                if dual { call!($crate::hyper_dual::Hyper, duals, state, out) } else { call!(f64, numbers, state, out) }
             };
             match states {
                 None => call(None, out),

@@ -26,7 +26,8 @@ fn inertia_of<'py>(
     // Ī = I_c − m [c]ₓ[c]ₓ, so I_c is what is left of Ī when that is taken away
     let point_mass = Inertia::from_com(I.mass, com, Sym3::zero());
     let about_com = I.rotational - point_mass.rotational;
-    class!(py, "Inertia")?.call1((I.mass, vector(com)?, matrix(about_com.full())?, matrix(I.rotational.full())?))
+    let class = class!(py, "condyle._inertia", "Inertia")?;
+    class.call1((I.mass, vector(com)?, matrix(about_com.full())?, matrix(I.rotational.full())?))
 }
 
 /// An inertia that Python gives: mass, centre of mass, and the rotational inertia about the origin, of which the lower

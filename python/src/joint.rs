@@ -93,6 +93,12 @@ impl Joint {
         self.0.axis().map(|axis| axis.give(py, None)).transpose()
     }
 
+    /// The metres along the axis for each radian about it; None if the joint is no screw.
+    #[getter]
+    fn pitch(&self) -> Option<f64> {
+        if let condyle::Joint::Helical { pitch, .. } = self.0 { Some(pitch) } else { None }
+    }
+
     /// The kind and the axis.
     fn __repr__(&self) -> String {
         let axis = self.0.axis().map_or(String::new(), |a| format!(" about or along {:?}", a.to_array()));

@@ -1,8 +1,7 @@
 //! Places and motions of bodies and frames: the library's functions one to one.
 
+use crate::arrays::Computed;
 use crate::functions::{any, functions};
-use condyle::Scalar;
-use nalgebra::DMatrix;
 use pyo3::prelude::*;
 
 /// Declarations of functions of a frame or of a body. Each calls the method of the same name of what a pass gives: the
@@ -75,10 +74,10 @@ functions! {
 /// >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
 /// (6, 7)
 fn frame_jacobian(model, data; q: Position, frame: FrameOf, reference: Reference = "local"; out) {
-    let mut J = DMatrix::from_element(6, model.nv(), Scalar::zero());
     let _ = data; // only the joints between the frame and the world count
-    condyle::frame_jacobian(model, &q, frame, reference, &mut J);
-    J
+    Computed::new([6, model.nv()], |J| {
+        condyle::frame_jacobian_strided(model, &q, frame, reference, J, [model.nv(), 1]);
+    })
 }
 batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
     b.frame_jacobian(model, q, frame, reference)
@@ -95,10 +94,10 @@ batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
 /// >>> np.array_equal(condyle.body_jacobian(arm, data, q, "joint7"), J)
 /// True
 fn body_jacobian(model, data; q: Position, body: BodyOf, reference: Reference = "local"; out) {
-    let mut J = DMatrix::from_element(6, model.nv(), Scalar::zero());
     let _ = data;
-    condyle::body_jacobian(model, &q, body, reference, &mut J);
-    J
+    Computed::new([6, model.nv()], |J| {
+        condyle::body_jacobian_strided(model, &q, body, reference, J, [model.nv(), 1]);
+    })
 }
 batch b: any(q: Position; body: BodyOf, reference: Reference) -> One {
     b.body_jacobian(model, q, body, reference)

@@ -8,6 +8,7 @@
 //! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
 //!   `regressors`, `simulation`: the library's functions and types, one to one;
+//! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
 //! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
 //!
 //! The doc comments here are the docstrings that Python sees; `stubs.py` writes them into `condyle/_condyle.pyi`.
@@ -21,6 +22,7 @@ mod builder;
 mod cached;
 mod casadi;
 mod centroidal;
+mod codegen;
 mod configuration;
 mod constrained;
 mod data;
@@ -65,6 +67,8 @@ mod _condyle {
         com_jacobian, com_velocity, compute_all_terms, kinetic_energy, mechanical_energy, potential_energy,
     };
     #[pymodule_export]
+    use codegen::generate;
+    #[pymodule_export]
     use configuration::{
         difference, difference_jacobian, distance, integrate, integrate_jacobian, interpolate, neutral, normalize,
         random_configuration, transport,
@@ -105,9 +109,9 @@ mod _condyle {
     use model::{Model, model_from_bytes};
     #[pymodule_export]
     use optimal::{
-        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, Cost, DifferentialAction, Fddp,
-        FreeDynamics, FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem, Residual, Sweep, Unicycle,
-        WrenchCone,
+        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics, Cost,
+        DifferentialAction, Fddp, FreeDynamics, FrictionCone, ImpulseDynamics, InverseDynamics, Limit, Lqr, Problem,
+        Residual, Sweep, Unicycle, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

@@ -1,15 +1,15 @@
 //! A robot as Python sees it.
 
-use crate::arrays::{class, read_only, three, type_name, vector};
+use crate::arrays::{Give, class, pose, read_only, three, type_name, vector};
 use crate::cached::{Attribute, Cached};
 use crate::exceptions::{ModelError, exception};
 use crate::inertial_parameters::{model_inertia, read_inertia};
 use crate::joint::{Joint, kind, root};
 use crate::tree::tree;
-use condyle::{FrameKind, MjcfOptions, SdfOptions, UrdfOptions, inertial_parameters};
+use condyle::{FrameKind, MjcfOptions, SdfOptions, Se3, UrdfOptions, inertial_parameters};
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyList, PyString};
+use pyo3::types::{PyBytes, PyDict, PyList, PyString};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -220,6 +220,27 @@ impl Model {
     fn from_sdf_str(text: &str, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
         let options = SdfOptions { root_joint: root(root_joint)?, mimic, strict };
         Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
+    }
+
+    /// A model from Pinocchio's, a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that numbers are
+    /// equal; `to_pinocchio` is the way back.
+    ///
+    /// Composite, universal and spherical ZYX joints become several ones, with bodies without mass between them. Limits of
+    /// quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+    ///
+    /// Raises `ModelError` if its joints do not stand depth first, as Pinocchio's readers of files number them, or are of a
+    /// kind that is not here.
+    #[staticmethod]
+    fn from_pinocchio<'py>(model: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        model.py().import("condyle._pinocchio_models")?.call_method1("from_pinocchio", (model,))
+    }
+
+    /// The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
+    ///
+    /// What follows another joint does so there too, unless it turns without limits.
+    fn to_pinocchio<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let module = slf.py().import("condyle._pinocchio_models")?;
+        module.call_method1("to_pinocchio", (slf,))
     }
 
     /// Warnings: what is odd about the robot although it could be loaded.
@@ -519,6 +540,98 @@ impl Model {
         Ok(self.inner.lock(&joints, &q).map_err(exception)?.into())
     }
 
+    /// This robot with another one on a frame of it, as a new model.
+    ///
+    /// Its bodies are numbered behind all that the body which carries them has carried before, as Pinocchio's `appendModel` does;
+    /// name and gravity are this one's.
+    ///
+    /// frame: the name or number of a frame; None is the world.
+    /// model: the other robot.
+    /// placement: its world in the frame, a homogeneous (4, 4) matrix; None is the identity.
+    /// prefix: put before all its names.
+    ///
+    /// >>> quadruped, arm = condyle.robots.quadruped(), condyle.robots.arm7()
+    /// >>> quadruped.append("trunk", arm, prefix="arm_").names[13:16]
+    /// ['RH_KFE', 'arm_joint1', 'arm_joint2']
+    ///
+    /// Raises `ModelError`: two bodies, joints or frames of one name.
+    #[pyo3(signature = (frame, model, placement=None, prefix=""))]
+    fn append(
+        &self,
+        frame: Option<&Bound<'_, PyAny>>,
+        model: &Bound<'_, Self>,
+        placement: Option<&Bound<'_, PyAny>>,
+        prefix: &str,
+    ) -> PyResult<Self> {
+        let fXw = placement.map_or(Ok(Se3::identity()), |placement| pose("placement", placement))?;
+        let (body, bXf) = match frame {
+            None => (0, Se3::identity()),
+            Some(frame) => {
+                let frame = &self.inner.frames()[frame_index(&self.inner, frame)?];
+                (frame.body, frame.placement)
+            }
+        };
+        Ok(self.inner.append(body, bXf * fXw, &model.get().inner, prefix).map_err(exception)?.into())
+    }
+
+    /// The same robot with one more joint that follows another one, its position being ratio q + offset, in place of a
+    /// coordinate of its own. Its limits are those of the one that it follows.
+    ///
+    /// follower, leader: the joints' names, or the numbers of their bodies.
+    ///
+    /// >>> arm = condyle.robots.arm7()
+    /// >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
+    /// 6
+    ///
+    /// Raises `ModelError` if they are not of one degree of freedom, or a joint would follow one that follows.
+    #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
+    fn with_mimic(
+        &self,
+        follower: &Bound<'_, PyAny>,
+        leader: &Bound<'_, PyAny>,
+        ratio: f64,
+        offset: f64,
+    ) -> PyResult<Self> {
+        let follower = body_index("follower: expected a joint's name", &self.inner, follower, 1)?;
+        let leader = body_index("leader: expected a joint's name", &self.inner, leader, 1)?;
+        Ok(self.inner.with_mimic(follower, leader, condyle::Mimic { ratio, offset }).map_err(exception)?.into())
+    }
+
+    /// The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.
+    ///
+    /// Joints that a state does not mention stay as in `neutral`; a joint that turns without limits may have its angle. States
+    /// of one name, of several groups, are one position. All else in the file is ignored.
+    ///
+    /// path: a path, as text or `os.PathLike`.
+    /// strict: whether joints that the robot has not are errors; SRDFs are often shared by robots with fewer joints.
+    ///
+    /// Raises `ParseError`, with file, line and element.
+    #[pyo3(signature = (path, strict=false))]
+    fn reference_configurations<'py>(
+        &self,
+        py: Python<'py>,
+        path: PathBuf,
+        strict: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        positions(py, self.inner.reference_configurations(path, strict))
+    }
+
+    /// The named positions of an SRDF in a string; see `reference_configurations`.
+    ///
+    /// >>> joint = '<joint name="joint4" value="-1.2"/>'
+    /// >>> srdf = f'<robot name="arm7"><group_state name="bent" group="arm">{joint}</group_state></robot>'
+    /// >>> condyle.robots.arm7().reference_configurations_str(srdf)
+    /// {'bent': array([ 0. ,  0. ,  0. , -1.2,  0. ,  0. ,  0. ])}
+    #[pyo3(signature = (text, strict=false))]
+    fn reference_configurations_str<'py>(
+        &self,
+        py: Python<'py>,
+        text: &str,
+        strict: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        positions(py, self.inner.reference_configurations_str(text, strict))
+    }
+
     /// The tree of bodies as text: each joint with its kind and where its coordinates stand in q and v, and the body that it
     /// carries; frames: whether the names of other frames stand with the bodies.
     ///
@@ -560,6 +673,15 @@ impl Model {
         let make = py.import("condyle._condyle")?.getattr("_model_from_bytes")?;
         Ok((make, (PyBytes::new(py, &bytes),)))
     }
+}
+
+/// Named positions as Python sees them.
+fn positions(py: Python<'_>, read: Result<Vec<(String, Vec<f64>)>, condyle::Error>) -> PyResult<Bound<'_, PyDict>> {
+    let positions = PyDict::new(py);
+    for (name, q) in read.map_err(exception)? {
+        positions.set_item(name, q.give(py, None)?)?;
+    }
+    Ok(positions)
 }
 
 /// The beginning of a pickled model: the library's version, since the form may change from one to the next.

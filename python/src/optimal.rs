@@ -2,8 +2,10 @@
 
 mod actions;
 mod alone;
+mod cones;
 mod costs;
 mod evaluation;
+mod inverse;
 mod models;
 mod own;
 mod problem;
@@ -12,11 +14,13 @@ mod robot_action;
 mod solvers;
 mod sweep;
 
-pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics, InverseDynamics};
+pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics};
 pub(crate) use alone::{Alone, alone};
+pub(crate) use cones::{FrictionCone, WrenchCone};
 pub(crate) use costs::{Activation, Cost, Limit};
+pub(crate) use inverse::{ContactInverseDynamics, InverseDynamics};
 pub(crate) use own::{Action, ConstrainedAction, DifferentialAction, Lqr, Unicycle};
 pub(crate) use problem::{Problem, lock};
-pub(crate) use residuals::{FrictionCone, Residual, WrenchCone};
+pub(crate) use residuals::Residual;
 pub(crate) use solvers::{AugmentedLagrangian, Fddp};
 pub(crate) use sweep::Sweep;

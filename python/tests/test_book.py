@@ -1,8 +1,11 @@
 """The book in `docs`: its Python blocks run and print what the pages say, its links lead somewhere."""
 
 import importlib.util
+import os
+import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -11,16 +14,16 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-def load() -> ModuleType:
-    """`docs/run.py`, which is no package."""
-    spec = importlib.util.spec_from_file_location("run", ROOT / "docs" / "run.py")
+def load(name: str) -> ModuleType:
+    """A program of `docs`, which is no package."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-BOOK = load()
+BOOK = load("run")
 
 
 @pytest.mark.parametrize(
@@ -60,10 +63,24 @@ def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     BOOK.run("a.md")
 
 
+def test_formulas() -> None:
+    """Each formula is LaTeX that becomes MathML; code with dollars stays as it is."""
+    mathml = load("mathml")
+    assert "<math" in mathml.with_mathml("an $x_i$ b") and mathml.with_mathml("`$x$`") == "`$x$`"
+    for chapter in BOOK.chapters():
+        page = mathml.with_mathml((ROOT / "docs" / chapter).read_text(encoding="utf-8"))
+        formulas = re.findall(r"<math.*?</math>", page, re.DOTALL)
+        wrong = [formula for formula in formulas if re.search(r"\\|>&<", formula)]  # what was not understood
+        assert not wrong, (chapter, wrong)
+
+
 def test_mdbook(tmp_path: Path) -> None:
     """mdBook builds the book, where it is installed."""
     program = shutil.which("mdbook")
     if program is None:
         pytest.skip("mdbook is not installed")
-    subprocess.run([program, "build", "--dest-dir", tmp_path / "book", ROOT / "docs"], check=True)
-    assert (tmp_path / "book" / "rnea.html").is_file()
+    python = Path(sys.executable).parent  # which has what turns formulas into MathML
+    environment = {**os.environ, "PATH": f"{python}{os.pathsep}{os.environ['PATH']}"}
+    command = [program, "build", "--dest-dir", tmp_path / "book", ROOT / "docs"]
+    subprocess.run(command, check=True, env=environment)
+    assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")

@@ -4,7 +4,18 @@ import subprocess
 import sys
 
 # What some functions need, and some users have not; and what takes long.
-LATER = {"casadi", "tqdm", "scipy", "matplotlib", "pandas", "pinocchio", "crocoddyl", "mujoco", "example_robot_data"}
+LATER = {
+    "casadi",
+    "tqdm",
+    "scipy",
+    "matplotlib",
+    "viser",
+    "pandas",
+    "pinocchio",
+    "crocoddyl",
+    "mujoco",
+    "example_robot_data",
+}
 
 
 def test_nothing_is_imported_but_numpy() -> None:

@@ -246,4 +246,4 @@ def test_help_has_an_index_of_everything() -> None:
     named = set(re.findall(r"`(\w+)`", index))
     missing = {name for name in condyle.__all__ if not name.startswith("_")} - named
     assert not missing
-    assert {name for name in named if not hasattr(condyle, name)} <= {"casadi", "pinocchio"}
+    assert {name for name in named if not hasattr(condyle, name)} <= {"casadi", "crocoddyl", "pinocchio"}

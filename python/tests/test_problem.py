@@ -14,6 +14,7 @@ from condyle.optimal import (
     AugmentedLagrangian,
     ConstrainedAction,
     ContactDynamics,
+    ContactInverseDynamics,
     Cost,
     DifferentialAction,
     Fddp,
@@ -400,6 +401,11 @@ def test_a_limit_of_ones_own_holds() -> None:
 def test_quasi_static_of_every_kind() -> None:
     assert InverseDynamics(ARM, 0.1, []).quasi_static(X0).tolist() == [0.0] * 7
     assert ImpulseDynamics(QUADRUPED, contacts(), []).quasi_static(STANDING).shape == (0,)
+    stance = ContactInverseDynamics(QUADRUPED, contacts(), 0.02, [])
+    u = stance.quasi_static(STANDING)
+    still = Problem(STANDING, [stance], [0], end()).evaluate(np.tile(STANDING, (2, 1)), [u])
+    assert not u[:18].any() and u[18:].any() and still.costs[0] < 1e-15
+    np.testing.assert_allclose(still.efforts[0][:6], 0.0, atol=1e-9)
     robot = FreeDynamics(ARM, 0.1, [])
     data = condyle.Data(ARM)
 
@@ -420,6 +426,7 @@ KINDS: dict[str, Any] = {
     "end": lambda: FreeDynamics(ARM, None, []),
     "InverseDynamics": lambda: InverseDynamics(ARM, 0.1, [], lower=np.full(7, -3.0), controls="linear"),
     "ContactDynamics": lambda: ContactDynamics(QUADRUPED, contacts(), 0.02, costs(3)),
+    "ContactInverseDynamics": lambda: ContactInverseDynamics(QUADRUPED, contacts(), 0.02, [], lower=np.full(30, -9.0)),
     "ImpulseDynamics": lambda: ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), []),
     "Lqr": lambda: Lqr([[1.0]], B=[[2.0]], R=[[1.0]], lower=[-1.0]),
     "Lqr, end": lambda: Lqr([[1.0]]),
@@ -431,6 +438,8 @@ KINDS: dict[str, Any] = {
     "Cost": lambda: Cost("a", 2.0, Residual.frame_velocity(ARM, "tool"), Activation.smooth2(0.5)),
     "Cost of one's own": lambda: Cost("a", 2.0, Residual.own(12, power, power_diff)),
     "Cost with a Hessian of one's own": lambda: Cost("a", 2.0, Residual.own_cost(power, power_diff)),
+    "Residual of inverse dynamics": Residual.undriven_effort,
+    "Residual of a contact that may move": lambda: Residual.contact_acceleration("foot"),
     "Cost of a cone": lambda: Cost("a", 2.0, Residual.friction_cone("foot", FrictionCone(0.7))),
     "Limit": lambda: Limit("a", Residual.control([0.0]), lower=[-1.0]),
     "Limit, equality": lambda: Limit("a", Residual.control([0.0])),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle import _condyle, _types
+from condyle import _condyle, _inertia, _types
 from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, FrictionCone, Outcome, Problem, Residual, Solution
 from condyle.simulation import Simulation
 
@@ -62,7 +62,7 @@ OBJECTS = {
 
 def namespace() -> dict[str, Any]:
     """The names that the types in the stubs are made of."""
-    names: dict[str, Any] = {"np": np, "typing": typing} | vars(_types) | vars(_condyle)
+    names: dict[str, Any] = {"np": np, "typing": typing} | vars(_types) | vars(_inertia) | vars(_condyle)
     for node in STUB.body:
         if isinstance(node, ast.ImportFrom) and node.module in ("typing", "collections.abc", "numpy.typing"):
             exec(ast.unparse(node), names)

@@ -195,20 +195,27 @@ function makeJoints(data, plots, focus) {
       row.querySelector(".chip").style.borderTop = `3.5px ${dash.length ? "dashed" : "solid"} ${colour}`;
     });
   }
+  // What changes with the time is written where it is another than it was: most of a robot's joints rest.
   let at = -1;
+  const written = rows.map(() => plots.quantities.map(() => ({ text: null, share: null })));
   function show(k) {
     if (k === at) return;
     at = k;
     rows.forEach(({ cells }, j) => plots.quantities.forEach((quantity, i) => {
-      const joint = data.joints[j], value = plots.valueAt(quantity, k, j), share = shareOf(value, quantity.limits(joint));
-      const cell = cells[i], size = Math.abs(share ?? 0);
+      const joint = data.joints[j], value = plots.valueAt(quantity, k, j), size = Math.abs(shareOf(value, quantity.limits(joint)) ?? 0);
+      const cell = cells[i], last = written[j][i], share = Math.min(size, 1).toFixed(3);
       const digits = joint.unit === "m" && i < 2 ? 4 : Math.abs(value) >= 10 ? 2 : 3;
-      cell.firstChild.textContent = value == null ? "–" : value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
-      cell.title = `${quantity.unit(joint.unit)}${share == null ? "" : `, ${Math.round(100 * size)} % of the way to its limit`}`;
+      const text = value == null ? "–" : value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+      if (text !== last.text) cell.firstChild.textContent = last.text = text;
       cell.classList.toggle("over", size > 1 + 1e-6);
-      cell.lastChild.style.setProperty("--share", Math.min(size, 1));
+      if (share !== last.share) cell.lastChild.style.setProperty("--share", last.share = share);
     }));
   }
+  // The words under the pointer are made when it comes.
+  rows.forEach(({ cells }, j) => cells.forEach((cell, i) => cell.addEventListener("pointerenter", () => {
+    const quantity = plots.quantities[i], joint = data.joints[j], share = shareOf(plots.valueAt(quantity, at, j), quantity.limits(joint));
+    cell.title = `${quantity.unit(joint.unit)}${share == null ? "" : `, ${Math.round(100 * Math.abs(share))} % of the way to its limit`}`;
+  })));
   // With the units, so that no number stands without one.
   const units = [...new Set(data.joints.map((joint) => joint.unit))];
   plots.quantities.forEach((quantity, i) => {
@@ -257,6 +264,8 @@ function makeGait({ times, contacts }) {
 /** The clock: playing, holding still under the pointer, stepping. Every picture follows `show`. */
 function makePlayer(times, show) {
   const start = times[0], end = times.at(-1), scrub = $("scrub"), play = $("play");
+  const seconds = element("b"), knot = element("span");
+  $("clock").replaceChildren(seconds, ` / ${end.toFixed(2)} s`, knot);
   let t = start, playing = false, held = false, before = null;
   Object.assign(scrub, { min: start, max: end, step: times.length > 1 ? (end - start) / (times.length - 1) : 1 });
 
@@ -265,7 +274,8 @@ function makePlayer(times, show) {
     const { k } = knotAt(times, t);
     scrub.value = t;
     scrub.setAttribute("aria-valuetext", `${t.toFixed(2)} seconds, knot ${k} of ${times.length - 1}`);
-    $("clock").replaceChildren(element("b", {}, t.toFixed(2)), ` / ${end.toFixed(2)} s`, element("span", {}, ` · knot ${k}`));
+    seconds.textContent = t.toFixed(2);
+    knot.textContent = ` · knot ${k}`;
     show(t);
     if (!playing) remember();
   }

@@ -225,8 +225,9 @@ function makePlots(data, on) {
   function show(t) {
     now = t;
     for (const u of plots) {
-      const left = u.valToPos(t, "x");
-      u.setCursor({ left: left < 0 || left > u.over.clientWidth + 0.5 ? -10 : left, top: u.over.clientHeight / 2 }, false);
+      // its own sizes: to ask the document for them would lay it out, at every frame
+      const left = u.valToPos(t, "x"), width = u.bbox.width / uPlot.pxRatio, height = u.bbox.height / uPlot.pxRatio;
+      u.setCursor({ left: left < 0 || left > width + 0.5 ? -10 : left, top: height / 2 }, false);
     }
   }
 

@@ -31,6 +31,12 @@ pub(crate) enum Error {
     /// A line of a task.
     #[error("{file}:{line}: {what}")]
     Task { file: String, line: usize, what: String },
+    /// A command of a feature with which the program was not built.
+    #[cfg(not(feature = "generate"))]
+    #[error(
+        "{command}: this program was built without the feature `{command}`: cargo install condyle-cli --features {command}"
+    )]
+    Feature { command: &'static str },
     /// A robot without joints.
     #[error("the robot has no joint that moves")]
     Rigid,

@@ -7,6 +7,8 @@ mod check;
 mod error;
 mod findings;
 mod gait;
+#[cfg(feature = "generate")]
+mod generate;
 mod inspect;
 mod limits;
 mod lines;
@@ -44,6 +46,15 @@ enum Command {
     Budget(budget::Arguments),
     Check(check::Arguments),
     Plan(Box<plan::Arguments>),
+    #[cfg(feature = "generate")]
+    Generate(generate::Arguments),
+    /// Write a robot's dynamics as code: of programs that were built with the feature `generate`
+    #[cfg(not(feature = "generate"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Generate {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
     /// Write a shell's completions to standard output
     #[command(after_help = "Example:\n  condyle completions bash > ~/.local/share/bash-completion/completions/condyle")]
     Completions {
@@ -62,6 +73,10 @@ fn main() -> ExitCode {
         Command::Budget(arguments) => budget::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        #[cfg(feature = "generate")]
+        Command::Generate(arguments) => generate::run(&arguments),
+        #[cfg(not(feature = "generate"))]
+        Command::Generate { .. } => Err(error::Error::Feature { command: "generate" }),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "condyle", &mut script);

@@ -141,20 +141,35 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
 
 /// An error for a name that is neither a file's nor that of a robot that comes along; with what it could have meant.
 fn unknown(name: &str) -> Error {
+    let kinds = ["urdf", "xml", "mjcf", "sdf"];
+    if name.contains(['.', '/', '\\']) {
+        return no_such_file(name, &kinds);
+    }
+    let files = files_beside(name, &kinds);
+    Error::Robot {
+        name: name.to_owned(),
+        nearest: nearest(name, EMBEDDED.into_iter().chain(files.iter().map(|x| &**x))),
+    }
+}
+
+/// An error for a file that is not there, with the one of such kinds (extensions) that it could have been.
+pub(crate) fn no_such_file(name: &str, kinds: &[&str]) -> Error {
+    let files = files_beside(name, kinds);
+    let nearest = nearest(name, files.iter().map(|file| &**file));
+    Error::File { file: name.to_owned(), what: format!("No such file{nearest}") }
+}
+
+/// Files of some kinds (extensions) in the folder in which a file would be.
+fn files_beside(name: &str, kinds: &[&str]) -> Vec<String> {
     let folder = Path::new(name).parent().map_or("", |parent| parent.to_str().unwrap_or_default());
     let look_in = if folder.is_empty() { "." } else { folder };
     let files = std::fs::read_dir(look_in).into_iter().flatten().flatten().filter_map(|entry| {
         let file = entry.file_name().to_str()?.to_owned();
         let kind = Path::new(&file).extension()?.to_str()?.to_lowercase();
         let path = Path::new(folder).join(&file).to_str()?.to_owned();
-        matches!(&*kind, "urdf" | "xml" | "mjcf" | "sdf").then_some(path)
+        kinds.contains(&&*kind).then_some(path)
     });
-    let files: Vec<String> = files.take(1000).collect();
-    let files = files.iter().map(|file| &**file);
-    if name.contains(['.', '/', '\\']) {
-        return Error::File { file: name.to_owned(), what: format!("No such file{}", nearest(name, files)) };
-    }
-    Error::Robot { name: name.to_owned(), nearest: nearest(name, EMBEDDED.into_iter().chain(files)) }
+    files.take(1000).collect()
 }
 
 /// The most that is read of a file that is looked at beside the library's reader, which has the same limit (bytes).

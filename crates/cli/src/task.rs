@@ -3,6 +3,7 @@
 use crate::error::{Error, nearest};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::Path;
 use toml::Spanned;
 
@@ -127,7 +128,10 @@ const LARGEST: u64 = 1 << 20;
 pub(crate) fn read(path: &Path) -> Result<Task, Error> {
     let file = path.display().to_string();
     let wrong = |what: String| Error::File { file: file.clone(), what };
-    let about = std::fs::metadata(path).map_err(|error| wrong(error.to_string()))?;
+    let about = std::fs::metadata(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => crate::robot::no_such_file(&file, &["toml"]),
+        _ => wrong(error.to_string()),
+    })?;
     if !about.is_file() || about.len() > LARGEST {
         return Err(wrong(format!("is no regular file of at most {LARGEST} bytes")));
     }

@@ -237,6 +237,46 @@ fn what_is_wrong_is_named_in_one_line() {
     }
 }
 
+/// A program without `generate` says which one has it, whatever it is asked for.
+#[cfg(not(feature = "generate"))]
+#[test]
+fn generate_is_a_feature() {
+    for flags in [&["generate", "--help"][..], &["generate", "arm7", "--functions", "rnea", "--out", "."]] {
+        let output = condyle(flags);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && error.contains("--features generate"), "{error}");
+        assert!(error.lines().count() == 1 && output.stdout.is_empty(), "{error}");
+    }
+}
+
+/// What `generate` writes is what the library makes; what is wrong is named.
+#[cfg(feature = "generate")]
+#[test]
+fn generate_writes_code() {
+    let out = folder("generate");
+    let out = out.to_str().unwrap();
+    let flags =
+        ["generate", "quadruped", "--functions", "rnea,constrained_dynamics", "--contacts", "LF_foot", "--out", out];
+    let text = said(&flags, 0);
+    let paths: Vec<&str> = text.lines().collect();
+    assert_eq!(paths.len(), 2);
+    let header = std::fs::read_to_string(paths[0]).unwrap();
+    assert!(header.contains("void quadruped_rnea(const double *restrict q, ") && header.contains("lambda: forces"));
+    let rust =
+        said(&["generate", "arm7", "--functions", "aba", "--language", "rust", "--inputs", "gravity", "--out", out], 0);
+    let rust = std::fs::read_to_string(rust.trim()).unwrap();
+    assert!(rust.contains("pub fn aba(q: &[f64; 7], gravity_vector: &[f64; 3], v: &[f64; 7], "), "{rust}");
+    for (flags, words) in [
+        (["--functions", "abba"], "--functions: `abba` is none of"),
+        (["--functions", "frames"], "--functions: frames: needs frames"),
+        (["--functions", "aba,rnea,crba_"], "nearest is `crba`"),
+    ] {
+        let output = condyle(&[&["generate", "arm7", "--out", out], &flags[..]].concat());
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && error.contains(words) && error.lines().count() == 1, "{error}");
+    }
+}
+
 #[test]
 fn help_and_completions() {
     for command in ["inspect", "budget", "check", "plan"] {

@@ -82,6 +82,8 @@ fn what_is_wrong_is_named() {
     };
     let urdf = include_str!("../../model/models/arm7.urdf");
     let malformed = write("malformed.urdf", &urdf.replace("</robot>", ""));
+    write("trot.toml", &example("trot"));
+    let misspelt = folder.join("trott.toml").to_str().unwrap().to_owned();
     let unknown = write("unknown.urdf", &urdf.replacen("<child link=\"link1\"/>", "<child link=\"lnik1\"/>", 1));
     for (arguments, words) in [
         (&["--robot", "nowhere.urdf", "--target", "0,0,1"][..], "nowhere.urdf: No such file"),
@@ -98,6 +100,7 @@ fn what_is_wrong_is_named() {
         (&["--record", "x.cvs"], "--record: `x.cvs` does not end in .csv, .npz or .json; nearest is `csv`"),
         (&["--example", "trto"], "--example"),
         (&["nowhere.toml"], "nowhere.toml: No such file"),
+        (&[&misspelt], "trott.toml: No such file; nearest is `"),
     ] {
         let error = complaint("wrong_option", arguments);
         assert!(error.contains(words), "{arguments:?}: `{words}` is missing in\n{error}");

@@ -23,6 +23,7 @@ use crate::passes::regressor;
 use crate::passes::rnea;
 use crate::passes::statics;
 use crate::workspace::{Long, Short, Size};
+use alloc::boxed::Box;
 use condyle_model::Model;
 use condyle_spatial::Scalar;
 use condyle_spatial::gate::{is, renamed};

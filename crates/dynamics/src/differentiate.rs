@@ -10,6 +10,8 @@
 
 use crate::data::Data;
 use crate::workspace::{Long, Short};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_model::integrate;
@@ -88,7 +90,7 @@ pub trait StateFunction {
 }
 
 /// Jacobians of functions of one robot's state, exact, as by [`jacobian`], but in one evaluation of f for each eight
-/// (AVX-512) or four (AVX2, NEON) directions, and without allocating beyond what f does.
+/// (AVX-512) or four (AVX2, NEON, SIMD128) directions, and without allocating beyond what f does.
 ///
 /// Results differ in their last digits from level to level ([`level`](mod@crate::level)).
 ///
@@ -134,7 +136,7 @@ impl LaneJacobian {
         assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
         let width = match level() {
             Level::Avx512 => Width::Long(Box::new(Directions::new(model, n, results))),
-            Level::Avx2 | Level::Neon => Width::Short(Box::new(Directions::new(model, n, results))),
+            Level::Simd128 | Level::Neon | Level::Avx2 => Width::Short(Box::new(Directions::new(model, n, results))),
             Level::Baseline => Width::One(Box::new(Directions::new(model, n, results))),
         };
         Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq() + model.nv()) }

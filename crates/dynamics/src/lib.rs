@@ -13,14 +13,25 @@
 //!
 //! Every function is generic over the [`Scalar`], allocates nothing, fills all that it returns, and is right whatever
 //! ran before. `CONVENTIONS` below says in which frames and order numbers are.
+//!
+//! # Features
+//! All are on by default. `loaders`: files of robots, and `robots`. `serde`: models and constraints to and from its formats.
+//! `threads`: those of rayon. `std`: the standard library, which the first and the last need, and derivatives of functions of
+//! your own (`jacobian`, `LaneJacobian`, …). Without it the crate needs `alloc` and, for the functions of floats, the feature
+//! `libm`: so it runs where there is no operating system (`examples/embedded` in the repository).
 #![doc = include_str!("../CONVENTIONS.md")]
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
+
+#[cfg_attr(not(any(feature = "std", test)), macro_use)]
+extern crate alloc;
 
 mod batch;
 mod calls;
 mod constraints;
 mod data;
 mod derivatives;
+#[cfg(feature = "std")]
 mod differentiate;
 mod divide_conquer;
 mod lanes;
@@ -47,6 +58,12 @@ pub use calls::constrained_dynamics::{
     Constrained, ConstrainedDerivatives, ConstrainedEquations, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_dynamics_equations,
 };
+pub use calls::constrained_inverse::{
+    ConstrainedInverse, ConstrainedInverseDerivatives, constrained_inverse_dynamics,
+    constrained_inverse_dynamics_derivatives,
+};
+#[doc(hidden)]
+pub use calls::constrained_inverse::{EquationsAt, constrained_equations_at};
 pub use calls::derivatives::{
     AbaDerivatives, CoriolisDerivatives, RneaDerivatives, aba_derivatives, centroidal_derivatives,
     coriolis_derivatives, energy_derivatives, rnea_derivatives, static_torque_derivative,
@@ -58,6 +75,8 @@ pub use calls::inverse_dynamics::{coriolis_matrix, gravity, nonlinear_effects, r
 pub use calls::kinematics::{
     body_jacobian, forward_accelerations, forward_kinematics, forward_velocities, frame_jacobian,
 };
+#[doc(hidden)]
+pub use calls::kinematics::{body_jacobian_strided, frame_jacobian_strided};
 pub use calls::parameter_derivatives::Input;
 pub use calls::regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
 pub use calls::second_derivatives::{
@@ -68,10 +87,11 @@ pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
 pub use condyle_model::integrate_jacobian_groups;
 pub use condyle_model::{
     Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, IntegrateArgument, Joint, JointOptions, Limits, Mimic,
-    MjcfOptions, Model, ModelBuilder, SdfOptions, UrdfOptions, WORLD, Warning, difference, difference_jacobian,
-    distance, inertial_parameters, integrate, integrate_jacobian, interpolate, neutral, normalize,
-    random_configuration, robots, transport,
+    Model, ModelBuilder, WORLD, Warning, difference, difference_jacobian, distance, inertial_parameters, integrate,
+    integrate_jacobian, interpolate, neutral, normalize, random_configuration, transport,
 };
+#[cfg(feature = "loaders")]
+pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};
 pub use condyle_spatial::{
     Act, Constant, Cross, Force, Inertia, Mat3, Motion, Quaternion, Scalar, Se3, Sym3, Vec3, level, lie,
 };
@@ -80,6 +100,7 @@ pub use constraints::constraint_set::ConstraintSet;
 pub use constraints::plan::Proximal;
 pub use data::Data;
 pub use derivatives::centroidal_derivatives::CentroidalDerivatives;
+#[cfg(feature = "std")]
 pub use differentiate::{LaneJacobian, StateFunction, gradient, hessian, jacobian};
 pub use divide_conquer::DivideConquer;
 pub use divide_conquer::assembly::AssemblySize;

@@ -2,6 +2,7 @@
 //!
 //! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer.
 
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_spatial::Scalar;
 use condyle_spatial::gate::{self, Witness};
@@ -15,7 +16,7 @@ pub(crate) struct Gate;
 #[allow(unsafe_code)]
 unsafe impl Witness for Gate {}
 
-/// Four numbers at once, with AVX2 or NEON.
+/// Four numbers at once, with AVX2, NEON or SIMD128.
 pub(crate) type Short = gate::Short<Gate>;
 /// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
 pub(crate) type Long = gate::Long<Gate>;
@@ -48,10 +49,12 @@ impl Size {
     }
 }
 
-/// An array of n equal entries. It is not inlined: a workspace has dozens of them.
+/// An array of n equal entries. It is not inlined, and makes the entry itself, as a workspace has dozens of arrays; entries are
+/// copied whole, where `vec!` would clone them number by number.
 #[inline(never)]
-pub(crate) fn filled<T: Copy>(entry: T, n: usize) -> Vec<T> {
-    vec![entry; n]
+pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Vec<T> {
+    let entry = entry();
+    (0..n).map(|_| entry).collect()
 }
 
 /// A matrix of zeros.

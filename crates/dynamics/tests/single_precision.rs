@@ -2,6 +2,7 @@
 #![allow(non_snake_case)]
 
 mod common;
+#[allow(dead_code)] // the tests of `f64` compare bits with single calls
 #[path = "vectors/table.rs"]
 mod table;
 

@@ -41,7 +41,7 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
                 if !(pivot > 0.0 && pivot.is_finite()) {
                     return Err((j, pivot));
                 }
-                self.inverse[j] = pivot.sqrt().recip();
+                self.inverse[j] = condyle_spatial::Scalar::sqrt(pivot).recip();
                 for s in 0..S {
                     c[j][s] = c[j][s].mul(V::splat(self.inverse[j]));
                     c[j][s].store(&mut self.L[j][s * V::N..]);

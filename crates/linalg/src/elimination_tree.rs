@@ -4,8 +4,9 @@
 //! branches are coupled; the rows are then eliminated in the order of least coupling, and the factor follows the elimination
 //! tree of that order (Liu, *The role of elimination trees in sparse factorization*, 1990).
 
+use alloc::collections::BTreeSet;
+use alloc::vec::Vec;
 use core::iter::successors;
-use std::collections::BTreeSet;
 
 /// A tree of columns, and the rows of a symmetric matrix for which they stand: the matrix may differ from zero where one of
 /// two columns is on the other's way to the root.

@@ -6,7 +6,14 @@
 //!
 //! Each dense kernel is compiled here, once for each [level](condyle_spatial::level) of vector instructions, and a call runs
 //! the one for the level in use. Work that has vector loops of its own is compiled for the level by [`at_level`].
+//!
+//! # Features
+//! `threads` and `std` are on by default; without `std` the crate needs `alloc` and the feature `libm`.
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
+
+#[cfg_attr(not(any(feature = "std", test)), macro_use)]
+extern crate alloc;
 
 #[doc(hidden)]
 pub mod axpy;

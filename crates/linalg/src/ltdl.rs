@@ -9,6 +9,7 @@
 use crate::axpy::{axpy, dot};
 use crate::check;
 use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
+use alloc::vec::Vec;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 

@@ -5,6 +5,7 @@ use crate::compiled::compiled;
 use crate::registers::Vector;
 use crate::tile::{SLACK, add_outer, next_strip};
 use crate::vectors::copy_scaled;
+use alloc::vec::Vec;
 
 /// Rows of numbers, one after the other, and for each row which of its blocks are not zero (see [`mask`]).
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -34,25 +35,28 @@ impl SparseRows {
 /// The blocks of a row that are not zero: bit k stands for the columns from k times [`block`] on.
 #[inline(always)]
 pub fn mask(row: &[f64]) -> u64 {
-    let mut mask = 0;
-    for (k, block) in row.chunks(block(row.len()).max(1)).enumerate() {
-        let (eights, rest) = block.as_chunks::<8>();
-        let mut bits = [0; 8];
-        for x in eights {
-            for i in 0..8 {
-                bits[i] |= x[i].to_bits();
-            }
+    let (eights, rest) = row.as_chunks::<8>();
+    let (wide, mut last, mut mask) = (block(row.len()) / 8, [0.0; 8], 0);
+    let (mut bit, mut left) = (1, wide);
+    for x in eights {
+        mask |= if any(x) { bit } else { 0 };
+        left -= 1;
+        if left == 0 {
+            (bit, left) = (bit << 1, wide);
         }
-        for (i, x) in rest.iter().enumerate() {
-            bits[i] |= x.to_bits();
-        }
-        let mut all = 0;
-        for i in 0..8 {
-            all |= bits[i];
-        }
-        mask |= u64::from(all << 1 != 0) << k; // all but the sign
     }
-    mask
+    last[..rest.len()].copy_from_slice(rest);
+    if any(&last) { mask | bit } else { mask }
+}
+
+/// Whether one of eight numbers is not zero, in registers; a NaN is not.
+#[inline(always)]
+fn any(x: &[f64; 8]) -> bool {
+    let mut any = false;
+    for i in 0..8 {
+        any |= x[i] != 0.0;
+    }
+    any
 }
 
 /// y −= Σ aᵢ xᵢ on the blocks of a [`mask`], in whole registers.
@@ -68,8 +72,10 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
         factors[k] = V::splat(-a[k]);
     }
     while mask != 0 {
-        let mut i = mask.trailing_zeros() as usize * wide;
-        let end = n.min(i + wide);
+        let first = mask.trailing_zeros();
+        let after = first + (mask >> first).trailing_ones(); // blocks side by side are one run
+        let mut i = first as usize * wide;
+        let end = n.min(after as usize * wide);
         while i + V::N <= end {
             // SAFETY: end ≤ n, and all rows have n numbers.
             unsafe {
@@ -82,7 +88,7 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
             }
             i += V::N;
         }
-        mask &= mask - 1;
+        mask &= u64::MAX.checked_shl(after).unwrap_or(0);
     }
 }
 
@@ -177,7 +183,7 @@ impl OuterProducts {
         let (k, size) = (self.count, self.size);
         let gradient = 1 << (size / block(x.len()));
         if dd > 0.0 {
-            let root = dd.sqrt();
+            let root = condyle_spatial::Scalar::sqrt(dd);
             self.push::<V>(x, root)[size] = d / root;
             self.multiply([k, k], [mask | gradient, mask]);
         } else if d != 0.0 || dd != 0.0 {

@@ -8,7 +8,7 @@ use core::marker::PhantomData;
 
 /// The registers of [`Level::Avx512`]; on other processors the same as `Short`.
 pub(crate) type Long = <f64 as Real>::Long<Gate>;
-/// The registers of [`Level::Avx2`] or [`Level::Neon`].
+/// The registers of [`Level::Avx2`], [`Level::Neon`] or [`Level::Simd128`].
 pub(crate) type Short = <f64 as Real>::Short<Gate>;
 
 /// The promise of this crate, by which it names registers.

@@ -1,5 +1,7 @@
 //! Entries of matrices with the zeros of a tree.
 
+use alloc::vec::Vec;
+
 /// The rows in which a column of such a matrix may differ from zero.
 #[derive(Clone, Debug)]
 pub struct NonzeroRows {

@@ -6,6 +6,6 @@ mod alone;
 mod shared;
 
 #[cfg(not(feature = "threads"))]
-pub use alone::{enter, join, threads};
+pub use alone::{join, threads};
 #[cfg(feature = "threads")]
-pub use shared::{enter, join, threads};
+pub use shared::{join, threads};

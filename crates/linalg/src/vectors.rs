@@ -93,18 +93,19 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// ‖x‖∞; NaN if an entry is.
+/// ‖x‖∞; NaN if an entry is. As integers, absolute values have the same order, and those of NaN are the largest.
 #[inline]
 pub fn max_abs(x: &[f64]) -> f64 {
-    let larger = |most: f64, x: f64| if x.abs() > most || x.is_nan() { x.abs() } else { most };
+    let abs = |x: f64| x.abs().to_bits() as i64;
     let (eights, rest) = x.as_chunks::<8>();
-    let mut most = [0.0; 8];
+    let mut most = [0; 8];
     for x in eights {
         for i in 0..8 {
-            most[i] = larger(most[i], x[i]);
+            most[i] = abs(x[i]).max(most[i]);
         }
     }
-    most.iter().chain(rest).fold(0.0, |most, x| larger(most, *x))
+    let rest = rest.iter().fold(0, |most, x| abs(*x).max(most));
+    f64::from_bits(most.into_iter().fold(rest, i64::max) as u64)
 }
 
 /// to = x, without the function call that copying a few numbers would be.

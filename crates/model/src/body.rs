@@ -1,11 +1,13 @@
 //! What a model is made of: bodies, frames, limits.
 
 use crate::joint::{Joint, Mimic};
+use alloc::string::String;
+use alloc::vec::Vec;
 use condyle_spatial::{Inertia, Se3};
-use serde::{Deserialize, Serialize};
 
 /// A moving body (a link, with all that fixed joints merge into it) and the joint that carries it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Body {
     /// The joint's name: how Pinocchio names the pair.
     pub joint_name: String,
@@ -28,7 +30,8 @@ pub struct Body {
 }
 
 /// A frame fixed to a body.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
     /// The name of the link or joint, or the user's.
     pub name: String,
@@ -41,7 +44,8 @@ pub struct Frame {
 }
 
 /// The origin of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FrameKind {
     /// A link of the URDF.
     Link,
@@ -52,18 +56,19 @@ pub enum FrameKind {
 }
 
 /// Limits of position, velocity and effort; infinite where there are none.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
     /// Least position, nq numbers (rad, m).
-    #[serde(with = "condyle_spatial::finite::lower")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
     /// Greatest position, nq numbers (rad, m).
-    #[serde(with = "condyle_spatial::finite::upper")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
     /// Greatest speed, nv numbers (rad/s, m/s).
-    #[serde(with = "condyle_spatial::finite::upper")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub velocity: Vec<f64>,
     /// Greatest effort, nv numbers (N m, N).
-    #[serde(with = "condyle_spatial::finite::upper")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub effort: Vec<f64>,
 }

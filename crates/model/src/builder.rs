@@ -7,8 +7,11 @@ use crate::limbs::Plan;
 use crate::model::Model;
 use crate::tree::Tree;
 use crate::validate::{CoordinateNumbers, check_body, check_frame};
+use alloc::borrow::ToOwned;
+use alloc::collections::BTreeSet;
+use alloc::string::String;
+use alloc::vec::Vec;
 use condyle_spatial::{Act, Inertia, Se3, Vec3};
-use std::collections::HashSet;
 
 /// The name of a body of a builder. [`WORLD`] is the one that is always there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,11 +162,13 @@ impl ModelBuilder {
         self.frame_of_kind(name, FrameKind::User, body, placement);
     }
 
-    pub(crate) fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
+    /// Adds a frame that stands for a link, for a joint, or for itself: two of different kinds may have one name.
+    pub fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
         self.frames.push(Frame { name: name.to_owned(), kind, body: body.0, placement });
     }
 
     /// Scales all masses and inertias.
+    #[cfg(feature = "loaders")]
     pub(crate) fn scale_inertias(&mut self, by: f64) {
         for draft in &mut self.drafts {
             draft.body.inertia = draft.body.inertia.scale(by);
@@ -282,7 +287,7 @@ impl ModelBuilder {
 
     /// Checks names, bodies, joints and frames, and makes axes unit vectors.
     fn check(&mut self) -> Result<(), Error> {
-        let (mut bodies, mut joints, mut frames) = (HashSet::new(), HashSet::new(), HashSet::new());
+        let (mut bodies, mut joints, mut frames) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
         let mimics: Vec<bool> = self.drafts.iter().map(|d| d.mimic.is_some()).collect();
         let kinds: Vec<Joint> = self.drafts.iter().map(|d| d.body.joint).collect();
         for Draft { body, options, mimic, .. } in &mut self.drafts {

@@ -1,11 +1,12 @@
-//! Models from models: chains of joints, appended robots, locked joints.
+//! Models from models: chains of joints, appended robots, locked joints, joints that follow others.
 
 use crate::body::FrameKind;
 use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 use crate::error::Error;
-use crate::joint::Joint;
+use crate::joint::{Joint, Mimic};
 use crate::layout::Single;
 use crate::model::Model;
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_spatial::{Inertia, Se3, Vec3};
 
@@ -68,7 +69,8 @@ impl ModelBuilder {
         self.append_locked(parent, placement, model, prefix, &[], &[]);
     }
 
-    /// Adds a whole robot, as `append` does, with some bodies fixed where they are at q.
+    /// Adds a whole robot, as `append` does, with some bodies fixed where they are at q. Returns where each body went: on which
+    /// body of this builder, and at which placement there.
     fn append_locked(
         &mut self,
         parent: BodyId,
@@ -77,8 +79,7 @@ impl ModelBuilder {
         prefix: &str,
         locked: &[usize],
         q: &[f64],
-    ) {
-        // where each body went: on which body of this builder, and at which placement there
+    ) -> Vec<(BodyId, Se3<f64>)> {
         let mut place = vec![(parent, placement)];
         self.merge(parent, placement, model.bodies[0].inertia);
         let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero()); // bXz
@@ -128,6 +129,7 @@ impl ModelBuilder {
                 self.frame_of_kind(&name, FrameKind::Joint, on, pXb);
             }
         }
+        place
     }
 }
 
@@ -166,5 +168,67 @@ impl Model {
         builder.gravity(self.gravity);
         builder.append_locked(WORLD, Se3::identity(), self, "", &locked, q);
         builder.build()
+    }
+
+    /// This robot with another one on it, whose world is at `placement` in the frame of one of its bodies (0 is the world). All
+    /// names of the other one get `prefix` before them; gravity and name are this one's.
+    ///
+    /// The bodies of the other robot are numbered behind all that the body which carries them has carried before, as
+    /// Pinocchio's `appendModel` does.
+    ///
+    /// ```
+    /// use condyle_model::{Se3, robots};
+    /// let (quadruped, arm) = (robots::quadruped(), robots::arm7());
+    /// let knee = &quadruped.frames()[quadruped.frame("LF_shank")?];
+    /// let both = quadruped.append(knee.body, knee.placement, &arm, "arm_")?;
+    /// assert_eq!((both.nv(), both.joint("arm_joint1")?), (18 + 7, quadruped.joint("LF_KFE")? + 1));
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`ModelBuilder::build`]: two bodies, joints or frames of one name.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    pub fn append(&self, body: usize, placement: Se3<f64>, other: &Self, prefix: &str) -> Result<Self, Error> {
+        let bodies = self.bodies.len();
+        assert!(body < bodies, "body: expected a number below {bodies}, found {body}");
+        let (mut builder, place) = self.to_builder();
+        builder.append(place[body].0, placement, other, prefix);
+        builder.build()
+    }
+
+    /// The same robot with one more joint that follows another one, in place of a coordinate of its own; both are named by
+    /// their bodies. Its limits are those of the one that it follows.
+    ///
+    /// ```
+    /// use condyle_model::{Mimic, robots};
+    /// let arm = robots::arm7();
+    /// let coupled = arm.with_mimic(arm.joint("joint4")?, arm.joint("joint2")?, Mimic { ratio: -2.0, offset: 0.1 })?;
+    /// assert_eq!((coupled.nv(), coupled.bodies().len()), (6, 8));
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`ModelBuilder::build`]: [`Error::Joint`] if the joints are not of one degree of freedom, the leader follows
+    /// another joint itself, or another one follows the follower.
+    ///
+    /// # Panics
+    /// If a body does not exist or is the world.
+    pub fn with_mimic(&self, follower: usize, leader: usize, mimic: Mimic) -> Result<Self, Error> {
+        for (name, i) in [("follower", follower), ("leader", leader)] {
+            assert!((1..self.bodies.len()).contains(&i), "{name}: there is no joint {i}");
+        }
+        let (mut builder, place) = self.to_builder();
+        builder.mimic(place[follower].0, place[leader].0, mimic);
+        builder.build()
+    }
+
+    /// A builder of this robot, and where each of its bodies is there.
+    fn to_builder(&self) -> (ModelBuilder, Vec<(BodyId, Se3<f64>)>) {
+        let mut builder = ModelBuilder::new(&self.name);
+        builder.gravity(self.gravity);
+        let place = builder.append_locked(WORLD, Se3::identity(), self, "", &[], &[]);
+        (builder, place)
     }
 }

@@ -3,6 +3,7 @@
 use crate::joint::GroupJacobian;
 use crate::model::Model;
 use crate::tree::Space;
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;

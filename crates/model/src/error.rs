@@ -1,6 +1,8 @@
 //! Errors in a robot's description, and warnings about it.
 
-use serde::{Deserialize, Serialize};
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use alloc::vec::Vec;
 
 /// An error in a robot's description, or in a name that was looked up in it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -147,7 +149,8 @@ pub enum Error {
 }
 
 /// Something odd about a model. Loaders collect warnings, or refuse the model when they are strict.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Warning {
     /// A body that moves has neither mass nor inertia.
@@ -199,37 +202,8 @@ fn where_looked(looked: &[String]) -> String {
     format!("looked for {}", looked.join(", "))
 }
 
-/// How much of a name is compared (characters), and the number of pairs of characters that are compared in all: the
-/// distance takes the product of the lengths.
-const COMPARED: [usize; 2] = [128, 1 << 22];
-
-/// The most similar of some names (optimal string alignment distance), as far as so many can be compared; empty if even that
-/// one differs in more than half of its characters.
-pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
-    let [length, mut left] = COMPARED;
-    let begin = |name: &str| name.chars().take(length).collect::<String>();
-    let name = begin(name);
-    let enough = |other: &&str| {
-        let pairs = name.len() * other.len().min(4 * length);
-        let enough = pairs <= left;
-        left = left.saturating_sub(pairs);
-        enough
-    };
-    let measured = names.take_while(enough).map(|other| (strsim::osa_distance(&begin(other), &name), other));
-    match measured.min_by_key(|(distance, _)| *distance) {
-        Some((distance, found)) if 2 * distance <= begin(found).chars().count().max(name.chars().count()) => {
-            found.to_owned()
-        }
-        _ => String::new(),
-    }
-}
-
-/// The end of a message about a name that is not there: the nearest one, if there is one.
-pub(crate) fn near(nearest: &str) -> String {
-    near_or(nearest, "")
-}
-
-fn near_or(nearest: &str, otherwise: &str) -> String {
+/// The end of a message about a name that is not there: the nearest one, or what is said if there is none.
+pub(crate) fn near_or(nearest: &str, otherwise: &str) -> String {
     if nearest.is_empty() { otherwise.to_owned() } else { format!("; nearest is `{nearest}`") }
 }
 

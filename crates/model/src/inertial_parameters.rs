@@ -27,7 +27,7 @@
 //!
 //! so m = e²ᵅ and t is the centre of mass.
 
-use condyle_spatial::elementary::exp;
+use condyle_spatial::elementary::{exp, ln};
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use nalgebra::{SMatrix, SVector};
 
@@ -161,9 +161,9 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
 /// [`NotPhysical`]: what [`check`] refuses has no logarithm.
 pub fn log_cholesky(I: Inertia<f64>) -> Result<[f64; 10], NotPhysical> {
     let Factor { scale, diagonal, above, t } = factor(I)?;
-    let d = diagonal.to_array().map(|x| (x / scale).ln());
+    let d = diagonal.to_array().map(|x| ln(x / scale));
     let s = above.scale(1.0 / scale);
-    Ok([scale.ln(), d[0], d[1], d[2], s.x, s.y, s.z, t.x, t.y, t.z])
+    Ok([ln(scale), d[0], d[1], d[2], s.x, s.y, s.z, t.x, t.y, t.z])
 }
 
 /// U / eᵅ row by row, and e²ᵅ.

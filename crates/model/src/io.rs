@@ -1,15 +1,25 @@
-//! Files of robots: URDF, MJCF, SDF, and those of serde.
+//! Files of robots: URDF, MJCF, SDF, SRDF, and those of serde.
 
+#[cfg(feature = "serde")]
 mod description;
+#[cfg(feature = "loaders")]
 pub(crate) mod mjcf;
+#[cfg(feature = "loaders")]
 mod packages;
+#[cfg(feature = "loaders")]
 pub(crate) mod sdf;
+#[cfg(feature = "loaders")]
+mod srdf;
+#[cfg(feature = "loaders")]
 pub(crate) mod urdf;
+#[cfg(feature = "loaders")]
 mod xml;
 
+#[cfg(feature = "loaders")]
 use condyle_spatial::{Mat3, Vec3};
 
 /// R = Rz(yaw) Ry(pitch) Rx(roll), as URDF and SDF have it (rad).
+#[cfg(feature = "loaders")]
 fn from_rpy(rpy: [f64; 3]) -> Mat3<f64> {
     let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(f64::sin_cos);
     Mat3 {

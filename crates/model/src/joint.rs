@@ -9,14 +9,16 @@ mod group;
 pub mod kinematics;
 mod motion;
 
+use alloc::borrow::ToOwned;
+use alloc::string::String;
 use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 pub use group::GroupJacobian;
 pub use motion::{ClassicalMotion, JointMotion};
-use serde::{Deserialize, Serialize};
 
 /// The kind of a joint, with what it needs to know.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Joint {
     /// One angle about an axis: q = \[θ\], v = \[θ̇\].
@@ -59,7 +61,8 @@ pub enum Joint {
 ///
 /// The follower's armature counts, as ratio² · armature of the leader's coordinate. Its limits, damping and friction do
 /// not: as in Pinocchio, those of a coordinate are its leader's alone.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
 pub struct Mimic {
     pub ratio: f64,
@@ -183,7 +186,7 @@ impl Joint {
         let turns = "a continuous joint's position is known up to whole turns only";
         match (leader, self) {
             (Self::Continuous { .. }, Self::Revolute { axis } | Self::Continuous { axis }) => {
-                if mimic.ratio.fract() != 0.0 {
+                if mimic.ratio % 1.0 != 0.0 {
                     return Err(format!("mimic ratio {} is not a whole number, and {turns}", mimic.ratio));
                 }
                 Ok(Self::Continuous { axis })
@@ -228,7 +231,10 @@ impl Joint {
     /// The part of a follower's offset that belongs to its placement: the pose by which its turned frame is moved.
     pub(crate) fn mimic_offset(self, mimic: Mimic) -> Se3<f64> {
         match self {
-            Self::Continuous { .. } => rotated_about_z(Se3::identity(), mimic.offset.sin(), mimic.offset.cos()),
+            Self::Continuous { .. } => {
+                let (sin, cos) = mimic.offset.sin_cos();
+                rotated_about_z(Se3::identity(), sin, cos)
+            }
             _ => Se3::identity(),
         }
     }

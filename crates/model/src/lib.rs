@@ -24,6 +24,7 @@
 //! | attributes of an element | 256 |
 //! | prefixes of namespaces in a file; declarations of them | 256; 65 536 |
 //! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
+//! | named positions (`<group_state>`) of an SRDF | 4096 |
 //! | degrees of freedom of a model, however it is made | 4096 |
 //! | coordinates of a model whose joints follow others | 1024 |
 //!
@@ -32,7 +33,16 @@
 //!
 //! What the crates of algorithms need beside it is hidden from the documentation: the verbs by which a pass sees a model
 //! (`layout`), the tree of its turned frames and columns (`tree`), the schedule of its limbs (`limbs`).
+//!
+//! # Features
+//! All are on by default. `loaders`: files of robots, and [`robots`]. `serde`: models to and from its formats. `threads`: those of
+//! rayon. `std`: the standard library, which the first and the last need; without it the crate needs `alloc` and, for the
+//! functions of floats, the feature `libm`.
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
+
+#[cfg_attr(not(any(feature = "std", test)), macro_use)]
+extern crate alloc;
 
 mod body;
 mod builder;
@@ -49,7 +59,9 @@ pub mod layout;
 pub mod limbs;
 mod magnitude;
 mod model;
+mod names;
 mod real;
+#[cfg(feature = "loaders")]
 pub mod robots;
 #[doc(hidden)]
 pub mod tree;
@@ -66,8 +78,7 @@ pub use configuration::{
     interpolate, neutral, normalize, random_configuration, transport,
 };
 pub use error::{Error, Warning};
-pub use io::mjcf::MjcfOptions;
-pub use io::sdf::SdfOptions;
-pub use io::urdf::UrdfOptions;
+#[cfg(feature = "loaders")]
+pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
 pub use joint::{Joint, Mimic};
 pub use model::Model;

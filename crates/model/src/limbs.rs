@@ -12,6 +12,7 @@ pub mod schedule;
 pub mod steps;
 
 use crate::tree::Tree;
+use alloc::vec::Vec;
 use column_map::ColumnMap;
 use schedule::Schedule;
 use steps::{StateMap, Step};

@@ -3,6 +3,8 @@
 use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::Model;
+use alloc::borrow::ToOwned;
+use alloc::string::String;
 use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
 
 /// The largest mass, length, inertia, gravity, armature, pitch or ratio of a model, in SI units. Inertia about a point that

@@ -1,10 +1,14 @@
 //! The frozen description of a robot.
 
 use crate::body::{Body, Frame, FrameKind, Limits};
-use crate::error::{Error, Warning, nearest};
+use crate::error::{Error, Warning};
 use crate::joint::Joint;
 use crate::limbs::Plan;
+use crate::names::nearest;
 use crate::tree::{Column, Node, Tree, hash};
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use alloc::vec::Vec;
 use condyle_linalg::ColumnTree;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::{Se3, Vec3};

@@ -50,7 +50,7 @@ pub(crate) fn real_inertia<S: Scalar>(I: Inertia<S>) -> Inertia<f64> {
     Inertia { mass: real(I.mass), mass_com: real_vector(I.mass_com), rotational }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::real;
     use num_dual::{Dual32, Dual64, HyperDual64};

@@ -5,6 +5,7 @@
 
 use crate::body::Body;
 use crate::joint::{Joint, Mimic};
+use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use core::iter::successors;

@@ -7,7 +7,10 @@ use crate::error::{Error, Warning};
 use crate::joint::Joint;
 use crate::layout::{Columns, Layout, Pairs, Single};
 use crate::model::Model;
-use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3, Sym3};
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use alloc::vec::Vec;
+use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Scalar, Se3, Sym3};
 use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
 
@@ -179,7 +182,7 @@ impl Model {
             }
             let unit = body.joint.unit_entries();
             let (from, to) = (body.idx_q + unit.start, body.idx_q + unit.end);
-            let length = q[from..to].iter().map(|x| x * x).sum::<f64>().sqrt();
+            let length = Scalar::sqrt(q[from..to].iter().map(|x| x * x).sum::<f64>());
             if !unit.is_empty() && (length - 1.0).abs() > UNIT_ROUNDING {
                 return wrong(format!("its rotation, q[{from}..{to}], has the length {length}, expected 1"));
             }

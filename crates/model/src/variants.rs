@@ -6,9 +6,13 @@ use crate::limbs::Plan;
 use crate::magnitude::check_gravity;
 use crate::model::Model;
 use crate::real::{real_inertia, real_vector};
+use alloc::vec::Vec;
 use condyle_linalg::check;
-use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Constant, Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
 use core::any::Any;
+
+/// A few roundings of numbers about 1.
+const RESIDUE: f64 = 1e-15;
 
 impl<R: Scalar> Model<R> {
     /// The same robot under another gravity (m/s², in the world's frame).
@@ -21,6 +25,18 @@ impl<R: Scalar> Model<R> {
         }
         self.gravity = gravity;
         Ok(self)
+    }
+
+    /// The same robot with an armature of the type of its constants, which is not looked at: what records code makes it an
+    /// argument.
+    ///
+    /// # Panics
+    /// If `armature` has not nv numbers.
+    #[doc(hidden)]
+    pub fn with_scalar_armature(mut self, armature: &[R]) -> Self {
+        check("armature", armature.len(), self.nv());
+        self.armature.copy_from_slice(armature);
+        self
     }
 }
 
@@ -125,6 +141,32 @@ impl Model {
             plain.limbs = self.limbs.as_ref().and_then(|_| Plan::new(&plain.tree));
         }
         Ok(model)
+    }
+
+    /// The same robot with zeros, ones and minus ones in its poses, and zeros in its inertias, where rounding has left numbers
+    /// next to them: what a right angle leaves would be computed with in code that is generated.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn without_residues(mut self) -> Self {
+        let whole = |x: f64| [0.0, 1.0, -1.0].into_iter().find(|whole| (x - whole).abs() < RESIDUE).unwrap_or(x);
+        let small = |x: f64, scale: f64| if x.abs() < RESIDUE * scale { 0.0 } else { x };
+        let vector = |v: Vec3<f64>, scale: f64| Vec3::from(v.to_array().map(|x| small(x, scale)));
+        let rotation = |R: Mat3<f64>| {
+            let axis = |v: Vec3<f64>| Vec3::from(v.to_array().map(whole));
+            Mat3 { x: axis(R.x), y: axis(R.y), z: axis(R.z) }
+        };
+        let pose = |X: Se3<f64>| Se3::new(rotation(X.rotation), vector(X.translation, 1.0));
+        for node in &mut self.tree.nodes {
+            (node.placement, node.axis_rotation) = (pose(node.placement), rotation(node.axis_rotation));
+        }
+        for body in &mut self.bodies {
+            let Inertia { mass, mass_com, rotational: J } = body.inertia;
+            let scale = [J.xx, J.yy, J.zz].map(f64::abs).into_iter().fold(0.0, f64::max);
+            let [xy, xz, yz] = [J.xy, J.xz, J.yz].map(|x| small(x, scale));
+            body.inertia = Inertia { mass, mass_com: vector(mass_com, mass), rotational: Sym3 { xy, xz, yz, ..J } };
+        }
+        self.frames.iter_mut().for_each(|frame| frame.placement = pose(frame.placement));
+        self
     }
 
     /// The same robot, with its limbs side by side in single calls or one body after the other.

@@ -70,11 +70,15 @@ mod ddp;
 mod error;
 mod lq;
 mod problem;
+#[cfg(feature = "serde")]
 mod read;
 pub mod robot;
+mod time;
 
 pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint};
 pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
 pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+pub use time::set_clock;

@@ -7,8 +7,8 @@ mod counting;
 use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
 use condyle_dynamics::{ConstraintKind, ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, ControlPolynomial, Cost, FreeAcceleration, FreeDynamics,
-    FrictionCone, ImpulseDynamics, Integrator, Limit, Residual,
+    Activation, Actuation, Contact, ContactDynamics, ContactInverseDynamics, ControlPolynomial, Cost, FreeAcceleration,
+    FreeDynamics, FrictionCone, ImpulseDynamics, Integrator, Limit, Residual,
 };
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Iteration, Problem, Status, Sweep};
 use counting::{allocated, allocations};
@@ -178,10 +178,14 @@ fn a_gait_allocates_nothing() {
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
     let flight = flight.with_controls(ControlPolynomial::Quadratic);
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
-    let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 72]].concat();
-    let models: Vec<Box<dyn condyle_optimal::ActionModel>> = vec![Box::new(stance), Box::new(impact), Box::new(flight)];
-    let mut problem = Problem::new(x0.clone(), models, vec![0, 0, 1, 2, 2], Box::new(end)).unwrap();
-    let xs = x0.repeat(6);
+    let effort = Residual::JointEffort { reference: vec![0.0; 18] };
+    let backwards = [standing(), vec![quadratic("effort", 1e-4, effort)]].concat();
+    let mut backwards = ContactInverseDynamics::running(model.clone(), &contacts, 0.01, backwards).unwrap();
+    let us = [stance.quasi_static(&x0).repeat(2), vec![0.0; 72], backwards.quasi_static(&x0)].concat();
+    let models: Vec<Box<dyn condyle_optimal::ActionModel>> =
+        vec![Box::new(stance), Box::new(impact), Box::new(flight), Box::new(backwards)];
+    let mut problem = Problem::new(x0.clone(), models, vec![0, 0, 1, 2, 2, 3], Box::new(end)).unwrap();
+    let xs = x0.repeat(7);
     let mut solver = Fddp::new(&problem);
     solver.settings.max_iterations = 3;
     solver.solve(&mut problem, &xs, &us).unwrap();

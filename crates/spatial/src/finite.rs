@@ -15,6 +15,7 @@
 //! # Ok::<(), serde_json::Error>(())
 //! ```
 
+use alloc::vec::Vec;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 fn vector<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {

@@ -1,6 +1,6 @@
 //! Spatial algebra, generic over the scalar.
 //!
-//! [`Scalar`] is a number: `f64`, `f32`, a dual number of [num-dual](num_dual), several numbers side by side.
+//! [`Scalar`] is a number: `f64`, `f32`, a dual number of [num-dual](https://docs.rs/num-dual), several numbers side by side.
 //! [`Motion`] and [`Force`] are the two kinds of spatial vector, [`Inertia`] takes one to the other, and a pose
 //! [`Se3`] changes their coordinates. [`lie`] has rotations, exponentials, logarithms and their Jacobians.
 //!
@@ -15,9 +15,20 @@
 //! let pull = Force::new(Vec3::new(0.0, 3.0, 0.0), Vec3::zero());
 //! assert_eq!(aXb.act(spin).dot(aXb.act(pull)), spin.dot(pull)); // power has no frame
 //! ```
+//!
+//! # Features
+//! `std` (on by default): the processor is asked which vectors it has, and numbers of num-dual are scalars. Without it the crate
+//! needs `alloc` and, for the functions of floats, the feature `libm`. `serde` (on by default): all that a file may have.
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!("roots and sines are those of `std` or of `libm`: one of these features must be on");
+
+extern crate alloc;
+
 mod algebra;
+#[cfg(feature = "serde")]
 #[doc(hidden)]
 pub mod finite;
 mod scalar;

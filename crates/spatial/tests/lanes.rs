@@ -122,7 +122,7 @@ fn each_lane_is_a_number() {
         match level {
             _ if !level.is_supported() => eprintln!("NOT RUN: {}", Unsupported(level)),
             Level::Baseline => {}
-            Level::Neon | Level::Avx2 => {
+            Level::Simd128 | Level::Neon | Level::Avx2 => {
                 operations::<<f64 as Real>::Short<Here>>();
                 operations::<<f32 as Real>::Short<Here>>();
                 Four::enter(Moves);

@@ -151,11 +151,10 @@ impl Elimination {
         }
     }
 
-    /// Splits the unknowns by A x = b. Whether the basis is the one of the call before.
-    pub(crate) fn split(&mut self, program: &ConeProgram, basis: &mut Basis) -> bool {
+    /// Splits the unknowns by A x = b; as in the call before where that serves.
+    pub(crate) fn split(&mut self, program: &ConeProgram, basis: &mut Basis) {
         let (n, equalities) = (program.size.unknowns, program.size.equalities);
-        let again = self.shape == (equalities, n) && self.eliminate(program, true);
-        if !again {
+        if self.shape != (equalities, n) || !self.eliminate(program, true) {
             self.eliminate(program, false);
             self.shape = (equalities, n);
             basis.basic.clear();
@@ -174,7 +173,6 @@ impl Elimination {
                 *t = w[j];
             }
         }
-        again
     }
 
     /// Gauss–Jordan elimination; with the pivots of the last call, unless one of them has become too small.

@@ -13,17 +13,20 @@
 use crate::basis::{Basis, Elimination};
 use crate::cone_program::{ConeProgram, Size};
 use crate::least_squares::LeastSquares;
+use crate::memory::Places;
 use condyle_linalg::{SLACK, View, add_product_lower, add_scaled_product};
 use nalgebra::DMatrix;
 
-/// What is known of the rows of G in the order in which they stand: first those with few zeros, then those that bound one
+/// What is known of a program. The rows of G stand in this order: first those with few zeros, then those that bound one
 /// unknown, then the others.
 #[derive(Clone, Copy)]
-pub(crate) struct RowKinds<'a> {
+pub(crate) struct Known<'a> {
     /// How many rows have few zeros.
     pub dense: usize,
     /// The unknown of each row that bounds one.
     pub single: &'a [usize],
+    /// Which unknowns and constraints they are.
+    pub places: &'a Places,
 }
 
 /// The elimination of one priority's equalities, with room for the largest program.
@@ -37,6 +40,8 @@ pub(crate) struct Condenser {
     P: DMatrix<f64>,
     /// Scratch: what rows are at z = 0.
     particular: Vec<f64>,
+    /// Scratch: z.
+    z: Vec<f64>,
 }
 
 impl Condenser {
@@ -52,36 +57,36 @@ impl Condenser {
             right_side: vec![0.0; most],
             P: DMatrix::zeros(tall, tall),
             particular: vec![0.0; rows.max(objective) + 4 * SLACK],
+            z: vec![0.0; unknowns],
         }
     }
 
-    /// The program over z of one over x with an objective over x. Whether z are the unknowns that they were at the call
-    /// before.
+    /// The program over z of one over x with an objective over x.
     pub(crate) fn condense(
         &mut self,
         full: &ConeProgram,
-        kinds: RowKinds<'_>,
+        known: Known<'_>,
         objective: &LeastSquares,
         out: &mut ConeProgram,
-    ) -> bool {
-        let again = self.elimination.split(full, &mut self.basis);
+    ) {
+        self.elimination.split(full, &mut self.basis);
         let Self { basis, particular, .. } = self;
         out.size = Size { unknowns: basis.others.len(), equalities: 0, ..full.size };
         out.cones.clear();
         out.cones.extend_from_slice(&full.cones);
 
-        basis.map_dense_rows(&full.Gt, kinds.dense, &mut out.Gt, particular);
+        basis.map_dense_rows(&full.Gt, known.dense, &mut out.Gt, particular);
         let bound = |out: &mut ConeProgram, r: usize, at_p: f64| {
             (out.lower[r], out.upper[r]) = (full.lower[r] - at_p, full.upper[r] - at_p);
         };
-        for r in 0..kinds.dense {
+        for r in 0..known.dense {
             bound(out, r, particular[r]);
         }
-        for (k, &unknown) in kinds.single.iter().enumerate() {
-            let at_p = basis.map_single_row(unknown, &mut out.Gt, kinds.dense + k);
-            bound(out, kinds.dense + k, at_p);
+        for (k, &unknown) in known.single.iter().enumerate() {
+            let at_p = basis.map_single_row(unknown, &mut out.Gt, known.dense + k);
+            bound(out, known.dense + k, at_p);
         }
-        for r in kinds.dense + kinds.single.len()..full.size.rows {
+        for r in known.dense + known.single.len()..full.size.rows {
             let at_p = basis.map_row(&full.Gt, r, &mut out.Gt);
             bound(out, r, at_p);
         }
@@ -89,7 +94,15 @@ impl Condenser {
             out.h[r] = full.h[r] + basis.map_row(&full.Ft, r, &mut out.Ft);
         }
         self.objective(objective, out);
-        again
+    }
+
+    /// z of x.
+    pub(crate) fn reduce(&mut self, x: &[f64]) -> &[f64] {
+        let z = &mut self.z[..self.basis.others.len()];
+        for (z, &j) in z.iter_mut().zip(&self.basis.others) {
+            *z = x[j];
+        }
+        z
     }
 
     /// P and c of the least squares over z.

@@ -1,8 +1,9 @@
 //! The numbers of a contact at one state: Jacobian, held acceleration, and the rows and cones of its force.
 
-use crate::cone_program::ConeProgram;
+use crate::cone_program::{ConeProgram, Size};
 use crate::contact::{FrictionContact, Geometry, Normal, norm};
 use crate::kinematics::FrameMotion;
+use crate::memory::Places;
 use crate::references::ContactTarget;
 use crate::settings::{Friction, Settings};
 use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
@@ -18,6 +19,10 @@ pub(crate) struct ContactNumbers {
     pub active: bool,
     /// The place of its force's first unknown in x, if it is active.
     pub column: usize,
+    /// How far it touches, up to 1.
+    activation: f64,
+    /// Where its numbers begin in a program in which all contacts touch.
+    first: Size,
     /// The axes in the world.
     axes: Mat3<f64>,
     /// From the frame's origin to the centre, in the world.
@@ -43,6 +48,8 @@ impl ContactNumbers {
             frame,
             active: false,
             column: 0,
+            activation: 0.0,
+            first: Size::default(),
             axes: Mat3::identity(),
             arm: Vec3::zero(),
             Jt: DMatrix::zeros(nv, geometry.motion.len()),
@@ -55,8 +62,36 @@ impl ContactNumbers {
         }
     }
 
+    /// Takes the next places of a program in which all contacts touch.
+    pub(crate) fn add_to(&mut self, all: &mut Size, friction: Friction) {
+        self.first = *all;
+        all.unknowns += self.geometry.unknowns();
+        all.equalities += self.geometry.motion.len();
+        all.rows += self.max_rows(friction);
+        all.cone_rows += if friction == Friction::Cone { 3 * self.geometry.cones() } else { 0 };
+    }
+
+    /// Adds the places of its unknowns and constraints in use, in their order in the program.
+    pub(crate) fn add_places(&self, places: &mut Places, friction: Friction) {
+        let Size { unknowns, equalities, rows, cone_rows } = self.first;
+        let end = rows + self.max_rows(friction);
+        places.unknowns.extend(unknowns..unknowns + self.geometry.unknowns());
+        places.units.extend((0..self.geometry.unknowns()).map(|_| self.activation));
+        places.equalities.extend(equalities..equalities + self.geometry.motion.len());
+        places.rows.extend(if self.has_bounds() { rows..end } else { rows + 1..end });
+        if friction == Friction::Cone {
+            places.cone_rows.extend(cone_rows..cone_rows + 3 * self.geometry.cones());
+        }
+    }
+
+    /// Whether the first of its rows bounds the normal force.
+    fn has_bounds(&self) -> bool {
+        let [least, most] = self.bounds;
+        least > 0.0 || most < f64::INFINITY
+    }
+
     /// How many rows of G the force may have.
-    pub(crate) fn max_rows(&self, friction: Friction) -> usize {
+    fn max_rows(&self, friction: Friction) -> usize {
         let edges = self.geometry.edges().count();
         let sides = if let Friction::Pyramid { sides, .. } = friction { sides } else { 0 };
         1 + edges + 2 * usize::from(edges > 0) + sides * self.geometry.cones()
@@ -119,6 +154,7 @@ impl ContactNumbers {
         }
         let FrictionContact { min_force, max_force, .. } = self.description;
         self.bounds = [min_force, max_force];
+        self.activation = target.activation.min(1.0);
         if target.activation < 1.0 {
             // f_n ≤ α times the greatest force there is, or the robot's weight
             let most = if max_force.is_finite() { max_force } else { weight };
@@ -166,8 +202,8 @@ impl ContactNumbers {
         let Geometry { by_corners, yaw, motion, .. } = self.geometry;
         let mu = self.description.friction;
         let cones = self.geometry.cones();
-        let [least, most] = self.bounds;
-        if least > 0.0 || most < f64::INFINITY {
+        if self.has_bounds() {
+            let [least, most] = self.bounds;
             let lower = if least > 0.0 { least } else { f64::NEG_INFINITY }; // the cones say f_n ≥ 0
             let row = add_row(program, lower, most);
             for k in 0..cones {

@@ -1,13 +1,14 @@
 //! The program's constraints at one state: each block beside its equation. x = (q̈, the forces of the active contacts).
 
-use crate::condense::RowKinds;
+use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};
 use crate::contact_numbers::ContactNumbers;
 use crate::kinematics::Kinematics;
 use crate::least_squares::{LeastSquares, dot};
 use crate::limits::AccelerationBounds;
+use crate::memory::Places;
 use crate::references::References;
-use crate::settings::{Friction, Settings};
+use crate::settings::Settings;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::DMatrix;
 
@@ -31,13 +32,20 @@ pub(crate) struct Equations {
     pub Et: DMatrix<f64>,
     /// Constraints of the whole program; P and c are the solver's affair.
     pub program: ConeProgram,
+    /// Which unknowns and constraints the program has.
+    places: Places,
     /// ‖g‖ times the mass (N).
     pub weight: f64,
 }
 
 impl Equations {
     /// With room for some more equalities.
-    pub(crate) fn new(kinematics: Kinematics, contacts: Vec<ContactNumbers>, settings: &Settings, held: usize) -> Self {
+    pub(crate) fn new(
+        kinematics: Kinematics,
+        mut contacts: Vec<ContactNumbers>,
+        settings: &Settings,
+        held: usize,
+    ) -> Self {
         let model = &kinematics.model;
         let nv = model.nv();
         let free_flyers = model.bodies().iter().skip(1).filter(|b| b.joint == Joint::FreeFlyer);
@@ -47,27 +55,23 @@ impl Equations {
         let limited: Vec<_> = actuated.iter().map(|&i| (i, effort[i])).filter(|l| l.1.is_finite()).collect();
         let bounds = AccelerationBounds::new(model, settings.joint_limits.as_ref());
         let bounded = bounds.bounds.iter().map(|bound| bound.0).collect();
-        let unknowns = nv + contacts.iter().map(|c| c.geometry.unknowns()).sum::<usize>();
-        let of_forces: usize = contacts.iter().map(|c| c.max_rows(settings.friction)).sum();
-        let cones: usize = contacts.iter().map(|c| c.geometry.cones()).sum();
-        let capacity = Size {
-            unknowns,
-            equalities: free.len() + contacts.iter().map(|c| c.geometry.motion.len()).sum::<usize>() + held,
-            rows: limited.len() + bounds.bounds.len() + of_forces,
-            cone_rows: if settings.friction == Friction::Cone { 3 * cones } else { 0 },
-        };
+        let rows = limited.len() + bounds.bounds.len();
+        let mut capacity = Size { unknowns: nv, equalities: free.len(), rows, cone_rows: 0 };
+        contacts.iter_mut().for_each(|contact| contact.add_to(&mut capacity, settings.friction));
+        capacity.equalities += held;
         let weight = kinematics.mass * model.gravity().norm_squared().sqrt();
-        let (Et, program) = (DMatrix::zeros(unknowns, nv), ConeProgram::new(capacity));
-        Self { free, actuated, limited, bounds, bounded, Et, program, weight, contacts, kinematics }
+        let (Et, program) = (DMatrix::zeros(capacity.unknowns, nv), ConeProgram::new(capacity));
+        let places = Places::new(capacity);
+        Self { free, actuated, limited, bounds, bounded, Et, program, places, weight, contacts, kinematics }
     }
 
     pub(crate) fn model(&self) -> &Model {
         &self.kinematics.model
     }
 
-    /// The program, and the order of its rows.
-    pub(crate) fn program(&mut self) -> (&mut ConeProgram, RowKinds<'_>) {
-        (&mut self.program, RowKinds { dense: self.limited.len(), single: &self.bounded })
+    /// The program, and what is known of it.
+    pub(crate) fn program(&mut self) -> (&mut ConeProgram, Known<'_>) {
+        (&mut self.program, Known { dense: self.limited.len(), single: &self.bounded, places: &self.places })
     }
 
     /// Computes all constraints at (q, v).
@@ -122,8 +126,14 @@ impl Equations {
             (program.lower[row], program.upper[row]) = (lower, upper);
         }
         program.size.rows = self.limited.len() + bounds.bounds.len();
+        self.places.clear();
+        self.places.unknowns.extend(0..nv);
+        self.places.units.resize(nv, 1.0);
+        self.places.equalities.extend(0..self.free.len());
+        self.places.rows.extend(0..program.size.rows);
         for contact in contacts.iter().filter(|contact| contact.active) {
             contact.add_force_rows(program, settings.friction);
+            contact.add_places(&mut self.places, settings.friction);
         }
     }
 

@@ -80,7 +80,7 @@ impl WholeBodyController {
 
     /// Solves what was assembled.
     pub fn solve_assembled(&mut self) {
-        self.levels.solve_assembled();
+        self.levels.solve_assembled(self.equations.program().1);
     }
 
     /// The program of the first priority as it stands before anything is eliminated.

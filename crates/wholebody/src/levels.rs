@@ -3,12 +3,13 @@
 //! Of min ½ ‖R x − b‖² over a convex set all minimisers have the same R x; the equality R x = R x* therefore describes them
 //! all. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014), section 2.
 
-use crate::condense::{Condenser, RowKinds};
+use crate::condense::{Condenser, Known};
 use crate::cone_program::{
-    Clarabel, ConeProgram, InteriorPoint, Outcome, Settings as SolverSettings, Size, Solver, Start,
+    Clarabel, ConeProgram, InteriorPoint, Multipliers, Outcome, Settings as SolverSettings, Size, Solver, Start,
 };
 use crate::least_squares::LeastSquares;
 use crate::lifted::Lifted;
+use crate::memory::Memory;
 use crate::settings::{Backend, Form, Settings};
 use condyle_linalg::max_abs;
 
@@ -37,6 +38,8 @@ enum Given {
 pub(crate) struct Levels {
     solvers: Vec<Box<dyn Solver + Send>>,
     given: Vec<Given>,
+    /// The last solution of each.
+    memories: Vec<Memory>,
     warm: bool,
     /// The last solution.
     pub x: Vec<f64>,
@@ -64,7 +67,8 @@ impl Levels {
             }
         };
         let solvers = given.iter().map(solver).collect();
-        Self { solvers, given, warm: settings.warm_start, x: vec![0.0; capacity.unknowns] }
+        let memories = rows.iter().map(|_| Memory::new(capacity)).collect();
+        Self { solvers, given, memories, warm: settings.warm_start, x: vec![0.0; capacity.unknowns] }
     }
 
     /// Minimises one objective after the other under a program; x is the best that was found, and finite. How many were
@@ -72,14 +76,14 @@ impl Levels {
     pub(crate) fn solve(
         &mut self,
         program: &mut ConeProgram,
-        kinds: RowKinds<'_>,
+        known: Known<'_>,
         objectives: &[LeastSquares],
     ) -> (Outcome, usize) {
         let (n, equalities) = (program.size.unknowns, program.size.equalities);
         let mut all = Outcome { iterations: 0, warm: true, reduced: false, stopped: None };
         let mut done = 0;
         for (level, objective) in objectives.iter().enumerate() {
-            let outcome = self.minimise(program, kinds, objective, level);
+            let outcome = self.minimise(program, known, objective, level);
             all.iterations += outcome.iterations;
             all.warm &= outcome.warm;
             all.reduced |= outcome.reduced;
@@ -97,8 +101,8 @@ impl Levels {
     }
 
     /// Writes what the first solver gets.
-    pub(crate) fn assemble(&mut self, program: &ConeProgram, kinds: RowKinds<'_>, objective: &LeastSquares) {
-        self.given[0].write(program, kinds, objective);
+    pub(crate) fn assemble(&mut self, program: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
+        self.given[0].write(program, known, objective);
     }
 
     /// What the first solver got last.
@@ -106,35 +110,47 @@ impl Levels {
         self.given[0].program()
     }
 
-    /// Solves what was assembled, from the last solution.
-    pub(crate) fn solve_assembled(&mut self) {
-        self.solvers[0].solve(self.given[0].program(), Start::Warm);
+    /// Solves what was assembled.
+    pub(crate) fn solve_assembled(&mut self, known: Known<'_>) {
+        self.solve_given(known, 0);
     }
 
     pub(crate) fn first_solver(&self) -> &dyn Solver {
         &*self.solvers[0]
     }
 
-    fn minimise(
-        &mut self,
-        program: &ConeProgram,
-        kinds: RowKinds<'_>,
-        objective: &LeastSquares,
-        level: usize,
-    ) -> Outcome {
-        let Self { solvers, given, x, warm } = self;
-        let (solver, given, x) = (&mut solvers[level], &mut given[level], &mut x[..program.size.unknowns]);
-        let same = given.write(program, kinds, objective);
+    fn minimise(&mut self, program: &ConeProgram, known: Known<'_>, objective: &LeastSquares, level: usize) -> Outcome {
+        let given = &mut self.given[level];
+        given.write(program, known, objective);
+        if level > 0 {
+            given.widen(program);
+        }
+        self.solve_given(known, level)
+    }
+
+    /// Solves what a solver was given, from the last solution.
+    fn solve_given(&mut self, known: Known<'_>, level: usize) -> Outcome {
+        let Self { solvers, given, memories, x, warm } = self;
+        let (solver, given, memory) = (&mut solvers[level], &mut given[level], &mut memories[level]);
+        let x = &mut x[..known.places.unknowns.len()];
         if given.program().size.unknowns == 0 {
             given.read(&[], x);
             return Outcome { iterations: 0, warm: true, reduced: false, stopped: None };
         }
-        if level > 0 {
-            given.widen(program);
-        }
-        let outcome = solver.solve(given.program(), if *warm && same { Start::Warm } else { Start::Cold });
+        let start = match memory.recall(known.places).filter(|_| *warm) {
+            Some((last, multipliers)) => {
+                given.start_from(last, multipliers, &mut **solver);
+                Start::Warm
+            }
+            None => Start::Cold,
+        };
+        let outcome = solver.solve(given.program(), start);
         if outcome.stopped.is_none() || level == 0 {
             given.read(solver.x(), x);
+        }
+        match outcome.stopped {
+            None => memory.keep(known.places, x, solver.multipliers()),
+            Some(_) => memory.forget(),
         }
         outcome
     }
@@ -154,17 +170,27 @@ impl Given {
         }
     }
 
-    /// Writes what the solver gets. Whether it has the unknowns that it had at the call before.
-    fn write(&mut self, from: &ConeProgram, kinds: RowKinds<'_>, objective: &LeastSquares) -> bool {
+    /// Writes what the solver gets.
+    fn write(&mut self, from: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         match self {
-            Given::Condensed(condenser, program) => return condenser.condense(from, kinds, objective, program),
-            Given::Lifted(lifted) => lifted.write(from, kinds, objective),
+            Given::Condensed(condenser, program) => condenser.condense(from, known, objective, program),
+            Given::Lifted(lifted) => lifted.write(from, known, objective),
             Given::Full(program) => {
                 program.copy_constraints(from);
                 objective.write(program);
             }
         }
-        true
+    }
+
+    /// Tells the solver to start from x.
+    fn start_from(&mut self, x: &[f64], multipliers: Multipliers<'_>, solver: &mut dyn Solver) {
+        match self {
+            Given::Condensed(condenser, _) => {
+                solver.start_from(condenser.reduce(x), Multipliers { equalities: &[], ..multipliers });
+            }
+            Given::Full(_) => solver.start_from(x, multipliers),
+            Given::Lifted(_) => {} // clarabel starts cold
+        }
     }
 
     /// x of what the solver found.

@@ -7,7 +7,7 @@
 //!
 //! RᵀR is not formed, and a row with two bounds is not there twice; the multipliers of rows and cones stay the same.
 
-use crate::condense::RowKinds;
+use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};
 use crate::least_squares::LeastSquares;
 
@@ -25,11 +25,11 @@ impl Lifted {
     }
 
     /// Writes the program of x with an objective of x.
-    pub(crate) fn write(&mut self, full: &ConeProgram, kinds: RowKinds<'_>, objective: &LeastSquares) {
+    pub(crate) fn write(&mut self, full: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         let to = &mut self.program;
         let (Size { unknowns: n, equalities, rows, cone_rows }, most) = (full.size, full.c.len());
         let (first_r, first_t) = (n, n + objective.count);
-        let all = first_t + kinds.dense;
+        let all = first_t + known.dense;
         to.size = Size { unknowns: all, equalities: equalities + all - n, rows, cone_rows };
         to.cones.clear();
         to.cones.extend_from_slice(&full.cones);
@@ -59,7 +59,7 @@ impl Lifted {
         }
         for i in 0..rows {
             let G = &full.Gt.as_slice()[i * most..][..n];
-            if i < kinds.dense {
+            if i < known.dense {
                 let e = equalities + objective.count + i;
                 let coefficients = to.equality_mut(e);
                 copy(coefficients, G);

@@ -3,9 +3,16 @@
 use condyle::{Mat3, Se3, Vec3};
 use nalgebra::DMatrix;
 use numpy::ndarray::Dimension;
-use numpy::{Element, Ix1, Ix2, Ix3, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::npyffi::{NPY_ARRAY_ALIGNED, NPY_ARRAY_C_CONTIGUOUS, PyArrayObject};
+use numpy::{
+    Element, Ix1, Ix2, Ix3, PyArray, PyArrayDescr, PyArrayMethods, PyReadonlyArray, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::{PyTypeInfo, ffi};
+use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::ops::Deref;
 
@@ -29,21 +36,62 @@ impl Input<'_, Ix2> {
 
 /// The doubles of an argument, in C order, for calls that keep the interpreter's lock: nothing is noted about the array,
 /// which takes as long as a small robot's dynamics.
-pub(crate) struct InPlace<'py, D: Dimension>(Bound<'py, PyArray<f64, D>>);
+pub(crate) enum InPlace<'py, D: Dimension> {
+    /// An array that is there as long as this.
+    Array(Bound<'py, PyArray<f64, D>>),
+    /// The numbers of an argument of a call in which nothing written in Python runs until they have been used.
+    AtOnce(*const f64, usize),
+}
 
 impl<'py, D: Dimension> InPlace<'py, D> {
     pub(super) fn read(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Self> {
-        as_it_lies_or_converted(argument, value, shape).map(Self)
+        as_it_lies_or_converted(argument, value, shape).map(Self::Array)
     }
 }
 
 #[allow(unsafe_code)]
 impl<D: Dimension> Deref for InPlace<'_, D> {
     type Target = [f64];
+    #[inline(always)]
     fn deref(&self) -> &[f64] {
         // SAFETY: who looks at the numbers holds the interpreter's lock and calls no Python meanwhile, so nobody writes to
-        // the array or moves it.
-        unsafe { self.0.as_slice() }.expect("was made contiguous and aligned")
+        // the array or moves it; an argument stays until the call returns.
+        unsafe {
+            match *self {
+                Self::AtOnce(numbers, count) => core::slice::from_raw_parts(numbers, count),
+                Self::Array(ref array) => array.as_slice().expect("was made contiguous and aligned"),
+            }
+        }
+    }
+}
+
+/// The numbers of a plain array of doubles of this shape in C order; none of anything else. Nothing written in Python runs.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(crate) fn at_once<'py, D: Dimension>(value: &Bound<'py, PyAny>, shape: &[usize]) -> Option<InPlace<'py, D>> {
+    static DOUBLE: PyOnceLock<Py<PyArrayDescr>> = PyOnceLock::new();
+    const PLAIN: c_int = NPY_ARRAY_C_CONTIGUOUS | NPY_ARRAY_ALIGNED;
+    let double = DOUBLE.get_or_init(value.py(), || f64::get_dtype(value.py()).unbind()).as_ptr();
+    // SAFETY: an object of this very type is an array, whose dimensions are as many as it says.
+    unsafe {
+        if ffi::Py_TYPE(value.as_ptr()) != PyUntypedArray::type_object_raw(value.py()) {
+            return None;
+        }
+        let array = &(*value.as_ptr().cast::<PyArrayObject>()).fields;
+        if array.descr.cast::<ffi::PyObject>() != double
+            || array.flags & PLAIN != PLAIN
+            || array.nd as usize != shape.len()
+        {
+            return None;
+        }
+        let mut count = 1;
+        for (k, &expected) in shape.iter().enumerate() {
+            if *array.dimensions.add(k) as usize != expected {
+                return None;
+            }
+            count *= expected;
+        }
+        Some(InPlace::AtOnce(array.data.cast::<f64>().cast_const(), count))
     }
 }
 

@@ -10,9 +10,12 @@ mod output;
 mod read_only;
 
 pub(crate) use input::{
-    Expected, Input, array, bounds, check_shape, matrix, numbers, pose, rotation, tensor, three, type_name, vector,
+    Expected, Input, array, at_once, bounds, check_shape, matrix, numbers, pose, rotation, tensor, three, type_name,
+    vector,
 };
-pub(crate) use output::{Array, Give, class, give_named, members, named, named_tuples, output, place, writable};
+pub(crate) use output::{
+    Array, Computed, Give, Symmetric, class, give_named, members, named, named_tuples, output, place, writable,
+};
 pub(crate) use read_only::read_only;
 
 use condyle::Scalar;

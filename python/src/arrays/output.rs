@@ -9,6 +9,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyTuple, PyType};
+use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Fills an array in C order, the caller's or a new one, and returns it.
@@ -25,10 +26,10 @@ pub(crate) fn output<'py>(
             Ok(out.clone())
         }
         None => {
-            // SAFETY: nobody else has the array yet.
+            // SAFETY: nobody else has the array yet, which has as many numbers, one after the other.
             #[allow(unsafe_code)]
-            let numbers = unsafe { array.as_slice_mut() };
-            fill(numbers.expect("was made contiguous"));
+            let numbers = unsafe { core::slice::from_raw_parts_mut(array.data(), shape.iter().product()) };
+            fill(numbers);
             Ok(array.into_any())
         }
     }
@@ -113,6 +114,19 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
                 x[r * columns + c] = number;
             }
         }
+    }
+}
+
+/// A square matrix that is symmetric up to rounding, so that its columns stand for its rows.
+pub(crate) struct Symmetric<'a, N>(pub(crate) &'a DMatrix<N>);
+
+impl<N: Number> Array for Symmetric<'_, N> {
+    type Number = N;
+    fn shape(&self) -> impl AsRef<[usize]> {
+        [self.0.nrows(), self.0.ncols()]
+    }
+    fn write(&self, x: &mut [N]) {
+        x.copy_from_slice(self.0.as_slice());
     }
 }
 
@@ -262,6 +276,32 @@ impl<T: Array + ?Sized> Give for T {
             return Ok(array);
         }
         T::Number::output(py, out, self.shape().as_ref(), |x| self.write(x))
+    }
+}
+
+/// An array that is computed where it goes, in C order.
+pub(crate) struct Computed<S, F, const AXES: usize> {
+    shape: [usize; AXES],
+    fill: F,
+    number: PhantomData<S>,
+}
+
+impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Computed<S, F, AXES> {
+    /// An array of this shape, all of whose numbers a function sets.
+    pub(crate) fn new(shape: [usize; AXES], fill: F) -> Self {
+        Self { shape, fill, number: PhantomData }
+    }
+}
+
+impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Give for Computed<S, F, AXES> {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        if out.is_none() {
+            return S::output(py, None, &self.shape, &self.fill);
+        }
+        // `out` may be what it is computed from
+        let mut numbers = vec![S::zero(); self.shape.iter().product()];
+        (self.fill)(&mut numbers);
+        S::output(py, out, &self.shape, |x| x.copy_from_slice(&numbers))
     }
 }
 

@@ -41,7 +41,10 @@ pub(super) fn polynomial(name: &str) -> PyResult<ControlPolynomial> {
 
 /// The matrix S if one is given, or none, which drives every joint but a free-flyer at the root; and the number of
 /// controls.
-fn actuation(model: &condyle::Model, map: Option<&Bound<'_, PyAny>>) -> PyResult<(Option<DMatrix<f64>>, usize)> {
+pub(super) fn actuation(
+    model: &condyle::Model,
+    map: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Option<DMatrix<f64>>, usize)> {
     let Some(map) = map else { return Ok((None, Actuation::joints(model).nu())) };
     let shape: Vec<usize> = map.getattr("shape").and_then(|shape| shape.extract()).unwrap_or_default();
     let &[_, nu] = shape.as_slice() else {
@@ -55,13 +58,13 @@ pub(super) fn terms(model: &Arc<condyle::Model>, costs: &[PyRef<'_, Cost>]) -> V
 }
 
 /// Costs, or limits, of single knots.
-type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
+pub(super) type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
 
 /// Limits of all knots, if there are any.
-type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
+pub(super) type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
 
 /// The residuals that are written in Python.
-fn kept_at(
+pub(super) fn kept_at(
     py: Python<'_>,
     costs: &[PyRef<'_, Cost>],
     costs_at: &At<'_, Cost>,
@@ -78,7 +81,7 @@ fn limits(model: &Arc<condyle::Model>, limits: Limits<'_>) -> Vec<robot::Limit> 
 }
 
 /// Contacts with the names that residuals call them by.
-fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Vec<robot::Contact>> {
+pub(super) fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Vec<robot::Contact>> {
     let contact = |(name, given): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         Ok(robot::Contact::new(&name.extract::<String>()?, constraint(model, &given)?))
     };
@@ -86,7 +89,7 @@ fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Ve
 }
 
 /// A knot as data.
-fn knot(
+pub(super) fn knot(
     model: &Arc<condyle::Model>,
     dynamics: Dynamics,
     (costs, costs_at): (&[PyRef<'_, Cost>], At<'_, Cost>),
@@ -297,64 +300,6 @@ impl ImpulseDynamics {
 
     fn __repr__(&self) -> String {
         self.0.repr("ImpulseDynamics")
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.0.traverse(&visit)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        slf.get().0.reduce(slf)
-    }
-
-    #[staticmethod]
-    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_json(model, text)?))
-    }
-}
-
-/// A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
-///
-/// model: the robot.
-/// dt: Δt in seconds.
-/// costs: a list of `Cost`; `Residual.joint_effort` looks at τ.
-/// integrator, lower, upper, limits, controls: as of `FreeDynamics`.
-///
-/// Raises `ProblemError` for a cost or a limit that does not fit.
-#[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct InverseDynamics(pub(super) RobotAction<robot::InverseDynamics>);
-
-#[pymethods]
-impl InverseDynamics {
-    #[new]
-    #[pyo3(signature = (
-        model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None, limits=None, controls="constant"
-    ))]
-    fn new(
-        model: &Bound<'_, Model>,
-        dt: f64,
-        costs: Vec<PyRef<'_, Cost>>,
-        integrator: &str,
-        lower: Option<&Bound<'_, PyAny>>,
-        upper: Option<&Bound<'_, PyAny>>,
-        limits: Limits<'_>,
-        controls: &str,
-    ) -> PyResult<Self> {
-        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
-        let kept = kept_at(model.py(), &costs, &None, &limits, &None);
-        Ok(Self(RobotAction::new(model, kept, |model| {
-            let bounds = bounds(model.nv(), lower, upper)?;
-            Ok(knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds, controls))
-        })?))
-    }
-
-    /// The accelerations that hold the robot still: nv zeros.
-    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x)
-    }
-
-    fn __repr__(&self) -> String {
-        self.0.repr("InverseDynamics")
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {

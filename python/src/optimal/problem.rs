@@ -28,8 +28,8 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 /// An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
 ///
 /// x0: the initial state, nx numbers.
-/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `Action`,
-///     `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
+///     `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
 /// stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
 ///     model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
 /// terminal: the model of the end, without controls.

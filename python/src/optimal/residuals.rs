@@ -1,12 +1,13 @@
-//! Residuals, and the cones that some of them look at.
+//! Residuals.
 
+use super::cones::{FrictionCone, WrenchCone, surface};
 use super::own::{Fault, Functions, MOST_SIZE, OwnFunction, Space, Way};
-use crate::arrays::{Give, array, numbers, pose, rotation, three};
-use crate::exceptions::{ProblemError, problem_error, within};
+use crate::arrays::{array, numbers, pose, rotation, three};
+use crate::exceptions::{ProblemError, within};
 use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
-use condyle::{Force, Mat3, Motion};
+use condyle::{Force, Motion};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -14,9 +15,9 @@ use std::sync::Arc;
 
 /// A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
 ///
-/// A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics` or
-/// `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it looks at the frame of that
-/// name, or is refused.
+/// A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics`,
+/// `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it
+/// looks at the frame of that name, or is refused.
 /// A target that is not given is zero, a rotation the identity.
 ///
 /// >>> from condyle.optimal import Residual
@@ -67,6 +68,20 @@ impl Residual {
     #[staticmethod]
     fn joint_effort(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::JointEffort { reference: numbers("reference", reference)? }))
+    }
+
+    /// The efforts that inverse dynamics finds where nothing drives the robot, r = Nᵀτ with Nᵀ S = 0; of a floating base the 6
+    /// numbers of the force on it. They are 0 in a motion that is possible.
+    #[staticmethod]
+    fn undriven_effort() -> Self {
+        Self::from(robot::Residual::UndrivenEffort)
+    }
+
+    /// The acceleration of a contact where accelerations are controls, r = J q̈ + γ along the axes of its rows: 1, 2, 3 or 6
+    /// numbers, 0 while it holds.
+    #[staticmethod]
+    fn contact_acceleration(contact: String) -> Self {
+        Self::from(robot::Residual::ContactAcceleration { contact })
     }
 
     /// The deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers.
@@ -291,121 +306,6 @@ impl Residual {
 fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<robot::FrameName> {
     let model = &model.get().inner;
     Ok((&model.frames()[frame_index(model, frame)?]).into())
-}
-
-/// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
-///
-/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
-/// rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
-/// (N), by default 0 and infinite.
-///
-/// Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
-///
-/// >>> condyle.optimal.FrictionCone(0.5).rows()[0]
-/// array([ 1. ,  0. , -0.5])
-#[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct FrictionCone(robot::FrictionCone);
-
-#[pymethods]
-impl FrictionCone {
-    #[new]
-    #[pyo3(signature = (mu, facets=4, inner=false, rotation=None, least=0.0, greatest=f64::INFINITY))]
-    fn new(
-        mu: f64,
-        facets: usize,
-        inner: bool,
-        rotation: Option<&Bound<'_, PyAny>>,
-        least: f64,
-        greatest: f64,
-    ) -> PyResult<Self> {
-        within("facets", facets, 0, robot::FrictionCone::MOST_FACETS)?;
-        let rotation = surface(rotation)?;
-        let cone = robot::FrictionCone { rotation, mu, facets, inner, least, greatest };
-        cone.check().map_err(problem_error)?;
-        Ok(Self(cone))
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        let text = serde_json::to_string(&slf.get().0).expect("is made of numbers and words");
-        Ok((slf.get_type().getattr("_from_json")?, (text,)))
-    }
-
-    #[staticmethod]
-    fn _from_json(text: &str) -> PyResult<Self> {
-        let wrong = |error| ProblemError::new_err(format!("no cone: {error}"));
-        let cone: robot::FrictionCone = serde_json::from_str(text).map_err(wrong)?;
-        cone.check().map_err(problem_error)?;
-        Ok(Self(cone))
-    }
-
-    /// The matrix A, (facets + 1, 3).
-    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.rows().give(py, None)
-    }
-
-    /// The least and greatest values of A f.
-    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        pair(py, self.0.bounds())
-    }
-}
-
-/// The wrench cone of a rectangular sole: friction, centre of pressure within the rectangle, and yaw moment, lower ≤ A
-/// w ≤ upper.
-///
-/// friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
-///
-/// Raises `ProblemError` if a side is negative or not finite.
-///
-/// >>> from condyle.optimal import FrictionCone, WrenchCone
-/// >>> WrenchCone(FrictionCone(0.7), [0.2, 0.1]).rows().shape
-/// (17, 6)
-#[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct WrenchCone(robot::WrenchCone);
-
-#[pymethods]
-impl WrenchCone {
-    #[new]
-    fn new(friction: &Bound<'_, FrictionCone>, size: [f64; 2]) -> PyResult<Self> {
-        let cone = robot::WrenchCone { friction: friction.get().0.clone(), size };
-        cone.check().map_err(problem_error)?;
-        Ok(Self(cone))
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        let text = serde_json::to_string(&slf.get().0).expect("is made of numbers and words");
-        Ok((slf.get_type().getattr("_from_json")?, (text,)))
-    }
-
-    #[staticmethod]
-    fn _from_json(text: &str) -> PyResult<Self> {
-        let wrong = |error| ProblemError::new_err(format!("no cone: {error}"));
-        let cone: robot::WrenchCone = serde_json::from_str(text).map_err(wrong)?;
-        cone.check().map_err(problem_error)?;
-        Ok(Self(cone))
-    }
-
-    /// The matrix A, (facets + 13, 6).
-    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.rows().give(py, None)
-    }
-
-    /// The least and greatest values of A w.
-    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        pair(py, self.0.bounds())
-    }
-}
-
-/// Least and greatest values as arrays.
-fn pair<'py>(
-    py: Python<'py>,
-    (lower, upper): (Vec<f64>, Vec<f64>),
-) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-    Ok((lower.give(py, None)?, upper.give(py, None)?))
-}
-
-/// The axes of a surface along those of a contact; the same if none are given.
-fn surface(rotation: Option<&Bound<'_, PyAny>>) -> PyResult<Mat3<f64>> {
-    rotation.map_or_else(|| Ok(Mat3::identity()), |given| self::rotation("rotation", given))
 }
 
 /// Six numbers, linear first; zeros if there are none.

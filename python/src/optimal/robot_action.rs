@@ -67,14 +67,17 @@ impl<A: ActionModel + Clone> RobotAction<A> {
     pub(super) fn repr(&self, class: &str) -> String {
         let Knot { dynamics, costs, limits, .. } = &self.described.knot;
         let duration = match dynamics {
-            Dynamics::Free { dt, .. } | Dynamics::Contact { dt, .. } | Dynamics::Inverse { dt, .. } => {
-                format!("{dt} s")
-            }
+            Dynamics::Free { dt, .. }
+            | Dynamics::Contact { dt, .. }
+            | Dynamics::Inverse { dt, .. }
+            | Dynamics::ContactInverse { dt, .. } => format!("{dt} s"),
             Dynamics::Impulse { .. } => "an impact".to_owned(),
             Dynamics::End => "the end".to_owned(),
         };
         let contacts: Vec<_> = match dynamics {
-            Dynamics::Contact { contacts, .. } | Dynamics::Impulse { contacts, .. } => {
+            Dynamics::Contact { contacts, .. }
+            | Dynamics::Impulse { contacts, .. }
+            | Dynamics::ContactInverse { contacts, .. } => {
                 contacts.iter().map(|contact| contact.name.as_str()).collect()
             }
             _ => vec![],
@@ -166,7 +169,10 @@ pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usiz
 /// A change of a robot's action in a problem, see `inside`; none if the action is not of a robot.
 macro_rules! change {
     ($problem:expr, $k:expr, |$knot:ident| $change:expr) => {
-        change!($problem, $k, |$knot| $change; FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics)
+        change!(
+            $problem, $k, |$knot| $change;
+            FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics, ContactInverseDynamics
+        )
     };
     ($problem:expr, $k:expr, |$knot:ident| $change:expr; $($class:ident),*) => {
         $(if let Some($knot) = $crate::optimal::robot_action::inside::<condyle::optimal::robot::$class>($problem, $k) {

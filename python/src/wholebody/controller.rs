@@ -149,6 +149,30 @@ impl WholeBodyController {
         give(py, py.detach(|| controller.step(position, velocity, numbers)))
     }
 
+    /// How far the step at this state, for these references, is from the optimum of its program of the first priority:
+    /// errors of the conditions of Karush, Kuhn and Tucker, below 1e-5 at the default tolerance, as `Optimality`. It must be the
+    /// last step. For tests: it assembles the program anew.
+    ///
+    /// q: nq numbers; v: nv.
+    /// references: `References` of this controller.
+    fn optimality<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        v: &Bound<'_, PyAny>,
+        references: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut inner = lock("controller", &self.inner)?;
+        let Inner { controller, references: numbers, q: position, v: velocity } = &mut *inner;
+        let (q, v) = (vector("q", q, position.len())?, vector("v", v, velocity.len())?);
+        position.copy_from_slice(&q);
+        velocity.copy_from_slice(&v);
+        references::read(references, numbers)?;
+        let errors = py.detach(|| controller.optimality(position, velocity, numbers));
+        let rust::Optimality { stationarity, primal, dual, complementarity } = errors;
+        class!(py, "condyle._wholebody", "Optimality")?.call1((stationarity, primal, dual, complementarity))
+    }
+
     /// The last `Command`; before the first step zeros.
     #[getter]
     fn command<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

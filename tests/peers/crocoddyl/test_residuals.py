@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import condyle
+import condyle.crocoddyl
 from condyle.optimal import (
     Activation,
     ContactDynamics,
@@ -238,6 +238,10 @@ def same_iterates(r, ours, theirs):
     np.testing.assert_allclose([i.cost for i in solution.trace], np.array(log.costs), rtol=SAME)
     np.testing.assert_array_equal([i.step for i in solution.trace], np.array(log.steps))
     np.testing.assert_allclose(solution.xs, np.array(solver.xs), atol=1e-7)
+    converted = condyle.crocoddyl.problem(shooting, bounded=False, strict=True)
+    again = Fddp(converted, max_iterations=3).solve(np.array(xs), np.array(us))
+    np.testing.assert_allclose([i.cost for i in again.trace], [i.cost for i in solution.trace], rtol=SAME)
+    np.testing.assert_allclose(again.xs, solution.xs, atol=1e-7)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from condyle.algebra import SE3, Force, Motion, exp3, exp6, jexp3, jexp6, jlog3, jlog6, log3, log6
+from condyle.algebra import SE3, Force, Inertia, Motion, exp3, exp6, jexp3, jexp6, jlog3, jlog6, log3, log6
 
 EXACT = 1e-12
 """Some thousand roundings of numbers near 1."""
@@ -94,3 +94,43 @@ def test_batches_and_what_is_refused() -> None:
         SE3([1, 2, 3], [1, 2, 3])
     with pytest.raises(ValueError, match=r"m: expected shape \(…, 6\), found \(3,\)"):
         exp6([1, 2, 3])
+
+
+def test_inertias_of_shapes() -> None:
+    """Beside Pinocchio's, and a capsule and a cylinder beside many points."""
+    for ours, theirs in (
+        (Inertia.from_sphere(2.0, 0.3), pin.Inertia.FromSphere(2.0, 0.3)),
+        (Inertia.from_ellipsoid(2.0, [0.3, 0.2, 0.1]), pin.Inertia.FromEllipsoid(2.0, 0.3, 0.2, 0.1)),
+        (Inertia.from_box(2.0, [0.3, 0.2, 0.1]), pin.Inertia.FromBox(2.0, 0.3, 0.2, 0.1)),
+        (Inertia.from_cylinder(2.0, 0.3, 0.7), pin.Inertia.FromCylinder(2.0, 0.3, 0.7)),
+        (Inertia.from_capsule(2.0, 0.3, 0.7), pin.Inertia.FromCapsule(2.0, 0.3, 0.7)),
+    ):
+        close(ours.matrix, theirs.matrix())
+        assert ours.mass == theirs.mass and not ours.com.any()
+    close(Inertia.from_capsule(2.0, 0.3, 0.0).matrix, Inertia.from_sphere(2.0, 0.3).matrix)
+    with pytest.raises(ValueError, match="mass: expected at least 0 kg, found -1"):
+        Inertia.from_sphere(-1.0, 0.1)
+    with pytest.raises(ValueError, match="radius: expected at least 0 m, found -0.1"):
+        Inertia.from_capsule(1.0, -0.1, 0.1)
+    with pytest.raises(ValueError, match=r"size: expected shape \(3,\), found 0.1"):
+        Inertia.from_box(1.0, 0.1)
+
+
+def test_actions_on_inertias() -> None:
+    rng = np.random.default_rng(2)
+    pin.seed(2)
+    for _ in range(20):
+        X, Y, Z = pin.SE3.Random(), pin.Inertia.Random(), pin.Inertia.Random()
+        pose = SE3(X.rotation, X.translation)
+        ours, other = (Inertia.from_com(J.mass, J.lever, J.inertia) for J in (Y, Z))
+        m = rng.standard_normal(6)
+        close(ours.matrix, Y.matrix())
+        close((pose * ours).matrix, (X.act(Y)).matrix())
+        close(pose.act_inv(ours).matrix, X.actInv(Y).matrix())
+        close((ours * Motion.from_vector(m)).vector, (Y * pin.Motion(m)).vector)
+        close((ours + other).matrix, (Y + Z).matrix())
+        close((ours + other).about_com, (Y + Z).inertia)
+    many = exp6(motions(1.0))
+    moved, v = many * ours, Motion.from_vector(motions(0.3))
+    close(moved.rotational[7], (SE3(many.rotation[7], many.translation[7]) * ours).rotational)
+    close((moved * v).vector, (many * (ours * (many.inverse() * v))).vector)

@@ -148,7 +148,49 @@ def test_check(name: str) -> None:
 def test_budget(name: str) -> None:
     report = run("budget", name, "--knots", "4", "--repetitions", "1", "--cores", "2")
     assert len(report["algorithms"]) == 6
+    assert {row["name"] for row in report["iterations"]} == {"free"}
     assert all(row["finite"] for row in report["iterations"])
+
+
+@pytest.mark.parametrize("name", list(ROBOTS))
+def test_budget_in_contact(name: str) -> None:
+    last = run("inspect", name)["bodies"][-1]["name"]
+    for kind in ("--contacts", "--rigid-contacts"):
+        report = run("budget", name, "--knots", "4", "--repetitions", "1", kind, last)
+        assert last in str(report["contacts"])
+        assert {row["name"] for row in report["iterations"]} == {"free", "in contact"}
+        assert all(row["finite"] for row in report["iterations"])
+
+
+def on_terminal(*line: str) -> str:
+    """What the program shows on a terminal."""
+    leader, follower = os.openpty()
+    environment = {**os.environ, "TERM": "xterm-256color"}
+    with subprocess.Popen([str(PROGRAM), *line], stdout=follower, stderr=follower, env=environment) as process:
+        os.close(follower)
+        shown = b""
+        while True:
+            try:
+                part = os.read(leader, 4096)
+            except OSError:  # how Linux says that nobody writes any more
+                part = b""
+            if not part:
+                break
+            shown += part
+    assert process.returncode == 0, shown.decode()
+    os.close(leader)
+    return shown.decode()
+
+
+@pytest.mark.parametrize("command", ["inspect", "check", "budget"])
+def test_colours_and_progress_are_for_terminals(command: str) -> None:
+    line = [command, "quadruped", *(["--knots", "60"] if command == "budget" else [])]
+    shown = on_terminal(*line)
+    assert "\x1b[1mquadruped" in shown
+    assert ("measuring" in shown) == (command == "budget")
+    piped = subprocess.run([str(PROGRAM), *line], capture_output=True, text=True, check=True)
+    assert "\x1b" not in piped.stdout
+    assert piped.stderr == ""
 
 
 MOST_TRIANGLES = 60_000

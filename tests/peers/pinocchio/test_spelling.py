@@ -1,7 +1,10 @@
 """`condyle.pinocchio`: the same lines run on it and on Pinocchio, and give the same numbers."""
 
 import doctest
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -161,3 +164,102 @@ def test_locked_joints() -> None:
         model = pin.buildReducedModel(pin.buildModelFromXML(condyle.robots.ARM7), [6, 7], q)
         locked.append(pin.rnea(model, model.createData(), q[:5], q[:5], q[:5]))
     np.testing.assert_allclose(*locked, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["buildSampleModelManipulator", "buildSampleModelHumanoid"])
+def test_robots_that_are_built_in(name: str) -> None:
+    model, theirs = getattr(condyle.pinocchio, name)(), getattr(pinocchio, name)()
+    assert model.names == list(theirs.names) and model.parents == list(theirs.parents)
+    assert {(f.name, f.parentJoint) for f in model.frames} == {(f.name, f.parentJoint) for f in theirs.frames}
+    assert np.array_equal(model.lowerPositionLimit[7:], theirs.lowerPositionLimit[7:])
+    assert np.array_equal(model.effortLimit[6:], theirs.effortLimit[6:])
+    rng = np.random.default_rng(1)
+    q, (v, a) = pinocchio.neutral(theirs), rng.standard_normal((2, theirs.nv))
+    q = pinocchio.integrate(theirs, q, rng.standard_normal(theirs.nv))
+    data, their_data = model.createData(), theirs.createData()
+    efforts = pinocchio.rnea(theirs, their_data, q, v, a)
+    np.testing.assert_allclose(condyle.pinocchio.rnea(model, data, q, v, a), efforts, atol=1e-10)
+    np.testing.assert_allclose(
+        condyle.pinocchio.crba(model, data, q), pinocchio.crba(theirs, their_data, q), atol=1e-10
+    )
+
+
+def test_derivatives_of_kinematics() -> None:
+    found = []
+    for pin in (condyle.pinocchio, pinocchio):
+        model = pin.buildSampleModelHumanoid()
+        rng = np.random.default_rng(1)
+        q = pin.integrate(model, pin.neutral(model), rng.standard_normal(model.nv))
+        data, (v, a) = model.createData(), rng.standard_normal((2, model.nv))
+        pin.computeForwardKinematicsDerivatives(model, data, q, v, a)
+        joint = model.getJointId("rleg_wrist2_joint")
+        out = []
+        for axes in (pin.LOCAL, pin.WORLD, pin.LOCAL_WORLD_ALIGNED):
+            out += [x.copy() for x in pin.getJointVelocityDerivatives(model, data, joint, axes)]
+            out += [x.copy() for x in pin.getJointAccelerationDerivatives(model, data, joint, axes)]
+        found.append(out)
+    for ours, theirs in zip(*found, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=SAME * (1.0 + np.abs(theirs).max()))
+
+
+def test_inverse_kinematics() -> None:
+    """A target pose, as Pinocchio's examples reach it: the same steps, the same position in the end."""
+    found = []
+    for pin in (condyle.pinocchio, pinocchio):
+        model = pin.buildSampleModelManipulator()
+        data, goal = model.createData(), pin.SE3(np.eye(3), np.array([1.0, 0.0, 1.0]))
+        q, errors = pin.utils.zero(model.nq), []
+        for _ in range(60):
+            pin.forwardKinematics(model, data, q)
+            there = data.oMi[6].actInv(goal)
+            errors.append(pin.log(there).vector)
+            J = -pin.Jlog6(there.inverse()) @ pin.computeJointJacobian(model, data, q, 6)
+            q = pin.integrate(model, q, -0.1 * J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(6), errors[-1]))
+        found.append(np.array([*errors, q]))
+    np.testing.assert_allclose(*found, atol=1e-9)
+    assert np.abs(found[0][59]).max() < 0.1 * np.abs(found[0][0]).max()
+
+
+def test_batches_by_columns() -> None:
+    found = []
+    for pin in (condyle.pinocchio, pinocchio):
+        model = pin.buildSampleModelHumanoid()
+        pool, rng = pin.ModelPool(model, 2), np.random.default_rng(1)
+        v, a = rng.standard_normal((2, model.nv, 9))
+        q = np.stack([pin.integrate(model, pin.neutral(model), column) for column in v.T], 1)
+        into = np.empty((model.nv, 9))
+        assert pin.abaInParallel(2, pool, q, v, a, into) is None
+        found.append([pin.rneaInParallel(1, pool, q, v, a), pin.abaInParallel(2, pool, q, v, a), into])
+    for ours, theirs in zip(*found, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=SAME * (1.0 + np.abs(theirs).max()))
+
+
+def test_columns_and_limits_as_scripts_have_them() -> None:
+    pin = condyle.pinocchio
+    model = pin.buildSampleModelHumanoid()
+    data = model.createData()
+    model.lowerPositionLimit, model.upperPositionLimit = -np.ones((model.nq, 1)), np.full((model.nq, 1), 0.5)
+    drawn = np.array([pin.randomConfiguration(model) for _ in range(50)])
+    lengths = np.r_[:3, 7 : model.nq]
+    assert drawn[:, lengths].min() >= -1.0 and drawn[:, lengths].max() <= 0.5
+    assert np.ptp(drawn[:, lengths], axis=0).min() > 1.0
+    np.testing.assert_allclose(np.linalg.norm(drawn[:, 3:7], axis=1), 1.0)
+    q, v = drawn[0], np.random.default_rng(1).standard_normal((model.nv, 1))
+    for function in (pin.rnea, pin.aba, pin.computeRNEADerivatives, pin.computeABADerivatives):
+        for column, flat in zip(
+            function(model, data, q, v, v), function(model, data, q, v[:, 0], v[:, 0]), strict=True
+        ):
+            np.testing.assert_array_equal(column, flat)
+        with pytest.raises(ValueError, match="v: expected shape"):
+            function(model, data, q, v[1:, 0], v[:, 0])
+        with pytest.raises(ValueError, match="v: expected shape"):
+            function(model, data, q, v[1:], v)
+    assert "universe" in [frame.name for frame in model.frames] and pin.omp_get_max_threads() > 0
+
+
+def test_tutorial() -> None:
+    """The tutorial with Pinocchio beside it."""
+    example = Path(__file__).parents[3] / "python" / "examples" / "coming_from_pinocchio.py"
+    run = subprocess.run([sys.executable, example], capture_output=True, text=True, check=False, timeout=300)
+    assert run.returncode == 0, run.stderr
+    assert "Pinocchio takes" in run.stdout

@@ -5,6 +5,8 @@ use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::plan::Proximal;
 use crate::workspace::Gate;
+use alloc::borrow::ToOwned;
+use alloc::vec::Vec;
 use condyle_model::{Error, Model};
 use condyle_spatial::block::Real;
 use core::ops::Range;

@@ -4,6 +4,7 @@ use super::places::Places;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::data::Data;
 use crate::workspace::{filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::threads;
 use condyle_model::Model;
 use condyle_spatial::Force;
@@ -35,6 +36,9 @@ pub(super) const DTAU: [usize; 3] = [2, 3, 4];
 
 pub(super) const DA: [usize; 2] = [5, 6];
 
+/// The kinds that are symmetric: the two numbers of a pair differ by rounding at most, and either may stand for both.
+const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
+
 pub(super) const KINDS: usize = 7;
 
 /// The arguments of a state, by their places: q; v; an acceleration or an effort; λ of a contraction; forces.
@@ -61,10 +65,10 @@ impl<S: Block> Worker<S> {
         let (nq, nv) = (model.nq(), model.nv());
         Self {
             data: Data::new(model),
-            numbers: [nq, nv, nv, nv].map(|n| filled(S::zero(), n)),
+            numbers: [nq, nv, nv, nv].map(|n| filled(S::zero, n)),
             f_ext: Vec::with_capacity(model.nodes().len()),
             six: [zero_matrix(6, nv), zero_matrix(6, nv)],
-            wide: filled(S::zero(), nv * nv.max(10)),
+            wide: filled(S::zero, nv * nv.max(10)),
         }
     }
 }
@@ -271,8 +275,11 @@ impl<S: Block> Group<S> {
                 each[states] = to;
                 states += 1;
             }
-            let matrix = Strided { vectors, strides: [1, n], shape: [n, n], negative: false };
-            scatter_matrix(&matrix, &mut each[..states], n);
+            let (strides, shape) = match SYMMETRIC.contains(&kind) {
+                true => ([n * n, 1], [1, n * n]), // its columns are its rows
+                false => ([1, n], [n, n]),
+            };
+            scatter_matrix(&Strided { vectors, strides, shape, negative: false }, &mut each[..states], n);
         }
     }
 }

@@ -20,6 +20,8 @@ pub(crate) mod results;
 mod table;
 
 use crate::workspace::Gate;
+use alloc::vec;
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::block::Real;
@@ -84,7 +86,7 @@ impl<T: Real> Batch<T> {
     pub const MOST_THREADS: usize = 1024;
 
     /// The most states, of which there may be less memory for.
-    pub const MOST_STATES: usize = 1 << 32;
+    pub const MOST_STATES: usize = 1 << (usize::BITS / 2);
 
     /// Room for up to `states` states at once, on `threads` threads.
     ///
@@ -103,7 +105,7 @@ impl<T: Real> Batch<T> {
             states,
             lanes: match level() {
                 Level::Baseline => InLanes::Single(Group::new(model, states, threads)),
-                Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
+                Level::Simd128 | Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
                 Level::Avx512 => InLanes::Long(Group::new(model, states, threads)),
             },
             slots: core::array::from_fn(|k| if k == 0 { vec![T::zero(); states * model.nv()] } else { Vec::new() }),

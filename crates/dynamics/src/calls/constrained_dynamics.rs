@@ -185,7 +185,7 @@ pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// The whole algorithm, for arguments that fit.
+/// Forward dynamics and the equations differentiated, for arguments that fit.
 pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

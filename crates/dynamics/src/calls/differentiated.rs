@@ -58,7 +58,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     /// The columns of body b's joint and of all before it: of which body, and the how manieth.
     pub(crate) fn columns(&self, b: usize) -> impl Iterator<Item = (usize, usize)> {
         let nodes = &self.model.nodes();
-        let way = std::iter::successors(Some(b), |&i| Some(nodes[i].parent)).take_while(|&i| i > 0);
+        let way = core::iter::successors(Some(b), |&i| Some(nodes[i].parent)).take_while(|&i| i > 0);
         way.flat_map(|i| (0..nodes[i].joint.nv()).map(move |k| (i, k)))
     }
 }

@@ -88,8 +88,23 @@ pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     reference: ReferenceFrame,
     J: &mut DMatrix<S>,
 ) {
+    by_columns(model, J);
+    frame_jacobian_strided(model, q, frame, reference, J.as_mut_slice(), [1, 6]);
+}
+
+/// [`frame_jacobian`] to where one row lies `strides[0]` numbers behind the one before, and one column `strides[1]`: for
+/// languages whose matrices lie by rows.
+#[doc(hidden)]
+pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    q: &[S],
+    frame: usize,
+    reference: ReferenceFrame,
+    J: &mut [S],
+    strides: [usize; 2],
+) {
     let frame = &model.frames()[frame];
-    jacobian_on(model, q, frame.body, frame.placement, reference, J);
+    jacobian_on(model, q, frame.body, frame.placement, reference, J, strides);
 }
 
 /// The Jacobian J of one body, 6 × nv: [`frame_jacobian`] of the frame that the URDF gives it.
@@ -111,7 +126,26 @@ pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     reference: ReferenceFrame,
     J: &mut DMatrix<S>,
 ) {
-    jacobian_on(model, q, body, Se3::identity(), reference, J);
+    by_columns(model, J);
+    body_jacobian_strided(model, q, body, reference, J.as_mut_slice(), [1, 6]);
+}
+
+/// [`body_jacobian`] to where rows and columns lie as in [`frame_jacobian_strided`].
+#[doc(hidden)]
+pub fn body_jacobian_strided<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    q: &[S],
+    body: usize,
+    reference: ReferenceFrame,
+    J: &mut [S],
+    strides: [usize; 2],
+) {
+    jacobian_on(model, q, body, Se3::identity(), reference, J, strides);
+}
+
+fn by_columns<S, R>(model: &Model<R>, J: &DMatrix<S>) {
+    let nv = model.nv();
+    assert!(J.shape() == (6, nv), "J: expected 6 × {nv}, found {:?}", J.shape());
 }
 
 fn jacobian_on<S: Scalar, R: Constant<S>>(
@@ -120,11 +154,13 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
     body: usize,
     bXf: Se3<f64>,
     reference: ReferenceFrame,
-    J: &mut DMatrix<S>,
+    J: &mut [S],
+    strides: [usize; 2],
 ) {
     check("q", q.len(), model.nq());
+    check("J", J.len(), 6 * model.nv());
     let zXb = Se3::new(model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
-    path_jacobian(model, q, body, (zXb * bXf).lift(), reference, J);
+    path_jacobian(model, q, body, (zXb * bXf).lift(), reference, J, strides);
 }
 
 /// Places all bodies and gives their velocities: v_i = v_λ + S q̇, in O(n).

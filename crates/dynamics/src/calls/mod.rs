@@ -3,6 +3,7 @@
 
 pub(crate) mod centroidal;
 pub(crate) mod constrained_dynamics;
+pub(crate) mod constrained_inverse;
 pub(crate) mod derivatives;
 mod differentiated;
 pub(crate) mod forward_dynamics;

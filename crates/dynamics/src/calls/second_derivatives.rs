@@ -6,6 +6,7 @@ use super::inverse_dynamics::check_arguments;
 use crate::data::Data;
 use crate::derivatives::{aba_hessian as aba, rnea_hessian as rnea};
 use crate::workspace::{filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
@@ -87,7 +88,7 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
     /// Memory for the tensors of a model.
     pub fn new<R>(model: &Model<R>) -> Self {
         let zeros = || vec![zero_matrix(model.nv(), model.nv()); model.nv()];
-        let lambda = filled(S::zero(), model.nv());
+        let lambda = filled(S::zero, model.nv());
         Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
     }
 }

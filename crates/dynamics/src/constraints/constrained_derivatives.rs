@@ -16,6 +16,7 @@
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::islands::Island;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::sparsity::NonzeroRows;
@@ -44,7 +45,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         Self {
-            forces: filled(Force::zero(), size.bodies),
+            forces: filled(Force::zero, size.bodies),
             P: square.clone(),
             dtau_dq: square.clone(),
             da_dq: square.clone(),

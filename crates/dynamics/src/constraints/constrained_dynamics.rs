@@ -17,6 +17,7 @@ use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::crba;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
@@ -49,14 +50,14 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         Self {
-            v: filled(Motion::zero(), size.bodies),
-            a: filled(Motion::zero(), size.bodies),
-            IC: filled(Inertia::zero(), size.bodies),
-            F: filled(Force::zero(), size.bodies),
+            v: filled(Motion::zero, size.bodies),
+            a: filled(Motion::zero, size.bodies),
+            IC: filled(Inertia::zero, size.bodies),
+            F: filled(Force::zero, size.bodies),
             M: zero_matrix(size.nv, size.nv),
             factor: Ltdl::new(model),
-            effort: filled(S::zero(), size.nv),
-            qdd: filled(S::zero(), size.nv),
+            effort: filled(S::zero, size.nv),
+            qdd: filled(S::zero, size.nv),
         }
     }
 }
@@ -216,6 +217,21 @@ kernel! {
             let gamma = ends.acceleration(plan, target).to_array();
             for r in 0..plan.rows() {
                 set.gamma[plan.row + r] = gamma[r];
+            }
+        }
+    }
+}
+
+kernel! {
+    /// J and J q̈ + γ, for bodies whose velocities and accelerations are known.
+    pub(crate) fn evaluate<S>(world: &World<S>, set: &mut ConstraintSet<S>, v: &[Motion<S>], a: &[Motion<S>]) {
+        for (i, plan) in set.plans.iter().enumerate() {
+            let target = &set.targets[i];
+            let ends = FramePair::new(plan, target, world, v, a);
+            ends.jacobian(plan, &world.S, &mut set.J);
+            let acceleration = ends.acceleration(plan, target).to_array();
+            for r in 0..plan.rows() {
+                set.error[plan.row + r] = acceleration[r];
             }
         }
     }

@@ -1,15 +1,16 @@
 //! What constraints are: frames that touch the world, and frames of two bodies that are held together.
 
 use crate::passes::frames::ReferenceFrame;
+use alloc::borrow::ToOwned;
 use condyle_model::Error;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3};
 use core::any::Any;
-use serde::{Deserialize, Serialize};
 
 /// The motion that a constraint holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ConstraintKind {
     /// The origin of a frame: three rows, a force.
     Point,
@@ -34,7 +35,8 @@ impl ConstraintKind {
 }
 
 /// The target of a constraint: where its frame should be, and how it should move there.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Target<S> {
     /// The wanted pose of the frame in the other frame (the world for a contact); of all but rigid ones, the translation
@@ -109,8 +111,9 @@ impl<S: Scalar> Target<S> {
 /// assert_eq!(contact.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ContactConstraint {
     /// The number of the frame that is held.
     pub frame: usize,
@@ -119,7 +122,7 @@ pub struct ContactConstraint {
     /// A point, some directions of it, or the whole frame.
     pub kind: ConstraintKind,
     /// The axes of a line or a plane, as columns along those of `reference`; 1 for all others.
-    #[serde(default = "Mat3::identity")]
+    #[cfg_attr(feature = "serde", serde(default = "Mat3::identity"))]
     pub axes: Mat3<f64>,
     /// Along which axes the rows and λ are: `Local` or `LocalWorldAligned`.
     pub reference: ReferenceFrame,

@@ -1,6 +1,8 @@
 //! What constrained dynamics of a robot with limbs (`constrained.rs`) needs of the constraints of a set, and writes.
 
 use crate::constraints::plan::Plan;
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::limbs::LANES;
 use condyle_spatial::gate::is;
@@ -75,7 +77,7 @@ impl ConstraintLanes {
         let (mut rows, mut start): (Vec<Rows>, usize) = (Vec::new(), 0);
         for plan in plans {
             let parent = |&i: &usize| Some(model.nodes()[i].parent);
-            let way = |i| std::iter::successors(Some(i), parent).take_while(|&i| i > root).collect::<Vec<_>>();
+            let way = |i| core::iter::successors(Some(i), parent).take_while(|&i| i > root).collect::<Vec<_>>();
             let link = |&body: &usize| {
                 let node = &model.nodes()[body];
                 let first = plan.touches.iter().find(|touch| touch.column == node.column);

@@ -8,6 +8,7 @@
 
 use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, Proximal};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::{axpy, dot};
 use condyle_spatial::Scalar;

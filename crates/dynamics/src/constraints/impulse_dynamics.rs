@@ -20,6 +20,7 @@ use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::islands::clear_rows;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_linalg::axpy::axpy;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
@@ -45,11 +46,11 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            v_after: filled(S::zero(), size.nv),
-            w: filled(S::zero(), size.nv),
-            velocity: filled(Motion::zero(), size.bodies),
-            Psid: filled(Motion::zero(), size.columns),
-            zero: filled(S::zero(), size.nv),
+            v_after: filled(S::zero, size.nv),
+            w: filled(S::zero, size.nv),
+            velocity: filled(Motion::zero, size.bodies),
+            Psid: filled(Motion::zero, size.columns),
+            zero: filled(S::zero, size.nv),
         }
     }
 }

@@ -6,6 +6,8 @@
 //! rows, none for a tree without constraints: where the ranges of two would overlap, they are taken for one.
 
 use crate::constraints::plan::Plan;
+use alloc::vec;
+use alloc::vec::Vec;
 use condyle_linalg::elimination_tree::{EliminationTree, NONE};
 use condyle_model::Model;
 use condyle_spatial::Scalar;

@@ -6,12 +6,13 @@
 
 use crate::constraints::constraint::{ConstraintKind, ContactConstraint};
 use crate::passes::frames::ReferenceFrame;
+use alloc::collections::BTreeSet;
+use alloc::vec::Vec;
 use condyle_linalg::elimination_tree::{EliminationTree, NONE};
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::{Error, Model};
 use condyle_spatial::{Mat3, Se3, Vec3};
 use core::ops::Range;
-use std::collections::BTreeSet;
 
 /// How J M⁻¹ Jᵀ is regularised, so that redundant constraints share their forces.
 ///

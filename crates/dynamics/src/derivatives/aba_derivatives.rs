@@ -11,6 +11,7 @@ use crate::derivatives::tree_solve::{self, minus_solve};
 use crate::passes::aba::{self};
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_spatial::Scalar;
 use condyle_spatial::kernel;
@@ -32,7 +33,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         let solve = tree_solve::Workspace::new(model.columns(), size.nv);
-        Self { a: filled(S::zero(), size.nv), da_dq: square.clone(), da_dv: square, solve }
+        Self { a: filled(S::zero, size.nv), da_dq: square.clone(), da_dv: square, solve }
     }
 }
 

@@ -14,6 +14,7 @@
 use crate::derivatives::aba_derivatives::{self};
 use crate::derivatives::rnea_hessian;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::minus_product;
 use condyle_spatial::Scalar;
@@ -53,9 +54,9 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = || zero_matrix(size.nv, size.nv);
         Self {
-            mu: filled(S::zero(), size.nv),
-            transpose: filled(S::zero(), size.nv * size.nv),
-            product: filled(S::zero(), size.nv * size.nv),
+            mu: filled(S::zero, size.nv),
+            transpose: filled(S::zero, size.nv * size.nv),
+            product: filled(S::zero, size.nv * size.nv),
             dqdq: square(),
             dvdq: square(),
             dvdv: square(),

@@ -16,6 +16,7 @@ use crate::passes::centroidal::{about, add};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
@@ -61,8 +62,8 @@ impl<S: Scalar> Workspace<S> {
         let rows = |n| zero_matrix(n, size.nv);
         let (six, three, o) = (rows(6), rows(3), Force::zero());
         Self {
-            IC: filled(Inertia::zero(), size.bodies),
-            BC: filled(Coriolis::zero(), size.bodies),
+            IC: filled(Inertia::zero, size.bodies),
+            BC: filled(Coriolis::zero, size.bodies),
             F: vec![o; size.bodies],
             columns: vec![Column { h_q: o, F_q: o, F_v: o, F_a: o }; size.columns],
             dh_dq: six.clone(),

@@ -33,6 +33,7 @@ use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
@@ -65,10 +66,10 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         Self {
-            w: filled(Motion::zero(), size.bodies),
-            W: filled(Motion::zero(), size.columns),
-            PD: filled(Coriolis::zero(), size.bodies),
-            Q: filled(Vec3::zero(), size.bodies),
+            w: filled(Motion::zero, size.bodies),
+            W: filled(Motion::zero, size.columns),
+            PD: filled(Coriolis::zero, size.bodies),
+            Q: filled(Vec3::zero, size.bodies),
             dqdq: square.clone(),
             dvdq: square.clone(),
             dvdv: square.clone(),

@@ -8,6 +8,7 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::selection::solve_by_tree;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
 
@@ -48,7 +49,7 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(columns: &[Column], nv: usize) -> Self {
         let paths = if solve_by_tree(columns, nv) { paths(columns) } else { Vec::new() };
         let places = paths.iter().map(|path| path.place + 1).max().unwrap_or(0);
-        let zeros = |n: usize| filled(S::zero(), n * SIDE);
+        let zeros = |n: usize| filled(S::zero, n * SIDE);
         let x = zeros(if paths.is_empty() { 0 } else { nv });
         Self { x, P: zeros(6 * places), A: zeros(6 * places), paths }
     }

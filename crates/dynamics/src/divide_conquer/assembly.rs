@@ -8,6 +8,7 @@
 //! thus has ⌈log₂ n⌉ levels of joins, and any tree O(log n). No cut is made below a body that without its load would not
 //! resist its own joint (one without mass, say): the piece above the cut could not be solved on its own.
 
+use alloc::vec::Vec;
 use condyle_model::{Body, Model};
 use condyle_spatial::{Act, ArticulatedInertia, Se3, Vec3};
 
@@ -156,7 +157,7 @@ impl Planner {
         if weights.iter().sum::<usize>() <= self.grain {
             self.piece(Kind::Run, false, |plan| plan.run(roots, &[]));
         } else if let &[root] = roots {
-            let path: Vec<usize> = std::iter::successors(Some(root), |&i| self.children[i].first().copied()).collect();
+            let path: Vec<usize> = core::iter::successors(Some(root), |&i| self.children[i].first().copied()).collect();
             self.path(&path, false);
         } else {
             let (left, right) = roots.split_at(halfway(&weights, |_| true).expect("there are two at least"));

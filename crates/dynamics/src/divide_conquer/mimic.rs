@@ -20,6 +20,7 @@ use crate::calls::inertia::crba;
 use crate::data::Data;
 use crate::divide_conquer::assembly::Link;
 use crate::divide_conquer::scratch::Dof;
+use alloc::vec::Vec;
 use condyle_linalg::Cholesky;
 use condyle_linalg::axpy::{axpy, dot};
 use condyle_model::Model;

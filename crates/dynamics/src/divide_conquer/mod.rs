@@ -18,6 +18,7 @@ use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::divide_conquer::mimic::Ties;
 use crate::divide_conquer::scratch::{Body, Dof, Part};
+use alloc::vec::Vec;
 use condyle_linalg::{check, threads};
 use condyle_model::Model;
 use condyle_model::joint::Joint;
@@ -139,11 +140,7 @@ impl<S: Scalar> DivideConquer<S> {
         let Self { assembly, bodies, dofs, handles, ties, zero, qdd, .. } = self;
         let all = Part { pieces: &assembly.pieces, links: &assembly.links, bodies, dofs, handles };
         let job = Job { l: &l, q, qd: v, f_ext, world, parallel };
-        if parallel {
-            threads::enter(|| job.run(all, ties, zero)); // enters the pool once, not three times
-        } else {
-            job.run(all, ties, zero);
-        }
+        job.run(all, ties, zero);
         let mut dofs = dofs.iter();
         for link in &assembly.links {
             let node = &model.nodes()[link.body];

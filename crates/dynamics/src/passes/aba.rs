@@ -7,6 +7,7 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
@@ -39,15 +40,15 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            IA: filled(ArticulatedInertia::zero(), size.levels),
-            U: filled(Force::zero(), size.columns),
-            D_inv: filled(S::zero(), size.columns),
-            v: filled(Motion::zero(), size.levels),
-            a: filled(Motion::zero(), size.levels),
-            c: filled(Motion::zero(), size.bodies),
-            pA: filled(Force::zero(), size.levels),
-            u: filled(S::zero(), size.columns),
-            qdd: filled(S::zero(), size.nv),
+            IA: filled(ArticulatedInertia::zero, size.levels),
+            U: filled(Force::zero, size.columns),
+            D_inv: filled(S::zero, size.columns),
+            v: filled(Motion::zero, size.levels),
+            a: filled(Motion::zero, size.levels),
+            c: filled(Motion::zero, size.bodies),
+            pA: filled(Force::zero, size.levels),
+            u: filled(S::zero, size.columns),
+            qdd: filled(S::zero, size.nv),
         }
     }
 }

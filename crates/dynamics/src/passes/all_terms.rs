@@ -10,6 +10,7 @@ use crate::passes::energy::rotors;
 use crate::passes::frames::{ReferenceFrame, Velocities, classical};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::kernel;
@@ -37,10 +38,10 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            a: filled(Motion::zero(), size.bodies),
-            f: filled(Force::zero(), size.bodies),
+            a: filled(Motion::zero, size.bodies),
+            f: filled(Force::zero, size.bodies),
             M: zero_matrix(size.nv, size.nv),
-            h: filled(S::zero(), size.nv),
+            h: filled(S::zero, size.nv),
             kinetic_energy: S::zero(),
             potential_energy: S::zero(),
         }

@@ -11,6 +11,7 @@ use crate::passes::coriolis::Coriolis;
 use crate::passes::frames::{Accelerations, Velocities};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
@@ -52,10 +53,10 @@ pub(crate) struct Whole<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            IC: filled(Inertia::zero(), size.bodies),
-            BC: filled(Coriolis::zero(), size.bodies),
-            F: filled(Force::zero(), size.columns),
-            dF: filled(Force::zero(), size.columns),
+            IC: filled(Inertia::zero, size.bodies),
+            BC: filled(Coriolis::zero, size.bodies),
+            F: filled(Force::zero, size.columns),
+            dF: filled(Force::zero, size.columns),
             Ag: zero_matrix(6, size.nv),
             dAg: zero_matrix(6, size.nv),
             Jcom: zero_matrix(3, size.nv),

@@ -13,6 +13,7 @@
 
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
@@ -94,8 +95,8 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            IC: filled(Inertia::zero(), size.bodies),
-            BC: filled(Coriolis::zero(), size.bodies),
+            IC: filled(Inertia::zero, size.bodies),
+            BC: filled(Coriolis::zero, size.bodies),
             C: zero_matrix(size.nv, size.nv),
         }
     }

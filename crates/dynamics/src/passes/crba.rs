@@ -5,6 +5,7 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::kernel;
@@ -22,7 +23,7 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        Self { IC: filled(Inertia::zero(), size.bodies), M: zero_matrix(size.nv, size.nv) }
+        Self { IC: filled(Inertia::zero, size.bodies), M: zero_matrix(size.nv, size.nv) }
     }
 }
 

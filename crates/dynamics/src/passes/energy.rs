@@ -4,6 +4,7 @@ use crate::passes::answers::{Number, answers};
 use crate::passes::frames::{Placements, Velocities};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
@@ -79,10 +80,10 @@ pub(crate) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
-        let zeros = || filled(S::zero(), size.nv);
+        let zeros = || filled(S::zero, size.nv);
         Self {
-            IC: filled(Inertia::zero(), size.bodies),
-            h: filled(Force::zero(), size.bodies),
+            IC: filled(Inertia::zero, size.bodies),
+            h: filled(Force::zero, size.bodies),
             dT_dq: zeros(),
             dT_dv: zeros(),
             dV_dq: zeros(),

@@ -1,6 +1,7 @@
 //! Forward dynamics by the method that is fastest for the model.
 
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_linalg::Cholesky;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
@@ -37,8 +38,8 @@ impl<S: Scalar> Workspace<S> {
         Self {
             sparse: Ltdl::new(model),
             dense: Cholesky::new(model.nv()),
-            qdd: filled(S::zero(), model.nv()),
-            zero: filled(S::zero(), model.nv()),
+            qdd: filled(S::zero, model.nv()),
+            zero: filled(S::zero, model.nv()),
         }
     }
 }

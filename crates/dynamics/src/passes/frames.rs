@@ -16,11 +16,11 @@ use condyle_model::layout::{Columns, Single};
 use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3, kernel};
 use core::ops::Deref;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 /// The frame in which what is asked about a frame (or a body, whose frame is then meant) is expressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ReferenceFrame {
     /// The frame itself.
     Local,

@@ -2,6 +2,7 @@
 //! be asked is in `frames.rs`.
 
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;
@@ -38,8 +39,8 @@ impl<S: Scalar> World<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
             sin_cos: JointSinCos::new(size.bodies),
-            oX: filled(Se3::identity(), size.bodies),
-            S: filled(Motion::zero(), size.columns),
+            oX: filled(Se3::identity, size.bodies),
+            S: filled(Motion::zero, size.columns),
             placed: PlacementCache::Nowhere,
         }
     }
@@ -77,10 +78,10 @@ pub(crate) struct Moving<S> {
 impl<S: Scalar> Moving<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            v: filled(Motion::zero(), size.bodies),
-            dS: filled(Motion::zero(), size.columns),
-            qd: filled(S::zero(), size.nv),
-            a: filled(Motion::zero(), size.bodies),
+            v: filled(Motion::zero, size.bodies),
+            dS: filled(Motion::zero, size.columns),
+            qd: filled(S::zero, size.nv),
+            a: filled(Motion::zero, size.bodies),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::selection::inverse_by_factor;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_model::Model;
@@ -39,8 +40,8 @@ impl<S: Scalar> Workspace<S> {
         Self {
             by_factor: inverse_by_factor(model, factor.nonzeros()),
             factor,
-            P: filled(S::zero(), 6 * size.columns),
-            A: filled(S::zero(), (1 + size.depth) * 6 * size.columns),
+            P: filled(S::zero, 6 * size.columns),
+            A: filled(S::zero, (1 + size.depth) * 6 * size.columns),
             Minv: zero_matrix(size.nv, size.nv),
         }
     }

@@ -8,30 +8,35 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 2.8 (S in any coordinates) and example 4.1.
 
-use super::frames::{ReferenceFrame, add, clear};
+use super::frames::ReferenceFrame;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Motion, Scalar, Se3, Vec3, kernel};
-use nalgebra::DMatrix;
 
 kernel! {
-    /// J of a frame at iXf on a body, in O(depth).
+    /// J of a frame at iXf on a body, in O(depth); the strides are the distances from one row of J to the next, and from one
+    /// column to the next.
     pub(crate) fn path_jacobian<S, R>(
         model: &Model<R>,
         q: &[S],
         body: usize,
         iXf: Se3<S>,
         reference: ReferenceFrame,
-        J: &mut DMatrix<S>,
+        J: &mut [S],
+        strides: [usize; 2],
     ) {
-        clear("J", J, model.nv());
+        J.fill(S::zero());
         let l = Single::new(model);
         let (mut i, mut X) = (body, iXf);
         while i > 0 {
             let joint = l.joint(i);
             for k in 0..joint.nv() {
-                add(model, J, l.column(i) + k, X.act_inv(joint.column(&Se3::identity(), k))); // J = iXf⁻¹ S
+                let column = &model.columns()[l.column(i) + k];
+                let S = X.act_inv(joint.column(&Se3::identity(), k)).scale(S::splat(column.ratio)); // J = iXf⁻¹ S
+                for (row, S) in S.to_array().into_iter().enumerate() {
+                    J[row * strides[0] + column.coordinate * strides[1]] += S;
+                }
             }
             X = Joint::placement(&l, i, q) * X; // λXf = λXi iXf
             i = model.nodes()[i].parent;
@@ -44,11 +49,11 @@ kernel! {
         if model.has_mimic() {
             // several columns may follow one coordinate
             for coordinate in 0..model.nv() {
-                act(turn, J, coordinate);
+                act(turn, J, coordinate, strides);
             }
         } else {
             for &column in model.support(&model.nodes()[body]) {
-                act(turn, J, model.columns()[column].coordinate);
+                act(turn, J, model.columns()[column].coordinate, strides);
             }
         }
     }
@@ -56,8 +61,13 @@ kernel! {
 
 /// Expresses a column in another frame.
 #[inline(always)]
-fn act<S: Scalar>(X: Se3<S>, J: &mut DMatrix<S>, coordinate: usize) {
-    let column = &mut J.as_mut_slice()[6 * coordinate..6 * coordinate + 6];
-    let motion = Motion::from([column[0], column[1], column[2], column[3], column[4], column[5]]);
-    column.copy_from_slice(&X.act(motion).to_array());
+fn act<S: Scalar>(X: Se3<S>, J: &mut [S], coordinate: usize, [down, along]: [usize; 2]) {
+    let mut column = [S::zero(); 6];
+    for row in 0..6 {
+        column[row] = J[row * down + coordinate * along];
+    }
+    column = X.act(Motion::from(column)).to_array();
+    for row in 0..6 {
+        J[row * down + coordinate * along] = column[row];
+    }
 }

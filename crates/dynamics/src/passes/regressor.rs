@@ -14,6 +14,7 @@
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
@@ -39,8 +40,8 @@ impl<S: Scalar> Workspace<S> {
         let parameters = PARAMETERS * (size.bodies - 1);
         Self {
             torque: zero_matrix(size.nv, parameters),
-            kinetic: filled(S::zero(), parameters),
-            potential: filled(S::zero(), parameters),
+            kinetic: filled(S::zero, parameters),
+            potential: filled(S::zero, parameters),
         }
     }
 }

@@ -20,6 +20,7 @@
 
 use crate::passes::kinematics::{PlacementCache, World};
 use crate::workspace::{Size, filled};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};
@@ -50,12 +51,12 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         let still = ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() };
         Self {
-            X: filled(Se3::identity(), size.levels),
-            motion: filled(still, size.levels),
-            K: filled(Mat3::zero(), size.levels),
-            f: filled(Force::zero(), size.levels),
-            tau: filled(S::zero(), size.nv),
-            zero: filled(S::zero(), size.nv),
+            X: filled(Se3::identity, size.levels),
+            motion: filled(|| still, size.levels),
+            K: filled(Mat3::zero, size.levels),
+            f: filled(Force::zero, size.levels),
+            tau: filled(S::zero, size.nv),
+            zero: filled(S::zero, size.nv),
         }
     }
 }

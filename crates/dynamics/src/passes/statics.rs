@@ -10,6 +10,7 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
@@ -33,9 +34,9 @@ pub(crate) struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            F: filled(Force::zero(), size.bodies),
-            tau: filled(S::zero(), size.nv),
-            IC: filled(Inertia::zero(), size.bodies),
+            F: filled(Force::zero, size.bodies),
+            tau: filled(S::zero, size.nv),
+            IC: filled(Inertia::zero, size.bodies),
             dtau_dq: zero_matrix(size.nv, size.nv),
         }
     }

@@ -3,6 +3,7 @@
 use super::{Input, Status, acceleration};
 use crate::data::Data;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_spatial::{Constant, Scalar};
@@ -17,7 +18,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        Self { effort: filled(S::zero(), model.nv()), way: filled(S::zero(), model.nv()) }
+        Self { effort: filled(S::zero, model.nv()), way: filled(S::zero, model.nv()) }
     }
 }
 

@@ -19,6 +19,7 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
@@ -54,17 +55,17 @@ impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
         let (bodies, columns, nv) = (model.nodes().len(), model.columns().len(), model.nv());
         Self {
-            v: filled(Motion::zero(), bodies),
-            IC: filled(Inertia::zero(), bodies),
-            hC: filled(Force::zero(), bodies),
-            FC: filled(Force::zero(), bodies),
-            Psid: filled(Motion::zero(), columns),
-            Psidd: filled(Motion::zero(), columns),
-            p: filled(S::zero(), nv),
-            L_q: filled(S::zero(), nv),
-            M: filled(S::zero(), nv * nv),
-            p_q: filled(S::zero(), nv * nv),
-            L_qq: filled(S::zero(), nv * nv),
+            v: filled(Motion::zero, bodies),
+            IC: filled(Inertia::zero, bodies),
+            hC: filled(Force::zero, bodies),
+            FC: filled(Force::zero, bodies),
+            Psid: filled(Motion::zero, columns),
+            Psidd: filled(Motion::zero, columns),
+            p: filled(S::zero, nv),
+            L_q: filled(S::zero, nv),
+            M: filled(S::zero, nv * nv),
+            p_q: filled(S::zero, nv * nv),
+            L_qq: filled(S::zero, nv * nv),
         }
     }
 }

@@ -24,6 +24,7 @@ mod variational;
 use crate::calls::forward_dynamics::aba;
 use crate::data::{Data, check_forces};
 use crate::passes::passive::passive_torque;
+use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};

@@ -12,6 +12,7 @@
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_model::joint::GroupJacobian;
@@ -34,7 +35,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = filled(S::zero(), model.nv());
+        let zero = filled(S::zero, model.nv());
         Self {
             effort: zero.clone(),
             xi: zero.clone(),

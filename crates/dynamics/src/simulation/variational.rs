@@ -26,6 +26,7 @@ use crate::data::Data;
 use crate::passes::kinematics::place;
 use crate::passes::passive::{passive_torque, passive_torque_derivative};
 use crate::workspace::filled;
+use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::integrate;
@@ -64,7 +65,7 @@ pub(super) struct Workspace<S> {
 
 impl<S: Scalar> Workspace<S> {
     pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = filled(S::zero(), model.nv());
+        let zero = filled(S::zero, model.nv());
         Self {
             p: zero.clone(),
             w: zero.clone(),
@@ -77,7 +78,7 @@ impl<S: Scalar> Workspace<S> {
             carried: zero.clone(),
             pushed: zero.clone(),
             residual: zero,
-            slope: filled(S::zero(), model.nv() * model.nv()),
+            slope: filled(S::zero, model.nv() * model.nv()),
             lagrangian: lagrangian::Workspace::new(model),
             M: Ltdl::new(model),
         }

@@ -9,7 +9,8 @@ use condyle_dynamics::{
     Cholesky, ConstraintSet, ContactConstraint, Data, DifferenceArgument, Force, ForwardDynamicsMethod,
     IntegrateArgument, Ltdl, Model, Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, aba, aba_derivatives,
     aba_hessian, body_jacobian, centroidal_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms,
-    constrained_dynamics, constrained_dynamics_derivatives, coriolis_derivatives, coriolis_matrix, crba, difference,
+    constrained_dynamics, constrained_dynamics_derivatives, constrained_inverse_dynamics,
+    constrained_inverse_dynamics_derivatives, coriolis_derivatives, coriolis_matrix, crba, difference,
     difference_jacobian, distance, energy_derivatives, forward_accelerations, forward_dynamics, forward_kinematics,
     forward_velocities, frame_jacobian, gravity, impulse_dynamics, impulse_dynamics_derivatives, integrate,
     integrate_jacobian, interpolate, joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects,
@@ -199,7 +200,7 @@ pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
 
 /// Name and call of each function. A call allocates only if the function does.
 pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
-    let others: [(&'static str, Function<S>); 39] = [
+    let others: [(&'static str, Function<S>); 41] = [
         ("rnea_derivatives by all other inputs", |m, d, i, o| {
             let r = rnea_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
             other_inputs(m).into_iter().zip(&mut o.by_inputs).for_each(|(input, out)| r.with_respect_to(input, out));
@@ -405,6 +406,20 @@ pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
             let r = constrained_dynamics_derivatives(m, d, &mut o.constraints, &i.q, &i.v, &i.x, &i.f_ext);
             o.numbers.extend_from_slice(r.a);
             let matrices = [r.da_dq, r.da_dv, r.da_dtau, r.dlambda_dq, r.dlambda_dv, r.dlambda_dtau, r.inertia];
+            matrices.into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
+        }),
+        ("constrained_inverse_dynamics", |m, d, i, o| {
+            let lambda = [S::splat(2.0); 64];
+            let lambda = &lambda[..o.constraints.rows()];
+            let r = constrained_inverse_dynamics(m, d, &mut o.constraints, &i.q, &i.v, &i.x, lambda, &i.f_ext);
+            [r.tau, r.acceleration].into_iter().for_each(|x| o.numbers.extend_from_slice(x));
+        }),
+        ("constrained_inverse_dynamics_derivatives", |m, d, i, o| {
+            let lambda = [S::splat(2.0); 64];
+            let (lambda, c) = (&lambda[..o.constraints.rows()], &mut o.constraints);
+            let r = constrained_inverse_dynamics_derivatives(m, d, c, &i.q, &i.v, &i.x, lambda, &i.f_ext);
+            [r.tau, r.acceleration].into_iter().for_each(|x| o.numbers.extend_from_slice(x));
+            let matrices = [r.M, r.dtau_dq, r.dtau_dv, r.dacceleration_dq, r.dacceleration_dv];
             matrices.into_iter().for_each(|x| o.numbers.extend_from_slice(x.as_slice()));
         }),
         ("impulse_dynamics", |m, d, i, o| {

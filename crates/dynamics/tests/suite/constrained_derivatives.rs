@@ -6,7 +6,8 @@ use common::contacts::cases;
 use common::{State, Worst, dual, eps, lift, lift_forces, moved, unit};
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, Force, Model, Scalar, constrained_dynamics,
-    constrained_dynamics_derivatives, constrained_dynamics_equations, crba, impulse_dynamics,
+    constrained_dynamics_derivatives, constrained_dynamics_equations, constrained_equations_at,
+    constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, crba, impulse_dynamics,
     impulse_dynamics_derivatives,
 };
 use nalgebra::{DMatrix, DVector};
@@ -45,6 +46,27 @@ impl Algorithm for Dynamics {
         let d = constrained_dynamics(model, data, set, q, v, tau, f);
         [d.a, d.lambda].concat()
     }
+}
+
+/// τ and J q̈ + γ as a function of q, v and q̈, for forces that are no solution.
+struct Inverse;
+
+impl Algorithm for Inverse {
+    fn run<S: Scalar>(
+        model: &Model,
+        data: &mut Data<S>,
+        set: &mut ConstraintSet<S>,
+        [q, v, a]: [&[S]; 3],
+        f: &[Force<S>],
+    ) -> Vec<S> {
+        let lambda: Vec<_> = some_forces(set.rows()).into_iter().map(S::splat).collect();
+        let d = constrained_inverse_dynamics(model, data, set, q, v, a, &lambda, f);
+        [d.tau, d.acceleration].concat()
+    }
+}
+
+fn some_forces(rows: usize) -> Vec<f64> {
+    (0..rows).map(|k| 3.0 * (1.0 + k as f64).sin()).collect()
 }
 
 const RESTITUTION: f64 = 0.3;
@@ -151,6 +173,7 @@ fn derivatives_of_constrained_dynamics() {
 fn equations_of_constrained_dynamics() {
     let names = ["r, c for q", "r, c for v", "for τ"];
     let mut worst = names.map(|name| Worst::new(name, CONDITIONED));
+    let mut known = Worst::new("where the motion is known", EXACT);
     for (model, s, constraints) in cases(TREES) {
         let mut data = Data::new(&model);
         let mut set = ConstraintSet::new(&model, &constraints).unwrap();
@@ -158,8 +181,10 @@ fn equations_of_constrained_dynamics() {
             let (nv, rows) = (model.nv(), set.rows());
             let duals = by_duals::<Dynamics>(&model, &s, &constraints, f_ext);
             let d = constrained_dynamics_equations(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+            let motion = (d.a.to_vec(), d.lambda.to_vec());
             let nothing = DMatrix::zeros(nv + rows, nv);
             let blocks = [stack(d.dtau_dq, d.dgamma_dq), stack(d.dtau_dv, d.dgamma_dv), nothing];
+            let matrices = [d.M, d.dtau_dq, d.dtau_dv, d.dgamma_dq, d.dgamma_dv].map(DMatrix::clone);
             let mut K = DMatrix::zeros(nv + rows, nv + rows);
             K.view_mut((0, 0), (nv, nv)).copy_from(d.M);
             let mut J = DMatrix::zeros(rows, nv);
@@ -172,6 +197,54 @@ fn equations_of_constrained_dynamics() {
                 let expected = if k < 2 { -(&K * &duals[k]) } else { efforts.clone() - &K * &duals[k] };
                 worst[k].see(&model, blocks[k].as_slice(), expected.as_slice());
             }
+            if f_ext.is_empty() {
+                let (other, s) = (&mut Data::new(&model), &s);
+                let d = constrained_equations_at(&model, other, &mut set, &s.q, &s.v, &motion.0, &motion.1);
+                let at = [d.M, d.dtau_dq, d.dtau_dv, d.dgamma_dq, d.dgamma_dv];
+                at.into_iter()
+                    .zip(&matrices)
+                    .for_each(|(at, there)| known.see(&model, at.as_slice(), there.as_slice()));
+                let mut again = DMatrix::zeros(rows, nv);
+                set.jacobian(&mut again);
+                known.see(&model, again.as_slice(), J.as_slice());
+            }
+        }
+    }
+}
+
+/// At a motion and forces that are no solution; and the value is that of the equations, M q̈ + h − Jᵀ λ and J q̈ + γ.
+#[test]
+fn derivatives_of_constrained_inverse_dynamics() {
+    let names = ["∂(τ, J q̈ + γ)/∂q", "∂(τ, J q̈ + γ)/∂v", "∂(τ, J q̈ + γ)/∂q̈"];
+    let mut exact = names.map(|name| Worst::new(name, EXACT));
+    let mut near = names.map(|name| Worst::new(name, DIFFERENCES));
+    let mut back = Worst::new("τ of q̈ and λ that follow from τ", CONDITIONED);
+    for (model, s, constraints) in cases(TREES) {
+        let mut data = Data::new(&model);
+        let mut set = ConstraintSet::new(&model, &constraints).unwrap();
+        let lambda = some_forces(set.rows());
+        for f_ext in [&[][..], &s.f_ext] {
+            let value = constrained_inverse_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &lambda, f_ext);
+            let value = [value.tau, value.acceleration].concat();
+            let d = constrained_inverse_dynamics_derivatives(
+                &model, &mut data, &mut set, &s.q, &s.v, &s.tau, &lambda, f_ext,
+            );
+            exact[2].see(&model, &[d.tau, d.acceleration].concat(), &value);
+            let (by_q, by_v) = (stack(d.dtau_dq, d.dacceleration_dq), stack(d.dtau_dv, d.dacceleration_dv));
+            let (M, mut J) = (d.M.clone(), DMatrix::zeros(lambda.len(), model.nv()));
+            set.jacobian(&mut J);
+            let found = [by_q, by_v, stack(&M, &J)];
+            let duals = by_duals::<Inverse>(&model, &s, &constraints, f_ext);
+            let differences = by_differences::<Inverse>(&model, &s, &constraints, f_ext);
+            for k in 0..3 {
+                exact[k].see(&model, found[k].as_slice(), duals[k].as_slice());
+                near[k].see(&model, found[k].as_slice(), differences[k].as_slice());
+            }
+            let d = constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+            let (a, lambda) = (d.a.to_vec(), d.lambda.to_vec());
+            let d = constrained_inverse_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &a, &lambda, f_ext);
+            let expected = [&s.tau[..], &vec![0.0; lambda.len()]].concat();
+            back.see(&model, &[d.tau, d.acceleration].concat(), &expected);
         }
     }
 }

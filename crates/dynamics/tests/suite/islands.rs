@@ -172,12 +172,12 @@ fn the_order_of_constraints_changes_nothing() {
     let mut found = [all.clone(), turned.clone()].map(|constraints| {
         let (mut data, mut set) = (Data::new(&whole), ConstraintSet::new(&whole, &constraints).unwrap());
         set.proximal = Proximal { mu: 1e-3, iterations: 3 };
-        let d = constrained_dynamics_derivatives(&whole, &mut data, &mut set, &q, &v, &tau, &[]);
         let mut order: Vec<usize> = Vec::new();
         for constraint in &all {
             let k = constraints.iter().position(|other| other == constraint).unwrap();
             order.extend(set.range(k));
         }
+        let d = constrained_dynamics_derivatives(&whole, &mut data, &mut set, &q, &v, &tau, &[]);
         let rows = |of: &DMatrix<f64>| DMatrix::from_fn(of.nrows(), of.ncols(), |i, j| of[(order[i], j)]);
         let inertia = DMatrix::from_fn(order.len(), order.len(), |i, j| d.inertia[(order[i], order[j])]);
         let numbers: [Vec<f64>; 7] = [

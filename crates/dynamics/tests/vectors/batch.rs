@@ -6,7 +6,8 @@ use crate::counting::{allocations, bytes};
 use crate::table::{Found, States, constraints, table};
 use crate::{each_level, models};
 use condyle_dynamics::{
-    Batch, ConstraintSet, ContactConstraint, Data, Force, Model, Proximal, ReferenceFrame, Se3, Target, robots,
+    Batch, ConstraintSet, ContactConstraint, Data, Force, Matrices, Model, Proximal, ReferenceFrame, Se3, Target,
+    robots,
 };
 
 fn random(model: &Model, n: usize, seed: u64) -> Vec<Input<f64>> {
@@ -18,20 +19,36 @@ fn states(model: &Model, n: usize, seed: u64) -> States<f64> {
     States::of(&random(model, n, seed))
 }
 
+/// What two ways of rounding leave, relative to the largest entry: some hundred roundings of a matrix of condition 1e3.
+const ROUNDING: f64 = 1e-11;
+
 /// Matrices that are written by rows have the entries of those of each state, in groups that are full and one that is not.
 #[test]
 fn matrices_by_rows() {
-    let humanoid = robots::humanoid();
-    let (n, count) = (humanoid.nv(), 19);
-    let s = states(&humanoid, count, 5);
-    let mut batch = Batch::new(&humanoid, count, 2);
-    let d = batch.aba_derivatives(&humanoid, &s.q, &s.v, &s.x, &s.f_ext);
-    for matrices in [d.da_dq, d.da_dv, d.da_dtau] {
-        let mut rows = vec![f64::NAN; count * n * n];
-        matrices.write_rows(&mut rows);
-        for (M, rows) in matrices.iter().zip(rows.chunks_exact(n * n)) {
-            assert_eq!(M.transpose().as_slice(), rows);
-        }
+    for model in models(2) {
+        let (n, count) = (model.nv(), 19);
+        let s = states(&model, count, 5);
+        let mut batch = Batch::new(&model, count, 2);
+        // what is symmetric may be written by columns, which then are rows up to rounding
+        let check = |matrices: Matrices<'_, f64>, symmetric: bool| {
+            let mut rows = vec![f64::NAN; count * n * n];
+            matrices.write_rows(&mut rows);
+            for (M, rows) in matrices.iter().zip(rows.chunks_exact(n * n)) {
+                let allowed = if symmetric { ROUNDING * M.amax() } else { 0.0 };
+                let same = |(x, y): (&f64, &f64)| (x - y).abs() <= allowed;
+                assert!(M.transpose().iter().zip(rows).all(same), "{model}");
+            }
+        };
+        let d = batch.aba_derivatives(&model, &s.q, &s.v, &s.x, &s.f_ext);
+        check(d.da_dq, false);
+        check(d.da_dv, false);
+        check(d.da_dtau, true);
+        let d = batch.rnea_derivatives(&model, &s.q, &s.v, &s.x, &s.f_ext);
+        check(d.dtau_dq, false);
+        check(d.dtau_dv, false);
+        check(d.dtau_da, true);
+        check(batch.crba(&model, &s.q), true);
+        check(batch.minv(&model, &s.q), true);
     }
 }
 

@@ -81,7 +81,7 @@ fn every_lane_is_a_single_call() {
     let all: Vec<Model> = models(4).into_iter().chain(long).collect();
     each_level(|level| match level {
         Level::Baseline => {}
-        Level::Neon | Level::Avx2 => knots_are_single_calls::<<f64 as Real>::Short<Here>>(&all),
+        Level::Simd128 | Level::Neon | Level::Avx2 => knots_are_single_calls::<<f64 as Real>::Short<Here>>(&all),
         Level::Avx512 => knots_are_single_calls::<<f64 as Real>::Long<Here>>(&all),
     });
 }

@@ -5,11 +5,6 @@ pub fn threads() -> usize {
     1
 }
 
-/// Does some work.
-pub fn enter<R: Send>(work: impl FnOnce() -> R + Send) -> R {
-    work()
-}
-
 /// Does two pieces of work, one after the other.
 pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     one();

@@ -82,13 +82,6 @@ pub fn threads() -> usize {
     }
 }
 
-/// Does some work in the pool whose [`threads`] share it, so that no [`join`] within has to enter it.
-pub fn enter<R: Send>(work: impl FnOnce() -> R + Send) -> R {
-    let (mut work, mut result) = (Some(work), None);
-    enter_dyn(&mut || result = work.take().map(|work| work()));
-    result.expect("the work was done")
-}
-
 /// Does two pieces of work, at the same time if one of the [`threads`] is free.
 pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     let (mut one, mut other) = (Some(one), Some(other));
@@ -97,25 +90,24 @@ pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     });
 }
 
-/// [`enter`], compiled once for all kinds of work: what rayon makes of each is some kilobytes.
-fn enter_dyn(work: &mut (dyn FnMut() + Send)) {
-    match pool() {
-        Pool::Global => rayon::scope(|_| work()),
-        Pool::Forked(pool) => pool.install(work),
-        Pool::Current | Pool::Missing => work(),
-    }
-}
-
-/// [`join`], likewise.
+/// [`join`], compiled once for all kinds of work: what rayon makes of each is some kilobytes. A thread that is not of the pool
+/// does its piece itself: to be woken takes a thread some 50 µs, and what a core has in its cache stays there.
 fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     match pool() {
+        Pool::Current => {
+            rayon::join(one, other);
+        }
+        Pool::Global => rayon::in_place_scope(|scope| {
+            scope.spawn(|_| other());
+            one();
+        }),
+        Pool::Forked(pool) => pool.in_place_scope(|scope| {
+            scope.spawn(|_| other());
+            one();
+        }),
         Pool::Missing => {
             one();
             other();
-        }
-        Pool::Forked(pool) => pool.install(|| join_dyn(one, other)),
-        Pool::Current | Pool::Global => {
-            rayon::join(one, other);
         }
     }
 }

@@ -5,9 +5,11 @@ use crate::body::{Body, Frame, Limits};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::{Error, Warning};
 use crate::model::Model;
+use alloc::collections::BTreeSet;
+use alloc::string::String;
+use alloc::vec::Vec;
 use condyle_spatial::{Inertia, Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::collections::HashSet;
 
 /// The fields of a model that stand in a file, each as in [`Model`].
 #[derive(Serialize, Deserialize)]
@@ -73,7 +75,7 @@ impl Description {
         let Self { bodies, limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
         // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
-        let warned: HashSet<&str> = warnings
+        let warned: BTreeSet<&str> = warnings
             .iter()
             .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })
             .collect();

@@ -35,16 +35,16 @@ impl Joint {
         for ((q, &lower), &upper) in q.iter_mut().zip(lower).zip(upper) {
             *q = lower + (upper - lower) * rng.random::<f64>();
         }
-        let turn = core::f64::consts::TAU * rng.random::<f64>();
+        let (sin, cos) = (core::f64::consts::TAU * rng.random::<f64>()).sin_cos();
         let mut rotate = |q: &mut [f64]| {
             // Shoemake (1992): a quaternion uniform on the sphere
-            let (u, a) = (rng.random::<f64>(), core::f64::consts::TAU * rng.random::<f64>());
+            let (u, a) = (rng.random::<f64>(), (core::f64::consts::TAU * rng.random::<f64>()).sin_cos());
             let (r, s) = ((1.0 - u).sqrt(), u.sqrt());
-            q.copy_from_slice(&[r * turn.sin(), r * turn.cos(), s * a.sin(), s * a.cos()]);
+            q.copy_from_slice(&[r * sin, r * cos, s * a.0, s * a.1]);
         };
         match self {
-            Self::Continuous { .. } => q.copy_from_slice(&[turn.cos(), turn.sin()]),
-            Self::Planar => q[2..].copy_from_slice(&[turn.cos(), turn.sin()]),
+            Self::Continuous { .. } => q.copy_from_slice(&[cos, sin]),
+            Self::Planar => q[2..].copy_from_slice(&[cos, sin]),
             Self::Spherical => rotate(q),
             Self::FreeFlyer => rotate(&mut q[3..]),
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {}

@@ -2,6 +2,7 @@
 
 use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
+use alloc::vec::Vec;
 use condyle_spatial::{Act, Force, Motion, Quaternion, Scalar, Se3, Vec3};
 
 /// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands behind the last body has no

@@ -12,6 +12,7 @@ use super::LANES;
 use super::schedule::Schedule;
 use super::steps::Step;
 use crate::tree::Tree;
+use alloc::vec::Vec;
 use condyle_spatial::moves::Move;
 use core::iter::successors;
 

@@ -6,6 +6,7 @@
 
 use super::LANES;
 use crate::tree::Node;
+use alloc::vec::Vec;
 
 /// The number of bodies a step, the world counted, from which limbs side by side pay: two legs of six joints each, under one
 /// trunk, just do.

@@ -4,6 +4,7 @@ use super::LANES;
 use super::schedule::Schedule;
 use crate::joint::Joint;
 use crate::tree::Tree;
+use alloc::vec::Vec;
 use condyle_spatial::moves::Move;
 use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 

@@ -5,8 +5,9 @@ use super::settings::ConstraintSettings;
 use crate::ddp::{Fddp, Observer, Settings, Solution, Status, Unobserved};
 use crate::error::Error;
 use crate::problem::Problem;
+use crate::time::Instant;
 use nalgebra::DVector;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The method of multipliers around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and robots with
 /// [`Limit`](crate::robot::Limit)s, with the rules of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991;

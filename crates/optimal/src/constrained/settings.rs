@@ -1,11 +1,11 @@
 //! The settings of the method of multipliers.
 
 use crate::error::Error;
-use serde::{Deserialize, Serialize};
 
 /// The settings of [`AugmentedLagrangian`](crate::AugmentedLagrangian).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct ConstraintSettings {
     /// The distance that a constraint may have from its bounds, and the dynamics from holding.
     pub tolerance: f64,

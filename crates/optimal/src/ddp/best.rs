@@ -118,6 +118,7 @@ impl Fddp {
         if goes_back && let Some(best) = self.best.restore(&mut self.solution, &mut self.next) {
             (self.solution.gap, self.solution.cost, now.feasible) = (best.gap, best.cost, best.feasible);
             self.update_gaps(problem);
+            self.knows_motions = false;
             if !now.swept_best {
                 self.calc_diff(problem, best.feasible);
                 self.sweep.keep_values(false);

@@ -2,7 +2,8 @@
 
 use super::observer::PacedObserver;
 use super::solution::Status;
-use std::time::{Duration, Instant};
+use crate::time::Instant;
+use std::time::Duration;
 
 /// A phase of an iteration.
 #[derive(Clone, Copy)]

@@ -11,8 +11,8 @@ use super::solution::{Iteration, Solution, Status, Timings};
 use crate::error::Error;
 use crate::lq::{LqNode, Sweep, SweepError};
 use crate::problem::Problem;
+use crate::time::Instant;
 use condyle_linalg::max_abs;
-use std::time::Instant;
 
 /// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`]), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
@@ -82,6 +82,10 @@ pub struct Fddp {
     pub(crate) solution: Solution,
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
     pub(super) next: Vec<f64>,
+    /// The accelerations and forces of the iterate, N equal parts, for nodes in inverse-dynamics form.
+    motions: Vec<f64>,
+    /// Whether they are those of the iterate.
+    pub(super) knows_motions: bool,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
     gaps: Vec<f64>,
@@ -123,6 +127,8 @@ impl Fddp {
             line_search: LineSearch::new(problem),
             solution: Solution::new(problem),
             next: vec![0.0; horizon * shape.nx],
+            motions: vec![0.0; horizon * problem.motion_size()],
+            knows_motions: false,
             costs: vec![0.0; horizon + 1],
             gaps: vec![0.0; (horizon + 1) * shape.ndx],
             best: Best::new(problem),
@@ -203,7 +209,9 @@ impl Fddp {
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
         self.solution.trace.reserve(self.settings.max_iterations.min(FORESEEN));
-        self.line_search.start(self.settings.step_lengths);
+        let motion_size = if self.inverse_dynamics { problem.motion_size() } else { 0 };
+        self.motions.resize(problem.horizon() * motion_size, 0.0);
+        self.line_search.start(self.settings.step_lengths, motion_size);
         let start = self.settings.regularisation_start;
         let mut progress = Progress {
             regularisation: start,
@@ -264,10 +272,11 @@ impl Fddp {
                 }
             }
             now.swept = true;
-            let Self { line_search, solution, next, gaps, best, sweep, settings, clock, .. } = self;
+            let Self { line_search, solution, next, motions, gaps, best, sweep, settings, clock, .. } = self;
             let (knots, feasible) = (sweep.knots(), now.feasible);
             let value = Value { gap, cost: solution.cost, feasible, regularisation: now.regularisation };
-            let iterate = Iterate { solution, next, value, best, gaps, knots, feasible, settings, clock, watch };
+            let iterate =
+                Iterate { solution, next, motions, value, best, gaps, knots, feasible, settings, clock, watch };
             search = line_search.run(problem, iterate, search);
             if let Some(status) = search.stopped {
                 return status;
@@ -316,7 +325,9 @@ impl Fddp {
     /// Dynamics and cost of the warm start.
     fn calc(&mut self, problem: &mut Problem) {
         let clock = Instant::now();
-        problem.calc(&self.solution.xs, &self.solution.us, &mut self.next, &mut self.costs);
+        let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
+        problem.calc_with_motion(xs, us, next, costs, motions);
+        self.knows_motions = true;
         let mut sum = Sum::default();
         self.costs.iter().for_each(|cost| sum.add(*cost));
         self.solution.cost = sum.value();
@@ -344,6 +355,12 @@ impl Fddp {
         let clock = Instant::now();
         for node in &mut self.nodes {
             node.inverse_dynamics.wanted = self.inverse_dynamics;
+            node.inverse_dynamics.knows_motion = self.knows_motions;
+        }
+        let size = self.motions.len() / problem.horizon();
+        for (node, motion) in self.nodes.iter_mut().zip(self.motions.chunks_exact(size.max(1))) {
+            node.inverse_dynamics.motion.resize(size, 0.0);
+            node.inverse_dynamics.motion.copy_from_slice(motion);
         }
         let Solution { xs, us, .. } = &self.solution;
         problem.calc_diff_on(self.settings.threads, xs, us, &mut self.nodes);

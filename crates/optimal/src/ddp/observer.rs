@@ -1,8 +1,9 @@
 //! Observers, who look at a solve while it goes on, and may end it.
 
 use super::solution::Iteration;
+use crate::time::Instant;
 use core::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// An observer of a solve, who may end it: the solution is then the best iterate so far, with
 /// [`Status::Interrupted`](crate::Status::Interrupted).

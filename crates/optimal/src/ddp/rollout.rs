@@ -37,6 +37,9 @@ pub(crate) struct Trials {
     us: Vec<f64>,
     /// φₜ(xₜ, uₜ), N knots. It differs from the next x by what is left of the gap.
     next: Vec<f64>,
+    /// The motion of each knot, in equal parts: see [`ActionModel::motion_size`](crate::ActionModel::motion_size).
+    motions: Vec<f64>,
+    motion_size: usize,
     /// Sum of the costs; meaningless where `failed`.
     costs: Vec<Sum>,
     /// Trials in which something grew beyond bounds.
@@ -68,6 +71,8 @@ impl Trials {
             xs: vec![0.0; (horizon + 1) * shape.nx * width],
             us: vec![0.0; shape.offsets[horizon] * width],
             next: vec![0.0; horizon * shape.nx * width],
+            motions: Vec::new(),
+            motion_size: 0,
             costs: vec![Sum::default(); width],
             failed: vec![false; width],
             knot_costs: vec![0.0; width],
@@ -84,6 +89,12 @@ impl Trials {
         self.us.resize(self.shape.offsets[self.shape.horizon()] * self.width, 0.0);
     }
 
+    /// Keeps so many numbers of each knot's motion from now on.
+    pub(crate) fn keep_motions(&mut self, size: usize) {
+        self.motion_size = size;
+        self.motions.resize(self.shape.horizon() * self.width * size, 0.0);
+    }
+
     /// The number of trials that fit.
     pub(crate) fn width(&self) -> usize {
         self.width
@@ -95,7 +106,8 @@ impl Trials {
     ///
     /// with uₜ moved into its bounds.
     pub(crate) fn run(&mut self, problem: &mut Problem, nominal: &Nominal, steps: &[f64]) {
-        let Self { shape, xs, us, next, costs, failed, knot_costs, knot, dx, unread, .. } = self;
+        let Self { shape, xs, us, next, motions, costs, failed, knot_costs, knot, dx, unread, .. } = self;
+        let size = self.motion_size;
         let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
         self.count = count;
         costs[..count].fill(Sum::default());
@@ -138,7 +150,15 @@ impl Trials {
             knot[..count].fill(t);
             let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
             let action = problem.action_mut(t);
-            action.calc_group(&knot[..count], x_all, u_all, next_all, &mut knot_costs[..count]);
+            let (knot, costs_all) = (&knot[..count], &mut knot_costs[..count]);
+            match size {
+                _ if t == horizon => action.calc_group(knot, x_all, u_all, next_all, costs_all),
+                0 => action.calc_group(knot, x_all, u_all, next_all, costs_all),
+                _ => {
+                    let motions = &mut motions[t * size * count..][..size * count];
+                    action.calc_group_with_motion(knot, x_all, u_all, next_all, costs_all, motions);
+                }
+            }
             for i in 0..count {
                 costs[i].add(knot_costs[i]);
                 let bounded = |x: f64| x.abs() < DIVERGED; // false for NaN
@@ -159,7 +179,7 @@ impl Trials {
     }
 
     /// Copies trial `i` out.
-    pub(crate) fn copy_to(&self, i: usize, xs: &mut [f64], us: &mut [f64], next: &mut [f64]) {
+    pub(crate) fn copy_to(&self, i: usize, xs: &mut [f64], us: &mut [f64], next: &mut [f64], motions: &mut [f64]) {
         for t in 0..=self.shape.horizon() {
             xs[self.shape.x(t)].copy_from_slice(self.x(i, t));
         }
@@ -168,6 +188,10 @@ impl Trials {
             let u = self.shape.offsets[t] * self.count + i * nu;
             us[self.shape.u(t)].copy_from_slice(&self.us[u..u + nu]);
             next[self.shape.x(t)].copy_from_slice(&self.next[(t * self.count + i) * nx..][..nx]);
+        }
+        let size = self.motion_size;
+        for (t, motion) in motions.chunks_exact_mut(size.max(1)).enumerate() {
+            motion.copy_from_slice(&self.motions[(t * self.count + i) * size..][..size]);
         }
     }
 }

@@ -8,8 +8,8 @@ use super::settings::{DdpMethod, Settings};
 use super::solution::{Solution, Status};
 use crate::lq::LqKnot;
 use crate::problem::Problem;
+use crate::time::Instant;
 use condyle_linalg::{View, add_scaled_product, dot};
-use std::time::Instant;
 
 /// The number of step lengths that are tried side by side when the first one fails: one of the next few is mostly good, and
 /// each has a cost of its own beside dynamics in lanes.
@@ -36,6 +36,8 @@ pub(super) struct Iterate<'a, 'o> {
     pub(super) solution: &'a mut Solution,
     /// φₜ(xₜ, uₜ), N·nx.
     pub(super) next: &'a mut Vec<f64>,
+    /// Its accelerations and forces.
+    pub(super) motions: &'a mut [f64],
     /// What it is worth, and the best one before it.
     pub(super) value: Value,
     pub(super) best: &'a mut Best,
@@ -82,8 +84,9 @@ impl LineSearch {
         self.trials.reshape(problem);
     }
 
-    /// Begins a solve with `count` step lengths.
-    pub(super) fn start(&mut self, count: usize) {
+    /// Begins a solve with `count` step lengths, in which so many numbers of each knot's motion are kept.
+    pub(super) fn start(&mut self, count: usize, motion_size: usize) {
+        self.trials.keep_motions(motion_size);
         self.steps.clear();
         self.steps.extend((0..count).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
     }
@@ -125,7 +128,7 @@ impl LineSearch {
                 if search.is_good(iterate.settings, iterate.feasible) {
                     search.left_best = iterate.best.leave(iterate.solution, iterate.next, iterate.value);
                     let Solution { xs, us, .. } = iterate.solution;
-                    self.trials.copy_to(i, xs, us, iterate.next);
+                    self.trials.copy_to(i, xs, us, iterate.next, iterate.motions);
                     iterate.solution.cost = cost;
                     search.accepted = true;
                     return search;

@@ -1,12 +1,12 @@
 //! The settings of the FDDP family.
 
 use crate::error::Error;
-use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// Which search for an optimum a solve is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum DdpMethod {
     /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`: every trial is a plain rollout from x̂₀,
@@ -19,8 +19,9 @@ pub enum DdpMethod {
 }
 
 /// The settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Settings {
     /// How gaps are closed and which steps are accepted.
     pub method: DdpMethod,

@@ -2,16 +2,17 @@
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
 use crate::problem::{Problem, Shape};
-use crate::read::matrices;
 use nalgebra::{DMatrix, DVector};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::time::Duration;
 
 /// The outcome of a solve. Whatever it says, the [`Solution`] holds the best iterate found: a converged one; else, of those
 /// from which a step could be computed and of the last one, the one with the smallest gap, and among equals that of least
 /// cost. An iterate that costs 1e8 times as much as the cheapest one and 1 has run away and is no candidate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Status {
     /// The iterate has no gaps and the expected decrease of its cost is below the tolerance.
@@ -33,7 +34,8 @@ pub enum Status {
 }
 
 /// A record of one iteration.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Iteration {
     /// Its number, from 0.
     pub iteration: usize,
@@ -62,7 +64,8 @@ pub struct Iteration {
 }
 
 /// The times that the phases of a solve took.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timings {
     /// Dynamics and cost of the warm start.
     pub calc: Duration,
@@ -77,15 +80,16 @@ pub struct Timings {
 }
 
 /// The result of a solve. One that is read from a file is checked: its parts have the lengths of one horizon.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(remote = "Self")] // the fields; the implementations below check them
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(remote = "Self"))] // the fields; the implementations below check them
 pub struct Solution {
     /// States x₀ … x_N, flat: (N + 1)·nx.
     pub xs: Vec<f64>,
     /// Controls u₀ … u_{N−1}, flat.
     pub us: Vec<f64>,
     /// Feedback gains of the last sweep, per knot nu × ndx: uₜ + Kₜ (x ⊖ xₜ) is the control near the trajectory.
-    #[serde(deserialize_with = "matrices")]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::matrices"))]
     pub K: Vec<DMatrix<f64>>,
     /// Feed-forward of the last sweep, per knot nu: the full step it asked for.
     pub k: Vec<DVector<f64>>,
@@ -173,6 +177,7 @@ impl Solution {
     }
 
     /// Says which part of a solution from a file has not the length that its horizon asks for.
+    #[cfg(feature = "serde")]
     fn check(&self) -> Result<(), String> {
         self.shape.check_itself()?;
         let Shape { nx, ndx, .. } = self.shape;
@@ -201,12 +206,14 @@ impl Solution {
     }
 }
 
+#[cfg(feature = "serde")]
 impl Serialize for Solution {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         Self::serialize(self, to)
     }
 }
 
+#[cfg(feature = "serde")]
 impl<'de> Deserialize<'de> for Solution {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let solution = Self::deserialize(from)?;

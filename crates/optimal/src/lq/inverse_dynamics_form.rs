@@ -10,6 +10,10 @@ pub(crate) struct InverseDynamicsForm {
     pub(crate) wanted: bool,
     /// Whether the action wrote the equations, in place of A and B.
     pub(crate) active: bool,
+    /// The motion of the knot (q̈, and the forces of its contacts), as the rollout that led to it found it.
+    pub(crate) motion: Vec<f64>,
+    /// Whether it is that of the point of the derivatives.
+    pub(crate) knows_motion: bool,
     /// The distance from a row to the next, in all rows.
     pub(crate) stride: usize,
     /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, how many.

@@ -90,12 +90,7 @@ impl Segments {
             return None;
         }
         let parallel = threads::threads() > 1;
-        let begin = SegmentTask { pass: Pass::Begin, nodes, regularisation, parallel };
-        if parallel {
-            threads::enter(|| self.sweep(begin, knots)) // enters the pool once, not for each step of it
-        } else {
-            self.sweep(begin, knots)
-        }
+        self.sweep(SegmentTask { pass: Pass::Begin, nodes, regularisation, parallel }, knots)
     }
 
     fn sweep(&mut self, begin: SegmentTask<'_>, knots: &mut [LqKnot]) -> Option<Result<(), SweepError>> {

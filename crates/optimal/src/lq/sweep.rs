@@ -5,6 +5,7 @@ use super::node::{Hessian, LqKnot, LqNode};
 use super::segments::Segments;
 use super::step::{Sizes, Step, SweepError};
 use crate::error::assert_length;
+use condyle_dynamics::level::level;
 
 /// The backward Riccati sweep, with its workspace.
 ///
@@ -73,6 +74,7 @@ impl Sweep {
     /// If `nodes` is empty, the shapes of a node do not fit each other, ndx differs from node to node, or the terminal
     /// node has controls.
     pub fn new(nodes: &[LqNode]) -> Self {
+        level(); // chosen now, as reading CONDYLE_LEVEL allocates
         let terminal = nodes.last().expect("`nodes` is empty");
         let n = terminal.ndx();
         assert_length("r of the terminal node", terminal.nu(), 0);

@@ -241,14 +241,33 @@ impl Problem {
     /// # Panics
     /// If a length is wrong.
     pub fn calc(&mut self, xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        self.calc_with_motion(xs, us, next, costs, &mut []);
+    }
+
+    /// As [`calc`](Self::calc), and the motion of each knot into `motions`, N equal parts that are empty or have
+    /// [`motion_size`](Self::motion_size) numbers.
+    pub(crate) fn calc_with_motion(
+        &mut self,
+        xs: &[f64],
+        us: &[f64],
+        next: &mut [f64],
+        costs: &mut [f64],
+        motions: &mut [f64],
+    ) {
         let (nx, horizon) = (self.nx(), self.horizon());
+        let room = motions.len() / horizon;
         self.assert_trajectory(xs, us);
         assert_length("next", next.len(), horizon * nx);
         assert_length("costs", costs.len(), horizon + 1);
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
             let (next, costs) = (&mut next[x.clone()], &mut costs[knots.clone()]);
-            self.models.actions[*model].calc_group(&self.knots[knots.clone()], &xs[x], &us[u], next, costs);
+            let motions = &mut motions[knots.start * room..knots.end * room];
+            let (action, t) = (&mut self.models.actions[*model], &self.knots[knots.clone()]);
+            match room {
+                0 => action.calc_group(t, &xs[x], &us[u], next, costs),
+                _ => action.calc_group_with_motion(t, &xs[x], &us[u], next, costs, motions),
+            }
         }
         let x = &xs[self.shape.x(horizon)];
         self.terminal.calc_group(&self.knots[horizon..], x, &[], &mut self.unread, &mut costs[horizon..]);
@@ -349,14 +368,20 @@ impl Problem {
         (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
 
+    /// The most numbers of its motion that a knot keeps from a rollout for its derivatives.
+    pub(crate) fn motion_size(&self) -> usize {
+        self.models.actions.iter().map(|model| model.motion_size()).max().unwrap_or(0)
+    }
+
     /// Makes room in nodes for the equations of inverse dynamics, wherever in the horizon their actions come to serve.
     pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) {
         let sizes = self.models.actions.iter().filter_map(|model| model.inverse_dynamics_form());
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return };
-        let (nv, horizon) = (self.ndx() / 2, self.horizon());
+        let (nv, horizon, motion) = (self.ndx() / 2, self.horizon(), self.motion_size());
         for node in &mut nodes[..horizon] {
             let nu = node.nu();
             node.inverse_dynamics.reserve(nv, nu, most);
+            node.inverse_dynamics.motion.resize(motion, 0.0);
         }
     }
 

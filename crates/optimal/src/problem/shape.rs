@@ -3,7 +3,6 @@
 use crate::error::Error;
 use crate::lq::LqNode;
 use core::ops::Range;
-use serde::{Deserialize, Serialize};
 
 /// The most knots of a horizon.
 pub(crate) const MOST_KNOTS: usize = 1 << 20;
@@ -11,7 +10,8 @@ pub(crate) const MOST_KNOTS: usize = 1 << 20;
 pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
 
 /// The dimensions of a horizon: what trajectories and workspaces are allocated by.
-#[derive(Debug, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Shape {
     pub(crate) nx: usize,
     pub(crate) ndx: usize,
@@ -56,6 +56,7 @@ impl Shape {
     }
 
     /// Says what is wrong with a shape from a file: it must be that of a problem.
+    #[cfg(feature = "serde")]
     pub(crate) fn check_itself(&self) -> Result<(), String> {
         let Self { nx, ndx, offsets } = self;
         if offsets.len() < 2 || offsets.len() > MOST_KNOTS + 1 || offsets[0] != 0 {

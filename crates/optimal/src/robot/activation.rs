@@ -1,7 +1,6 @@
 //! Activations: functions that say how much a residual costs.
 
 use crate::problem::leave_a_value;
-use serde::{Deserialize, Serialize};
 
 /// A function a(r) that says how much a residual r costs.
 ///
@@ -10,8 +9,9 @@ use serde::{Deserialize, Serialize};
 /// let barrier = Activation::Barrier { lower: vec![-1.0, -1.0], upper: vec![1.0, f64::INFINITY] };
 /// assert_eq!(barrier.value(&[3.0, 3.0]), 2.0); // ½ (3 − 1)², and nothing for the second
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 pub enum Activation {
     /// ½ Σ rᵢ².
     Quadratic,
@@ -23,19 +23,19 @@ pub enum Activation {
     /// ½ Σ (excess of rᵢ over its bounds)²: nothing inside them.
     Barrier {
         /// Least values; −∞ for none.
-        #[serde(with = "condyle_spatial::finite::lower")]
+        #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
         lower: Vec<f64>,
         /// Greatest values; ∞ for none.
-        #[serde(with = "condyle_spatial::finite::upper")]
+        #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
         upper: Vec<f64>,
     },
     /// ½ Σ wᵢ (excess of rᵢ over its bounds)². (Crocoddyl has the square of wᵢ in its value.)
     WeightedBarrier {
         /// Least values; −∞ for none.
-        #[serde(with = "condyle_spatial::finite::lower")]
+        #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
         lower: Vec<f64>,
         /// Greatest values; ∞ for none.
-        #[serde(with = "condyle_spatial::finite::upper")]
+        #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
         upper: Vec<f64>,
         /// w, numbers of at least 0.
         weights: Vec<f64>,

@@ -4,6 +4,9 @@ use crate::Error;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::{DMatrix, DVector};
 
+/// A direction so much shorter than the longest one is rounding.
+const LEAST: f64 = 1e-9;
+
 /// τ = S u: how the controls drive the joints.
 ///
 /// ```
@@ -52,6 +55,15 @@ impl Actuation {
         Ok(Self { nv: rows, map: Map::Matrix(S) })
     }
 
+    /// Refuses drives of another robot.
+    pub(super) fn check(&self, model: &Model) -> Result<(), Error> {
+        let (found, nv) = (self.nv, model.nv());
+        match found == nv {
+            true => Ok(()),
+            false => Err(Error::Actuation { what: format!("it drives {found} coordinates, the robot has {nv}") }),
+        }
+    }
+
     /// A drive for each coordinate.
     pub(super) fn all(model: &Model) -> Self {
         Self { nv: model.nv(), map: Map::After(0) }
@@ -76,11 +88,6 @@ impl Actuation {
             Map::After(passive) => Some(passive),
             Map::Matrix(_) => None,
         }
-    }
-
-    /// The number of coordinates, nv.
-    pub(super) fn nv(&self) -> usize {
-        self.nv
     }
 
     /// τ = S u.
@@ -156,7 +163,32 @@ impl Actuation {
         }
     }
 
-    /// u of the smallest (u, λ) that comes nearest to S u + Jᵀλ = τ.
+    /// An orthonormal basis of the efforts that no control makes, row after row: Nᵀ with Nᵀ S = 0, unit vectors where S
+    /// selects.
+    pub(super) fn undriven(&self) -> Vec<f64> {
+        let nv = self.nv;
+        let mut left = DMatrix::identity(nv, nv);
+        match &self.map {
+            Map::After(passive) => left.columns_mut(*passive, nv - passive).fill(0.0),
+            Map::Matrix(S) if S.ncols() > 0 => {
+                let inverse = S.clone().pseudo_inverse(LEAST * S.amax()).expect("the bound is not negative");
+                left -= S * inverse; // 1 − S S⁺
+            }
+            Map::Matrix(_) => {}
+        }
+        // Gram and Schmidt, the longest first; a projection has columns of length 1, or of rounding
+        let mut basis = Vec::new();
+        loop {
+            let squares: Vec<_> = left.column_iter().map(|column| column.norm_squared()).collect();
+            let longest = (0..nv).reduce(|a, b| if squares[b] > squares[a] { b } else { a });
+            let Some(k) = longest.filter(|&k| squares[k] > LEAST) else { return basis };
+            let unit = left.column(k).normalize();
+            basis.extend_from_slice(unit.as_slice());
+            left -= &unit * (unit.transpose() * &left);
+        }
+    }
+
+    /// The smallest (u, λ) that comes nearest to S u + Jᵀλ = τ.
     pub(super) fn hold(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
         let nu = self.nu();
         let mut map = DMatrix::zeros(self.nv, nu + J.nrows());
@@ -167,13 +199,13 @@ impl Actuation {
             }
         }
         if map.is_empty() {
-            return vec![0.0; nu];
+            return vec![0.0; nu + J.nrows()];
         }
         map.columns_mut(nu, J.nrows()).copy_from(&J.transpose());
         let singular = map.svd(true, true);
         let least = f64::EPSILON * self.nv.max(nu + J.nrows()) as f64 * singular.singular_values.max();
         let tau = DVector::from_column_slice(tau);
         let both = singular.solve(&tau, least).expect("both factors were asked for");
-        both.as_slice()[..nu].to_vec()
+        both.as_slice().to_vec()
     }
 }

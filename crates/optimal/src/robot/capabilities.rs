@@ -11,6 +11,8 @@ pub(crate) enum Output {
     Effort,
     /// λ, the forces or impulses of all contacts.
     Force,
+    /// J q̈ + γ of all contacts, where accelerations are controls.
+    ContactAcceleration,
 }
 
 /// The outputs that the dynamics of a knot have, known when the knot is made.
@@ -21,6 +23,10 @@ pub(crate) struct Capabilities {
     pub effort: bool,
     /// Whether it is an impact.
     pub impulse: bool,
+    /// Whether accelerations, and forces of contacts, are controls.
+    pub inverse: bool,
+    /// Nᵀ: the parts of the efforts that nothing drives, where accelerations are controls. Shape: parts × nv, row after row.
+    pub undriven: Vec<f64>,
     /// The contacts' names and rows of λ.
     pub contacts: Vec<(String, Range<usize>)>,
 }

@@ -4,7 +4,6 @@ use crate::Error;
 use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, Proximal};
 use condyle_spatial::Scalar;
 use core::ops::Range;
-use serde::{Deserialize, Serialize};
 
 /// A contact of a frame with the world, and the name by which residuals call it.
 ///
@@ -23,8 +22,9 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(contact.constraint.kind.rows(), 3);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Contact {
     /// The name by which residuals call it.
     pub name: String,
@@ -38,6 +38,9 @@ impl Contact {
         Self { name: name.to_owned(), constraint }
     }
 }
+
+/// A damping for contacts whose forces are given, which may share them as they like: it is not used.
+pub(super) const SHARED: f64 = 1.0;
 
 /// The constraints of some contacts, with the damping μ of J M⁻¹ Jᵀ + μ 1.
 pub(super) fn constraint_set<S: Scalar>(

@@ -88,6 +88,24 @@ pub trait ContinuousModel: Send + 'static {
         None
     }
 
+    /// The number of accelerations and forces that [`Wanted::Equations`] starts from.
+    #[doc(hidden)]
+    fn motion_size(&self) -> usize {
+        0
+    }
+
+    /// Writes them, of a state of the group that was [prepared](Self::prepare).
+    #[doc(hidden)]
+    fn motion(&self, lane: usize, to: &mut [f64]) {
+        let _ = (lane, to);
+    }
+
+    /// Sets them, of a state of the group that is to be prepared for [`Wanted::Equations`].
+    #[doc(hidden)]
+    fn set_motion(&mut self, lane: usize, from: &[f64]) {
+        let _ = (lane, from);
+    }
+
     /// Moves the horizon on by a knot, see [`ActionModel::shift`](crate::ActionModel::shift). Nothing by default.
     fn shift(&mut self) {}
 
@@ -206,7 +224,8 @@ pub enum Wanted {
     Motion,
     /// Accelerations and their derivatives.
     Derivatives,
-    /// Accelerations and the equations that they satisfy, differentiated: for nodes in inverse-dynamics form.
+    /// The equations of motion, differentiated at accelerations and forces that are known: those of the
+    /// [motion](Self::Motion) of the same group, or others that were set. For nodes in inverse-dynamics form.
     #[doc(hidden)]
     Equations,
 }

@@ -7,12 +7,12 @@ use super::residuals::residual::Residual;
 use super::residuals::terms::{Objective, Term, Terms};
 use crate::Error;
 use condyle_dynamics::Model;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A term w · a(r(x, u)) of a cost.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Cost {
     /// The name of the term.
     pub name: String,

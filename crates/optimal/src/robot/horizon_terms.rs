@@ -38,6 +38,12 @@ impl HorizonTerms {
         Ok(Self { costs, limits: Limits::none(), layouts, scratch: None, capabilities, model })
     }
 
+    /// Adds limits that hold at every knot, beside those that are given.
+    pub(crate) fn require(&mut self, limits: Vec<Limit>) -> Result<(), Error> {
+        self.limits = Limits::asked_for(limits);
+        self.set_limits(None, Vec::new())
+    }
+
     /// The costs of knot t, or those of all knots without costs of their own.
     pub(crate) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
         self.costs.chosen_mut().at_mut(t)

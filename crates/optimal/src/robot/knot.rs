@@ -16,12 +16,17 @@ pub(crate) struct KnotData {
     pub tau: Vec<f64>,
     /// λ. Shape: rows.
     pub lambda: Vec<f64>,
-    /// The derivatives of q̈ by q, v and what the controls drive: τ, or q̈ itself. Shape: nv × nv.
+    /// The derivatives of q̈ by q, v and what the controls drive: τ, or q̈ itself and λ. Shape: nv × nv, the last with a
+    /// column of zeros more for each λ that is a control.
     pub da: [DMatrix<f64>; 3],
     /// The derivatives of λ, written only if a residual looks at forces. Shape: rows × nv.
     pub dlambda: [DMatrix<f64>; 3],
     /// The derivatives of τ by q, v and q̈ where the controls drive q̈, else nothing. Shape: nv × nv.
     pub dtau: [DMatrix<f64>; 3],
+    /// J q̈ + γ where the controls drive q̈, else nothing. Shape: rows.
+    pub contact_acceleration: Vec<f64>,
+    /// The derivatives of that by q, v and q̈, the last being J; that of τ by λ is −Jᵀ. Shape: rows × nv.
+    pub dcontact_acceleration: [DMatrix<f64>; 3],
     /// The equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
     /// Whether the limbs in contact are solved in it.
@@ -35,9 +40,9 @@ impl KnotData {
         let rows = capabilities.rows();
         let square = || DMatrix::zeros(nv, nv);
         let wide = || DMatrix::zeros(rows, nv);
-        let (last, n) = match given {
-            Output::Acceleration => (DMatrix::identity(nv, nv), nv),
-            _ => (square(), 0),
+        let (last, n, controlled) = match given {
+            Output::Acceleration => (DMatrix::identity(nv, nv + rows), nv, rows),
+            _ => (square(), 0, 0),
         };
         Self {
             a: vec![0.0; nv],
@@ -46,6 +51,8 @@ impl KnotData {
             da: [square(), square(), last],
             dlambda: [wide(), wide(), wide()],
             dtau: [(); 3].map(|()| DMatrix::zeros(n, n)),
+            contact_acceleration: vec![0.0; controlled],
+            dcontact_acceleration: [(); 3].map(|()| DMatrix::zeros(controlled, nv)),
             equations: Vec::new(),
             limbs_solved: false,
             residuals: ResidualData::default(),

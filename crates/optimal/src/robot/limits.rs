@@ -9,7 +9,6 @@ use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
 use crate::Error;
 use crate::problem::{Bounded, Multipliers, Visit, leave_a_value};
 use condyle_dynamics::Model;
-use serde::{Deserialize, Serialize};
 
 /// A residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
 ///
@@ -41,18 +40,19 @@ use serde::{Deserialize, Serialize};
 /// assert!(solution.us.iter().all(|u| u.abs() < 30.0 + 1e-6));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Limit {
     /// The name by which errors call it.
     pub name: String,
     /// The residual r.
     pub residual: Residual,
     /// The least values; −∞ for none. Empty, as is `upper`, where r = 0.
-    #[serde(with = "condyle_spatial::finite::lower")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
     /// The greatest values; ∞ for none.
-    #[serde(with = "condyle_spatial::finite::upper")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
 
@@ -122,6 +122,8 @@ impl LimitSet {
 #[derive(Clone, Debug)]
 pub struct Limits {
     sets: PerModel<PerKnot<LimitSet>>,
+    /// Those that the dynamics ask for at every knot, before those that are given.
+    own: Vec<Limit>,
     /// No limits, where they do not count.
     none: Terms<Limit>,
     multipliers: Multipliers,
@@ -135,7 +137,12 @@ impl Limits {
     /// No limits.
     pub(super) fn none() -> Self {
         let (sets, none) = (PerModel::new(PerKnot::new(LimitSet::default())), Terms::default());
-        Self { sets, none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
+        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
+    }
+
+    /// The same with the limits that the dynamics ask for at every knot.
+    pub(super) fn asked_for(own: Vec<Limit>) -> Self {
+        Self { own, ..Self::none() }
     }
 
     /// Sets the limits of knot t, or of all knots without limits of their own. Forgets multipliers.
@@ -146,7 +153,8 @@ impl Limits {
         t: Option<usize>,
         limits: Vec<Limit>,
     ) -> Result<(), Error> {
-        self.sets.chosen_mut().set(t, LimitSet::new(model, capabilities, limits, t)?);
+        let all = self.own.iter().cloned().chain(limits).collect();
+        self.sets.chosen_mut().set(t, LimitSet::new(model, capabilities, all, t)?);
         self.multipliers = Multipliers::new(self.most());
         Ok(())
     }

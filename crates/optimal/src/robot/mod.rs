@@ -4,8 +4,9 @@
 //! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name. A [`Limit`] holds a
 //!   residual within bounds, or to zero.
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
-//!   [`InverseDynamics`] the accelerations are the controls. An [`Actuation`] drives the robot, an [`Integrator`] steps
-//!   through the time of a knot, and a [`ControlPolynomial`] says how the controls go through it.
+//!   [`InverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts too. An
+//!   [`Actuation`] drives the robot, an [`Integrator`] steps through the time of a knot, and a [`ControlPolynomial`] says how
+//!   the controls go through it.
 //! - A [`RobotProblem`] is a problem as data, in a file for example.
 //! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
 //!
@@ -69,6 +70,7 @@ pub use dynamics::contact::{ContactAcceleration, ContactDynamics};
 pub use dynamics::free::{FreeAcceleration, FreeDynamics};
 pub use dynamics::impulse::ImpulseDynamics;
 pub use dynamics::inverse::{ControlledAcceleration, InverseDynamics};
+pub use dynamics::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
 pub use integrators::{ControlPolynomial, Integrated, Integrator};
 pub use limits::Limit;
 pub use problem::{ControlBounds, Dynamics, Knot, RobotProblem};

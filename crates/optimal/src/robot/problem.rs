@@ -8,15 +8,14 @@ use super::dynamics::contact::ContactAcceleration;
 use super::dynamics::free::{FreeAcceleration, FreeDynamics};
 use super::dynamics::impulse::ImpulseDynamics;
 use super::dynamics::inverse::ControlledAcceleration;
+use super::dynamics::inverse_contact::ControlledContactAcceleration;
 use super::dynamics::knots::HasRobot;
 use super::integrators::{ControlPolynomial, Integrated, Integrator};
 use super::limits::Limit;
 use crate::ActionModel;
-use crate::read::optional_matrix;
 use crate::{Error, Problem};
 use condyle_dynamics::Model;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -42,8 +41,9 @@ use std::sync::Arc;
 /// assert_eq!(problem.horizon(), 20);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct RobotProblem {
     /// The robot.
     pub model: Model,
@@ -58,50 +58,54 @@ pub struct RobotProblem {
 }
 
 /// A knot as data.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Knot {
     /// The rule by which the state goes on.
     pub dynamics: Dynamics,
     /// The costs.
     pub costs: Vec<Cost>,
     /// Other costs in their place, by the number of a knot of the horizon.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub costs_at: BTreeMap<usize, Vec<Cost>>,
     /// The limits.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub limits: Vec<Limit>,
     /// Other limits in their place, by the number of a knot of the horizon.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub limits_at: BTreeMap<usize, Vec<Limit>>,
     /// Bounds on the controls, if there are any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub bounds: Option<ControlBounds>,
     /// How the controls go through the knot's time; constant at an impact and at the end, which have none.
-    #[serde(default, skip_serializing_if = "ControlPolynomial::is_constant")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "ControlPolynomial::is_constant"))]
     pub controls: ControlPolynomial,
 }
 
 /// Bounds on the controls of a knot, nu numbers each, infinite where there is none; of polynomials, at each of their nodes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ControlBounds {
     /// The least values.
-    #[serde(with = "condyle_spatial::finite::lower")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
     /// The greatest values.
-    #[serde(with = "condyle_spatial::finite::upper")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
 
 /// The rule by which the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 pub enum Dynamics {
     /// [`FreeDynamics`].
     Free {
         /// S.
-        #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_matrix")]
+        #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
         /// The integrator.
         integrator: Integrator,
@@ -115,7 +119,8 @@ pub enum Dynamics {
         /// μ (1/kg).
         damping: f64,
         /// S.
-        #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_matrix")]
+        #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
         /// The integrator.
         integrator: Integrator,
@@ -133,6 +138,19 @@ pub enum Dynamics {
     },
     /// [`InverseDynamics`](super::InverseDynamics).
     Inverse {
+        /// The integrator.
+        integrator: Integrator,
+        /// Δt (s).
+        dt: f64,
+    },
+    /// [`ContactInverseDynamics`](super::ContactInverseDynamics).
+    ContactInverse {
+        /// The contacts that hold.
+        contacts: Vec<Contact>,
+        /// S.
+        #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
+        actuation: Option<DMatrix<f64>>,
         /// The integrator.
         integrator: Integrator,
         /// Δt (s).
@@ -184,6 +202,10 @@ impl Knot {
             }
             Dynamics::Inverse { integrator, dt } => {
                 let inner = ControlledAcceleration::new(model.clone(), costs)?;
+                self.bounded(Integrated::new(inner, *integrator, *dt)?)
+            }
+            Dynamics::ContactInverse { contacts, actuation, integrator, dt } => {
+                let inner = ControlledContactAcceleration::new(model.clone(), drives(actuation)?, contacts, costs)?;
                 self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Impulse { contacts, restitution, damping } => {

@@ -33,6 +33,7 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     (touch[0].constraint.kind, touch[0].constraint.axes) = (ConstraintKind::Line, rotation(rng));
     let impulse = Dynamics::Impulse { contacts: touch, restitution: 0.2, damping };
     let integrator = Integrator::RungeKutta2;
+    let backwards = Dynamics::ContactInverse { contacts: contacts.clone(), actuation: None, integrator, dt: DT };
     let stance_foot = contacts[1].name.clone();
     let contact = Dynamics::Contact { contacts, damping, actuation: None, integrator, dt: DT };
     let mut stance = knot(contact, costs, bounds(vec![f64::NEG_INFINITY; nv - 6], vec![9.0; nv - 6]));
@@ -58,8 +59,9 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
             stance,
             knot(impulse, vec![landing], None),
             Knot { controls: ControlPolynomial::Quadratic, ..knot(inverse, still(nv), None) },
+            knot(backwards, still(nv + 12), None),
         ],
-        stages: vec![0, 1, 1, 2, 3, 0],
+        stages: vec![0, 1, 1, 2, 3, 4, 0],
         terminal: end,
         model,
     }
@@ -130,7 +132,7 @@ fn what_is_wrong_in_a_file_is_said() {
     let landing = |data: &mut RobotProblem| data.terminal = data.knots[2].clone();
     let mut landed = data.clone();
     landing(&mut landed);
-    assert_eq!(landed.build().map(|problem| problem.horizon()).unwrap(), 6); // an impact may come last
+    assert_eq!(landed.build().map(|problem| problem.horizon()).unwrap(), 7); // an impact may come last
     assert!(built(&|data| data.x0[0] = f64::NAN).contains("`x0[0]` is NaN"));
     assert_eq!(
         built(&|data| data.knots[1].limits_at.get_mut(&1).unwrap()[0].lower.truncate(4)),

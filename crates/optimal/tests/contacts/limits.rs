@@ -54,7 +54,7 @@ fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
 }
 
 /// Compares the gradient of a knot's cost with central differences at a random state.
-fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
+pub(super) fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
     let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
     let (x, u) = (random_state(model, rng), random(nu, effort, rng));
     let mut node = LqNode::zeros(ndx, nu);

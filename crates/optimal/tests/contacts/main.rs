@@ -3,6 +3,7 @@
 
 mod files;
 mod implicit;
+mod inverse;
 mod limits;
 
 use condyle_dynamics::{

@@ -5,10 +5,10 @@ use crate::algebra::se3::{Act, Se3};
 use crate::algebra::vector::{Mat3, Sym3, Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
-use serde::{Deserialize, Serialize};
 
 /// The inertia of a rigid body: the ten numbers that its dynamics is linear in.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Inertia<S> {
     /// m (kg).

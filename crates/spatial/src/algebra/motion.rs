@@ -2,7 +2,6 @@
 
 use crate::algebra::vector::{Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
-use serde::{Deserialize, Serialize};
 
 /// The cross product of spatial algebra, chosen by type: v × m of motions, v ×* f of a motion and a force.
 pub trait Cross<T> {
@@ -12,7 +11,8 @@ pub trait Cross<T> {
 
 /// A spatial velocity or acceleration, [linear; angular]: that of the body's point at the frame's origin, and of the
 /// body's rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Motion<S> {
     /// The motion of the point of the body at the origin of the frame: m/s or m/s².
@@ -23,7 +23,8 @@ pub struct Motion<S> {
 impl_linear!(Motion { linear, angular });
 
 /// A spatial force or momentum, [linear; angular]: the sum of the forces, and their moment about the frame's origin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Force<S> {
     /// Force (N) or momentum (kg m/s).

@@ -5,10 +5,10 @@ use crate::algebra::quaternion::Quaternion;
 use crate::algebra::vector::{Mat3, Vec3, impl_lift};
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
-use serde::{Deserialize, Serialize};
 
 /// The pose aXb of frame b in frame a: it takes coordinates in b to coordinates in a.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Se3<S> {
     /// aRb: its columns are the axes of b in a.

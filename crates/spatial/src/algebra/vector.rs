@@ -2,7 +2,6 @@
 
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
-use serde::{Deserialize, Serialize};
 
 /// Component-wise `+`, `−`, negation, `+=`, `−=`, product with a scalar, and lifting of constants, for a struct whose
 /// fields have them.
@@ -124,7 +123,8 @@ impl<S: Scalar> Scale<S> for S {
 }
 
 /// A vector in three dimensions.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
 #[repr(C)]
 pub struct Vec3<S> {
@@ -194,7 +194,8 @@ impl<S> From<[S; 3]> for Vec3<S> {
 }
 
 /// A 3×3 matrix by its columns. Of a rotation aRb they are the axes of b in a.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
 #[repr(C)]
 pub struct Mat3<S> {
@@ -284,7 +285,8 @@ impl<S: Scalar> Mul for Mat3<S> {
 }
 
 /// A symmetric 3×3 matrix.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
 #[repr(C)]
 pub struct Sym3<S> {

@@ -1,18 +1,21 @@
-//! tanh and exp of a [`Scalar`], out of its arithmetic: one source for floats, lanes and dual numbers.
+//! tanh and exp of a [`Scalar`], out of its arithmetic: one source for floats, lanes and dual numbers. And the logarithm of a
+//! number, which is the platform's.
 
 use crate::scalar::Scalar;
 
 /// From here on tanh is 1 to the last bit of a double.
 const SATURATED: f64 = 20.0;
 /// log₂ of what an argument is divided by before a series is summed.
-const HALVINGS: i32 = 6;
+const HALVINGS: u32 = 6;
+/// What an argument is multiplied by before a series is summed.
+const SCALE: f64 = 1.0 / (1u32 << HALVINGS) as f64;
 
 /// tanh x, to a few units of the last place of x: the continued fraction of x/64, then six times
 /// tanh 2y = 2 tanh y / (1 + tanh² y), which amplifies no relative error. ±1 without slope beyond ±20.
 #[inline(always)]
 pub fn tanh<S: Scalar>(x: S) -> S {
     let inside = x.abs().lt(S::splat(SATURATED));
-    let y = S::select(inside, x, S::zero()) * S::splat(0.5f64.powi(HALVINGS));
+    let y = S::select(inside, x, S::zero()) * S::splat(SCALE);
     let t = y * y;
     // Lambert (1768): y/(1 + y²/(3 + y²/(5 + … y²/13))), as one fraction
     let above = (t + S::splat(378.0)).mul_add(t, S::splat(17_325.0)).mul_add(t, S::splat(135_135.0));
@@ -30,7 +33,7 @@ pub fn tanh<S: Scalar>(x: S) -> S {
 #[inline(always)]
 pub fn exp<S: Scalar>(x: S) -> S {
     let negative = x.lt(S::zero());
-    let y = S::select(negative, -x, x) * S::splat(0.5f64.powi(HALVINGS));
+    let y = S::select(negative, -x, x) * S::splat(SCALE);
     let mut sum = S::one();
     for k in (2..=18).rev() {
         sum = (y * S::splat(1.0 / f64::from(k))).mul_add(sum, S::one()); // (eʸ − 1)/y = 1 + y/2 (1 + y/3 (1 + …))
@@ -41,6 +44,14 @@ pub fn exp<S: Scalar>(x: S) -> S {
     }
     let exp = expm1 + S::one();
     S::select(negative, exp.recip(), exp)
+}
+
+/// ln x.
+pub fn ln(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return x.ln();
+    #[cfg(not(feature = "std"))]
+    return libm::log(x);
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::Scalar;
 use super::number::Number;
+use super::platform::Platform;
 
 macro_rules! impl_float {
     ($($float:ident $compiled:literal),*) => {$(
@@ -18,7 +19,7 @@ macro_rules! impl_float {
             fn mul_add(self, b: Self, c: Self) -> Self {
                 // Without the instruction, a fused product is a library call, thirty times slower than two roundings.
                 if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
-                    $float::mul_add(self, b, c)
+                    Platform::fused(self, b, c)
                 } else {
                     self * b + c
                 }
@@ -29,7 +30,7 @@ macro_rules! impl_float {
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
-                $float::sqrt(self)
+                Platform::root(self)
             }
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
@@ -40,7 +41,7 @@ macro_rules! impl_float {
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {
-                $float::atan2(self, x)
+                Platform::angle(self, x)
             }
             #[inline(always)]
             fn abs(self) -> Self {

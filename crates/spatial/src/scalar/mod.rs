@@ -1,5 +1,6 @@
 //! The numbers an algorithm can run on.
 
+#[cfg(any(feature = "std", test))]
 mod dual;
 #[doc(hidden)]
 pub mod elementary;
@@ -8,6 +9,7 @@ mod float;
 pub mod lane_dual;
 pub(crate) mod number;
 pub(crate) mod operators;
+mod platform;
 mod sin_cos;
 
 use crate::simd::kernel::Kernel;

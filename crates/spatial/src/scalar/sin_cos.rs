@@ -7,6 +7,7 @@
 
 use super::Scalar;
 use super::number::Number;
+use super::platform::Platform;
 
 /// The constants of a precision.
 struct Precision<const T: usize> {
@@ -91,7 +92,7 @@ macro_rules! number {
             }
             #[inline(always)]
             fn far(self) -> (Self, Self) {
-                $float::sin_cos(self)
+                Platform::sine_cosine(self)
             }
         }
     };

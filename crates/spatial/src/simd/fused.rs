@@ -6,11 +6,11 @@ use crate::scalar::number::Number;
 use crate::scalar::operators::operators;
 use crate::simd::kernel::{Kernel, short};
 use crate::simd::lanes::{Element, Lanes};
-use crate::simd::level::{Level, assert_supported, level};
+use crate::simd::level::{Level, SHORT, VECTORS, assert_supported, level};
 use crate::simd::pack::Block;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// An `f64` whose products and sums are fused: what a lane is, alone.
+/// An `f64` whose products and sums are fused where those of lanes are (in WebAssembly they are not): what a lane is, alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
 pub struct Fused(pub f64);
@@ -70,11 +70,11 @@ impl Neg for Fused {
 impl Scalar for Fused {
     type Mask = bool;
     const LANES: usize = 1;
-    const COMPILED: bool = true;
+    const COMPILED: bool = VECTORS;
 
     #[inline(always)]
     fn enter(kernel: impl Kernel) {
-        assert!(level() > Level::Baseline, "products are fused from AVX2 and NEON on");
+        assert!(level() > Level::Baseline, "there are no lanes at the baseline");
         short(kernel);
     }
     #[inline(always)]
@@ -83,6 +83,9 @@ impl Scalar for Fused {
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
+        if cfg!(target_arch = "wasm32") {
+            return self * b + c;
+        }
         Self(self.0.mul_add(b.0, c.0))
     }
     #[inline(always)]
@@ -101,10 +104,10 @@ impl Scalar for Fused {
         let (sin, cos) = self.0.far();
         (Self(sin), Self(cos))
     }
-    /// Four at a time: where products are fused, there are vectors of four.
+    /// Four at a time: where there are lanes, there are vectors of four.
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
-        assert_supported(if cfg!(target_arch = "aarch64") { Level::Neon } else { Level::Avx2 });
+        assert_supported(SHORT);
         let (angles, others) = angles.as_chunks_mut::<4>();
         let (cosines, other_cosines) = cosines.as_chunks_mut::<4>();
         for (x, y) in angles.iter_mut().zip(cosines) {

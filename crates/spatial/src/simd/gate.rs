@@ -21,7 +21,7 @@ pub use crate::simd::pack::{Real, Witness};
 use core::any::TypeId;
 use core::mem::ManuallyDrop;
 
-/// Four numbers at once, with AVX2 or NEON.
+/// Four numbers at once, with AVX2, NEON or SIMD128.
 pub type Short<W> = <f64 as Real>::Short<W>;
 /// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
 pub type Long<W> = <f64 as Real>::Long<W>;
@@ -51,6 +51,30 @@ pub unsafe fn renamed<A, B>(a: A) -> B {
     unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
+/// Statements for vectors, where the processor may have some ([`VECTORS`](crate::simd::level::VECTORS)), else others: so that
+/// nothing is compiled for vectors that a microcontroller has not.
+#[cfg(any(
+    all(target_arch = "x86_64", feature = "std"),
+    target_arch = "aarch64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
+#[macro_export]
+#[doc(hidden)]
+macro_rules! if_vectors {
+    ({ $($with:tt)* } else { $($without:tt)* }) => { $($with)* };
+}
+/// What stands in the place of code for vectors, which are not here.
+#[cfg(not(any(
+    all(target_arch = "x86_64", feature = "std"),
+    target_arch = "aarch64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+)))]
+#[macro_export]
+#[doc(hidden)]
+macro_rules! if_vectors {
+    ({ $($with:tt)* } else { $($without:tt)* }) => { $($without)* };
+}
+
 /// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
 /// [`gate`](crate::simd::gate). It returns nothing: what it computes is in its arguments.
 #[macro_export]
@@ -61,13 +85,7 @@ macro_rules! kernel {
         #[inline]
         #[allow(unsafe_code, clippy::too_many_arguments)]
         $vis fn $name<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?>($($arg: $type),*) {
-            use $crate::simd::gate::{Fused, Kernel, Level, is, level};
-
-            struct Gate;
-            // SAFETY: each scalar's code is entered through its door.
-            unsafe impl $crate::simd::gate::Witness for Gate {}
-            type Short = $crate::simd::gate::Short<Gate>;
-            type Long = $crate::simd::gate::Long<Gate>;
+            use $crate::simd::gate::{Kernel, is};
 
             struct Work<T, Scalars>(T, ::core::marker::PhantomData<Scalars>);
             impl<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?> Kernel for Work<($($type,)*), ($S, $($R)?)> {
@@ -82,11 +100,22 @@ macro_rules! kernel {
                 return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
             $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
-            let (f64, fused) = (is::<$S, f64>(), is::<$S, f64>() && level() > Level::Baseline);
-            $crate::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
+            let f64 = is::<$S, f64>();
+            $crate::if_vectors!({
+                use $crate::simd::gate::{Fused, Level, level};
+
+                struct Gate;
+                // SAFETY: each scalar's code is entered through its door.
+                unsafe impl $crate::simd::gate::Witness for Gate {}
+                type Short = $crate::simd::gate::Short<Gate>;
+                type Long = $crate::simd::gate::Long<Gate>;
+
+                let fused = f64 && level() > Level::Baseline;
+                $crate::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
+                $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
+                $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
+            } else {});
             $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
-            $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
-            $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
         }
     };
     // the function compiled for one scalar, if it is the one
@@ -117,13 +146,7 @@ macro_rules! register_kernel {
         $(#[$doc])*
         #[allow(unsafe_code, clippy::too_many_arguments)]
         $vis fn $name($($arg: $type),*) {
-            use $crate::simd::gate::{Kernel, Level, level};
-
-            struct Gate;
-            // SAFETY: the registers' code is entered through their door.
-            unsafe impl $crate::simd::gate::Witness for Gate {}
-            type Short = $crate::simd::gate::Short<Gate>;
-            type Long = $crate::simd::gate::Long<Gate>;
+            use $crate::simd::gate::Kernel;
 
             struct Work<T, V>(T, ::core::marker::PhantomData<V>);
             impl<$V: $crate::simd::pack::Block<Number = f64>> Kernel for Work<($($type,)*), $V> {
@@ -135,11 +158,24 @@ macro_rules! register_kernel {
             }
 
             let work = ($($arg,)*);
-            if level() >= Level::Avx512 {
-                <Long as $crate::Scalar>::enter(Work::<_, Long>(work, ::core::marker::PhantomData));
+            $crate::if_vectors!({
+                use $crate::simd::gate::{Level, level};
+
+                struct Gate;
+                // SAFETY: the registers' code is entered through their door.
+                unsafe impl $crate::simd::gate::Witness for Gate {}
+                type Short = $crate::simd::gate::Short<Gate>;
+                type Long = $crate::simd::gate::Long<Gate>;
+
+                if level() >= Level::Avx512 {
+                    <Long as $crate::Scalar>::enter(Work::<_, Long>(work, ::core::marker::PhantomData));
+                } else {
+                    <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
+                }
             } else {
-                <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
-            }
+                // as right, if anybody called it
+                <f64 as $crate::Scalar>::enter(Work::<_, f64>(work, ::core::marker::PhantomData));
+            });
         }
     };
 }
@@ -158,33 +194,36 @@ macro_rules! level_function {
         #[allow(unsafe_code, unused_unsafe, clippy::extra_unused_type_parameters)]
         #[inline]
         $vis fn $name($($arg: $type),*) $(-> $out)? {
-            use $crate::simd::gate::{Level, level};
-
             $item
 
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
-            #[inline(never)]
-            fn long($($arg: $type),*) $(-> $out)? {
-                $long($($arg),*)
-            }
-            #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
-            #[inline(never)]
-            fn short($($arg: $type),*) $(-> $out)? {
-                $short($($arg),*)
-            }
             #[inline(never)]
             fn baseline($($arg: $type),*) $(-> $out)? {
                 $baseline($($arg),*)
             }
-            match level() {
-                // SAFETY: the processor has the level in use.
+            $crate::if_vectors!({
+                use $crate::simd::gate::{Level, level};
+
                 #[cfg(target_arch = "x86_64")]
-                Level::Avx512 => unsafe { long($($arg),*) },
-                Level::Baseline => baseline($($arg),*),
-                // SAFETY: as above.
-                _ => unsafe { short($($arg),*) },
-            }
+                #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+                #[inline(never)]
+                fn long($($arg: $type),*) $(-> $out)? {
+                    $long($($arg),*)
+                }
+                #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
+                #[inline(never)]
+                fn short($($arg: $type),*) $(-> $out)? {
+                    $short($($arg),*)
+                }
+                match level() {
+                    // SAFETY: the processor has the level in use.
+                    #[cfg(target_arch = "x86_64")]
+                    Level::Avx512 => return unsafe { long($($arg),*) },
+                    Level::Baseline => {}
+                    // SAFETY: as above.
+                    _ => return unsafe { short($($arg),*) },
+                }
+            } else {});
+            baseline($($arg),*)
         }
     };
 }

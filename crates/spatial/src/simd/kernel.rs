@@ -1,7 +1,7 @@
 //! Work that is compiled for the instructions of a level, and the doors through which it is entered.
 #![allow(unsafe_code)]
 
-use crate::simd::level::{Level, assert_supported};
+use crate::simd::level::{SHORT, assert_supported};
 
 /// Work that is to be compiled for a level: `run` is always inlined, and so takes the level of the function it stands in.
 pub trait Kernel: Sized {
@@ -10,7 +10,7 @@ pub trait Kernel: Sized {
 }
 
 /// Runs a kernel with the instructions of [`Real::Short`](crate::simd::pack::Real::Short): those of
-/// [`Level::Avx2`](crate::simd::level::Level::Avx2), or of [`Level::Neon`](crate::simd::level::Level::Neon), which every 64-bit Arm has.
+/// [`Level::Avx2`](crate::simd::level::Level::Avx2), or where the processor is of another kind, of its only level.
 ///
 /// # Panics
 /// If the processor does not have them.
@@ -21,9 +21,9 @@ pub fn short(kernel: impl Kernel) {
     fn with_instructions(kernel: impl Kernel) {
         kernel.run();
     }
-    assert_supported(if cfg!(target_arch = "aarch64") { Level::Neon } else { Level::Avx2 });
+    assert_supported(SHORT);
     // SAFETY: the processor has the instructions.
-    #[allow(unused_unsafe)] // on Arm every processor has them
+    #[allow(unused_unsafe)] // elsewhere than on x86-64 every processor has them
     unsafe {
         with_instructions(kernel);
     }

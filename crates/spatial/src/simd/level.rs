@@ -1,38 +1,67 @@
 //! Which vector instructions this machine has, and which of them are used.
 //!
 //! A build holds code for every level of its architecture; the best that the processor has is chosen at the first call. The
-//! environment variable `CONDYLE_LEVEL` (`baseline`, `neon`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that
+//! environment variable `CONDYLE_LEVEL` (`baseline`, `simd128`, `neon`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that
 //! results can be repeated to the last bit on machines of one architecture that differ: a level decides where products and
 //! sums are fused. (On Arm they are wherever an algorithm asks for it, at the baseline too.)
+//!
+//! A WebAssembly module cannot ask: it has SIMD128 if it was compiled with `-C target-feature=+simd128`, and then runs only where
+//! that is known, which is in every browser since 2023. Nor can a program without the standard library: it runs at the
+//! baseline of its processor, on a 64-bit Arm with NEON.
+
+#[cfg(feature = "std")]
+mod requested;
 
 use core::fmt;
 use core::sync::atomic::{AtomicU8, Ordering};
+#[cfg(feature = "std")]
+pub use requested::{Refused, requested};
 
 /// A set of vector instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// One number at a time, with what every processor of its architecture has: SSE2, or fused products on Arm.
     Baseline = 1,
+    /// SIMD128 of WebAssembly: four numbers at once in two registers; products are not fused.
+    Simd128 = 2,
     /// NEON, which every 64-bit Arm has: four numbers at once in two registers, fused products.
-    Neon = 2,
+    Neon = 3,
     /// AVX2 and FMA: four numbers at once, fused products.
-    Avx2 = 3,
+    Avx2 = 4,
     /// AVX-512 (F, DQ, VL, BW): eight numbers at once.
-    Avx512 = 4,
+    Avx512 = 5,
 }
+
+/// The level at which there are vectors of four, for the kind of processor that this is compiled for.
+pub(crate) const SHORT: Level = if cfg!(target_arch = "aarch64") {
+    Level::Neon
+} else if cfg!(target_arch = "wasm32") {
+    Level::Simd128
+} else {
+    Level::Avx2
+};
+
+/// Whether there can be a level above the baseline. Where there cannot, nobody has to ask.
+#[doc(hidden)]
+pub const VECTORS: bool = cfg!(any(
+    all(target_arch = "x86_64", feature = "std"),
+    target_arch = "aarch64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+));
 
 impl Level {
     /// All levels, the lowest first.
-    pub const ALL: [Self; 4] = [Self::Baseline, Self::Neon, Self::Avx2, Self::Avx512];
+    pub const ALL: [Self; 5] = [Self::Baseline, Self::Simd128, Self::Neon, Self::Avx2, Self::Avx512];
 
     /// Whether this processor can run it.
     pub fn is_supported(self) -> bool {
         match self {
             Self::Baseline => true,
+            Self::Simd128 => cfg!(all(target_arch = "wasm32", target_feature = "simd128")),
             Self::Neon => cfg!(target_arch = "aarch64"),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
             Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "std"))]
             Self::Avx512 => {
                 Self::Avx2.is_supported()
                     && is_x86_feature_detected!("avx512f")
@@ -40,7 +69,7 @@ impl Level {
                     && is_x86_feature_detected!("avx512vl")
                     && is_x86_feature_detected!("avx512bw")
             }
-            #[cfg(not(target_arch = "x86_64"))]
+            #[cfg(not(all(target_arch = "x86_64", feature = "std")))]
             Self::Avx2 | Self::Avx512 => false,
         }
     }
@@ -49,6 +78,7 @@ impl Level {
     pub fn name(self) -> &'static str {
         match self {
             Self::Baseline => "baseline",
+            Self::Simd128 => "simd128",
             Self::Neon => "neon",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
@@ -79,55 +109,7 @@ impl fmt::Display for Unsupported {
     }
 }
 
-impl std::error::Error for Unsupported {}
-
-/// A `CONDYLE_LEVEL` that cannot be obeyed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Refused {
-    /// The value names no level.
-    Unknown(
-        /// The value.
-        String,
-    ),
-    /// This processor does not have the level.
-    Unsupported(
-        /// The level.
-        Level,
-    ),
-}
-
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown(name) => write!(f, "CONDYLE_LEVEL: expected {}, found `{name}`", List(&Level::ALL))?,
-            Self::Unsupported(level) => write!(f, "CONDYLE_LEVEL: {}", Unsupported(*level))?,
-        }
-        let here: Vec<Level> = Level::ALL.into_iter().filter(|level| level.is_supported()).collect();
-        write!(f, " (this processor has {})", List(&here))
-    }
-}
-
-impl std::error::Error for Refused {}
-
-/// Levels as a sentence names them.
-struct List<'a>(&'a [Level]);
-
-impl fmt::Display for List<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, level) in self.0.iter().enumerate() {
-            let before = if i == 0 {
-                ""
-            } else if i + 1 == self.0.len() {
-                " or "
-            } else {
-                ", "
-            };
-            write!(f, "{before}{level}")?;
-        }
-        Ok(())
-    }
-}
+impl core::error::Error for Unsupported {}
 
 /// The level in use; 0 until it is first asked for.
 static LEVEL: AtomicU8 = AtomicU8::new(0);
@@ -143,37 +125,23 @@ static LEVEL: AtomicU8 = AtomicU8::new(0);
 /// ```
 #[inline]
 pub fn level() -> Level {
+    if !VECTORS {
+        return Level::Baseline;
+    }
     match LEVEL.load(Ordering::Relaxed) {
-        2 => Level::Neon,
-        3 => Level::Avx2,
-        4 => Level::Avx512,
+        2 => Level::Simd128,
+        3 => Level::Neon,
+        4 => Level::Avx2,
+        5 => Level::Avx512,
         1 => Level::Baseline,
         _ => choose(),
     }
 }
 
-/// The level that `CONDYLE_LEVEL` asks for, if it is set.
-///
-/// ```
-/// let requested = condyle_spatial::level::requested()?; // a program that would rather stop than run another level
-/// assert!(requested.is_none_or(|level| level.is_supported()));
-/// # Ok::<(), condyle_spatial::level::Refused>(())
-/// ```
-///
-/// # Errors
-/// [`Refused`], if it names no level, or one that this processor does not have.
-pub fn requested() -> Result<Option<Level>, Refused> {
-    let Some(name) = std::env::var_os("CONDYLE_LEVEL") else { return Ok(None) };
-    let Some(level) = Level::ALL.into_iter().find(|level| name == level.name()) else {
-        return Err(Refused::Unknown(name.to_string_lossy().into_owned()));
-    };
-    if level.is_supported() { Ok(Some(level)) } else { Err(Refused::Unsupported(level)) }
-}
-
 /// Asserts that this processor has a level: at each door to code that is compiled for it.
 #[inline(always)]
 pub(crate) fn assert_supported(level: Level) {
-    /// The best level of this processor; 0 until it is first asked for. (Each has all below, Arm's only one too.)
+    /// The best level of this processor; 0 until it is first asked for. (Each has all below that are of its kind.)
     static BEST: AtomicU8 = AtomicU8::new(0);
     #[cold]
     fn find(level: Level) {
@@ -189,13 +157,17 @@ pub(crate) fn assert_supported(level: Level) {
 #[cold]
 fn choose() -> Level {
     let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap_or(Level::Baseline);
+    #[cfg(feature = "std")]
     let (level, refused) = match requested() {
         Ok(level) => (level.unwrap_or(best), None),
         Err(refused) => (best, Some(refused)),
     };
+    #[cfg(not(feature = "std"))]
+    let level = best;
     // another thread may have chosen or pinned one meanwhile
     match LEVEL.compare_exchange(0, level as u8, Ordering::Relaxed, Ordering::Relaxed) {
         Ok(_) => {
+            #[cfg(feature = "std")]
             if let Some(refused) = refused {
                 eprintln!("{refused}; using {best}");
             }

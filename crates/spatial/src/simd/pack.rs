@@ -252,8 +252,8 @@ pub unsafe trait Witness: 'static {}
 
 /// A number with its vectors.
 pub trait Real: Block<Number = Self> {
-    /// The vectors of [`Level::Avx2`](crate::simd::level::Level::Avx2), or of
-    /// [`Level::Neon`](crate::simd::level::Level::Neon).
+    /// The vectors of [`Level::Avx2`](crate::simd::level::Level::Avx2), of
+    /// [`Level::Neon`](crate::simd::level::Level::Neon), or of [`Level::Simd128`](crate::simd::level::Level::Simd128).
     type Short<W: Witness>: Block<Number = Self>;
     /// The vectors of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as short ones where there is none.
     type Long<W: Witness>: Block<Number = Self>;
@@ -334,7 +334,7 @@ mod tests {
                     f64::enter(kernel::<f64>());
                     f32::enter(kernel::<f32>());
                 }
-                Level::Neon | Level::Avx2 => {
+                Level::Simd128 | Level::Neon | Level::Avx2 => {
                     Lanes::<f64, 4>::enter(kernel::<Lanes<f64, 4>>());
                     Lanes::<f32, 8>::enter(kernel::<Lanes<f32, 8>>());
                 }

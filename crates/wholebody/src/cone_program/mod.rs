@@ -100,6 +100,9 @@ pub(crate) struct Multipliers<'s> {
 
 /// A solver of programs whose sizes fit a capacity.
 pub(crate) trait Solver {
+    /// Sets where the next warm start begins, for a program of this size. A solver that always starts cold ignores it.
+    fn start_from(&mut self, _x: &[f64], _multipliers: Multipliers<'_>) {}
+
     /// Minimises.
     ///
     /// # Panics

@@ -26,6 +26,7 @@ use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
 use crate::selection::pairs_by_rows;
 use crate::workspace::{Size, filled, zero_matrix};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
@@ -60,14 +61,14 @@ pub(crate) struct Bodies<S> {
 impl<S: Scalar> Bodies<S> {
     pub(crate) fn new(size: Size) -> Self {
         Self {
-            v: filled(Motion::zero(), size.bodies),
-            a: filled(Motion::zero(), size.bodies),
-            IC: filled(Inertia::zero(), size.bodies),
-            BC: filled(Coriolis::zero(), size.bodies),
-            F: filled(Force::zero(), size.bodies),
-            Psid: filled(Motion::zero(), size.columns),
-            Psidd: filled(Motion::zero(), size.columns),
-            PsidSd: filled(Motion::zero(), size.columns),
+            v: filled(Motion::zero, size.bodies),
+            a: filled(Motion::zero, size.bodies),
+            IC: filled(Inertia::zero, size.bodies),
+            BC: filled(Coriolis::zero, size.bodies),
+            F: filled(Force::zero, size.bodies),
+            Psid: filled(Motion::zero, size.columns),
+            Psidd: filled(Motion::zero, size.columns),
+            PsidSd: filled(Motion::zero, size.columns),
             rows: Rows::new(size.columns),
         }
     }
@@ -95,9 +96,9 @@ impl<S: Scalar> Workspace<S> {
         let square = zero_matrix(size.nv, size.nv);
         Self {
             bodies: Bodies::new(size),
-            qd: filled(S::zero(), size.nv),
-            qdd: filled(S::zero(), size.nv),
-            still: filled(S::zero(), size.nv),
+            qd: filled(S::zero, size.nv),
+            qdd: filled(S::zero, size.nv),
+            still: filled(S::zero, size.nv),
             dtau_dq: square.clone(),
             dtau_dv: square.clone(),
             dtau_da: square,

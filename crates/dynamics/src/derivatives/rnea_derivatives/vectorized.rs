@@ -6,6 +6,7 @@
 
 use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
 use crate::passes::kinematics::World;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::{Force, Scalar, Vec3};

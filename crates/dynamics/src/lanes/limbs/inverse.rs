@@ -16,6 +16,7 @@ use super::lanes::{Four, Limbs};
 use super::{LANES, Plan};
 use crate::passes::aba;
 use crate::passes::kinematics::World;
+use alloc::vec::Vec;
 use condyle_model::layout::Layout;
 use condyle_model::limbs::column_map::{ColumnBlock, Sizes};
 use condyle_spatial::block::Block;

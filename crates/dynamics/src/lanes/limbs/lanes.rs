@@ -3,6 +3,7 @@
 
 use super::{LANES, Plan};
 use crate::workspace::{Gate, Short};
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Columns, Layout};

@@ -8,6 +8,8 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::passes::rnea;
 use crate::workspace::{Size, filled};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::limbs::steps::Source;
 use condyle_spatial::block::lanes;
@@ -42,17 +44,17 @@ impl Scratch {
         let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
         let (steps, nv) = (plan.steps.len(), plan.state.coordinates.len());
         let size = Size { bodies: steps, columns: nv + plan.columns.copies.len(), depth: 0, levels: steps, nv };
-        let zeros = filled(Four::zero(), nv);
+        let zeros = filled(Four::zero, nv);
         Some(Box::new(Self {
-            q: filled(Four::zero(), plan.state.positions.len()),
+            q: filled(Four::zero, plan.state.positions.len()),
             v: zeros.clone(),
             x: zeros,
-            f_ext: filled(Force::zero(), steps),
+            f_ext: filled(Force::zero, steps),
             padded: vec![Fused(0.0); model.nq().max(model.nv()) + 1],
             world: World::new(size),
             rnea: rnea::Workspace::new(size),
             aba: aba::Workspace::new(size),
-            IC: filled(Inertia::zero(), steps),
+            IC: filled(Inertia::zero, steps),
             bodies: rnea_derivatives::Bodies::new(size),
             inverted: inverse::Scratch::new(model.nv(), plan),
         }))

@@ -1,7 +1,8 @@
 //! Attributes of MJCF elements, with the defaults of their classes, in SI units.
 
-use crate::error::{Error, near, nearest};
+use crate::error::Error;
 use crate::io::xml::{self, Element};
+use crate::names::{near, nearest};
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 use std::collections::HashMap;
 

@@ -1,9 +1,10 @@
 //! The poses of links, joints and frames of an SDF, and the frames in which axes are given.
 
 use super::WORLD_LINK;
-use crate::error::{Error, near, nearest};
+use crate::error::Error;
 use crate::io::from_rpy;
 use crate::io::xml::{self, Element};
+use crate::names::{near, nearest};
 use condyle_spatial::{Quaternion, Se3, Vec3};
 use std::collections::HashMap;
 

@@ -167,6 +167,28 @@ pub trait ActionModel: Any + Send {
         }
     }
 
+    /// The number of accelerations and forces that the inverse-dynamics form of a knot starts from, none without that form.
+    #[doc(hidden)]
+    fn motion_size(&self) -> usize {
+        0
+    }
+
+    /// As [`calc_group`](Self::calc_group), and writes the accelerations and forces of each knot to the beginning of its part
+    /// of `motions`, which are as many equal parts as knots.
+    #[doc(hidden)]
+    fn calc_group_with_motion(
+        &mut self,
+        knots: &[usize],
+        xs: &[f64],
+        us: &[f64],
+        next: &mut [f64],
+        costs: &mut [f64],
+        motions: &mut [f64],
+    ) {
+        let _ = motions;
+        self.calc_group(knots, xs, us, next, costs);
+    }
+
     /// [`calc_diff`](Self::calc_diff) for a group.
     ///
     /// # Panics

@@ -9,7 +9,8 @@ use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
     LimbElimination, invert_limbs, restore, solve_limbs, write_drift, write_jacobian, write_motion,
 };
-use crate::robot::contact::{Contact, constraint_set};
+use crate::robot::actuation::Actuation;
+use crate::robot::contact::{Contact, SHARED, constraint_set};
 use crate::robot::continuous::Wanted;
 use crate::robot::horizon_terms::HorizonTerms;
 use crate::robot::knot::{KnotData, WIDEST, unpack};
@@ -17,7 +18,8 @@ use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use crate::robot::residuals::surplus::Surplus;
 use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
-    constrained_dynamics_equations, rnea, rnea_derivatives,
+    constrained_equations_at, constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, rnea,
+    rnea_derivatives,
 };
 use condyle_spatial::block::{Block, gather_rows, scatter};
 use nalgebra::DMatrix;
@@ -34,6 +36,8 @@ pub(crate) enum Law {
     Contact(Vec<Contact>, f64),
     /// The controls: q̈ = u, and τ = M q̈ + h follows.
     Inverse,
+    /// The controls: (q̈, λ) = u, and τ = M q̈ + h − Jᵀλ follows, for these contacts and drives.
+    ContactInverse(Vec<Contact>, Actuation),
 }
 
 /// A law with the scratch that it takes.
@@ -44,6 +48,8 @@ pub(crate) enum Pass<S> {
     /// The constraints, and J. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, DMatrix<S>),
     Inverse,
+    /// As [`Self::Contact`].
+    ContactInverse(Box<ConstraintSet<S>>, DMatrix<S>),
 }
 
 /// The dynamics of as many knots as a scalar has lanes.
@@ -58,6 +64,7 @@ pub(crate) struct KnotBatch<S> {
     /// The output that the controls drive: τ, or q̈.
     tau: Vec<S>,
     a: Vec<S>,
+    lambda: Vec<S>,
     linear: LinearEquations<S>,
     /// Whether the last pass was at q.
     visited: bool,
@@ -77,11 +84,18 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 Pass::Contact(set, J)
             }
             Law::Inverse => Pass::Inverse,
+            Law::ContactInverse(contacts, _) => {
+                let set = Box::new(constraint_set(model, contacts, SHARED).expect("was checked when it was given"));
+                let J = DMatrix::from_element(set.rows(), nv, S::zero());
+                Pass::ContactInverse(set, J)
+            }
         };
         let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
+        let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
+        let lambda = zeros(rows);
         let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Arc::default());
-        Self { data, pass, surplus, residuals, q, v, tau, a, linear, visited: false }
+        Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Makes room for the equations of knots in inverse-dynamics form.
@@ -119,7 +133,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 
     /// Accelerations and forces, and their derivatives; those of forces only if they are looked at.
     fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
-        let Self { data, pass, q, v, tau, a, .. } = self;
+        let Self { data, pass, q, v, tau, a, lambda, .. } = self;
         match pass {
             Pass::None => return,
             Pass::Free if !derivatives => a.copy_from_slice(aba(model, data, q, v, tau, &[])),
@@ -150,20 +164,40 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                     unpack_matrices([d.dtau_dq, d.dtau_dv, d.dtau_da], to, |to| &mut to.dtau);
                 }
             }
+            Pass::ContactInverse(set, _) if !derivatives => {
+                a.copy_from_slice(tau);
+                pack(to.len(), |k| &to[k].lambda, lambda);
+                let d = constrained_inverse_dynamics(model, data, set, q, v, a, lambda, &[]);
+                unpack(d.tau, to, |to| &mut to.tau);
+                unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
+            }
+            Pass::ContactInverse(set, J) => {
+                a.copy_from_slice(tau);
+                pack(to.len(), |k| &to[k].lambda, lambda);
+                let d = constrained_inverse_dynamics_derivatives(model, data, set, q, v, a, lambda, &[]);
+                unpack(d.tau, to, |to| &mut to.tau);
+                unpack(d.acceleration, to, |to| &mut to.contact_acceleration);
+                unpack_matrices([d.dtau_dq, d.dtau_dv, d.M], to, |to| &mut to.dtau);
+                for (k, from) in [d.dacceleration_dq, d.dacceleration_dv].into_iter().enumerate() {
+                    unpack(from.as_slice(), to, |to| to.dcontact_acceleration[k].as_mut_slice());
+                }
+                set.jacobian(J);
+                unpack(J.as_slice(), to, |to| to.dcontact_acceleration[2].as_mut_slice());
+            }
         }
         unpack(a, to, |to| &mut to.a);
         self.visited = true;
     }
 
-    /// Accelerations and forces, and the equations that they satisfy, in which limbs are solved.
+    /// The equations that accelerations and forces satisfy, which are known, with the limbs solved.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
-        let Self { data, pass, q, v, tau, a, linear, .. } = self;
+        let Self { data, pass, q, v, a, lambda, linear, .. } = self;
+        pack(to.len(), |k| &to[k].a, a);
         match pass {
             Pass::Contact(set, J) => {
+                pack(to.len(), |k| &to[k].lambda, lambda);
                 let mu = set.proximal.mu;
-                let d = constrained_dynamics_equations(model, data, set, q, v, tau, &[]);
-                a.copy_from_slice(d.a);
-                unpack(d.lambda, to, |to| &mut to.lambda);
+                let d = constrained_equations_at(model, data, set, q, v, a, lambda);
                 let LinearEquations { size, tableau, .. } = linear;
                 write_motion(*size, d.M, d.dtau_dv, d.dtau_dq, tableau);
                 write_drift(*size, d.dgamma_dv, d.dgamma_dq, mu, tableau);
@@ -171,13 +205,11 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 write_jacobian(*size, J, tableau);
             }
             _ => {
-                a.copy_from_slice(aba(model, data, q, v, tau, &[]));
                 let d = rnea_derivatives(model, data, q, v, a, &[]);
                 write_motion(linear.size, d.dtau_da, d.dtau_dv, d.dtau_dq, &mut linear.tableau);
             }
         }
         linear.solve_limbs(to);
-        unpack(a, to, |to| &mut to.a);
         self.visited = true;
     }
 

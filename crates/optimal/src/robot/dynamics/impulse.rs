@@ -1,7 +1,8 @@
 //! Impacts: knots without time and controls, at which velocities jump.
 
 use super::batch::Law;
-use super::robot::{DynamicsSensitivities, Parts, RobotDynamics, Work};
+use super::robot::{Parts, RobotDynamics, Work};
+use super::sensitivities::DynamicsSensitivities;
 use crate::ActionModel;
 use crate::Error;
 use crate::lq::LqNode;

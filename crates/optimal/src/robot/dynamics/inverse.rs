@@ -21,8 +21,10 @@ pub struct ControlledAcceleration(pub(super) RobotDynamics);
 /// ```
 ///
 /// No equation is solved, so that a knot costs less than one of [`FreeDynamics`](crate::robot::FreeDynamics). Efforts are
-/// looked at by [`Residual::JointEffort`](crate::robot::Residual::JointEffort), which is 0 where nothing drives a joint (a
-/// heavy weight on the first six entries holds a floating base to that).
+/// looked at by [`Residual::JointEffort`](crate::robot::Residual::JointEffort); where nothing drives a floating base they
+/// must be 0, which a [`Limit`](crate::robot::Limit) of
+/// [`Residual::UndrivenEffort`](crate::robot::Residual::UndrivenEffort) holds. For a robot in contact, and with other drives,
+/// see [`ContactInverseDynamics`](crate::robot::ContactInverseDynamics).
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -45,7 +47,8 @@ impl ControlledAcceleration {
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.
     pub fn new(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
-        let capabilities = Capabilities { nu: model.nv(), effort: true, ..Capabilities::default() };
+        let (nu, undriven) = (model.nv(), Actuation::joints(&model).undriven());
+        let capabilities = Capabilities { nu, effort: true, inverse: true, undriven, ..Capabilities::default() };
         let actuation = Actuation::all(&model);
         RobotDynamics::new(model, actuation, capabilities, Law::Inverse, costs).map(Self)
     }

@@ -138,17 +138,17 @@ impl KktElimination {
     #[inline(always)]
     fn choose(&self, r: usize, row: &[f64], scale: [f64; 2]) -> Option<usize> {
         let Tableau { nv, rows } = self.tableau;
-        let any = self.largest(row, 0..nv);
-        let (best, least) = if r < rows {
-            (self.largest(row, self.preferred[r].iter().copied()), PREFERENCE * any.1.abs())
+        let any = || self.largest(row, 0..nv);
+        let ((k, pivot), least) = if r < rows {
+            (self.largest(row, self.preferred[r].iter().copied()), PREFERENCE * any().1.abs())
         } else {
             (self.largest(row, nv..nv + rows), PREFERENCE * scale[1])
         };
-        match (best, any) {
-            ((k, pivot), _) if pivot != 0.0 && pivot.abs() >= least && pivot.abs() > REDUNDANT * scale[1] => Some(k),
-            (_, (k, pivot)) if pivot.abs() > REDUNDANT * scale[0] => Some(k),
-            _ => None, // a NaN ends here
+        if pivot != 0.0 && pivot.abs() >= least && pivot.abs() > REDUNDANT * scale[1] {
+            return Some(k);
         }
+        let (k, pivot) = any();
+        (pivot.abs() > REDUNDANT * scale[0]).then_some(k) // a NaN ends here
     }
 }
 
@@ -325,6 +325,7 @@ impl Sensitivities for Unknowns<'_> {
         let KktElimination { tableau, passive, place, forces, .. } = self.elimination;
         let per_step = c / self.dt; // δa = (y − δv) / Δt
         match (output, row) {
+            (Output::ContactAcceleration, _) => {} // J q̈ + γ = 0
             (Output::Effort, row) if row < *passive => {}
             (Output::Effort, row) => self.add(&self.form.efforts, row - passive, c, g),
             (Output::Acceleration, row) => match place[row] {

@@ -4,6 +4,7 @@ use super::contact::{ContactAcceleration, ContactDynamics};
 use super::free::{FreeAcceleration, FreeDynamics};
 use super::impulse::ImpulseDynamics;
 use super::inverse::{ControlledAcceleration, InverseDynamics};
+use super::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
@@ -97,7 +98,7 @@ macro_rules! robot_knots {
         }
     )*};
 }
-robot_knots!(FreeDynamics, ContactDynamics, InverseDynamics, ImpulseDynamics);
+robot_knots!(FreeDynamics, ContactDynamics, InverseDynamics, ContactInverseDynamics, ImpulseDynamics);
 
 /// Continuous models of a robot.
 macro_rules! robot_models {
@@ -122,7 +123,7 @@ macro_rules! robot_models {
             }
 
             fn nu(&self) -> usize {
-                self.0.actuation.nu()
+                self.0.nu()
             }
 
             fn lanes(&self) -> usize {
@@ -147,6 +148,18 @@ macro_rules! robot_models {
 
             fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
                 self.0.inverse_dynamics_form()
+            }
+
+            fn motion_size(&self) -> usize {
+                self.0.motion_size()
+            }
+
+            fn motion(&self, lane: usize, to: &mut [f64]) {
+                self.0.motion(lane, to);
+            }
+
+            fn set_motion(&mut self, lane: usize, from: &[f64]) {
+                self.0.set_motion(lane, from);
             }
 
             fn shift(&mut self) {
@@ -212,4 +225,4 @@ macro_rules! robot_models {
         }
     )*};
 }
-robot_models!(FreeAcceleration, ContactAcceleration, ControlledAcceleration);
+robot_models!(FreeAcceleration, ContactAcceleration, ControlledAcceleration, ControlledContactAcceleration);

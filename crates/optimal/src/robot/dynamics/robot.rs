@@ -4,22 +4,22 @@
 use super::batch::{KnotBatch, Law, Pass};
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
+use super::sensitivities::DynamicsSensitivities;
 use crate::Error;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::{Capabilities, Output};
-use crate::robot::contact::{check_contacts, constraint_set, moved_by};
+use crate::robot::contact::{Contact, SHARED, check_contacts, constraint_set, moved_by};
 use crate::robot::continuous::{Derivatives, KnotInput, Wanted};
 use crate::robot::costs::Cost;
 use crate::robot::horizon_terms::HorizonTerms;
-use crate::robot::knot::{KnotData, KnotState, Sensitivities, add_matrix_row};
+use crate::robot::knot::{KnotData, KnotState};
 use crate::robot::on_demand::OnDemand;
-use crate::robot::residuals::rows::Row;
 use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
-    Data, IntegrateArgument, Model, aba_hessian, constrained_dynamics, gravity, integrate_jacobian_groups,
+    Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics, gravity, integrate_jacobian_groups,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Real, Witness};
@@ -92,7 +92,7 @@ struct VectorBatches {
 fn lanes(law: &Law) -> usize {
     match (law, level()) {
         (Law::None, _) | (_, Level::Baseline) => 1,
-        (_, Level::Neon | Level::Avx2) => Short::LANES,
+        (_, Level::Simd128 | Level::Neon | Level::Avx2) => Short::LANES,
         (_, Level::Avx512) => Long::LANES,
     }
 }
@@ -178,14 +178,12 @@ impl RobotDynamics {
         law: Law,
         costs: Vec<Cost>,
     ) -> Result<Self, Error> {
-        let nv = model.nv();
-        if let Law::Contact(contacts, damping) = &law {
-            check_contacts(&model, contacts, *damping)?;
+        match &law {
+            Law::Contact(contacts, damping) => check_contacts(&model, contacts, *damping)?,
+            Law::ContactInverse(contacts, _) => check_contacts(&model, contacts, SHARED)?,
+            _ => {}
         }
-        if actuation.nv() != nv {
-            let what = format!("it drives {} coordinates, the robot has {nv}", actuation.nv());
-            return Err(Error::Actuation { what });
-        }
+        actuation.check(&model)?;
         let terms = HorizonTerms::new(model.clone(), capabilities.clone(), costs)?;
         let singular = model.singular_joints();
         if !singular.is_empty() && (capabilities.impulse || matches!(law, Law::Free | Law::Contact(..))) {
@@ -194,9 +192,14 @@ impl RobotDynamics {
             let what = format!("{why} {}: their accelerations are undefined", names.join(", "));
             return Err(Error::Actuation { what });
         }
-        let given = if matches!(law, Law::Inverse) { Output::Acceleration } else { Output::Effort };
+        let given = if capabilities.inverse { Output::Acceleration } else { Output::Effort };
         let groups = groups(&model);
         Ok(Self { model, actuation, terms, law, given, capabilities, groups, work: OnDemand::default() })
+    }
+
+    /// The number of controls.
+    pub(crate) fn nu(&self) -> usize {
+        self.capabilities.nu
     }
 
     /// Makes the memory in which knots are computed, unless it is there.
@@ -229,12 +232,16 @@ impl RobotDynamics {
 
     /// As [`ContinuousModel::prepare`](crate::robot::ContinuousModel::prepare): side by side where that is worthwhile.
     pub(crate) fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
-        let Parts { model, actuation, terms, work, .. } = self.parts();
+        let Parts { model, actuation, terms, capabilities, work, .. } = self.parts();
         let Work { single, vectors, data, prepared, .. } = work;
-        let (nu, nx, count) = (actuation.nu(), model.nq() + model.nv(), knots.len());
+        let (nu, nx, count) = (capabilities.nu, model.nq() + model.nv(), knots.len());
         let data = &mut data[..count];
         for (k, data) in data.iter_mut().enumerate() {
-            actuation.effort(&us[k * nu..][..nu], &mut data.tau); // τ = S u
+            let (drives, forces) = us[k * nu..][..nu].split_at(actuation.nu());
+            actuation.effort(drives, &mut data.tau); // τ = S u, or q̈
+            if !forces.is_empty() {
+                data.lambda.copy_from_slice(forces);
+            }
         }
         match vectors.as_mut().filter(|_| count >= WORTHWHILE || wanted == Wanted::Equations) {
             Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || wanted != Wanted::Motion => {
@@ -289,6 +296,32 @@ impl RobotDynamics {
         (!layout.curved).then_some([elimination.most_dependent(), layout.rows[0]])
     }
 
+    /// As [`ContinuousModel::motion_size`](crate::robot::ContinuousModel::motion_size).
+    pub(crate) fn motion_size(&self) -> usize {
+        match self.inverse_dynamics_form() {
+            Some(_) => self.model.nv() + self.capabilities.rows(),
+            None => 0,
+        }
+    }
+
+    /// As [`ContinuousModel::motion`](crate::robot::ContinuousModel::motion).
+    pub(crate) fn motion(&self, lane: usize, to: &mut [f64]) {
+        let Some(work) = self.work.made() else { return };
+        let KnotData { a, lambda, .. } = &work.data[lane];
+        let (to_a, to_lambda) = to.split_at_mut(a.len());
+        to_a.copy_from_slice(a);
+        to_lambda[..lambda.len()].copy_from_slice(lambda);
+    }
+
+    /// As [`ContinuousModel::set_motion`](crate::robot::ContinuousModel::set_motion).
+    pub(crate) fn set_motion(&mut self, lane: usize, from: &[f64]) {
+        let KnotData { a, lambda, .. } = &mut self.parts().work.data[lane];
+        let (from_a, from_lambda) = from.split_at(a.len());
+        a.copy_from_slice(from_a);
+        let rows = lambda.len();
+        lambda.copy_from_slice(&from_lambda[..rows]);
+    }
+
     /// As [`ActionModel::outputs`](crate::ActionModel::outputs), of a knot that was prepared.
     pub(crate) fn outputs(&mut self, lane: usize, show: &mut dyn FnMut(&str, &[f64])) {
         let Parts { capabilities, work, .. } = self.parts();
@@ -302,23 +335,30 @@ impl RobotDynamics {
         }
     }
 
-    /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺ g(q).
+    /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺ g(q); and
+    /// where accelerations are controls, none of these.
     pub(crate) fn hold(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         assert_length("x", x.len(), nq + nv);
-        if self.law == Law::Inverse {
-            return vec![0.0; nv]; // q̈ = u
-        }
         // one state does not need the memory of many knots, which may not be there
-        let Self { model, actuation, law, .. } = self;
-        let (data, mut J) = (&mut Data::new(model), DMatrix::zeros(0, nv));
-        if let Law::Contact(contacts, damping) = law {
-            let mut set = constraint_set(model, contacts, *damping).expect("was checked when it was given");
-            constrained_dynamics(model, data, &mut set, &x[..nq], &x[nq..], &vec![0.0; nv], &[]);
+        let Self { model, actuation, law, .. } = &*self;
+        let (data, zero, mut J) = (&mut Data::new(model), vec![0.0; nv], DMatrix::zeros(0, nv));
+        let (contacts, drives): (&[Contact], _) = match law {
+            Law::Inverse => return zero, // q̈ = u
+            Law::Contact(contacts, _) => (contacts, actuation),
+            Law::ContactInverse(contacts, drives) => (contacts, drives),
+            Law::None | Law::Free => (&[], actuation),
+        };
+        if !contacts.is_empty() {
+            let mut set = constraint_set(model, contacts, SHARED).expect("was checked when it was given");
+            let forces = vec![0.0; set.rows()];
+            constrained_inverse_dynamics(model, data, &mut set, &x[..nq], &x[nq..], &zero, &forces, &[]);
             J = DMatrix::zeros(set.rows(), nv);
             set.jacobian(&mut J);
         }
-        actuation.hold(gravity(model, data, &x[..nq]), &J)
+        let mut both = drives.hold(gravity(model, data, &x[..nq]), &J);
+        let forces = both.split_off(drives.nu());
+        if matches!(law, Law::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ) = u, or τ = S u
     }
 
     /// As [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
@@ -353,8 +393,8 @@ impl RobotDynamics {
                 let (first, da_du) = (d.first, actuation.columns(d.first.da_dtau, da_du));
                 Some(Derivatives { a: first.a, da_dq: first.da_dq, da_dv: first.da_dv, da_du })
             }
-            Pass::Inverse => {
-                knot.a.copy_from_slice(u);
+            Pass::Inverse | Pass::ContactInverse(..) => {
+                knot.a.copy_from_slice(&u[..model.nv()]);
                 for part in [&mut hessian.xx, &mut hessian.xu, &mut hessian.uu] {
                     part.fill(0.0); // accelerations that are given do not curve
                 }
@@ -375,31 +415,5 @@ impl RobotDynamics {
     pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
         let Parts { model, groups, work, .. } = self.parts();
         work.group_hessian.run(model, groups, dq, lambda, hessian);
-    }
-}
-
-/// The derivatives of the outputs of a knot, from those in its data.
-pub(crate) struct DynamicsSensitivities<'a> {
-    /// The output that is S u.
-    pub given: Output,
-    pub data: &'a KnotData,
-    pub actuation: &'a Actuation,
-}
-
-impl Sensitivities for DynamicsSensitivities<'_> {
-    fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>) {
-        let [by_q, by_v, by_given] = match output {
-            output if output == self.given => return self.actuation.add_row(row, c, g.u),
-            Output::Acceleration => &self.data.da,
-            Output::Effort => &self.data.dtau,
-            Output::Force => &self.data.dlambda,
-        };
-        add_matrix_row(by_q, row, c, g.q);
-        add_matrix_row(by_v, row, c, g.v);
-        self.actuation.add_product_row(by_given, row, c, g.u);
-    }
-
-    fn add_control(&self, k: usize, c: f64, g: &mut Row<'_>) {
-        g.u[k] += c;
     }
 }

@@ -3,7 +3,6 @@
 
 use super::Integrator;
 use crate::lq::LqNode;
-use serde::{Deserialize, Serialize};
 
 /// The polynomial u(s) that the controls of a knot follow, at the time s of its Δt, from 0 to 1.
 ///
@@ -24,8 +23,9 @@ use serde::{Deserialize, Serialize};
 /// let [a, b, c] = ControlPolynomial::Quadratic.weights(Integrator::RungeKutta4, 0.5);
 /// assert_eq!([a, b, c], [0.0, 1.0, 0.0]); // w₁ is the control in the middle
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ControlPolynomial {
     /// The same controls all the time.
     #[default]

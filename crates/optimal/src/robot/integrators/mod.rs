@@ -18,26 +18,26 @@ use controls::widen;
 use curvature::Curvature;
 use retraction::Retraction;
 use runge_kutta::RungeKutta;
-use serde::{Deserialize, Serialize};
 use std::any::Any;
 
 /// The rule by which a knot steps through its time.
 ///
 /// The stages of the Runge–Kutta methods add velocities of different points as if positions were a vector space, as
 /// Crocoddyl's do; for a free-flyer they are therefore of first order in its rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Integrator {
     /// v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): one evaluation; symplectic. Crocoddyl's `IntegratedActionModelEuler`.
     SemiImplicitEuler,
     /// The midpoint rule, 2 evaluations.
-    #[serde(rename = "runge_kutta_2")]
+    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_2"))]
     RungeKutta2,
     /// Heun's rule of third order, 3 evaluations.
-    #[serde(rename = "runge_kutta_3")]
+    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_3"))]
     RungeKutta3,
     /// The classical rule, 4 evaluations.
-    #[serde(rename = "runge_kutta_4")]
+    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_4"))]
     RungeKutta4,
 }
 
@@ -179,6 +179,28 @@ impl<M: ContinuousModel> Integrated<M> {
         }
     }
 
+    /// Writes the derivatives of a group in inverse-dynamics form, from the motion that the nodes know, or else from its own.
+    fn write_equations(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+        let (nx, nu, lanes, size) = (self.nx(), self.nu(), self.lanes(), self.motion_size());
+        for (k, nodes) in nodes.chunks_mut(lanes).enumerate() {
+            let (from, count) = (k * lanes, nodes.len());
+            let (knots, xs, us) =
+                (&knots[from..][..count], &xs[from * nx..][..count * nx], &us[from * nu..][..count * nu]);
+            if nodes.iter().all(|node| node.inverse_dynamics.knows_motion) {
+                for (lane, node) in nodes.iter().enumerate() {
+                    self.inner.set_motion(lane, &node.inverse_dynamics.motion[..size]);
+                }
+            } else {
+                self.inner.prepare(knots, xs, us, Wanted::Motion);
+            }
+            self.inner.prepare(knots, xs, us, Wanted::Equations);
+            for (lane, (node, &t)) in nodes.iter_mut().zip(knots).enumerate() {
+                let (x, u) = (&xs[lane * nx..][..nx], &us[lane * nu..][..nu]);
+                self.differentiate(KnotInput { lane, t, x, u }, node);
+            }
+        }
+    }
+
     /// Whether a step is one of semi-implicit Euler with controls that stay the same.
     fn is_simple_step(&self) -> bool {
         matches!(self.method, Method::Euler(_)) && self.controls.is_constant()
@@ -279,12 +301,36 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         });
     }
 
+    fn motion_size(&self) -> usize {
+        if self.is_simple_step() { self.inner.motion_size() } else { 0 }
+    }
+
+    fn calc_group_with_motion(
+        &mut self,
+        knots: &[usize],
+        xs: &[f64],
+        us: &[f64],
+        next: &mut [f64],
+        costs: &mut [f64],
+        motions: &mut [f64],
+    ) {
+        let (nx, room, size) = (self.nx(), motions.len() / knots.len(), self.motion_size());
+        assert_length("next", next.len(), knots.len() * nx);
+        assert_length("costs", costs.len(), knots.len());
+        self.each(knots, xs, us, Wanted::Motion, |knot, input, i| {
+            if size > 0 {
+                knot.inner.motion(input.lane, &mut motions[i * room..][..size]);
+            }
+            costs[i] = knot.step(input, &mut next[i * nx..][..nx]);
+        });
+    }
+
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         assert_length("nodes", nodes.len(), knots.len());
-        let inverse =
-            self.inverse_dynamics_form().is_some() && nodes.first().is_some_and(|node| node.inverse_dynamics.wanted);
-        let wanted = if inverse { Wanted::Equations } else { Wanted::Derivatives };
-        self.each(knots, xs, us, wanted, |knot, input, i| knot.differentiate(input, &mut nodes[i]));
+        if nodes.first().is_some_and(|node| node.inverse_dynamics.wanted) && self.inverse_dynamics_form().is_some() {
+            return self.write_equations(knots, xs, us, nodes);
+        }
+        self.each(knots, xs, us, Wanted::Derivatives, |knot, input, i| knot.differentiate(input, &mut nodes[i]));
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {

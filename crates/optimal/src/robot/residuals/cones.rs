@@ -6,7 +6,6 @@
 use crate::Error;
 use crate::problem::leave_a_value;
 use condyle_dynamics::{Mat3, Vec3};
-use serde::{Deserialize, Serialize};
 
 /// Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: rows A with lower ≤ A f ≤ upper.
 ///
@@ -17,8 +16,9 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(rows.len(), 5); // ±x, ±y, and the normal force
 /// assert_eq!(rows[0], [1.0, 0.0, -0.5]); // f_x ≤ 0.5 f_z
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct FrictionCone {
     /// R, the surface's axes along the contact's.
     pub rotation: Mat3<f64>,
@@ -31,7 +31,7 @@ pub struct FrictionCone {
     /// The least normal force (N).
     pub least: f64,
     /// The greatest normal force (N).
-    #[serde(with = "condyle_spatial::finite::greatest")]
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::greatest"))]
     pub greatest: f64,
 }
 
@@ -46,8 +46,9 @@ pub struct FrictionCone {
 /// let cone = WrenchCone { friction: FrictionCone::new(0.7), size: [0.2, 0.1] };
 /// assert_eq!(cone.rows().len(), 17);
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct WrenchCone {
     /// The cone of the force.
     pub friction: FrictionCone,

@@ -1,7 +1,6 @@
 //! Frames by their names, which mean the same frame of whatever robot a problem is of.
 
 use condyle_dynamics::{Frame, FrameKind, Model};
-use serde::{Deserialize, Serialize};
 
 /// A frame by its name. Its number is looked up in the robot for which an action is made, which refuses a name that is
 /// unknown there.
@@ -15,13 +14,14 @@ use serde::{Deserialize, Serialize};
 /// assert!(tool.number(&robots::quadruped()).is_err());
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct FrameName {
     /// The name.
     pub name: String,
     /// The kind that goes first where several frames have that name; otherwise as in [`Model::frame`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub kind: Option<FrameKind>,
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct Plan {
     pub rows: Range<usize>,
     /// Whether its knot has contacts.
     pub in_contact: bool,
-    /// W of a residual W f, row after row.
+    /// W of a residual W f of a contact's force, or W τ, row after row.
     pub W: Vec<f64>,
 }
 
@@ -32,7 +32,11 @@ impl Plan {
         let n = residual.check(model, capabilities)?;
         let frame = residual.frame().map_or(Ok(0), |name| name.number(model)).map_err(|error| error.to_string())?;
         let rows = residual.contact().map_or(Ok(0..0), |name| capabilities.contact(name))?;
-        let (W, in_contact) = (residual.force_rows(rows.len()), !capabilities.contacts.is_empty());
+        let W = match residual {
+            Residual::UndrivenEffort => capabilities.undriven.clone(),
+            _ => residual.force_rows(rows.len()),
+        };
+        let in_contact = !capabilities.contacts.is_empty();
         Ok(Self { n, first: 0, index: 0, frame, rows, in_contact, W })
     }
 }

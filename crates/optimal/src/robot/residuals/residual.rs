@@ -5,13 +5,13 @@ use super::frame_name::FrameName;
 use super::own::OwnResidual;
 use crate::robot::capabilities::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
-use serde::{Deserialize, Serialize};
 
 /// A residual: a vector r(x, u) that should be small.
 ///
 /// Frames are called by their names in the robot, contacts and impulses by those that the action gives them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 pub enum Residual {
     /// x ⊖ x_ref, 2 nv numbers.
     State {
@@ -29,6 +29,15 @@ pub enum Residual {
     JointEffort {
         /// τ_ref.
         reference: Vec<f64>,
+    },
+    /// Nᵀτ, the efforts that inverse dynamics finds where nothing drives the robot, which must vanish in a motion that is
+    /// possible: of a floating base 6 numbers, the force and the moment on it. Nᵀ S = 0, orthonormal.
+    UndrivenEffort,
+    /// J q̈ + γ of a contact, along the axes of its rows, where accelerations are controls: 1, 2, 3 or 6 numbers that must
+    /// vanish while the contact holds.
+    ContactAcceleration {
+        /// The contact's name.
+        contact: String,
     },
     /// q̈ − a_ref, nv numbers.
     JointAcceleration {
@@ -110,7 +119,7 @@ pub enum Residual {
     /// J_c (v⁺ − v), 3 numbers in the world: by how much an impact changes the velocity of the centre of mass (m/s).
     ImpulseCenterOfMass,
     /// A function of one's own. It cannot be put into a file.
-    #[serde(skip)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     Own(OwnResidual),
 }
 
@@ -151,7 +160,8 @@ impl Residual {
     /// The output of the dynamics that it looks at, beside x and u.
     pub(crate) fn output(&self) -> Option<Output> {
         match self {
-            Self::JointEffort { .. } => Some(Output::Effort),
+            Self::JointEffort { .. } | Self::UndrivenEffort => Some(Output::Effort),
+            Self::ContactAcceleration { .. } => Some(Output::ContactAcceleration),
             Self::ControlGravity | Self::JointAcceleration { .. } | Self::ImpulseCenterOfMass => {
                 Some(Output::Acceleration)
             }
@@ -214,6 +224,7 @@ impl Residual {
     pub(crate) fn contact(&self) -> Option<&str> {
         match self {
             Self::ContactForce { contact, .. }
+            | Self::ContactAcceleration { contact }
             | Self::FrictionCone { contact, .. }
             | Self::WrenchCone { contact, .. }
             | Self::CenterOfPressure { contact, .. } => Some(contact),
@@ -261,7 +272,9 @@ impl Residual {
             Self::ControlGravity => nv,
             Self::CenterOfMass { .. } | Self::FrameTranslation { .. } | Self::FrameRotation { .. } => 3,
             Self::CentroidalMomentum { .. } | Self::FramePlacement { .. } | Self::FrameVelocity { .. } => 6,
-            Self::ContactForce { .. } => rows,
+            Self::UndrivenEffort if capabilities.effort => capabilities.undriven.len() / nv.max(1),
+            Self::UndrivenEffort => 0,
+            Self::ContactForce { .. } | Self::ContactAcceleration { .. } => rows,
             Self::FrictionCone { cone, .. } => cone.wrong().map_or(Ok(cone.facets + 1), Err)?,
             Self::WrenchCone { cone, .. } => {
                 rigid("a wrench cone")?;
@@ -279,6 +292,9 @@ impl Residual {
             Self::Own(own) => own.size(),
         };
         match self.output() {
+            Some(Output::ContactAcceleration) if !capabilities.inverse => {
+                Err("its contact holds at this knot; contacts accelerate where accelerations are controls".to_owned())
+            }
             Some(Output::Effort) if !capabilities.effort => Err("there is no effort at this knot".to_owned()),
             Some(Output::Acceleration) if !(capabilities.effort || capabilities.impulse) => {
                 Err("there is no acceleration at this knot".to_owned())
@@ -286,6 +302,7 @@ impl Residual {
             Some(Output::Acceleration) if capabilities.impulse && *self != Self::ImpulseCenterOfMass => {
                 Err("an impact has no acceleration".to_owned())
             }
+            Some(Output::Effort) if n == 0 && nv > 0 => Err("all efforts of this knot are those of drives".to_owned()),
             _ => Ok(n),
         }
     }

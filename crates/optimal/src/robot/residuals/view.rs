@@ -1,5 +1,5 @@
 //! Values of residuals, and how their Jacobians come into a node; costs and limits say what they are worth.
-#![allow(non_snake_case)] // D
+#![allow(non_snake_case)] // D, W
 
 use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::OwnResidual;
@@ -62,6 +62,13 @@ impl Scratch {
     }
 }
 
+/// r = W x, for W row after row.
+fn product(r: &mut [f64], W: &[f64], x: &[f64]) {
+    for (r, row) in r.iter_mut().zip(W.chunks_exact(x.len())) {
+        *r = row.iter().zip(x).map(|(w, x)| w * x).sum();
+    }
+}
+
 /// The residuals of a knot: those of its costs, or those of its limits.
 pub(crate) struct ResidualView<'a> {
     pub model: &'a Model,
@@ -89,6 +96,10 @@ impl ResidualView<'_> {
             }
             Residual::JointEffort { reference } => minus(r, &data.tau, reference),
             Residual::JointAcceleration { reference } => minus(r, &data.a, reference),
+            Residual::UndrivenEffort => product(r, &plan.W, &data.tau), // Nᵀ τ
+            Residual::ContactAcceleration { .. } => {
+                r.copy_from_slice(&data.contact_acceleration[plan.rows.clone()]);
+            }
             Residual::ImpulseCenterOfMass => r.copy_from_slice(&data.residuals.com_change),
             Residual::Own(own) => own.calc(*t, x, u, r),
             Residual::ContactForce { target, .. } => {
@@ -96,10 +107,7 @@ impl ResidualView<'_> {
                 (0..r.len()).for_each(|k| r[k] = lambda[k] - target[held(lambda.len())[k]]);
             }
             Residual::FrictionCone { .. } | Residual::WrenchCone { .. } | Residual::CenterOfPressure { .. } => {
-                let f = &data.lambda[plan.rows.clone()];
-                for (r, row) in r.iter_mut().zip(plan.W.chunks_exact(f.len())) {
-                    *r = row.iter().zip(f).map(|(w, f)| w * f).sum(); // W f
-                }
+                product(r, &plan.W, &data.lambda[plan.rows.clone()]); // W f
             }
             _ => r.copy_from_slice(kinematics.residual(plan)),
         }
@@ -186,6 +194,14 @@ impl ResidualView<'_> {
             }
             Residual::JointEffort { .. } => sensitivities.add_row(Output::Effort, i, 1.0, g),
             Residual::JointAcceleration { .. } => sensitivities.add_row(Output::Acceleration, i, 1.0, g),
+            Residual::ContactAcceleration { .. } => {
+                sensitivities.add_row(Output::ContactAcceleration, plan.rows.start + i, 1.0, g);
+            }
+            Residual::UndrivenEffort => {
+                for (k, w) in plan.W[i * nv..(i + 1) * nv].iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                    sensitivities.add_row(Output::Effort, k, *w, g); // Nᵀ ∂τ
+                }
+            }
             _ => {
                 let rows = plan.rows.len();
                 for (k, w) in plan.W[i * rows..(i + 1) * rows].iter().enumerate().filter(|(_, w)| **w != 0.0) {

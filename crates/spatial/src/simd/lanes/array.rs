@@ -46,6 +46,7 @@ impl<T: Number, const N: usize> Register<T, N> for [T; N] {
         fn load(x: [T; N]) -> Self = [T::zero(); k => x[k]]
         fn store(a: Self) -> [T; N] = [T::zero(); k => a[k]]
         fn splat(x: T) -> Self = [x; _k => x]
+        fn zero() -> Self = [T::zero(); _k => T::zero()]
         fn add(a: Self, b: Self) -> Self = [T::zero(); k => a[k] + b[k]]
         fn sub(a: Self, b: Self) -> Self = [T::zero(); k => a[k] - b[k]]
         fn mul(a: Self, b: Self) -> Self = [T::zero(); k => a[k] * b[k]]

@@ -1,19 +1,20 @@
 //! Several numbers side by side in one vector register.
 //!
-//! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON, where they are two registers each;
+//! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON or SIMD128, where they are two registers each;
 //! `Lanes<f64, 8>` and `Lanes<f32, 16>` AVX-512; and [`Fused`](super::Fused) is a single `f64` where products and sums are fused. They are
 //! for code that has been entered through a function compiled for their [`Level`](crate::simd::level::Level), which is the
 //! business of a dispatcher: anywhere else each operation would be a function call, and on a processor without the
 //! instructions an illegal one. Only who promises to keep to this can name them ([`Witness`](crate::simd::pack::Witness)). Every operation treats each lane alone, so what one lane holds (not-a-numbers included) never
 //! reaches another.
 //!
-//! What a processor does is in the file of its kind, x86.rs or neon.rs, as an implementation of [`Register`].
+//! What a processor does is in the file of its kind, x86.rs, neon.rs or wasm.rs, as an implementation of [`Register`].
 #![allow(unsafe_code)]
 
 use crate::scalar::number::Number;
 use crate::scalar::operators::operators;
 use crate::scalar::{Constant, Scalar};
 use crate::simd::kernel::Kernel;
+use crate::simd::level::VECTORS;
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 pub use processor::moves;
@@ -21,7 +22,15 @@ pub(crate) use processor::{LongF32, LongF64};
 
 #[cfg_attr(target_arch = "x86_64", path = "x86.rs")]
 #[cfg_attr(target_arch = "aarch64", path = "neon.rs")]
-#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), path = "array.rs")]
+#[cfg_attr(all(target_arch = "wasm32", target_feature = "simd128"), path = "wasm.rs")]
+#[cfg_attr(
+    not(any(
+        target_arch = "x86_64",
+        target_arch = "aarch64",
+        all(target_arch = "wasm32", target_feature = "simd128")
+    )),
+    path = "array.rs"
+)]
 mod processor;
 
 /// A number of which vectors of N exist.
@@ -44,6 +53,9 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn store(a: Self) -> [T; N];
     /// x in every lane.
     fn splat(x: T) -> Self;
+    /// 0 in every lane: bits, where [`splat`](Self::splat) is an instruction. Workspaces are filled with it by code that is
+    /// compiled for any processor, where an instruction of these registers would be a call.
+    fn zero() -> Self;
     /// a + b.
     fn add(a: Self, b: Self) -> Self;
     /// a − b.
@@ -52,7 +64,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn mul(a: Self, b: Self) -> Self;
     /// a / b.
     fn div(a: Self, b: Self) -> Self;
-    /// a b + c, rounded once.
+    /// a b + c, rounded once; in WebAssembly, which has no such instruction, twice.
     fn mul_add(a: Self, b: Self, c: Self) -> Self;
     /// √a.
     fn sqrt(a: Self) -> Self;
@@ -198,7 +210,7 @@ impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
 impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     type Mask = <T::Register as Register<T, N>>::Mask;
     const LANES: usize = N;
-    const COMPILED: bool = T::COMPILED;
+    const COMPILED: bool = T::COMPILED && VECTORS;
 
     #[inline(always)]
     fn enter(kernel: impl Kernel) {
@@ -207,6 +219,10 @@ impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     #[inline(always)]
     fn splat(x: f64) -> Self {
         Self(T::Register::splat(T::splat(x)))
+    }
+    #[inline(always)]
+    fn zero() -> Self {
+        Self(T::Register::zero())
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {

@@ -35,6 +35,7 @@ macro_rules! pair {
                     x
                 }}
                 fn splat(x: $float) -> Self { $pair($splat(x), $splat(x)) }
+                fn zero() -> Self { core::mem::zeroed() }
                 fn add(a: Self, b: Self) -> Self { $pair($add(a.0, b.0), $add(a.1, b.1)) }
                 fn sub(a: Self, b: Self) -> Self { $pair($sub(a.0, b.0), $sub(a.1, b.1)) }
                 fn mul(a: Self, b: Self) -> Self { $pair($mul(a.0, b.0), $mul(a.1, b.1)) }

@@ -50,6 +50,7 @@ macro_rules! register {
                     x
                 }}
                 fn splat(x: $float) -> Self { $splat(x) }
+                fn zero() -> Self { core::mem::zeroed() }
                 fn add(a: Self, b: Self) -> Self { $add(a, b) }
                 fn sub(a: Self, b: Self) -> Self { $sub(a, b) }
                 fn mul(a: Self, b: Self) -> Self { $mul(a, b) }

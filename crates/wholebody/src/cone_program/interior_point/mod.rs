@@ -69,6 +69,10 @@ impl InteriorPoint {
 }
 
 impl Solver for InteriorPoint {
+    fn start_from(&mut self, x: &[f64], multipliers: Multipliers<'_>) {
+        self.solution.set(x, multipliers);
+    }
+
     fn solve(&mut self, program: &ConeProgram, start: Start) -> Outcome {
         assert_eq!(program.capacity(), self.capacity, "the program's capacity");
         self.size = program.size;

@@ -2,7 +2,7 @@
 
 use super::scaled::Source;
 use super::workspace::Workspace;
-use crate::cone_program::Size;
+use crate::cone_program::{Multipliers, Size};
 
 /// x and the multipliers, with the size of the capacity.
 #[derive(Clone, Debug)]
@@ -30,6 +30,19 @@ impl Solution {
         *solves = None;
         for x in [x, y, lower, upper, z, w] {
             x.fill(0.0);
+        }
+    }
+
+    /// Takes numbers from elsewhere.
+    pub(super) fn set(&mut self, x: &[f64], multipliers: Multipliers<'_>) {
+        self.clear();
+        self.solves = Some(x.len());
+        let Multipliers { equalities, rows, cones } = multipliers;
+        for (to, from) in [(&mut self.x, x), (&mut self.y, equalities), (&mut self.z, rows), (&mut self.w, cones)] {
+            to[..from.len()].copy_from_slice(from);
+        }
+        for (i, z) in rows.iter().enumerate() {
+            (self.sides[0][i], self.sides[1][i]) = (z.max(0.0), (-z).max(0.0));
         }
     }
 

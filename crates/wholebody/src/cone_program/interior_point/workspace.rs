@@ -6,6 +6,7 @@ use super::cones::Cones;
 use super::scaled::Scaled;
 use super::system::System;
 use crate::cone_program::{Size, Status};
+use condyle_dynamics::level::level;
 use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_product_vector, at_level, copy_scaled, dot, max_abs, transposed_product_vector,
 };
@@ -80,6 +81,7 @@ pub(super) struct Measure {
 
 impl Workspace {
     pub(super) fn new(capacity: Size) -> Self {
+        level(); // chosen now, as reading CONDYLE_LEVEL allocates
         let Size { unknowns: n, equalities, rows, cone_rows } = capacity;
         let (m, me, columns) = (rows + cone_rows, equalities + rows, rows + cone_rows);
         let vector = |length: usize| vec![0.0; length];

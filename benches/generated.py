@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+"""Times generated C beside Pinocchio, compiled for the same processor, and beside our pass on plain f64.
+
+    python benches/generated.py [--rounds N] [--cpu K] [ROBOT ...]
+
+Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn, as is Pinocchio, which
+benches/peers/dynamics.py builds (some ten minutes the first time). Our passes are timed by `cargo bench -p
+condyle-codegen --bench generated`: limbs one after the other, and side by side. Needs Linux, Rust, compilers of C and
+C++, and the package condyle. Pinocchio's own generated code needs CppADCodeGen, which no wheel brings: it is not
+measured.
+"""
+
+import argparse
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import condyle
+
+sys.path.insert(0, str(Path(__file__).with_name("peers")))
+import dynamics
+
+FUNCTIONS = ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives"]
+FLAGS = ["-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno"]
+ROUND_NS = 2e7
+"""How long a round takes, in ns."""
+TIMER = """
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+static double now(void) { struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return 1e9 * t.tv_sec + t.tv_nsec; }
+static double in[STATES][SIZE], out[OUT];
+CODE
+int main(int count, char **arguments) {
+    int rounds = atoi(arguments[count - 1]);
+    FILE *file = fopen(arguments[1], "rb");
+    if (fread(in, sizeof in, 1, file) != 1) return 1;
+    long calls = STATES;
+    for (double took = 0; took < TIME; calls *= 2) {
+        double t = now();
+        for (long k = 0; k < calls; k++) call(in[k % STATES]);
+        took = now() - t;
+    }
+    for (int r = 0; r < rounds; r++) {
+        double t = now();
+        for (long k = 0; k < calls; k++) call(in[k % STATES]);
+        printf("%f\\n", (now() - t) / calls);
+    }
+    return 0;
+}
+"""
+
+
+def compiler() -> str:
+    return os.environ.get("CC") or next(c for c in ("clang", "gcc", "cc") if shutil.which(c))
+
+
+def measured(model: condyle.Model, function: str, states: Path, rounds: int, cpu: int) -> dict[str, float]:
+    """A function as generated C: ns of a call (median of rounds), operations, KB of the program, s of the compiler."""
+    stem, files, [(_, inputs, outputs, operations)] = condyle._condyle._generate(model, [function], "c")
+    width = model.nq + 3 * model.nv
+    starts = {"q": 0, "v": model.nq, "a": model.nq + model.nv, "tau": model.nq + 2 * model.nv}
+    arguments, size = [f"x + {starts[name]}" for name, _, _ in inputs], 0
+    for _, rows, columns in outputs:
+        arguments.append(f"out + {size}")
+        size += rows * columns
+    call = f"{stem}_{function}({', '.join(arguments)});"
+    text = TIMER.replace("CODE", f'#include "{stem}.c"\nstatic void call(const double *x) {{ {call} }}')
+    for word, value in (("STATES", dynamics.STATES), ("SIZE", width), ("OUT", size), ("TIME", ROUND_NS)):
+        text = text.replace(word, str(value))
+    with TemporaryDirectory() as folder:
+        for file, code in [*files, ("timer.c", text)]:
+            (Path(folder) / file).write_text(code, encoding="utf-8")
+        start = time.perf_counter()
+        subprocess.run([compiler(), *FLAGS, "timer.c", "-o", "timer", "-lm"], cwd=folder, check=True)
+        took = time.perf_counter() - start
+        call_timer = ["taskset", "-c", str(cpu), "./timer", str(states), str(rounds)]
+        told = subprocess.run(call_timer, cwd=folder, check=True, capture_output=True, text=True).stdout
+        kb = (Path(folder) / "timer").stat().st_size / 1024
+    ns = statistics.median(float(line) for line in told.split())
+    return {"ns": ns, "operations": operations, "kb": kb, "compile_s": took}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("robots", nargs="*", default=["panda", "anymal", "talos"], metavar="ROBOT")
+    parser.add_argument("--rounds", type=int, default=11)
+    parser.add_argument("--cpu", type=int, default=0)
+    options = parser.parse_args()
+    dynamics.PEERS.mkdir(parents=True, exist_ok=True)
+    python = dynamics.environment("venv", "pin==4.1.0", "example-robot-data-loaders==5.0.0")
+    theirs = dynamics.build_pinocchio(python)
+    print(f"{compiler()} {' '.join(FLAGS)}, {options.rounds} rounds\n")
+    print("| robot | function | operations | generated ns | Pinocchio ns | ratio | KB | compiled in s |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    files = []
+    for robot in options.robots:
+        source, locked = dynamics.ROBOTS[robot]
+        paths = [dynamics.PEERS / f"{robot}.{suffix}" for suffix in ("bin", "urdf", "states")]
+        exported = [python, "-c", dynamics.EXPORT, str(source), "0", ",".join(locked), str(dynamics.STATES), *paths]
+        path, root = dynamics.run(*exported).splitlines()
+        model = condyle.Model.from_urdf(path, root_joint=None if root == "fixed" else root)
+        if locked:
+            model = model.lock(locked, condyle.neutral(model))
+        peer = dynamics.times(dynamics.run("taskset", "-c", str(options.cpu), theirs, paths[0], paths[2]))
+        for function in FUNCTIONS:
+            ours = measured(model, function, paths[2], options.rounds, options.cpu)
+            print(
+                f"| {robot} | {function} | {ours['operations']} | {ours['ns']:.0f} | {peer[function]:.0f} | "
+                f"{ours['ns'] / peer[function]:.2f} | {ours['kb']:.0f} | {ours['compile_s']:.1f} |",
+                flush=True,
+            )
+        files.append(path + ("" if root == "fixed" else ":free"))
+    environment = os.environ | {"CC": compiler(), "CFLAGS": " ".join(FLAGS)}
+    command = ["cargo", "bench", "--locked", "-p", "condyle-codegen", "--bench", "generated", "--", *files]
+    subprocess.run(command, cwd=dynamics.ROOT, check=True, env=environment)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""Times an iteration of FDDP on one thread and on several.
+
+    .venv/crocoddyl/bin/python benches/peers/ocp_threads.py [--threads 2] [--rounds 15] [NAME ...]
+
+Three ways, in turn, round after round, on the problems of `ocp_problems.py`: one thread; derivatives on several; and
+besides them the sweep in as many segments. Figures are medians over the rounds of milliseconds in an iteration and, in
+brackets, of the quotient with one thread. Segments change the iterates by rounding only; each way's own iterations are
+counted. Needs as many cores as threads.
+"""
+
+import argparse
+import statistics
+
+import numpy as np
+from ocp_ours import Ours
+from ocp_problems import PROBLEMS
+
+from condyle import optimal
+
+PHASES = ("total", "derivatives", "sweep", "rollout")
+
+
+def ways(threads):
+    yield "one thread", {}
+    yield f"derivatives on {threads}", {"threads": threads}
+    yield f"and {threads} segments", {"threads": threads, "segments": threads}
+
+
+def solver(spec, robot, settings):
+    """A problem's solver with settings of its own, and where it starts: at rest, held still."""
+    ours = Ours(spec, robot, "fddp")
+    problem = ours.made(robot, "fddp")
+    ours.solver = optimal.Fddp(problem, **ours.settings("fddp"), **settings)
+    xs = np.tile(spec["x0"], (len(spec["stages"]) + 1, 1))
+    return ours, xs, problem.quasi_static(xs)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("names", nargs="*", default=["reach", "trot", "walk", "humanoid"])
+    options = parser.parse_args()
+    print("ms in an iteration (of one thread's)")
+    for name in options.names:
+        spec, robot = PROBLEMS[name]()
+        named = list(ways(options.threads))
+        solvers = [solver(spec, robot, settings) for _, settings in named]
+        times = []
+        for _ in range(options.rounds):
+            row = []
+            for ours, *start in solvers:
+                ours.solve(*start)
+                solved = ours.solve(*start)
+                row.append({phase: 1e3 * solved.phases[phase] / len(solved.rows) for phase in PHASES})
+            times.append(row)
+        for i, (way, _) in enumerate(named):
+            figures = []
+            for phase in PHASES:
+                ms = statistics.median(row[i][phase] for row in times)
+                share = statistics.median(row[i][phase] / row[0][phase] for row in times)
+                figures.append(f"{phase} {ms:.3f} ({share:.2f})")
+            print(f"{name:9} {way:20} {'  '.join(figures)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,312 @@
+//! The graph of what a recording has computed: each value once, simplified as it is recorded.
+//!
+//! A value that exists already is found again, however it was written: operands of sums and products are in order, signs are
+//! taken out of products and go into the sum that follows, constants are computed at once, and what is multiplied by 0 is 0.
+//! (So an infinite number or none at all, times 0, is 0 here.)
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+/// A value by its number: how manieth it was recorded.
+pub(crate) type Id = u32;
+
+/// 0, which every graph begins with; as a mask, what never holds.
+pub(crate) const ZERO: Id = 0;
+/// 1, which comes next; as a mask, what always holds.
+pub(crate) const ONE: Id = 1;
+
+/// How a value is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Node {
+    /// A constant, by its bits.
+    Constant(u64),
+    /// An input, by its place among those of all arguments.
+    Input(u32),
+    Add(Id, Id),
+    Sub(Id, Id),
+    Mul(Id, Id),
+    Div(Id, Id),
+    Neg(Id),
+    Sqrt(Id),
+    Sin(Id),
+    Cos(Id),
+    /// The angle of the point (second, first).
+    Atan2(Id, Id),
+    Abs(Id),
+    /// The mask of first < second.
+    Less(Id, Id),
+    And(Id, Id),
+    Or(Id, Id),
+    /// The second where the mask holds, else the third.
+    Select(Id, Id, Id),
+}
+
+impl Node {
+    pub(crate) fn constant(x: f64) -> Self {
+        Self::Constant(x.to_bits())
+    }
+
+    /// What it is computed from.
+    pub(crate) fn operands(self) -> impl DoubleEndedIterator<Item = Id> {
+        let (n, all) = match self {
+            Self::Constant(_) | Self::Input(_) => (0, [0; 3]),
+            Self::Neg(a) | Self::Sqrt(a) | Self::Sin(a) | Self::Cos(a) | Self::Abs(a) => (1, [a, 0, 0]),
+            Self::Select(m, a, b) => (3, [m, a, b]),
+            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) | Self::Div(a, b) => (2, [a, b, 0]),
+            Self::Atan2(a, b) | Self::Less(a, b) | Self::And(a, b) | Self::Or(a, b) => (2, [a, b, 0]),
+        };
+        all.into_iter().take(n)
+    }
+
+    /// The same of other operands.
+    pub(crate) fn renamed(self, to: impl Fn(Id) -> Id) -> Self {
+        match self {
+            Self::Constant(_) | Self::Input(_) => self,
+            Self::Add(a, b) => Self::Add(to(a), to(b)),
+            Self::Sub(a, b) => Self::Sub(to(a), to(b)),
+            Self::Mul(a, b) => Self::Mul(to(a), to(b)),
+            Self::Div(a, b) => Self::Div(to(a), to(b)),
+            Self::Neg(a) => Self::Neg(to(a)),
+            Self::Sqrt(a) => Self::Sqrt(to(a)),
+            Self::Sin(a) => Self::Sin(to(a)),
+            Self::Cos(a) => Self::Cos(to(a)),
+            Self::Atan2(a, b) => Self::Atan2(to(a), to(b)),
+            Self::Abs(a) => Self::Abs(to(a)),
+            Self::Less(a, b) => Self::Less(to(a), to(b)),
+            Self::And(a, b) => Self::And(to(a), to(b)),
+            Self::Or(a, b) => Self::Or(to(a), to(b)),
+            Self::Select(m, a, b) => Self::Select(to(m), to(a), to(b)),
+        }
+    }
+
+    /// Whether it is a mask.
+    pub(crate) fn is_mask(self) -> bool {
+        matches!(self, Self::Less(..) | Self::And(..) | Self::Or(..))
+    }
+}
+
+/// All values of a recording.
+#[derive(Debug)]
+pub(crate) struct Graph {
+    pub nodes: Vec<Node>,
+    known: HashMap<Node, Id>,
+}
+
+impl Graph {
+    pub(crate) fn new() -> Self {
+        let mut graph = Self { nodes: Vec::new(), known: HashMap::new() };
+        graph.constant(0.0);
+        graph.constant(1.0);
+        graph
+    }
+
+    /// The value that is computed in this way.
+    fn find(&mut self, node: Node) -> Id {
+        match self.known.entry(node) {
+            Entry::Occupied(found) => *found.get(),
+            Entry::Vacant(place) => {
+                let id = Id::try_from(self.nodes.len()).expect("a recording has at most 2³² values");
+                self.nodes.push(node);
+                *place.insert(id)
+            }
+        }
+    }
+
+    pub(crate) fn constant(&mut self, x: f64) -> Id {
+        self.find(Node::constant(if x == 0.0 { 0.0 } else { x })) // −0 is 0
+    }
+
+    pub(crate) fn input(&mut self, place: u32) -> Id {
+        self.find(Node::Input(place))
+    }
+
+    /// The number, if it is a constant.
+    fn value(&self, a: Id) -> Option<f64> {
+        match self.nodes[a as usize] {
+            Node::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// What a value is the negative of, if it is a negative.
+    fn negated(&self, a: Id) -> Option<Id> {
+        match self.nodes[a as usize] {
+            Node::Neg(x) => Some(x),
+            _ => None,
+        }
+    }
+
+    /// A value without its sign, and whether it had one.
+    fn unsigned(&mut self, a: Id) -> (Id, bool) {
+        match (self.negated(a), self.value(a)) {
+            (Some(x), _) => (x, true),
+            (None, Some(x)) if x < 0.0 => (self.constant(-x), true),
+            _ => (a, false),
+        }
+    }
+
+    fn signed(&mut self, a: Id, minus: bool) -> Id {
+        if minus { self.neg(a) } else { a }
+    }
+
+    pub(crate) fn neg(&mut self, a: Id) -> Id {
+        match (self.negated(a), self.value(a)) {
+            (Some(x), _) => x,
+            (None, Some(x)) => self.constant(-x),
+            _ => self.find(Node::Neg(a)),
+        }
+    }
+
+    pub(crate) fn add(&mut self, a: Id, b: Id) -> Id {
+        if let (Some(x), Some(y)) = (self.value(a), self.value(b)) {
+            return self.constant(x + y);
+        }
+        match (self.negated(a), self.negated(b)) {
+            _ if a == ZERO => b,
+            _ if b == ZERO => a,
+            (Some(a), Some(b)) => {
+                let sum = self.add(a, b);
+                self.neg(sum)
+            }
+            (None, Some(b)) => self.sub(a, b),
+            (Some(a), None) => self.sub(b, a),
+            (None, None) if a == b => {
+                let two = self.constant(2.0);
+                self.mul(two, a)
+            }
+            (None, None) => self.find(Node::Add(a.min(b), a.max(b))),
+        }
+    }
+
+    pub(crate) fn sub(&mut self, a: Id, b: Id) -> Id {
+        if let (Some(x), Some(y)) = (self.value(a), self.value(b)) {
+            return self.constant(x - y);
+        }
+        match (self.negated(a), self.negated(b)) {
+            _ if a == b => ZERO,
+            _ if b == ZERO => a,
+            _ if a == ZERO => self.neg(b),
+            (None, Some(b)) => self.add(a, b),
+            (Some(a), None) => {
+                let sum = self.add(a, b);
+                self.neg(sum)
+            }
+            (Some(a), Some(b)) => self.sub(b, a),
+            (None, None) if a > b => {
+                let difference = self.find(Node::Sub(b, a));
+                self.neg(difference)
+            }
+            (None, None) => self.find(Node::Sub(a, b)),
+        }
+    }
+
+    pub(crate) fn mul(&mut self, a: Id, b: Id) -> Id {
+        if a == ZERO || b == ZERO {
+            return ZERO;
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.unsigned(a), self.unsigned(b));
+        let product = match (self.value(a), self.value(b)) {
+            (Some(x), Some(y)) => self.constant(x * y),
+            (Some(x), None) => self.scale(x, a, b),
+            (None, Some(y)) => self.scale(y, b, a),
+            (None, None) => self.find(Node::Mul(a.min(b), a.max(b))),
+        };
+        self.signed(product, minus_a != minus_b)
+    }
+
+    /// The constant x, which has the number c, times another value.
+    fn scale(&mut self, x: f64, c: Id, a: Id) -> Id {
+        if c == ONE {
+            return a;
+        }
+        if let Node::Mul(d, b) = self.nodes[a as usize]
+            && let Some(y) = self.value(d)
+        {
+            let both = self.constant(x * y);
+            return self.mul(both, b);
+        }
+        self.find(Node::Mul(c, a))
+    }
+
+    pub(crate) fn div(&mut self, a: Id, b: Id) -> Id {
+        if let Some(y) = self.value(b) {
+            if let Some(x) = self.value(a) {
+                return self.constant(x / y);
+            }
+            let inverse = self.constant(1.0 / y);
+            return self.mul(a, inverse);
+        }
+        if a == ZERO {
+            return ZERO;
+        }
+        let ((a, minus_a), (b, minus_b)) = (self.unsigned(a), self.unsigned(b));
+        let quotient = self.find(Node::Div(a, b));
+        self.signed(quotient, minus_a != minus_b)
+    }
+
+    pub(crate) fn sqrt(&mut self, a: Id) -> Id {
+        match self.value(a) {
+            Some(x) => self.constant(x.sqrt()),
+            None => self.find(Node::Sqrt(a)),
+        }
+    }
+
+    pub(crate) fn sin_cos(&mut self, a: Id) -> (Id, Id) {
+        let (a, minus) = self.unsigned(a);
+        let (sin, cos) = match self.value(a) {
+            Some(x) => (self.constant(x.sin()), self.constant(x.cos())),
+            None => (self.find(Node::Sin(a)), self.find(Node::Cos(a))),
+        };
+        (self.signed(sin, minus), cos)
+    }
+
+    pub(crate) fn atan2(&mut self, y: Id, x: Id) -> Id {
+        match (self.value(y), self.value(x)) {
+            (Some(y), Some(x)) => self.constant(y.atan2(x)),
+            _ => self.find(Node::Atan2(y, x)),
+        }
+    }
+
+    pub(crate) fn abs(&mut self, a: Id) -> Id {
+        let (a, _) = self.unsigned(a);
+        match self.nodes[a as usize] {
+            Node::Constant(_) | Node::Abs(_) => a,
+            _ => self.find(Node::Abs(a)),
+        }
+    }
+
+    pub(crate) fn less(&mut self, a: Id, b: Id) -> Id {
+        match (self.value(a), self.value(b)) {
+            (Some(x), Some(y)) => Id::from(x < y),
+            _ if a == b => ZERO,
+            _ => self.find(Node::Less(a, b)),
+        }
+    }
+
+    pub(crate) fn and(&mut self, a: Id, b: Id) -> Id {
+        match (a.min(b), a.max(b)) {
+            (ZERO, _) => ZERO,
+            (ONE, b) => b,
+            (a, b) if a == b => a,
+            (a, b) => self.find(Node::And(a, b)),
+        }
+    }
+
+    pub(crate) fn or(&mut self, a: Id, b: Id) -> Id {
+        match (a.min(b), a.max(b)) {
+            (ZERO, b) => b,
+            (ONE, _) => ONE,
+            (a, b) if a == b => a,
+            (a, b) => self.find(Node::Or(a, b)),
+        }
+    }
+
+    pub(crate) fn select(&mut self, mask: Id, a: Id, b: Id) -> Id {
+        match mask {
+            ZERO => b,
+            ONE => a,
+            _ if a == b => a,
+            _ => self.find(Node::Select(mask, a, b)),
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Names that code can have.
+
+/// Identifiers for some names: what code cannot have becomes `_`, and equal ones get numbers.
+pub(crate) fn identifiers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut found: Vec<String> = Vec::new();
+    for name in names {
+        let first = identifier(name);
+        let mut own = first.clone();
+        let mut k = 2;
+        while found.contains(&own) {
+            own = format!("{first}_{k}");
+            k += 1;
+        }
+        found.push(own);
+    }
+    found
+}
+
+/// A name that code can have: `robot` in front of what does not begin with a letter.
+pub fn identifier(name: &str) -> String {
+    let mut own: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    if !own.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        own = format!("robot{own}");
+    }
+    own
+}
+
+#[cfg(test)]
+mod tests {
+    use super::identifiers;
+
+    #[test]
+    fn names_become_identifiers() {
+        let names = identifiers(["LF_foot", "tool 1", "tool-1", "7th", "é"].into_iter());
+        assert_eq!(names, ["LF_foot", "tool_1", "tool_1_2", "robot7th", "robot_"]);
+    }
+}

@@ -1,0 +1,40 @@
+//! Robots as straight-line code: the library's algorithms, run once on numbers that remember how they were computed.
+//!
+//! ```
+//! use condyle_codegen::{Language, Settings, functions};
+//! use condyle_dynamics::robots;
+//! let arm = robots::arm7();
+//! let functions = functions(&arm, &["rnea", "aba"], &Settings::default())?;
+//! let [header, source] = &Language::C.text("arm7", &functions)[..] else { unreachable!() };
+//! assert!(header.text.contains("void arm7_aba(const double *restrict q, "));
+//! assert!(source.text.contains("arm7_sin_cos"));
+//! # Ok::<(), condyle_codegen::Error>(())
+//! ```
+//!
+//! [`record`] runs any closure that is generic over the scalar on [`Expression`]s, which leave a graph: constants folded, what is
+//! 0 left out, each value computed once. [`functions`] does it with the algorithms of a robot, [`Language`] writes the graph as
+//! C, Rust or CUDA, and [`generate`] puts that into files. What does not depend on the robot's position is not computed at run
+//! time, and the code has neither loops nor branches nor memory of its own.
+#![allow(non_snake_case)]
+
+mod derivative;
+mod error;
+mod expression;
+mod function;
+mod generate;
+mod graph;
+mod identifiers;
+mod order;
+mod program;
+mod robot;
+mod steps;
+mod text;
+
+pub use derivative::{DualExpression, jacobian};
+pub use error::Error;
+pub use expression::{Expression, Mask};
+pub use function::{Array, Function, Operations, Recorder, record};
+pub use generate::generate;
+pub use identifiers::identifier;
+pub use robot::{FUNCTIONS, Settings, functions};
+pub use text::{Language, SourceFile};

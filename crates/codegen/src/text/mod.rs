@@ -1,0 +1,384 @@
+//! Programs as text: what all languages have in common.
+
+mod c;
+mod casadi;
+mod cuda;
+mod rust;
+
+use crate::function::{Array, Function};
+use crate::graph::{Id, Node};
+use crate::program::{Place, Program};
+use crate::steps::{Angle, Step};
+use core::fmt::Write;
+
+/// A file of code.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceFile {
+    /// Its name, without a folder.
+    pub name: String,
+    /// What is in it.
+    pub text: String,
+}
+
+/// A language in which functions are written down.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Language {
+    /// C99 on numbers of type `double`: a header and a source, which need nothing but `math.h`.
+    #[default]
+    C,
+    /// C99 on numbers of type `float`.
+    CFloat,
+    /// C99 with vectors of GCC and clang: four states in a call, on numbers of type `double`.
+    CFour,
+    /// The same with eight states.
+    CEight,
+    /// The same with four states, on numbers of type `float`.
+    CFloatFour,
+    /// The same with eight states, on numbers of type `float`.
+    CFloatEight,
+    /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
+    /// `robot_aba_casadi` for `robot_aba`.
+    CCasadi,
+    /// A module of Rust on `f64` that needs no `std`.
+    Rust,
+    /// A module of Rust on `f32` that needs no `std`.
+    RustFloat,
+    /// CUDA on numbers of type `double`: a thread for each state, the numbers of one kind side by side.
+    Cuda,
+    /// CUDA on numbers of type `float`.
+    CudaFloat,
+}
+
+impl Language {
+    /// The languages by the names that [`named`](Self::named) knows.
+    pub const NAMES: [&str; 11] = [
+        "c",
+        "c-float",
+        "c-4",
+        "c-8",
+        "c-float-4",
+        "c-float-8",
+        "c-casadi",
+        "rust",
+        "rust-float",
+        "cuda",
+        "cuda-float",
+    ];
+
+    /// The language of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        let all = [
+            Self::C,
+            Self::CFloat,
+            Self::CFour,
+            Self::CEight,
+            Self::CFloatFour,
+            Self::CFloatEight,
+            Self::CCasadi,
+            Self::Rust,
+            Self::RustFloat,
+            Self::Cuda,
+            Self::CudaFloat,
+        ];
+        Self::NAMES.iter().position(|&known| known == name).map(|k| all[k])
+    }
+
+    /// The files in which some functions are written down. The same functions give the same text.
+    ///
+    /// ```
+    /// use condyle_codegen::{Language, record};
+    /// let square = record("square", "x².", |r| {
+    ///     let x = r.input("x", 1, "a number");
+    ///     r.output("y", &[x[0] * x[0]], "its square");
+    /// });
+    /// let files = Language::C.text("numbers", &[square]);
+    /// assert_eq!(files.iter().map(|f| &*f.name).collect::<Vec<_>>(), ["numbers.h", "numbers.c"]);
+    /// assert!(files[1].text.contains("void numbers_square(const double *restrict x, double *restrict y)"));
+    /// ```
+    ///
+    /// # Panics
+    /// If `name` is no identifier (ASCII letters, digits and `_`).
+    pub fn text(self, name: &str, functions: &[Function]) -> Vec<SourceFile> {
+        assert!(crate::function::is_identifier(name), "name: `{name}` is not made of ASCII letters, digits and `_`");
+        let programs: Vec<Program> = functions.iter().map(Program::new).collect();
+        match self {
+            Self::C => c::files(name, &programs, "double", 1),
+            Self::CFloat => c::files(name, &programs, "float", 1),
+            Self::CFour => c::files(&format!("{name}_x4"), &programs, "double", 4),
+            Self::CEight => c::files(&format!("{name}_x8"), &programs, "double", 8),
+            Self::CFloatFour => c::files(&format!("{name}_x4"), &programs, "float", 4),
+            Self::CFloatEight => c::files(&format!("{name}_x8"), &programs, "float", 8),
+            Self::CCasadi => {
+                let mut files = c::files(name, &programs, "double", 1);
+                files.push(casadi::file(name, &programs));
+                files
+            }
+            Self::Rust => rust::files(name, &programs, "f64"),
+            Self::RustFloat => rust::files(name, &programs, "f32"),
+            Self::Cuda => cuda::files(name, &programs, "double"),
+            Self::CudaFloat => cuda::files(name, &programs, "float"),
+        }
+    }
+}
+
+/// How a language says things.
+pub(crate) trait Dialect {
+    /// A constant.
+    fn number(&self, x: f64) -> String;
+    /// A number of an array.
+    fn element(&self, array: &str, index: usize) -> String {
+        format!("{array}[{index}]")
+    }
+    /// A number of the work space.
+    fn work(&self, slot: usize) -> String {
+        format!("w[{slot}]")
+    }
+    /// A value where no operation makes one for each state of a constant.
+    fn whole(&self, value: String) -> String {
+        value
+    }
+    /// A new variable, a mask or a number.
+    fn variable(&self, name: &str, expression: &str, is_mask: bool) -> String;
+    /// New variables for the sine and the cosine of an angle.
+    fn sin_cos(&self, sin: &str, cos: &str, angle: &str) -> String;
+    /// a b + c, with signs before the product and before c.
+    fn mul_add(&self, minus_product: bool, a: &str, b: &str, minus: bool, c: &str) -> String {
+        match (minus_product, minus) {
+            (false, false) => format!("{a} * {b} + {c}"),
+            (false, true) => format!("{a} * {b} - {c}"),
+            _ => format!("{c} - {a} * {b}"),
+        }
+    }
+    /// A choice.
+    fn select(&self, mask: &str, a: &str, b: &str) -> String;
+    /// A function of one number: sqrt, abs.
+    fn call(&self, function: &str, a: &str) -> String;
+    /// The angle of a point.
+    fn atan2(&self, y: &str, x: &str) -> String;
+    /// A mask as a number of the work space.
+    fn mask_to_work(&self, mask: &str) -> String;
+    /// A mask out of the work space.
+    fn mask_from_work(&self, number: &str) -> String;
+    /// 0 or 1 as a mask.
+    fn truth(&self, holds: bool) -> &'static str;
+}
+
+/// Writes the parts of a program.
+pub(crate) struct Writer<'p, D> {
+    pub program: &'p Program<'p>,
+    pub dialect: D,
+    inputs: Vec<(usize, usize)>,
+    /// The places among all outputs that each value goes to.
+    goes_to: Vec<Vec<usize>>,
+    outputs: Vec<(usize, usize)>,
+}
+
+impl<'p, D: Dialect> Writer<'p, D> {
+    pub(crate) fn new(program: &'p Program<'p>, dialect: D) -> Self {
+        let mut goes_to = vec![Vec::new(); program.steps.values];
+        program.steps.results.iter().enumerate().for_each(|(k, &id)| goes_to[id as usize].push(k));
+        let (inputs, outputs) = (&program.function.inputs, &program.function.outputs);
+        let (inputs, outputs) = (Function::places(inputs), Function::places(outputs));
+        Self { program, dialect, inputs, goes_to, outputs }
+    }
+
+    /// A value as part p sees it.
+    fn value(&self, p: usize, id: Id, is_mask: bool) -> String {
+        match self.program.steps.nodes[id as usize] {
+            Node::Constant(bits) if is_mask => self.dialect.truth(f64::from_bits(bits) != 0.0).to_owned(),
+            Node::Constant(bits) => self.dialect.number(f64::from_bits(bits)),
+            Node::Input(place) => {
+                let (array, index) = self.inputs[place as usize];
+                self.dialect.element(&self.program.function.inputs[array].name, index)
+            }
+            _ => match self.program.places[id as usize] {
+                Place::Work(slot) if self.program.part_of[id as usize] != p => {
+                    let number = self.dialect.work(slot);
+                    if is_mask { self.dialect.mask_from_work(&number) } else { number }
+                }
+                _ => format!("t{id}"),
+            },
+        }
+    }
+
+    /// How a value is computed, in part p.
+    fn expression(&self, p: usize, node: Node) -> String {
+        let d = &self.dialect;
+        let number = |id| self.value(p, id, false);
+        let mask = |id| self.value(p, id, true);
+        match node {
+            Node::Constant(_) | Node::Input(_) | Node::Sin(_) | Node::Cos(_) => String::new(), // no step of its own
+            Node::Add(a, b) => format!("{} + {}", number(a), number(b)),
+            Node::Sub(a, b) => format!("{} - {}", number(a), number(b)),
+            Node::Mul(a, b) => format!("{} * {}", number(a), number(b)),
+            Node::Div(a, b) => format!("{} / {}", number(a), number(b)),
+            Node::Neg(a) => format!("-{}", number(a)),
+            Node::Sqrt(a) => d.call("sqrt", &number(a)),
+            Node::Abs(a) => d.call("abs", &number(a)),
+            Node::Atan2(y, x) => d.atan2(&number(y), &number(x)),
+            Node::Less(a, b) => format!("{} < {}", number(a), number(b)),
+            Node::And(a, b) => format!("{} & {}", mask(a), mask(b)),
+            Node::Or(a, b) => format!("{} | {}", mask(a), mask(b)),
+            Node::Select(m, a, b) => d.select(&mask(m), &number(a), &number(b)),
+        }
+    }
+
+    /// The lines of part p.
+    pub(crate) fn lines(&self, p: usize) -> Vec<String> {
+        let mut lines = Vec::new();
+        for step in &self.program.steps.all[self.program.parts[p].clone()] {
+            let number = |id| self.value(p, id, false);
+            let fused = |[a, b, c]: [Id; 3], minus_product, minus| {
+                self.dialect.mul_add(minus_product, &number(a), &number(b), minus, &number(c))
+            };
+            let (id, text, is_mask) = match *step {
+                Step::Plain(id, node) => (id, self.expression(p, node), node.is_mask()),
+                Step::MulAdd(id, abc) => (id, fused(abc, false, false), false),
+                Step::MulSub(id, abc) => (id, fused(abc, false, true), false),
+                Step::SubMul(id, abc) => (id, fused(abc, true, false), false),
+                Step::SinCos(Angle { angle, sin, cos }) => {
+                    let name =
+                        |half: Option<Id>, other| half.map_or(format!("unused_{angle}_{other}"), |id| format!("t{id}"));
+                    lines.push(self.dialect.sin_cos(&name(sin, "s"), &name(cos, "c"), &number(angle)));
+                    sin.into_iter().chain(cos).for_each(|id| self.hand_on(&mut lines, id, false));
+                    continue;
+                }
+            };
+            // a value that is a result and nothing else needs no variable
+            let used_later = self.program.places[id as usize] != Place::Local || self.is_taken(id);
+            if let ([only], false) = (&self.goes_to[id as usize][..], used_later) {
+                lines.push(format!("{} = {text};", self.output(*only)));
+                continue;
+            }
+            lines.push(self.dialect.variable(&format!("t{id}"), &text, is_mask));
+            self.hand_on(&mut lines, id, is_mask);
+        }
+        lines
+    }
+
+    /// Whether a step takes a value.
+    fn is_taken(&self, id: Id) -> bool {
+        self.program.taken[id as usize]
+    }
+
+    /// The lines that write a value to the work space and to results.
+    fn hand_on(&self, lines: &mut Vec<String>, id: Id, is_mask: bool) {
+        if let Place::Work(slot) = self.program.places[id as usize] {
+            let name = format!("t{id}");
+            let number = if is_mask { self.dialect.mask_to_work(&name) } else { name };
+            lines.push(format!("{} = {number};", self.dialect.work(slot)));
+        }
+        for &k in &self.goes_to[id as usize] {
+            lines.push(format!("{} = t{id};", self.output(k)));
+        }
+    }
+
+    /// A number among all outputs.
+    fn output(&self, k: usize) -> String {
+        let (array, index) = self.outputs[k];
+        self.dialect.element(&self.program.function.outputs[array].name, index)
+    }
+
+    /// The lines that write results which no part computes: constants, inputs, sines and cosines of inputs.
+    pub(crate) fn given_results(&self) -> Vec<String> {
+        let part_of = &self.program.part_of;
+        let given =
+            self.program.steps.results.iter().enumerate().filter(|&(_, &id)| part_of[id as usize] == usize::MAX);
+        let value = |id| self.dialect.whole(self.value(usize::MAX - 1, id, false));
+        given.map(|(k, &id)| format!("{} = {};", self.output(k), value(id))).collect()
+    }
+
+    /// The inputs that nothing is computed from.
+    pub(crate) fn unused_inputs(&self) -> Vec<&'p str> {
+        let inputs = &self.program.function.inputs;
+        let mut unused = vec![true; inputs.len()];
+        for node in self.program.steps.nodes {
+            if let Node::Input(place) = node {
+                unused[self.inputs[*place as usize].0] = false;
+            }
+        }
+        inputs.iter().zip(unused).filter(|(_, unused)| *unused).map(|(array, _)| &*array.name).collect()
+    }
+
+    /// An angle that is known at once, as one expression.
+    pub(crate) fn angle(&self, id: Id) -> String {
+        let inside = |id| self.angle(id);
+        match self.program.steps.nodes[id as usize] {
+            Node::Add(a, b) => format!("({} + {})", inside(a), inside(b)),
+            Node::Sub(a, b) => format!("({} - {})", inside(a), inside(b)),
+            Node::Mul(a, b) => format!("({} * {})", inside(a), inside(b)),
+            Node::Neg(a) => format!("(-{})", inside(a)),
+            _ => self.value(usize::MAX - 1, id, false),
+        }
+    }
+
+    /// The arrays that part p reads and writes.
+    pub(crate) fn arrays(&self, p: usize) -> (Vec<&'p Array>, Vec<&'p Array>) {
+        let steps = &self.program.steps.all[self.program.parts[p].clone()];
+        let function = self.program.function;
+        let (mut reads, mut writes) = (vec![false; function.inputs.len()], vec![false; function.outputs.len()]);
+        for step in steps {
+            for id in step.takes() {
+                if let Node::Input(place) = self.program.steps.nodes[id as usize] {
+                    reads[self.inputs[place as usize].0] = true;
+                }
+            }
+            for id in step.makes() {
+                self.goes_to[id as usize].iter().for_each(|&k| writes[self.outputs[k].0] = true);
+            }
+        }
+        let pick = |arrays: &'p [Array], which: &[bool]| -> Vec<&'p Array> {
+            arrays.iter().zip(which).filter(|(_, used)| **used).map(|(array, _)| array).collect()
+        };
+        (pick(&function.inputs, &reads), pick(&function.outputs, &writes))
+    }
+}
+
+/// What a function takes and gives, line by line.
+pub(crate) fn description(program: &Program) -> Vec<String> {
+    let function = program.function;
+    let mut lines = vec![function.about.clone(), String::new()];
+    for array in function.inputs.iter().chain(&function.outputs) {
+        let shape = match array.columns {
+            1 => format!("{}", array.rows),
+            columns => format!("{} x {columns}, column by column", array.rows),
+        };
+        lines.push(format!("{}: {} ({shape})", array.name, array.about));
+    }
+    lines.push(String::new());
+    lines.push(format!("Operations: {}.", program.steps.operations()));
+    if program.work > 0 {
+        lines.push(format!("Stack: {} numbers beside the variables.", program.work));
+    }
+    lines
+}
+
+/// What every file says at its head.
+pub(crate) fn heading(name: &str, programs: &[Program]) -> Vec<String> {
+    let functions: Vec<&str> = programs.iter().map(|p| &*p.function.name).collect();
+    vec![
+        format!("{name}: {}, as straight-line code.", functions.join(", ")),
+        String::new(),
+        format!("Written by condyle-codegen {}; not to be edited.", env!("CARGO_PKG_VERSION")),
+        String::new(),
+        "Units are SI and radians, frames right-handed. Of velocities, forces and Jacobians the linear part comes first, then".to_owned(),
+        "the angular one; quaternions are x, y, z, w. A free-flyer has the position, then the quaternion in q, and its velocity".to_owned(),
+        "in its own frame in v; an unbounded revolute joint has (cos, sin) in q. Matrices stand column by column. Derivatives by".to_owned(),
+        "q are in the tangent space: nv columns. No array may overlap one that is written.".to_owned(),
+    ]
+}
+
+/// Lines, each behind some text, and without spaces at the end.
+pub(crate) fn prefixed(prefix: &str, lines: &[String]) -> String {
+    let mut text = String::new();
+    for line in lines {
+        let _ = writeln!(text, "{}", format!("{prefix}{line}").trim_end());
+    }
+    text
+}
+
+/// The digits of a number, so that it is read back as it is.
+pub(crate) fn digits(x: f64) -> String {
+    format!("{x:?}")
+}

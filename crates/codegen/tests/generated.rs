@@ -1,0 +1,345 @@
+//! Generated code against the library that it was recorded from.
+#![allow(non_snake_case)]
+
+mod common;
+
+use common::{Program, assert_equal, folder, is_there};
+use condyle_codegen::{FUNCTIONS, Function, Language, Settings, functions, record};
+use condyle_dynamics::{
+    ConstraintSet, ContactConstraint, Data, Force, Model, ReferenceFrame, aba, aba_derivatives, aba_hessian,
+    centroidal_map_rate, constrained_dynamics, constrained_dynamics_derivatives, crba, forward_kinematics,
+    forward_velocities, gravity, impulse_dynamics, minv, nonlinear_effects, random_configuration, rnea,
+    rnea_derivatives, rnea_hessian, robots,
+};
+use condyle_spatial::{Scalar, Vec3};
+use nalgebra::DMatrix;
+use num_dual::Dual64;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+/// Sums in another order: what is recorded is not what lanes compute.
+const ROUNDING: f64 = 1e-12;
+
+/// As above, where M⁻¹ or Λ stands in between: it amplifies roundings by its condition.
+const THROUGH_INVERSE: f64 = 1e-11;
+
+fn all_robots() -> [(&'static str, Model, Settings); 3] {
+    let with = |model: &Model, names: &[&str]| Settings {
+        frames: names.iter().map(|&name| name.to_owned()).collect(),
+        constraints: names.iter().map(|name| ContactConstraint::point(model.frame(name).unwrap())).collect(),
+        ..Settings::default()
+    };
+    let (arm, quadruped, humanoid) = (robots::arm7(), robots::quadruped(), robots::humanoid());
+    let (a, q) = (with(&arm, &["tool"]), with(&quadruped, &["LF_foot", "RH_foot"]));
+    let mut h = with(&humanoid, &["left_sole", "right_sole"]);
+    h.constraints = vec![ContactConstraint::rigid(humanoid.frame("left_sole").unwrap())];
+    [("arm", arm, a), ("quadruped", quadruped, q), ("humanoid", humanoid, h)]
+}
+
+/// q, v, numbers for a or τ, and for λ.
+fn state(model: &Model, rng: &mut StdRng) -> [Vec<f64>; 4] {
+    let mut numbers = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
+    let [v, x, lambda] = [(); 3].map(|()| numbers(model.nv()));
+    let q = random_configuration(model, rng);
+    [q, v, x, lambda]
+}
+
+fn matrix(m: &DMatrix<f64>) -> Vec<f64> {
+    m.as_slice().to_vec()
+}
+
+/// What the library computes.
+fn expected(
+    model: &Model,
+    settings: &Settings,
+    name: &str,
+    [q, v, x, lambda]: &[Vec<f64>; 4],
+    f: &[Force<f64>],
+) -> Vec<Vec<f64>> {
+    let data = &mut Data::new(model);
+    let mut set = ConstraintSet::new(model, &settings.constraints).unwrap();
+    match name {
+        "rnea" => vec![rnea(model, data, q, v, x, f).to_vec()],
+        "aba" => vec![aba(model, data, q, v, x, f).to_vec()],
+        "crba" => vec![matrix(crba(model, data, q))],
+        "minv" => vec![matrix(minv(model, data, q))],
+        "gravity" => vec![gravity(model, data, q).to_vec()],
+        "nonlinear_effects" => vec![nonlinear_effects(model, data, q, v).to_vec()],
+        "rnea_derivatives" => {
+            let d = rnea_derivatives(model, data, q, v, x, f);
+            [d.dtau_dq, d.dtau_dv, d.dtau_da].map(matrix).to_vec()
+        }
+        "aba_derivatives" => {
+            let d = aba_derivatives(model, data, q, v, x, f);
+            [&[d.a.to_vec()][..], &[d.da_dq, d.da_dv, d.da_dtau].map(matrix)].concat()
+        }
+        "rnea_hessian" => {
+            let H = rnea_hessian(model, data, q, v, x, f, lambda);
+            [H.dqdq, H.dvdq, H.dvdv, H.dadq].map(matrix).to_vec()
+        }
+        "aba_hessian" => {
+            let H = aba_hessian(model, data, q, v, x, f, lambda);
+            [H.dqdq, H.dvdq, H.dvdv, H.dtaudq].map(matrix).to_vec()
+        }
+        "frames" => {
+            let k = forward_velocities(model, data, q, v);
+            let axes = ReferenceFrame::LocalWorldAligned;
+            let of = |name: &String| {
+                let frame = model.frame(name).unwrap();
+                let [mut J, mut dJ] = [(); 2].map(|()| DMatrix::zeros(6, model.nv()));
+                k.frame_jacobian(frame, axes, &mut J);
+                k.frame_jacobian_rate(frame, axes, &mut dJ);
+                let oXf = k.frame(frame);
+                let rotation = oXf.rotation.columns().iter().flat_map(|c| c.to_array()).collect();
+                let velocity = k.frame_velocity(frame, axes).to_array().to_vec();
+                [rotation, oXf.translation.to_array().to_vec(), velocity, matrix(&J), matrix(&dJ)]
+            };
+            settings.frames.iter().flat_map(of).collect()
+        }
+        "centroidal" => {
+            let m = centroidal_map_rate(model, data, q, v);
+            let vectors = [m.com.to_array().to_vec(), m.com_velocity.to_array().to_vec(), m.hg.to_array().to_vec()];
+            [vectors, [m.Jcom, m.Ag, m.dAg].map(matrix)].concat()
+        }
+        "constrained_dynamics" => {
+            let d = constrained_dynamics(model, data, &mut set, q, v, x, f);
+            vec![d.a.to_vec(), d.lambda.to_vec()]
+        }
+        "constrained_dynamics_derivatives" => {
+            let d = constrained_dynamics_derivatives(model, data, &mut set, q, v, x, f);
+            let matrices = [d.da_dq, d.da_dv, d.da_dtau, d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau].map(matrix);
+            [&[d.a.to_vec(), d.lambda.to_vec()][..], &matrices].concat()
+        }
+        "impulse_dynamics" => {
+            let d = impulse_dynamics(model, data, &mut set, q, v, 0.0);
+            vec![d.v.to_vec(), d.lambda.to_vec()]
+        }
+        _ => panic!("no such function: {name}"),
+    }
+}
+
+fn bound(name: &str) -> f64 {
+    let through_inverse = name.contains("aba") || name.contains("minv") || name.contains("dynamics");
+    if through_inverse { THROUGH_INVERSE } else { ROUNDING }
+}
+
+/// The arguments of a function at a state.
+fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
+    state[..function.inputs.len()].to_vec()
+}
+
+/// The functions that compilers are given for a robot: those of which the code is not long, and with `CONDYLE_ALL_CODE`, which
+/// keeps them busy for some minutes, nearly all.
+fn for_compilers(robot: &str) -> Vec<&'static str> {
+    let is_all = std::env::var_os("CONDYLE_ALL_CODE").is_some();
+    let short = ["rnea", "aba", "crba", "gravity", "nonlinear_effects", "frames", "centroidal"];
+    match robot {
+        "arm" | "quadruped" if is_all => FUNCTIONS.to_vec(),
+        "humanoid" if is_all => [&short[..], &["minv", "rnea_derivatives", "aba_derivatives"]].concat(),
+        "arm" => FUNCTIONS.into_iter().filter(|&name| name != "aba_hessian").collect(),
+        "quadruped" => [&short[..], &["minv", "rnea_derivatives", "constrained_dynamics", "impulse_dynamics"]].concat(),
+        _ => short[..4].to_vec(),
+    }
+}
+
+/// Compares what `compute` makes of functions at some states with the library.
+fn check(
+    what: &str,
+    names: impl Fn(&str) -> Vec<&'static str>,
+    mut compute: impl FnMut(&str, &[Function], &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>>,
+) {
+    for (robot, model, settings) in all_robots() {
+        let all = functions(&model, &names(robot), &settings).unwrap();
+        let mut rng = StdRng::seed_from_u64(7);
+        for _ in 0..3 {
+            let state = state(&model, &mut rng);
+            let inputs: Vec<_> = all.iter().map(|f| arguments(f, &state)).collect();
+            let found = compute(robot, &all, &inputs);
+            for (function, found) in all.iter().zip(found) {
+                let expected = expected(&model, &settings, &function.name, &state, &[]);
+                assert_equal(&format!("{what} {robot}"), function, &found, &expected, bound(&function.name));
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_recorded_is_what_the_library_computes() {
+    check(
+        "recorded",
+        |_| FUNCTIONS.to_vec(),
+        |_, all, inputs| {
+            all.iter().zip(inputs).map(|(f, x)| f.evaluate(&x.iter().map(|x| &x[..]).collect::<Vec<_>>())).collect()
+        },
+    );
+}
+
+#[test]
+fn c_computes_what_the_library_does() {
+    if !is_there("cc") {
+        return;
+    }
+    let mut programs = std::collections::HashMap::new();
+    check("C", for_compilers, |robot, all, inputs| {
+        let program = programs.entry(robot.to_owned()).or_insert_with(|| {
+            let flags = ["-O0", "-fsanitize=undefined", "-fno-sanitize-recover"];
+            // the checks are in every line: of long code they take minutes
+            let flags = if robot == "humanoid" { &flags[..1] } else { &flags };
+            Program::c(&folder(&format!("c_{robot}")), all, Language::C, flags)
+        });
+        program.run(inputs)
+    });
+}
+
+#[test]
+fn rust_computes_what_the_library_does() {
+    if !is_there("rustc") {
+        return;
+    }
+    // rustc takes ten times as long as the compilers of C
+    let short = |robot: &str| -> Vec<&'static str> {
+        let all = for_compilers(robot);
+        all.into_iter().filter(|name| !name.contains("hessian") && (robot == "arm" || !name.contains("_d"))).collect()
+    };
+    let mut programs = std::collections::HashMap::new();
+    check("Rust", short, |robot, all, inputs| {
+        let new = || Program::rust(&folder(&format!("rust_{robot}")), all, false);
+        programs.entry(robot.to_owned()).or_insert_with(new).run(inputs)
+    });
+}
+
+/// Vectors of four and eight states give each state what it gets alone.
+#[test]
+fn vectors_compute_what_the_library_does() {
+    if !is_there("cc") {
+        return;
+    }
+    for (robot, model, settings) in all_robots().into_iter().take(2) {
+        let short = ["rnea", "aba", "crba", "constrained_dynamics"];
+        let (names, languages): (&[&str], &[_]) = match robot {
+            "arm" => (
+                &["rnea", "aba", "crba", "frames", "centroidal"],
+                &[
+                    (Language::CFour, 4, false),
+                    (Language::CEight, 8, false),
+                    (Language::CFloatFour, 4, true),
+                    (Language::CFloatEight, 8, true),
+                ],
+            ),
+            _ => (&short, &[(Language::CFour, 4, false)]),
+        };
+        let all = functions(&model, names, &settings).unwrap();
+        for &(language, lanes, is_float) in languages {
+            let program = Program::c(&folder(&format!("{robot}_{language:?}")), &all, language, &["-O0"]);
+            let mut rng = StdRng::seed_from_u64(11);
+            let states: Vec<_> = (0..lanes).map(|_| state(&model, &mut rng)).collect();
+            // number k of state i at [lanes k + i]
+            let side_by_side = |f: &Function| -> Vec<Vec<f64>> {
+                let each: Vec<_> = states.iter().map(|state| arguments(f, state)).collect();
+                let array = |a: usize| {
+                    (0..f.inputs[a].len()).flat_map(|k| each.iter().map(|x| x[a][k]).collect::<Vec<_>>()).collect()
+                };
+                (0..f.inputs.len()).map(array).collect()
+            };
+            let found = program.run(&all.iter().map(side_by_side).collect::<Vec<_>>());
+            for (function, found) in all.iter().zip(found) {
+                for (i, state) in states.iter().enumerate() {
+                    let own: Vec<Vec<f64>> =
+                        found.iter().map(|array| array.chunks(lanes).map(|numbers| numbers[i]).collect()).collect();
+                    let expected = expected(&model, &settings, &function.name, state, &[]);
+                    let bound = if is_float { SINGLE } else { bound(&function.name) };
+                    assert_equal(&format!("{language:?} {robot}"), function, &own, &expected, bound);
+                }
+            }
+        }
+    }
+}
+
+/// What single precision rounds, of numbers that condition amplifies.
+const SINGLE: f64 = 2e-3;
+
+#[test]
+fn floats_are_near() {
+    let names = ["rnea", "crba", "aba", "rnea_derivatives", "centroidal"];
+    for (robot, model, settings) in all_robots() {
+        let all = functions(&model, &names, &settings).unwrap();
+        let state = state(&model, &mut StdRng::seed_from_u64(3));
+        let inputs: Vec<_> = all.iter().map(|f| arguments(f, &state)).collect();
+        let mut results = Vec::new();
+        if is_there("cc") {
+            results.push(Program::c(&folder(&format!("float_{robot}")), &all, Language::CFloat, &["-O0"]).run(&inputs));
+        }
+        if is_there("rustc") {
+            results.push(Program::rust(&folder(&format!("f32_{robot}")), &all, true).run(&inputs));
+        }
+        for found in results {
+            for (function, found) in all.iter().zip(found) {
+                let expected = expected(&model, &settings, &function.name, &state, &[]);
+                assert_equal(robot, function, &found, &expected, SINGLE);
+            }
+        }
+    }
+}
+
+/// A user's own function: a cost with choices, angles and roots, and its Jacobian by dual numbers.
+fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
+    let reach = (tool.x * tool.x + tool.y * tool.y).sqrt();
+    let is_low = tool.z.lt(S::splat(0.4));
+    let is_near = reach.lt(S::splat(0.3));
+    let penalty = S::select(S::or(is_low, is_near), S::splat(0.4) - tool.z, S::zero());
+    let both = S::select(S::and(is_low, is_near), reach, S::splat(2.0));
+    vec![penalty * penalty + both, tool.y.atan2(tool.x), q[1].abs() * S::splat(3.0)]
+}
+
+#[test]
+fn functions_of_ones_own_with_their_derivatives() {
+    let arm = robots::arm7();
+    let tool = arm.frame("tool").unwrap();
+    let function = record("own", "A cost, an angle and a magnitude, with their Jacobian.", |r| {
+        let q = r.input("q", 7, "position (rad)");
+        let mut data = Data::new(&arm);
+        let of = |q: &[_]| own(q, forward_kinematics(&arm, &mut data, q).frame(tool).translation);
+        let (y, dy) = condyle_codegen::jacobian(&arm, &q, of);
+        r.output("y", &y, "values");
+        r.matrix("dy", &dy, "Jacobian");
+    });
+    let all = [function];
+    let mut programs = Vec::new();
+    if is_there("cc") {
+        programs.push((Program::c(&folder("own_c"), &all, Language::C, &["-O1", "-fsanitize=undefined"]), 1));
+        programs.push((Program::c(&folder("own_c4"), &all, Language::CFour, &["-O1"]), 4));
+    }
+    if is_there("rustc") {
+        programs.push((Program::rust(&folder("own_rust"), &all, false), 1));
+    }
+    let mut rng = StdRng::seed_from_u64(5);
+    let mut choices = [0, 0];
+    for _ in 0..20 {
+        let q: Vec<f64> = (0..7).map(|_| rng.random_range(-2.0..2.0)).collect();
+        let mut data = Data::new(&arm);
+        let of = |q: &[Dual64]| own(q, forward_kinematics(&arm, &mut data, q).frame(tool).translation);
+        let (y, dy) = condyle_dynamics::jacobian(&arm, &q, of);
+        choices[usize::from(y[0] == 2.0)] += 1;
+        let expected = [y.as_slice().to_vec(), matrix(&dy)];
+        let recorded = all[0].evaluate(&[&q]);
+        assert_equal("recorded", &all[0], &recorded, &expected, ROUNDING);
+        for (program, lanes) in &programs {
+            let inputs = q.iter().flat_map(|&x| vec![x; *lanes]).collect();
+            let found = &program.run(&[vec![inputs]])[0];
+            let found: Vec<Vec<f64>> =
+                found.iter().map(|array| array.iter().copied().step_by(*lanes).collect()).collect();
+            assert_equal("compiled", &all[0], &found, &expected, ROUNDING);
+        }
+    }
+    assert!(choices.iter().all(|&n| n > 0), "both sides of the choices are met: {choices:?}");
+}
+
+#[test]
+fn the_text_is_the_same_every_time() {
+    let quadruped = robots::quadruped();
+    let text = || {
+        let all = functions(&quadruped, &["aba_derivatives", "rnea"], &Settings::default()).unwrap();
+        [Language::C, Language::Rust, Language::CudaFloat].map(|language| language.text("quadruped", &all))
+    };
+    assert_eq!(text(), text());
+}

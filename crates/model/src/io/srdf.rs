@@ -1,0 +1,113 @@
+//! Positions with names, from SRDF: MoveIt's description of what a robot's groups of joints are for.
+
+use super::xml::{Amount, Element, numbers};
+use crate::body::Body;
+use crate::configuration::neutral;
+use crate::error::Error;
+use crate::joint::Joint;
+use crate::model::Model;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// The most `<group_state>`s that a file may have: each is as many numbers as a position of the robot has.
+const MAX_STATES: usize = 4096;
+
+impl Model {
+    /// Reads the named positions of an SRDF file, its `<group_state>`s: (name, q) in the order of the file.
+    ///
+    /// A `<joint>` of a state has as many numbers as q has for it, or the angle if it turns without limits; joints that are not
+    /// mentioned stay as in [`neutral`]. States of one name, such as `home` of an arm and of its hand, are one position. An SRDF
+    /// is often shared by robots with fewer joints: those that this one has not are passed over, or errors if `strict`. Joints
+    /// that follow others have no number of their own. All else in the file (groups, pairs that cannot collide, …) is ignored.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::Xml`] and [`Error::Element`], with file, line and element: what is no number, more or fewer
+    /// numbers than a joint has, rotations that have not the length 1. What a file may have at most stands at the
+    /// [beginning](crate#limits-of-files).
+    pub fn reference_configurations(
+        &self,
+        path: impl AsRef<Path>,
+        strict: bool,
+    ) -> Result<Vec<(String, Vec<f64>)>, Error> {
+        let (path, mut amount) = (path.as_ref(), Amount::default());
+        let text = amount.read(path)?;
+        self.group_states(&Element::parse(&text, &path.display().to_string(), &mut amount)?, strict)
+    }
+
+    /// Reads the named positions of an SRDF from a string; see [`reference_configurations`](Self::reference_configurations).
+    ///
+    /// ```
+    /// let arm = condyle_model::robots::arm7();
+    /// let srdf = r#"<robot name="arm7"><group_state name="bent" group="arm">
+    ///   <joint name="joint2" value="0.5"/><joint name="joint4" value="-1.2"/>
+    /// </group_state></robot>"#;
+    /// let positions = arm.reference_configurations_str(srdf, true)?;
+    /// assert_eq!(positions, [("bent".to_owned(), vec![0.0, 0.5, 0.0, -1.2, 0.0, 0.0, 0.0])]);
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`reference_configurations`](Self::reference_configurations).
+    pub fn reference_configurations_str(&self, text: &str, strict: bool) -> Result<Vec<(String, Vec<f64>)>, Error> {
+        self.group_states(&Element::parse(text, "<string>", &mut Amount::default())?, strict)
+    }
+
+    fn group_states(&self, root: &Element, strict: bool) -> Result<Vec<(String, Vec<f64>)>, Error> {
+        if root.tag != "robot" {
+            return Err(root.wrong("expected <robot>, the root of an SRDF"));
+        }
+        let bodies: HashMap<&str, &Body> = self.bodies[1..].iter().map(|b| (b.joint_name.as_str(), b)).collect();
+        let (mut states, mut places) = (Vec::<(String, Vec<f64>)>::new(), HashMap::new());
+        for (k, state) in root.all("group_state").enumerate() {
+            if k == MAX_STATES {
+                return Err(state.wrong(format!("more than {MAX_STATES} positions")));
+            }
+            let name = text(state, "name")?;
+            let place = *places.entry(name).or_insert_with(|| {
+                states.push((name.to_owned(), neutral(self)));
+                states.len() - 1
+            });
+            let q = &mut states[place].1;
+            for joint in state.all("joint") {
+                let name = text(joint, "name")?;
+                match bodies.get(name) {
+                    Some(body) => set(body, joint, q)?,
+                    None if strict => self.joint(name).map(drop).map_err(|unknown| joint.wrong(unknown.to_string()))?,
+                    None => {}
+                }
+            }
+            self.check_position(q).map_err(|e| match &e {
+                Error::Position { joint: name, what } => {
+                    let at = state.all("joint").find(|joint| joint.attribute("name") == Some(name));
+                    at.unwrap_or(state).wrong(what.clone())
+                }
+                _ => e,
+            })?;
+        }
+        Ok(states)
+    }
+}
+
+/// Sets what a `<joint>` of a state says; a joint that follows another one has no position of its own.
+fn set(body: &Body, element: &Element, q: &mut [f64]) -> Result<(), Error> {
+    let x = numbers(text(element, "value")?).map_err(|what| element.wrong(format!("value: {what}")))?;
+    if body.mimic.is_some() {
+        return Ok(());
+    }
+    let to = &mut q[body.idx_q..][..body.joint.nq()];
+    match (body.joint, &x[..]) {
+        (Joint::Continuous { .. }, &[angle]) => to.copy_from_slice(&[angle.cos(), angle.sin()]),
+        (_, x) if x.len() == to.len() => to.copy_from_slice(x),
+        _ => {
+            let s = if to.len() == 1 { "" } else { "s" };
+            return Err(element.wrong(format!("value: expected {} number{s}, found {}", to.len(), x.len())));
+        }
+    }
+    Ok(())
+}
+
+/// The text of an attribute that must be there.
+fn text<'a>(element: &'a Element, attribute: &str) -> Result<&'a str, Error> {
+    let text = element.attribute(attribute).filter(|text| !text.trim().is_empty());
+    text.ok_or_else(|| element.wrong(format!("has no {attribute}")))
+}

@@ -1,0 +1,96 @@
+//! Dynamics of a robot in contact whose accelerations and forces are the controls, and whose efforts follow.
+
+use super::batch::Law;
+use super::robot::RobotDynamics;
+use crate::Error;
+use crate::robot::actuation::Actuation;
+use crate::robot::capabilities::Capabilities;
+use crate::robot::contact::{Contact, rows_of};
+use crate::robot::costs::Cost;
+use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::limits::Limit;
+use crate::robot::residuals::residual::Residual;
+use condyle_dynamics::Model;
+use std::sync::Arc;
+
+/// Inverse dynamics of a robot in contact, and costs: (q̈, λ) = u, τ = M q̈ + h − Jᵀλ, which asks for Nᵀτ = 0 and J q̈ + γ = 0.
+#[derive(Clone, Debug)]
+pub struct ControlledContactAcceleration(pub(super) RobotDynamics);
+
+/// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
+/// Euler:
+///
+/// ```text
+/// (q̈, λ) = u,   τ = M q̈ + h − Jᵀλ,   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
+/// Nᵀτ = 0        nothing drives some coordinates     (Nᵀ S = 0: of a floating base the first 6 rows of τ)
+/// J q̈ + γ = 0    contacts hold
+/// ```
+///
+/// The equations are [`Limit`]s that the knot has of itself, called `undriven efforts` and `contact …`, before those that are
+/// given; [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds them, to [`Fddp`](crate::Fddp) alone they are costs.
+/// Nothing is inverted, so that contacts may be redundant and M singular. Solutions are those of
+/// [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations where it serves. Without contacts it is
+/// [`InverseDynamics`](crate::robot::InverseDynamics) with drives. These are Crocoddyl's rules
+/// (`DifferentialActionModelContactInvDynamics`, and `DifferentialActionModelFreeInvDynamics` without contacts).
+///
+/// ```
+/// use condyle_dynamics::{ContactConstraint, robots};
+/// use condyle_optimal::ActionModel;
+/// use condyle_optimal::robot::{Contact, ContactInverseDynamics};
+/// use std::sync::Arc;
+/// let quadruped = Arc::new(robots::quadruped());
+/// let contacts = ["LF_foot", "RH_foot"].map(|foot| {
+///     let frame = quadruped.frame(foot).unwrap();
+///     Contact::new(foot, ContactConstraint { kd: 50.0, ..ContactConstraint::point(frame) })
+/// });
+/// let trot = ContactInverseDynamics::running(quadruped, &contacts, 0.02, vec![])?;
+/// assert_eq!(trot.nu(), 18 + 6);
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+pub type ContactInverseDynamics = Integrated<ControlledContactAcceleration>;
+
+impl ControlledContactAcceleration {
+    /// A robot with some drives, in contact.
+    ///
+    /// # Errors
+    /// [`Error::Contact`] for a contact that does not fit or is named twice; [`Error::Cost`] for a term that does not fit;
+    /// [`Error::Actuation`] for drives of another robot.
+    pub fn new(model: Arc<Model>, actuation: Actuation, contacts: &[Contact], costs: Vec<Cost>) -> Result<Self, Error> {
+        actuation.check(&model)?;
+        let (all, named, undriven) = (Actuation::all(&model), rows_of(contacts), actuation.undriven());
+        let drives = (!undriven.is_empty()).then(|| Limit::equality("undriven efforts", Residual::UndrivenEffort));
+        let holds = named.iter().map(|(contact, _)| {
+            Limit::equality(&format!("contact {contact}"), Residual::ContactAcceleration { contact: contact.clone() })
+        });
+        let limits = drives.into_iter().chain(holds).collect();
+        let nu = model.nv() + named.last().map_or(0, |(_, rows)| rows.end);
+        let capabilities =
+            Capabilities { nu, effort: true, inverse: true, undriven, contacts: named, ..Capabilities::default() };
+        let law = Law::ContactInverse(contacts.to_vec(), actuation);
+        let mut robot = RobotDynamics::new(model, all, capabilities, law, costs)?;
+        robot.terms.require(limits)?;
+        Ok(Self(robot))
+    }
+}
+
+impl ContactInverseDynamics {
+    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other drives and
+    /// integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
+    ///
+    /// # Errors
+    /// As [`ControlledContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
+    pub fn running(model: Arc<Model>, contacts: &[Contact], dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
+        let actuation = Actuation::joints(&model);
+        let inner = ControlledContactAcceleration::new(model, actuation, contacts, costs)?;
+        Self::new(inner, Integrator::SemiImplicitEuler, dt)
+    }
+
+    /// No accelerations, and the forces among the smallest efforts and forces that hold the robot still at a state,
+    /// (τ, λ) = [S Jᵀ]⁺ g(q): u = (0, λ). Allocates.
+    ///
+    /// # Panics
+    /// If `x` has not nq + nv numbers.
+    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
+        self.inner_mut().0.hold(x)
+    }
+}

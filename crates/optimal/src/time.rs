@@ -1,0 +1,11 @@
+//! The clock of a solve: the system's, or in a browser, which has none for Rust, one that the host gives.
+
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+mod host;
+
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+pub(crate) use host::Instant;
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+pub use host::set_clock;
+#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
+pub(crate) use std::time::Instant;

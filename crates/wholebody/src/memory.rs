@@ -1,0 +1,111 @@
+//! The last solution, from which the next one starts also where contacts have come or gone.
+//!
+//! Every unknown and every constraint keeps its place in a numbering in which all contacts touch. Forces are kept in parts of
+//! their contact's activation, so that one whose limit is ramped stays at it; those of a contact that begins are where they
+//! were when it ended.
+
+use crate::cone_program::{Multipliers, Size};
+
+/// The place of each unknown and constraint in use, where all contacts touch.
+pub(crate) struct Places {
+    pub unknowns: Vec<usize>,
+    /// What each unknown is in proportion to: 1, or the activation of the contact whose force it is.
+    pub units: Vec<f64>,
+    pub equalities: Vec<usize>,
+    pub rows: Vec<usize>,
+    pub cone_rows: Vec<usize>,
+}
+
+impl Places {
+    pub(crate) fn new(capacity: Size) -> Self {
+        let Size { unknowns, equalities, rows, cone_rows } = capacity;
+        Self {
+            unknowns: Vec::with_capacity(unknowns),
+            units: Vec::with_capacity(unknowns),
+            equalities: Vec::with_capacity(equalities),
+            rows: Vec::with_capacity(rows),
+            cone_rows: Vec::with_capacity(cone_rows),
+        }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        let Self { unknowns, units, equalities, rows, cone_rows } = self;
+        units.clear();
+        [unknowns, equalities, rows, cone_rows].into_iter().for_each(Vec::clear);
+    }
+}
+
+/// A solution with room for all contacts, and the numbers of it that a program asks for.
+pub(crate) struct Memory {
+    /// Whether there is a solution.
+    known: bool,
+    all: Point,
+    asked: Point,
+}
+
+/// x and the multipliers.
+struct Point {
+    x: Vec<f64>,
+    equalities: Vec<f64>,
+    rows: Vec<f64>,
+    cones: Vec<f64>,
+}
+
+impl Point {
+    fn new(capacity: Size) -> Self {
+        let Size { unknowns, equalities, rows, cone_rows } = capacity;
+        Self {
+            x: vec![0.0; unknowns],
+            equalities: vec![0.0; equalities],
+            rows: vec![0.0; rows],
+            cones: vec![0.0; cone_rows],
+        }
+    }
+}
+
+impl Memory {
+    pub(crate) fn new(capacity: Size) -> Self {
+        Self { known: false, all: Point::new(capacity), asked: Point::new(capacity) }
+    }
+
+    pub(crate) fn forget(&mut self) {
+        self.known = false;
+    }
+
+    /// Keeps a solution. Equalities that a solver did not see have no multipliers.
+    pub(crate) fn keep(&mut self, places: &Places, x: &[f64], multipliers: Multipliers<'_>) {
+        let Point { x: all_x, equalities, rows, cones } = &mut self.all;
+        for (all, places, values) in [
+            (all_x, &places.unknowns, x),
+            (equalities, &places.equalities, multipliers.equalities),
+            (rows, &places.rows, multipliers.rows),
+            (cones, &places.cone_rows, multipliers.cones),
+        ] {
+            places.iter().zip(values).for_each(|(&place, &value)| all[place] = value);
+        }
+        for (&place, unit) in places.unknowns.iter().zip(&places.units) {
+            self.all.x[place] /= unit;
+        }
+        self.known = true;
+    }
+
+    /// x and the multipliers of a program, if there is a solution.
+    pub(crate) fn recall(&mut self, places: &Places) -> Option<(&[f64], Multipliers<'_>)> {
+        let Self { known, all, asked } = self;
+        let gather = |to: &mut [f64], places: &[usize], all: &[f64]| {
+            to.iter_mut().zip(places).for_each(|(to, &place)| *to = all[place]);
+        };
+        gather(&mut asked.x, &places.unknowns, &all.x);
+        gather(&mut asked.equalities, &places.equalities, &all.equalities);
+        gather(&mut asked.rows, &places.rows, &all.rows);
+        gather(&mut asked.cones, &places.cone_rows, &all.cones);
+        let Point { x, equalities, rows, cones } = asked;
+        x.iter_mut().zip(&places.units).for_each(|(x, unit)| *x *= unit);
+        let multipliers = Multipliers {
+            equalities: &equalities[..places.equalities.len()],
+            rows: &rows[..places.rows.len()],
+            cones: &cones[..places.cone_rows.len()],
+        };
+        known.then_some((&x[..places.unknowns.len()], multipliers))
+    }
+}

@@ -1,0 +1,92 @@
+//! The conditions of Karush, Kuhn and Tucker for a step's program, as it stands before anything is eliminated or scaled.
+
+use crate::controller::WholeBodyController;
+use crate::inspection::{Optimum, Program};
+use crate::references::References;
+use nalgebra::{DVector, DVectorView};
+
+/// How far a step is from the optimum of its program of the first priority: errors of the conditions of Karush, Kuhn and Tucker.
+/// At the default [`tolerance`](crate::Settings::tolerance) the first three are below 1e-7 and the last below 1e-5: the solver's
+/// own is of numbers that are scaled to size one, where here forces of 1000 N stand beside accelerations of 1 m/s².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optimality {
+    /// The gradient P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
+    pub stationarity: f64,
+    /// What the worst equality, bound or cone is violated by, relative to its row and the unknowns.
+    pub primal: f64,
+    /// How far the multipliers are outside of their cones, relative to themselves.
+    pub dual: f64,
+    /// The sum of the products of slacks and multipliers, relative to 1 and the terms of the objective.
+    pub complementarity: f64,
+}
+
+impl Optimality {
+    /// The largest of the errors.
+    pub fn worst(&self) -> f64 {
+        let Self { stationarity, primal, dual, complementarity } = *self;
+        [stationarity, primal, dual, complementarity].into_iter().fold(0.0, f64::max)
+    }
+}
+
+impl WholeBodyController {
+    /// The errors of the conditions of optimality at the last step, which was at this state and for these references. For tests
+    /// and demonstrations: it assembles the program anew, and allocates. After a safe command, which is no optimum, they say
+    /// nothing.
+    ///
+    /// ```
+    /// # use condyle_dynamics::robots;
+    /// # use condyle_wholebody::{FrictionContact, Settings, Task, WholeBodyController};
+    /// # let robot = robots::quadruped();
+    /// # let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|foot| FrictionContact::point(foot, 0.7));
+    /// # let mut q = vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0];
+    /// # q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
+    /// let mut controller = WholeBodyController::new(&robot, &feet, &[Task::com(), Task::posture()], Settings::default())?;
+    /// let references = controller.hold(&q);
+    /// controller.step(&q, &[0.0; 18], &references).solved().unwrap();
+    /// assert!(controller.optimality(&q, &[0.0; 18], &references).worst() < 1e-6);
+    /// # Ok::<(), condyle_wholebody::Error>(())
+    /// ```
+    pub fn optimality(&mut self, q: &[f64], v: &[f64], references: &References) -> Optimality {
+        let optimum = self.optimum();
+        errors(&self.program(q, v, references), &optimum)
+    }
+}
+
+fn errors(program: &Program, optimum: &Optimum) -> Optimality {
+    let Optimum { x, rows: z, cones: w, .. } = optimum;
+    let Program { P, c, A, b, G, lower, upper, F, h, cones } = program;
+    // P x + c = Aᵀ y + Gᵀ z + Fᵀ w for some y
+    let terms = [P * x, c.clone(), -G.transpose() * z, -F.transpose() * w];
+    let gradient = terms.iter().sum::<DVector<f64>>();
+    let size = 1.0 + terms.iter().map(DVector::amax).fold(0.0, f64::max);
+    let Q = A.transpose().qr().q(); // what of the gradient is not in the range of Aᵀ
+    let stationarity = (&gradient - &Q * Q.tr_mul(&gradient)).amax() / size;
+
+    let norm = |M: &nalgebra::DMatrix<f64>, i: usize| M.row(i).norm() * (1.0 + x.norm());
+    let (equalities, g, s) = (A * x - b, G * x, F * x + h);
+    let (mut primal, mut dual, mut gap) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for i in 0..b.len() {
+        primal = primal.max(equalities[i].abs() / norm(A, i));
+    }
+    for i in 0..g.len() {
+        let (below, above) = (g[i] - lower[i], upper[i] - g[i]);
+        primal = primal.max(f64::max(-below, -above) / norm(G, i));
+        // z⁺ belongs to the lower bound and z⁻ to the upper one, where there is one
+        for (z, slack) in [(z[i].max(0.0), below), ((-z[i]).max(0.0), above)] {
+            if z > 0.0 {
+                gap += z * slack;
+            }
+        }
+    }
+    let mut first = 0;
+    for &dim in cones {
+        let (s, w) = (s.rows(first, dim), w.rows(first, dim));
+        let margin = |x: &DVectorView<'_, f64>| x.rows(1, dim - 1).norm() - x[0];
+        primal = primal.max(margin(&s) / norm(F, first));
+        dual = dual.max(margin(&w) / (1.0 + w[0].abs()));
+        gap += s.dot(&w);
+        first += dim;
+    }
+    let objective = 0.5 * x.dot(&(P * x)) + c.dot(x).abs();
+    Optimality { stationarity, primal, dual, complementarity: gap.abs() / (1.0 + objective) }
+}

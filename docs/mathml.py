@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""Turns the formulas of the book, LaTeX between dollars, into MathML, which browsers show without help.
+
+A preprocessor of mdBook, which calls it with the book on its standard input (`[preprocessor.mathml]` in book.toml).
+Needs the package latex2mathml (`pip install latex2mathml`).
+"""
+
+import json
+import re
+import sys
+from typing import Any
+
+from latex2mathml.converter import convert
+
+SPECIAL = str.maketrans({"*": "&#42;", "_": "&#95;", "|": "&#124;"})
+"""What Markdown would take for its own."""
+PARTS = re.compile(r"(?P<code>^```.*?^```$|`[^`\n]*`)|\$\$(?P<display>[^$]+)\$\$|\$(?P<inline>[^$\n]+)\$", re.M | re.S)
+
+
+def with_mathml(text: str) -> str:
+    """A page with its formulas as MathML; code stays as it is."""
+
+    def replace(part: re.Match[str]) -> str:
+        if part["code"] is not None:
+            return part[0]
+        if part["display"] is not None:
+            formula = part["display"].strip().replace("{aligned}", "{split}")  # the converter knows one of the two
+            return convert(formula, display="block").translate(SPECIAL)
+        return convert(part["inline"]).translate(SPECIAL)
+
+    return PARTS.sub(replace, text)
+
+
+def visit(items: list[Any]) -> None:
+    for item in items:
+        if isinstance(item, dict) and "Chapter" in item:
+            chapter = item["Chapter"]
+            chapter["content"] = with_mathml(chapter["content"])
+            visit(chapter["sub_items"])
+
+
+def main() -> None:
+    if sys.argv[1:2] == ["supports"]:
+        sys.exit(sys.argv[2] != "html")
+    _, book = json.load(sys.stdin)
+    visit(book["items"] if "items" in book else book["sections"])
+    json.dump(book, sys.stdout)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,25 @@
+//! Motions of the arm, and the efforts that they take.
+
+use crate::arm::JOINTS;
+use condyle_dynamics::{Data, Model, aba, rnea};
+
+/// How many motions there are.
+pub(crate) const MOTIONS: usize = 20;
+/// The difference of accelerations that is rounding (rad/s²).
+const ROUNDING: f64 = 1e-10;
+
+/// The efforts τ of the motions. From each the accelerations are computed again, and must be what they were.
+pub(crate) fn efforts(arm: &Model, data: &mut Data<f64>) -> [[f64; JOINTS]; MOTIONS] {
+    let mut efforts = [[0.0; JOINTS]; MOTIONS];
+    for (motion, tau) in efforts.iter_mut().enumerate() {
+        // any motion will do: sixteenths, which all machines have
+        let number = |k: usize, part: usize| (((motion + 1) * (7 * part + 3 * k + 1) % 64) as f64 - 32.0) / 16.0;
+        let [q, v, a]: [[f64; JOINTS]; 3] = [1, 2, 3].map(|part| core::array::from_fn(|k| number(k, part)));
+        tau.copy_from_slice(rnea(arm, data, &q, &v, &a, &[])); // τ = M q̈ + h
+        let again = aba(arm, data, &q, &v, &*tau, &[]); // q̈ = M⁻¹ (τ − h)
+        for (a, again) in a.iter().zip(again) {
+            assert!((again - a).abs() < ROUNDING, "motion {motion}: {a} came back as {again}");
+        }
+    }
+    efforts
+}

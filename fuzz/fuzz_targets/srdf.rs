@@ -1,0 +1,4 @@
+//! Named positions from SRDF.
+#![no_main]
+
+condyle_fuzz::target!(condyle_fuzz::Kind::Srdf);

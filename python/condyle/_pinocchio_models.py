@@ -1,0 +1,245 @@
+"""Models of Pinocchio as ours, and ours as Pinocchio's."""
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._condyle import WORLD, BodyId, Joint, Model, ModelBuilder, ModelError
+from ._inertia import Inertia
+
+_Part = tuple[Joint, NDArray[np.float64]]
+"""A joint, and its place."""
+
+ALIGNED: dict[str, Callable[..., Joint]] = {
+    "JointModelR": Joint.revolute,
+    "JointModelRUB": Joint.continuous,
+    "JointModelP": Joint.prismatic,
+    "JointModelH": Joint.helical,
+}
+"""Pinocchio's names of joints about or along x, y or z, without that letter."""
+UNALIGNED: dict[str, Callable[..., Joint]] = {
+    "JointModelRevoluteUnaligned": Joint.revolute,
+    "JointModelPrismaticUnaligned": Joint.prismatic,
+    "JointModelHelicalUnaligned": Joint.helical,
+}
+FREE = {
+    "JointModelSpherical": Joint.spherical,
+    "JointModelPlanar": Joint.planar,
+    "JointModelTranslation": Joint.translation,
+    "JointModelFreeFlyer": Joint.free_flyer,
+}
+NO_LIMIT = 1e30
+"""Limits of this size are none: Pinocchio has infinity or the largest number for them."""
+
+
+def from_pinocchio(theirs: Any) -> Model:
+    """Ours of theirs; see `Model.from_pinocchio`."""
+    _check_order(theirs)
+    builder, bodies = ModelBuilder(theirs.name), [WORLD]
+    builder.gravity(theirs.gravity.linear)
+    builder.merge(WORLD, None, _inertia(theirs.inertias[0]))
+    links = {frame.parentJoint: frame.name for frame in reversed(list(theirs.frames)) if _is_link(frame)}
+    followers = []
+    for i in range(1, theirs.njoints):
+        joint, name, on = theirs.joints[i], theirs.names[i], bodies[theirs.parents[i]]
+        place, inertia = theirs.jointPlacements[i].homogeneous, _inertia(theirs.inertias[i])
+        kind = joint.shortname()
+        if kind == "JointModelMimic":
+            followers.append((i, joint))
+        parts = _parts(joint, name)
+        if len(parts) > 1:
+            _check_lossless(theirs, joint, name)
+            parts[0] = (parts[0][0], place @ parts[0][1])
+            bodies.append(builder.chain(name, on, parts, inertia))
+            continue
+        options: Any = {} if kind == "JointModelMimic" else _losses(theirs, joint, name)
+        link = links.get(i, name)
+        bodies.append(builder.body(link, on, parts[0][0], place @ parts[0][1], inertia, joint_name=name, **options))
+    for i, joint in followers:
+        leader = next(k for k in range(1, theirs.njoints) if theirs.nvs[k] and theirs.idx_vs[k] == joint.idx_v)
+        builder.mimic(bodies[i], bodies[leader], joint.extract().scaling, joint.extract().offset)
+    _add_frames(builder, bodies, theirs)
+    model = builder.build()
+    lower, upper = theirs.lowerPositionLimit.copy(), theirs.upperPositionLimit.copy()
+    for i in range(1, model.nbodies):
+        if model.nqs[i] != model.nvs[i]:
+            turn = slice(model.idx_qs[i] + TURNS.get(model.joint_types[i], 0), model.idx_qs[i] + model.nqs[i])
+            lower[turn], upper[turn] = -np.inf, np.inf
+    model = model.with_limits(
+        _limits(lower), _limits(upper), _limits(theirs.upperVelocityLimit), _limits(theirs.upperEffortLimit)
+    )
+    return model.with_armature(theirs.armature)
+
+
+TURNS = {"free_flyer": 3, "planar": 2}
+"""Where in the position of a joint its rotation begins, if not at 0."""
+
+
+def _check_order(theirs: Any) -> None:
+    """Joints must stand depth first: that of each one's parent is on the way from the root to the joint before."""
+    way = [0]
+    for i in range(1, theirs.njoints):
+        parent = theirs.parents[i]
+        while way and way[-1] != parent:
+            way.pop()
+        if not way:
+            raise ModelError(
+                f"joint `{theirs.names[i]}` (number {i}) does not stand behind `{theirs.names[parent]}` and what it "
+                "carries: joints are expected depth first, as Pinocchio's readers of files number them"
+            )
+        way.append(i)
+
+
+def _parts(joint: Any, name: str) -> list[_Part]:
+    """The joints that one of Pinocchio's is made of, and where each sits in the frame of the one before."""
+    kind, here = joint.shortname(), np.eye(4)
+    if kind in FREE:
+        return [(FREE[kind](), here)]
+    own = joint.extract() if hasattr(joint, "extract") else joint
+    pitch = [own.pitch] if "JointModelH" in kind else []
+    if kind == "JointModelRevoluteUnboundedUnaligned":
+        return [(Joint.continuous(_motion(joint)[3:]), here)]
+    if kind == "JointModelMimic":
+        return [(_follower(_motion(joint) * own.scaling, name), here)]
+    if kind in UNALIGNED:
+        return [(UNALIGNED[kind](own.axis, *pitch), here)]
+    if kind[:-1] in ALIGNED:
+        return [(ALIGNED[kind[:-1]](np.eye(3)["XYZ".index(kind[-1])], *pitch), here)]
+    if kind == "JointModelUniversal":
+        return [(Joint.revolute(own.axis1), here), (Joint.revolute(own.axis2), here)]
+    if kind == "JointModelSphericalZYX":
+        return [(Joint.revolute(axis), here) for axis in np.eye(3)[::-1]]
+    if kind == "JointModelComposite":
+        parts = []
+        for part, X in zip(own.joints, own.jointPlacements, strict=True):
+            (first, place), *others = _parts(part, name)
+            parts += [(first, X.homogeneous @ place), *others]
+        return parts
+    raise ModelError(f"joint `{name}`: no joint here is a {kind}")
+
+
+def _motion(joint: Any) -> NDArray[np.float64]:
+    """S, the motion of a joint of one degree of freedom for a unit velocity, which does not depend on its position."""
+    data = joint.createData()
+    joint.calc(data, np.eye(max(joint.idx_q + 2, 2))[joint.idx_q])
+    return np.array(data.S, float).ravel()
+
+
+def _follower(S: NDArray[np.float64], name: str) -> Joint:
+    """The joint that moves along S, whose length is the square of the ratio, when the one that it follows moves."""
+    linear, angular = S[:3], S[3:]
+    if not S.any():
+        raise ModelError(f"joint `{name}`: follows another one with the ratio 0")
+    if not angular.any():
+        return Joint.prismatic(linear)
+    if not linear.any():
+        return Joint.revolute(angular)
+    return Joint.helical(angular, float(linear @ angular / (angular @ angular)))
+
+
+def _inertia(theirs: Any) -> Inertia:
+    return Inertia.from_com(theirs.mass, theirs.lever, theirs.inertia)
+
+
+def _limits(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    out: NDArray[np.float64] = np.where(np.abs(numbers) < NO_LIMIT, numbers, np.copysign(np.inf, numbers))
+    return out
+
+
+def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
+    """Damping and friction, which a joint has once here."""
+    out = {}
+    for what, numbers in ("damping", theirs.damping), ("friction", theirs.upperDryFrictionLimit):
+        own = np.array(numbers[joint.idx_v : joint.idx_v + joint.nv])
+        if np.ptp(own) > 0.0:
+            raise ModelError(f"joint `{name}`: expected one {what} for all its degrees of freedom, found {own}")
+        out[what] = float(own[0])
+    return out
+
+
+def _check_lossless(theirs: Any, joint: Any, name: str) -> None:
+    """Joints that become a chain have no damping nor friction."""
+    if any(_losses(theirs, joint, name).values()):
+        raise ModelError(f"joint `{name}`: damping and friction of a {joint.shortname()} have no place here")
+
+
+def _is_link(frame: Any) -> bool:
+    """Whether a frame is that of a joint's body itself."""
+    return str(frame.type) == "BODY" and np.array_equal(frame.placement.homogeneous, np.eye(4))
+
+
+def _add_frames(builder: ModelBuilder, bodies: Sequence[BodyId], theirs: Any) -> None:
+    kinds = {"BODY": "link", "JOINT": "joint", "FIXED_JOINT": "joint"}
+    for frame in list(theirs.frames)[1:]:
+        kind: Any = kinds.get(str(frame.type), "user")
+        builder.frame(frame.name, bodies[frame.parentJoint], frame.placement.homogeneous, kind)
+
+
+def to_pinocchio(ours: Model) -> Any:
+    """Theirs of ours; see `Model.to_pinocchio`."""
+    pin: Any = import_module("pinocchio")
+    theirs = pin.Model()
+    theirs.name = ours.name
+    theirs.gravity.linear = ours.gravity
+    for i in range(ours.nbodies):
+        if i:
+            place = pin.SE3(ours.joint_placements[i])
+            theirs.addJoint(
+                ours.parents[i], _their_joint(pin, ours.joints[i], ours.joint_types[i]), place, ours.names[i]
+            )
+        inertia, own = pin.Inertia.Zero(), ours.inertias[i]  # its constructor refuses what some files have
+        inertia.mass, inertia.lever, inertia.inertia = own.mass, own.com, own.about_com
+        theirs.inertias[i] = inertia
+    for i, mimic in enumerate(ours.mimics):
+        if mimic:
+            leader = next(k for k in range(1, ours.nbodies) if ours.nvs[k] and ours.idx_vs[k] == ours.idx_vs[i])
+            if "continuous" in (ours.joint_types[i], ours.joint_types[leader]):
+                raise ModelError(f"joint `{ours.names[i]}`: follows a joint, and one of them turns without limits")
+            theirs = pin.transformJointIntoMimic(theirs, leader, i, mimic.ratio, mimic.offset)
+    moving: dict[int, int] = {}
+    for f in sorted(ours.frames, key=lambda f: f.kind != "joint"):
+        moves = f.kind == "joint" and f.name == ours.names[f.body] and f.body > 0
+        kind = {"link": "BODY", "joint": "JOINT" if moves else "FIXED_JOINT", "user": "OP_FRAME"}[f.kind]
+        place = pin.SE3(np.array(f.placement))
+        number = theirs.addFrame(pin.Frame(f.name, f.body, moving.get(f.body, 0), place, getattr(pin.FrameType, kind)))
+        if moves:
+            moving[f.body] = number
+    limits = ours.limits
+    theirs.lowerPositionLimit, theirs.upperPositionLimit = np.array(limits.lower), np.array(limits.upper)
+    theirs.upperVelocityLimit, theirs.lowerVelocityLimit = np.array(limits.velocity), -np.array(limits.velocity)
+    theirs.upperEffortLimit, theirs.lowerEffortLimit = np.array(limits.effort), -np.array(limits.effort)
+    theirs.damping, theirs.armature = np.array(ours.damping), np.array(ours.armature)
+    theirs.upperDryFrictionLimit, theirs.lowerDryFrictionLimit = np.array(ours.friction), -np.array(ours.friction)
+    return theirs
+
+
+def _their_joint(pin: Any, joint: Joint | None, kind: str) -> Any:
+    """The joint of Pinocchio's of this kind, along an axis by its own name where it has one."""
+    assert joint is not None
+    free = {"spherical": "Spherical", "planar": "Planar", "translation": "Translation", "free_flyer": "FreeFlyer"}
+    if kind in free:
+        return getattr(pin, f"JointModel{free[kind]}")()
+    assert joint.axis is not None
+    pitch = [joint.pitch] if kind == "helical" else []
+    for letter, axis in zip("XYZ", np.eye(3), strict=True):
+        if np.array_equal(joint.axis, axis):
+            name = {"revolute": "R", "continuous": "RUB", "prismatic": "P", "helical": "H"}[kind]
+            return getattr(pin, f"JointModel{name}{letter}")(*pitch)
+    if kind == "continuous":
+        return _unbounded(pin, joint.axis)
+    make: Callable[..., Any] = getattr(pin, f"JointModel{kind.capitalize()}Unaligned")
+    return make(joint.axis, *pitch)
+
+
+def _unbounded(pin: Any, axis: NDArray[np.float64]) -> Any:
+    """A joint that turns without limits about any axis: in Python only Pinocchio's reader of URDFs makes one."""
+    xyz = " ".join(repr(float(x)) for x in axis)
+    inertia = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    ends = f'<parent link="a"/><child link="b"/><axis xyz="{xyz}"/>'
+    joint = f'<joint name="joint" type="continuous">{ends}</joint>'
+    return pin.buildModelFromXML(
+        f'<robot name="joint"><link name="a"/><link name="b">{inertia}</link>{joint}</robot>'
+    ).joints[1]

@@ -1,0 +1,182 @@
+"""Playback of a motion in the browser, by viser."""
+
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._condyle import Data, Model, forward_kinematics
+from ._shapes import Shape, capsules, visuals
+from .algebra import SE3, quaternion
+
+_Array = NDArray[np.float64]
+_Forces = Sequence[Mapping[str, ArrayLike]]
+GREY, ORANGE = (158, 170, 186), (235, 120, 20)
+
+
+class Player:
+    """A motion that the browser shows: `show` a knot, `play`, `pause`, `close`; in a notebook it shows itself."""
+
+    def __init__(
+        self, model: Model, q: _Array, dt: float, shapes: list[Shape], arrows: list[_Array], server: Any
+    ) -> None:
+        self.server, self.dt, self.knot = server, dt, 0
+        self._poses = forward_kinematics(model, Data(model), q)
+        self._arrows = arrows
+        self._playing, self._closed = threading.Event(), threading.Event()
+        self._moving = threading.Lock()
+        scene = server.scene
+        scene.set_up_direction("+z")
+        scene.add_grid("/ground", width=4.0, height=4.0, cell_size=0.25)
+        self.bodies = [scene.add_frame(f"/robot/{k}", show_axes=False) for k in range(model.nbodies)]
+        for k, shape in enumerate(shapes):
+            name = f"/robot/{shape.body}/{k}"
+            X = SE3.from_homogeneous(shape.placement)
+            at = {"position": X.translation, "wxyz": _wxyz(X.rotation)}
+            if shape.mesh is not None:
+                scene.add_mesh_trimesh(name, shape.mesh, **at)
+            else:
+                scene.add_mesh_simple(name, shape.vertices, shape.faces, color=shape.color or GREY, **at)
+        self.arrows = None
+        if any(len(points) for points in arrows):
+            size = {"shaft_radius": 0.008, "head_radius": 0.02, "head_length": 0.05}
+            self.arrows = scene.add_arrows("/forces", _some(arrows[0]), ORANGE, **size)
+        last = len(self._poses) - 1
+        self.slider = server.gui.add_slider("time (s)", 0.0, max(last, 1) * dt, dt, 0.0)
+        self.button = server.gui.add_button("play")
+        self.slider.on_update(lambda _: self.show(round(self.slider.value / dt)))
+        self.button.on_click(lambda _: self.pause() if self._playing.is_set() else self.play())
+        self._look(self._poses)
+        self.show(0)
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """The page's address."""
+        return f"http://localhost:{self.server.get_port()}"
+
+    def show(self, knot: int) -> None:
+        """Shows a knot; those beyond the last one are the last one."""
+        with self._moving:
+            self.knot = min(max(knot, 0), len(self._poses) - 1)
+            with self.server.atomic():
+                for body, pose in zip(self.bodies, self._poses[self.knot], strict=True):
+                    body.position, body.wxyz = pose[:3, 3], _wxyz(pose[:3, :3])
+                if self.arrows is not None:
+                    points = self._arrows[min(self.knot, len(self._arrows) - 1)]
+                    self.arrows.visible = len(points) > 0
+                    if len(points):
+                        self.arrows.points = points.astype(np.float32)
+
+    def play(self) -> None:
+        """Plays on from the knot that is shown, again and again, until `pause`."""
+        self.button.label = "pause"
+        self._playing.set()
+
+    def pause(self) -> None:
+        """Stops at the knot that is shown."""
+        self.button.label = "play"
+        self._playing.clear()
+
+    def close(self) -> None:
+        """Ends the server of the page."""
+        self._closed.set()
+        self._playing.set()
+        self._thread.join()
+        self.server.stop()
+
+    def _run(self) -> None:
+        while True:
+            self._playing.wait()
+            begin, first = time.perf_counter(), self.knot
+            while self._playing.is_set():
+                if self._closed.is_set():
+                    return
+                gone = int((time.perf_counter() - begin) / self.dt)
+                knot = (first + gone) % len(self._poses)
+                if knot != self.knot:
+                    self.slider.value = knot * self.dt  # which shows it
+                    self.show(knot)
+                time.sleep(min(self.dt, 1.0 / 60.0))
+
+    def _look(self, poses: _Array) -> None:
+        """Where the page looks from, so that all of the motion is seen."""
+        points = poses[:, 1:, :3, 3].reshape(-1, 3)
+        low, high = points.min(0), points.max(0)
+        middle, far = (low + high) / 2.0, 0.8 + 1.2 * np.linalg.norm(high - low)
+        self.server.initial_camera.look_at = tuple(middle)
+        self.server.initial_camera.position = tuple(middle + far * np.array([0.75, -0.8, 0.35]))
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.url}" width="100%" height="480" style="border:0"></iframe>'
+
+    def __repr__(self) -> str:
+        return f"<condyle.viz.Player at {self.url}: {len(self._poses)} knots>"
+
+
+def play(
+    model: Model,
+    q: ArrayLike,
+    dt: float,
+    forces: _Forces | None = None,
+    urdf: str | PathLike[str] | None = None,
+    packages: Sequence[str | PathLike[str]] = (),
+    newtons_per_metre: float = 500.0,
+    port: int = 8080,
+) -> Player:
+    """Shows a motion in the browser, at the address that the returned `Player` has.
+
+    q: positions, (N, nq), as `solution.xs[:, :model.nq]`.
+    dt: the time from one knot to the next (s).
+    forces: contact forces of each knot, by the names of frames: the first three numbers are an arrow at the frame,
+        along the axes of the world; `solution.forces` of contacts whose rows are 'local_world_aligned' and whose names
+        are those of frames.
+    urdf: the file with the robot's shapes and meshes; `packages` are folders for `package://`. Without it, and for
+        meshes that are not there, bodies are capsules from joint to joint.
+    port: the page's port; the next free one is taken if it is in use.
+
+    Raises ImportError without viser (pip install condyle[viz]).
+    """
+    try:
+        viser = import_module("viser")
+    except ImportError as error:
+        raise ImportError("playback needs viser: pip install condyle[viz]") from error
+    q = np.atleast_2d(np.asarray(q, float))
+    if q.ndim != 2 or q.shape[1] != model.nq or not len(q):
+        raise ValueError(f"q: expected shape (N, {model.nq}) with N ≥ 1, found {q.shape}")
+    if not dt > 0.0:
+        raise ValueError(f"dt: expected a positive time, found {dt}")
+    arrows = _arrows(model, q, forces or [], newtons_per_metre)
+    shapes = capsules(model) if urdf is None else visuals(model, urdf, packages)
+    return Player(model, q, dt, shapes, arrows, viser.ViserServer(port=port, verbose=False))
+
+
+def _arrows(model: Model, q: _Array, forces: _Forces, scale: float) -> list[_Array]:
+    """The ends of each knot's arrows, (n, 2, 3)."""
+    data, out = Data(model), []
+    for position, knot in zip(q, forces, strict=False):
+        poses, ends = forward_kinematics(model, data, position), []
+        for name, force in knot.items():
+            f = np.asarray(force, float)
+            if f.ndim != 1 or len(f) < 3:
+                raise ValueError(f"forces: expected three numbers or more for `{name}`, found shape {f.shape}")
+            frame = model.frames[model.frame(name)]
+            at = (poses[frame.body] @ frame.placement)[:3, 3]
+            ends.append([at, at + f[:3] / scale])
+        out.append(np.array(ends).reshape(-1, 2, 3))
+    return out or [np.zeros((0, 2, 3))]
+
+
+def _some(points: _Array) -> NDArray[np.float32]:
+    """Arrows that can be drawn, where there may be none."""
+    return (points if len(points) else np.zeros((1, 2, 3))).astype(np.float32)
+
+
+def _wxyz(R: _Array) -> _Array:
+    return quaternion(R)[..., [3, 0, 1, 2]]

@@ -1,0 +1,74 @@
+//! Robots as straight-line code: the text and what its functions take, for `condyle.codegen`.
+
+use crate::constrained::constraint;
+use crate::exceptions::{exception, wrong_word};
+use crate::functions::regular;
+use crate::model::Model;
+use condyle_codegen::{Array, Error, FUNCTIONS, Language, Settings, functions, identifier};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Names and shapes of arrays.
+type Arrays = Vec<(String, usize, usize)>;
+
+/// The name of the code, its files as (name, text), and its functions as (name, arguments, results, operations).
+type Generated = (String, Vec<(String, String)>, Vec<(String, Arrays, Arrays, usize)>);
+
+fn arrays(arrays: &[Array]) -> Arrays {
+    arrays.iter().map(|a| (a.name.clone(), a.rows, a.columns)).collect()
+}
+
+/// The code of functions of a robot: its name, its files, and its functions with their arguments and results.
+#[pyfunction]
+#[pyo3(
+    name = "_generate",
+    signature = (model, names, language, *, frames=vec![], constraints=vec![], external_forces=false, inputs=vec![])
+)]
+pub(crate) fn generate(
+    py: Python<'_>,
+    model: &Bound<'_, Model>,
+    names: Vec<String>,
+    language: &str,
+    frames: Vec<String>,
+    constraints: Vec<Bound<'_, PyAny>>,
+    external_forces: bool,
+    inputs: Vec<String>,
+) -> PyResult<Generated> {
+    let robot = &model.get().inner;
+    let known = |name: &&String| !["inertia", "armature", "gravity"].contains(&&***name);
+    if let Some(other) = inputs.iter().find(known) {
+        return Err(wrong_word("inputs", "'inertia', 'armature' or 'gravity'", other));
+    }
+    let is_input = |name: &str| inputs.iter().any(|other| other == name);
+    let expected = || Language::NAMES.map(|name| format!("'{name}'")).join(", ");
+    let written = Language::named(language).ok_or_else(|| wrong_word("language", &expected(), language))?;
+    let settings = Settings {
+        frames,
+        constraints: constraints.iter().map(|given| constraint(robot, given)).collect::<PyResult<_>>()?,
+        external_forces,
+        inertia_is_input: is_input("inertia"),
+        armature_is_input: is_input("armature"),
+        gravity_is_input: is_input("gravity"),
+    };
+    let names: Vec<&str> = names.iter().map(|name| &**name).collect();
+    if let Some(other) = names.iter().find(|name| !FUNCTIONS.contains(name)) {
+        return Err(wrong_word("functions", &FUNCTIONS.map(|name| format!("'{name}'")).join(", "), other));
+    }
+    let made = py.detach(|| {
+        let all = functions(robot, &names, &settings)?;
+        let name = identifier(robot.name());
+        let files = written.text(&name, &all);
+        Ok((name, files, all))
+    });
+    let (name, files, all) = match made {
+        Ok(made) => made,
+        Err(Error::Model(error)) => return Err(exception(error)),
+        Err(Error::Singular { .. }) => {
+            return Err(regular(robot).err().unwrap_or_else(|| PyValueError::new_err("model")));
+        }
+        Err(other) => return Err(PyValueError::new_err(other.to_string())),
+    };
+    let files = files.into_iter().map(|file| (file.name, file.text)).collect();
+    let all = all.iter().map(|f| (f.name.clone(), arrays(&f.inputs), arrays(&f.outputs), f.operations().total()));
+    Ok((name, files, all.collect()))
+}

@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# Checks that each feature of each crate can be left out: none is on, one is, all but one are. Then it runs the unit tests of what
+# needs no standard library without it (dynamics runs without it in tests/embedded.sh).
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# $1: a crate; $2: a feature that it must have, or none; $3, …: features that it may have.
+check() {
+    local crate=$1 needed=$2 feature others combinations
+    shift 2
+    combinations=("$needed")
+    for feature in "$@"; do
+        others=$(printf '%s\n' "$@" | grep -vx "$feature" | paste -sd ,)
+        combinations+=("$needed,$feature" "$needed,$others")
+    done
+    while read -r combination; do
+        echo "$crate: ${combination:-none}"
+        cargo check --quiet --locked --package "$crate" --no-default-features --features "$combination"
+    done < <(printf '%s\n' "${combinations[@]}" | sed 's/^,//; s/,$//' | sort -u)
+}
+
+check condyle-spatial libm serde std
+check condyle-linalg libm std threads
+check condyle-model libm loaders serde std threads
+check condyle-dynamics libm loaders serde std threads
+check condyle-optimal "" loaders serde threads
+check condyle-wholebody "" loaders threads
+check condyle "" loaders serde threads
+
+for crate in spatial linalg model; do
+    cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
+done
+cargo test --locked --package condyle-linalg --no-default-features --features std
