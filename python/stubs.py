@@ -150,7 +150,7 @@ RESULTS = {
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Problem.rollout Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
+        Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
         FrictionContact.normal Task.joints""",
@@ -167,7 +167,7 @@ RESULTS = {
     "tuple[float, float]": "Plan.span",
     "int": """
         ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame Model.joint
-        Model.nbodies Model.nq Model.nv Problem.horizon Task.priority""",
+        Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority""",
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",

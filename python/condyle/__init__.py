@@ -33,7 +33,7 @@ Ctrl-C, ends the call. A solver then has the best iterate as its `solution`, a s
 and `out` is written as far as the call came.
 
 The environment variable `CONDYLE_LEVEL` chooses the vector instructions: "baseline", "neon", "avx2" or "avx512". If
-this processor does not have them, or there are none of that name, the import fails.
+this processor does not have them, or there are none of that name, the import fails. `LEVEL` is the one in use.
 
 Derivatives of one's own function of the state are exact, by `HyperDual` numbers in arrays of objects:
 
@@ -71,6 +71,7 @@ Contacts, loops, impacts: `ContactConstraint`, `ConstraintSet`, `constrained_dyn
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
+Many solves: `sweep` (`Variations`), in this process or on a Ray cluster
 Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
     (poses, motions, forces), `conventions` (other libraries' numbers), `casadi`, `pinocchio` (its spelling),
     `crocoddyl` (its problems) and `viz` (pictures; all four imported by themselves)
@@ -78,6 +79,7 @@ Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simul
 
 from . import algebra, conventions, inertial_parameters, optimal, robots, simulation, wholebody
 from ._condyle import (
+    LEVEL,
     WORLD,
     BodyId,
     Cholesky,
@@ -167,6 +169,7 @@ from ._condyle import (
 from ._differentiate import gradient, hessian, jacobian
 from ._inertia import Inertia
 from ._load import load
+from ._sweep import Variations, sweep
 from ._types import (
     AbaDerivatives,
     AbaHessian,
@@ -192,6 +195,7 @@ from ._types import (
 )
 
 __all__ = [
+    "LEVEL",
     "WORLD",
     "AbaDerivatives",
     "AbaHessian",
@@ -229,6 +233,7 @@ __all__ = [
     "RneaDerivatives",
     "RneaHessian",
     "RneaSecondDerivatives",
+    "Variations",
     "__version__",
     "aba",
     "aba_derivatives",
@@ -308,6 +313,7 @@ __all__ = [
     "simulation",
     "static_torque",
     "static_torque_derivative",
+    "sweep",
     "transport",
     "wholebody",
 ]

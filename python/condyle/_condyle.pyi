@@ -45,6 +45,7 @@ from ._wholebody import Command, Gains, Optimality, References, Settings
 __all__ = [
     "ARM7",
     "HUMANOID",
+    "LEVEL",
     "QUADRUPED",
     "WORLD",
     "Action",
@@ -210,6 +211,7 @@ _Action: TypeAlias = (
 )
 
 __version__: str
+LEVEL: str
 WORLD: BodyId
 ARM7: str
 QUADRUPED: str
@@ -2832,6 +2834,18 @@ class Problem:
     @property
     def horizon(self) -> int:
         """The number of knots before the terminal one, N."""
+
+    @property
+    def ndx(self) -> int:
+        """The number of numbers of a change of a state."""
+
+    @property
+    def nx(self) -> int:
+        """The number of numbers of a state."""
+
+    @property
+    def x0(self) -> _Array:
+        """The initial state, nx numbers; `set_x0` sets it."""
 
     @staticmethod
     def from_json(text: str) -> Problem:

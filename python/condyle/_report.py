@@ -17,7 +17,7 @@ class Reporter:
         self._callback, self._lines = callback, verbose
         self._bar: Any = None
         if progress:
-            self._bar = _bar()
+            self._bar = _bar(desc="FDDP", unit=" iterations")
             self._lines = verbose or self._bar is None
 
     def __call__(self, now: Iteration) -> object:
@@ -41,10 +41,27 @@ class Reporter:
             self._bar.close()
 
 
-def _bar() -> Any:
+def _bar(**options: Any) -> Any:
     """A bar of tqdm, or None where that is not installed."""
     try:
         tqdm: Any = importlib.import_module("tqdm.auto")
     except ImportError:
         return None
-    return tqdm.tqdm(desc="FDDP", unit=" iterations")
+    return tqdm.tqdm(**options)
+
+
+def counter(progress: bool | Callable[[int, int], object], total: int, done: int) -> Callable[[int | None], None]:
+    """Who is told how many more are done, and None at the end; shows it as `progress` says."""
+    bar = _bar(desc="sweep", unit=" variations", total=total, initial=done) if progress is True else None
+
+    def more(count: int | None) -> None:
+        nonlocal done
+        done += count or 0
+        if bar is not None:
+            bar.close() if count is None else bar.update(count)
+        elif count is not None and callable(progress):
+            progress(done, total)
+        elif count is not None and progress:
+            print(f"{done} of {total} variations", flush=True)
+
+    return more

@@ -129,6 +129,7 @@ mod _condyle {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         condyle::level::requested().map_err(|refused| PyImportError::new_err(refused.to_string()))?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("LEVEL", condyle::level::level().name())?;
         module.add("WORLD", builder::world(module.py())?)?;
         module.add("ARM7", condyle::robots::ARM7)?;
         module.add("QUADRUPED", condyle::robots::QUADRUPED)?;

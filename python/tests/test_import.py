@@ -11,6 +11,7 @@ LATER = {
     "matplotlib",
     "viser",
     "pandas",
+    "ray",
     "pinocchio",
     "crocoddyl",
     "mujoco",

@@ -183,6 +183,25 @@ impl Problem {
         Ok(lock("problem", &self.inner)?.horizon())
     }
 
+    /// The number of numbers of a state.
+    #[getter]
+    fn nx(&self) -> PyResult<usize> {
+        Ok(lock("problem", &self.inner)?.nx())
+    }
+
+    /// The number of numbers of a change of a state.
+    #[getter]
+    fn ndx(&self) -> PyResult<usize> {
+        Ok(lock("problem", &self.inner)?.ndx())
+    }
+
+    /// The initial state, nx numbers; `set_x0` sets it.
+    #[getter]
+    fn x0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let inner = lock("problem", &self.inner)?;
+        output(py, None, &[inner.nx()], |out| out.copy_from_slice(inner.x0()))
+    }
+
     /// Sets the initial state, nx numbers, as an MPC does before each solve.
     ///
     /// Raises `ProblemError` for a number that is not finite, and for a rotation whose length is not 1 (up to 1e-3).

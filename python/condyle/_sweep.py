@@ -1,0 +1,264 @@
+"""Many solves of problems that vary: in this process, or on the machines of a Ray cluster."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._condyle import LEVEL, AugmentedLagrangian, Error, Fddp, Problem, __version__
+from ._report import counter
+from ._types import Solution
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+_Array = NDArray[np.float64]
+_Rows = dict[str, NDArray[Any]]
+
+
+class Variations(NamedTuple):
+    """The results of a `sweep`: row i is of variation i.
+
+    The numbers of a variation that failed with an error are NaN, its status is "error".
+    """
+
+    status: NDArray[np.str_]
+    """The end of each solve, as the status of a `Solution`; "error" where there is an `error`."""
+    cost: _Array
+    """The cost of each trajectory."""
+    gap: _Array
+    """The largest gap of each trajectory."""
+    iterations: NDArray[np.int64]
+    """The iterations of each solve."""
+    seconds: _Array
+    """The time that each solve took."""
+    error: NDArray[np.str_]
+    """What went wrong where a variation could not be made or solved; else empty."""
+    xs: _Array | None
+    """States, (V, N + 1, nx)."""
+    us: _Array | None
+    """Controls, (V, N, nu); where knots differ in nu, those of all knots one after the other, (V, Σ nu)."""
+    K: _Array | None
+    """Feedback gains, (V, N, nu, ndx), or (V, Σ nu · ndx); None unless `keep` names them."""
+    k: _Array | None
+    """Feed-forward, as `us`; None unless `keep` names it."""
+
+    @staticmethod
+    def load(folder: "str | PathLike[str]") -> "Variations":
+        """The results that a `sweep` has written to a folder: all, or those of the chunks that are done.
+
+        Raises ValueError if the folder holds no sweep, or none of its chunks is done.
+        """
+        from ._sweep_folder import Folder
+
+        rows = Folder.open(folder).done()
+        if not rows:
+            raise ValueError(f"folder: no chunk of the sweep in {folder} is done")
+        return _table([rows[chunk] for chunk in sorted(rows)])
+
+
+class Job(NamedTuple):
+    """What all variations share: it travels to each worker once."""
+
+    problem: Problem
+    start: tuple[Any, Any]
+    vary: Callable[[Problem, Any], Problem | None] | None
+    solver: type[Fddp] | type[AugmentedLagrangian]
+    settings: dict[str, Any]
+    keep: tuple[str, ...]
+
+
+def sweep(
+    problem: Problem,
+    variations: ArrayLike | Sequence[Any],
+    *,
+    vary: Callable[[Problem, Any], Problem | None] | None = None,
+    start: Solution | tuple[Any, Any] | None = None,
+    solver: type[Fddp] | type[AugmentedLagrangian] = Fddp,
+    settings: dict[str, Any] | None = None,
+    keep: Sequence[Literal["xs", "us", "K", "k"]] = ("xs", "us"),
+    folder: "str | PathLike[str] | None" = None,
+    chunk: int = 64,
+    cluster: bool | str | None = None,
+    workers: int | None = None,
+    progress: bool | Callable[[int, int], object] = False,
+) -> Variations:
+    """Solves variations of a problem: a library of motions, a sweep of parameters, Monte Carlo of a plan.
+
+    problem: the nominal problem.
+    variations: initial states, (V, nx); or with `vary` a sequence of anything.
+    vary: a function of the problem and a variation. It returns the problem to solve, such as one of a heavier robot, or
+        changes what it is given and returns None; then it must set the same things for each variation, since the next
+        one gets the same problem. None sets the initial state.
+    start: states and controls from which all solves start, or a `Solution`. None solves the nominal problem from rest,
+        and starts from its solution. The first state is that of the variation.
+    solver: `Fddp` or `AugmentedLagrangian`, which is made for each problem with the `settings`.
+    keep: what is kept of each solution: "xs", "us", "K", "k".
+    folder: where results are written, chunk by chunk, as NPZ files. A sweep that was cut off goes on from there when it
+        is called again with the same arguments; `Variations.load` reads it. None writes nothing.
+    chunk: how many variations travel, and are written, together.
+    cluster: None solves in this process; True on the processors of this machine, or of the cluster that `ray` is
+        connected to; else the address of a Ray cluster (`pip install condyle[ray]`). Problem and start travel once to
+        each worker, which computes at this process's level of vector instructions (`condyle.LEVEL`): the results have
+        the same bits. The share of a worker that is lost is done again by another one.
+    workers: how many workers there are on the cluster; None is one for each of its processors.
+    progress: whether to show the progress (by tqdm where that is installed); or a function of the numbers of variations
+        that are done and that there are.
+
+    Returns `Variations`. An error of one variation is in its row, and ends no sweep.
+
+    Raises ValueError for arguments that make no sense, and for a folder with the results of another sweep; ImportError
+    where Ray is not installed; RuntimeError if workers are lost again and again.
+
+    >>> arm, rest = condyle.robots.arm7(), np.zeros(14)
+    >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual
+    >>> costs = [Cost("rest", 1.0, Residual.state(rest)), Cost("effort", 1e-3, Residual.control_gravity())]
+    >>> problem = Problem(rest, [FreeDynamics(arm, 0.02, costs)], [0] * 20, FreeDynamics(arm, None, costs[:1]))
+    >>> found = condyle.sweep(problem, np.random.default_rng(1).normal(rest, 0.05, (100, 14)))
+    >>> set(found.status.tolist()), found.xs.shape
+    ({'converged'}, (100, 21, 14))
+    """
+    if chunk < 1:
+        raise ValueError(f"chunk: expected at least 1, found {chunk}")
+    if not set(keep) <= {"xs", "us", "K", "k"}:
+        raise ValueError(f"keep: expected some of 'xs', 'us', 'K' and 'k', found {list(keep)!r}")
+    items: Any = variations if vary is not None else _states(problem, variations)
+    if len(items) == 0:
+        raise ValueError("variations: there are none")
+    options = settings or {}
+    job = Job(problem, _start(problem, start, solver, options), vary, solver, options, tuple(keep))
+
+    chunks = [(first, items[first : first + chunk]) for first in range(0, len(items), chunk)]
+    results: dict[int, _Rows] = {}
+    record = None
+    if folder is not None:
+        from ._sweep_folder import Folder
+
+        record = Folder.create(folder, job, items, chunk, {"level": LEVEL, "version": __version__})
+        results = record.done()
+    report = counter(progress, len(items), sum(len(rows["cost"]) for rows in results.values()))
+    missing = [(number, *chunks[number]) for number in range(len(chunks)) if number not in results]
+    try:
+        for number, rows in _solved(job, missing, cluster, workers):
+            if record is not None:
+                record.write(number, rows)
+            results[number] = rows
+            report(len(rows["cost"]))
+    finally:
+        report(None)
+    return _table([results[number] for number in range(len(chunks))])
+
+
+def _solved(
+    job: Job, missing: list[tuple[int, int, Any]], cluster: bool | str | None, workers: int | None
+) -> Iterator[tuple[int, _Rows]]:
+    """The chunks as they are done: their numbers and rows."""
+    if cluster:
+        from ._sweep_ray import on_cluster
+
+        yield from on_cluster(job, missing, cluster if isinstance(cluster, str) else None, workers)
+        return
+    worker = Worker(job)
+    for number, first, items in missing:
+        yield number, worker.solve(first, items)
+
+
+class Worker:
+    """Who solves chunks, with one solver for all of them where the problem stays the same."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._same = None if job.vary else job.solver(job.problem, **job.settings)
+
+    def solve(self, first: int, items: Any) -> _Rows:
+        """The rows of the variations `items`, of which the first has the number `first`."""
+        found: list[Solution | str] = []
+        for number, item in enumerate(items, first):
+            try:
+                found.append(self._one(item))
+            except (Error, ArithmeticError, LookupError, TypeError, ValueError) as wrong:
+                found.append(f"variation {number}: {type(wrong).__name__}: {wrong}")
+        return _rows(found, self._job)
+
+    def _one(self, item: Any) -> Solution:
+        job = self._job
+        xs, us = job.start
+        xs = np.array(xs, float)
+        if self._same is not None:
+            job.problem.set_x0(item)
+            xs[0] = item
+            return self._same.solve(xs, us)
+        assert job.vary is not None
+        problem = job.vary(job.problem, item) or job.problem
+        xs[0] = problem.x0
+        return job.solver(problem, **job.settings).solve(xs, us)
+
+
+def _states(problem: Problem, variations: ArrayLike) -> _Array:
+    states = np.array(variations, float)
+    if states.ndim != 2 or states.shape[1] != problem.nx:
+        raise ValueError(f"variations: expected states, (V, {problem.nx}), found the shape {states.shape}")
+    return states
+
+
+def _start(
+    problem: Problem, start: Solution | tuple[Any, Any] | None, solver: Any, settings: dict[str, Any]
+) -> tuple[Any, Any]:
+    """The states and controls from which all solves start."""
+    if isinstance(start, Solution):
+        return start.xs, start.us
+    if start is not None:
+        return start
+    xs = np.tile(problem.x0, (problem.horizon + 1, 1))
+    try:
+        us = problem.quasi_static(xs)
+    except Error as none:
+        raise ValueError(
+            f"start: the nominal problem has no controls at rest ({none}): give states and controls"
+        ) from none
+    nominal = solver(problem, **settings).solve(xs, us)
+    return nominal.xs, nominal.us
+
+
+def _flat(x: Any) -> _Array:
+    """Numbers of all knots: an array, of knots that differ one after the other."""
+    return np.concatenate([np.ravel(part) for part in x]) if isinstance(x, list) else np.asarray(x, float)
+
+
+def _shapes(job: Job) -> dict[str, tuple[int, ...]]:
+    """The shape of what is kept of a solution, by the start and the problem."""
+    us = _flat(job.start[1])
+    n, ndx = job.problem.horizon, job.problem.ndx
+    wide = us.ndim == 2
+    return {
+        "xs": (n + 1, job.problem.nx),
+        "us": us.shape,
+        "k": us.shape,
+        "K": (*us.shape, ndx) if wide else (us.size * ndx,),
+    }
+
+
+def _rows(found: list[Solution | str], job: Job) -> _Rows:
+    """The table of some variations."""
+    shapes = _shapes(job)
+    solved = [None if isinstance(one, str) else one for one in found]
+    rows: _Rows = {
+        "status": np.array(["error" if one is None else one.status for one in solved]),
+        "cost": np.array([np.nan if one is None else one.cost for one in solved]),
+        "gap": np.array([np.nan if one is None else one.gap for one in solved]),
+        "iterations": np.array([0 if one is None else len(one.trace) for one in solved]),
+        "seconds": np.array([np.nan if one is None else one.timings.total for one in solved]),
+        "error": np.array([one if isinstance(one, str) else "" for one in found]),
+    }
+    for name in job.keep:
+        rows[name] = np.full((len(found), *shapes[name]), np.nan)
+        for row, one in zip(rows[name], solved, strict=True):
+            if one is not None:
+                row[...] = _flat(getattr(one, name)).reshape(row.shape)
+    return rows
+
+
+def _table(parts: list[_Rows]) -> Variations:
+    names = Variations._fields
+    return Variations(**{n: np.concatenate([p[n] for p in parts]) if n in parts[0] else None for n in names})  # type: ignore[arg-type]

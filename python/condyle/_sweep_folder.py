@@ -1,0 +1,89 @@
+"""The folder of a sweep: what it is a sweep of, and the chunks that are done."""
+
+import hashlib
+import json
+import os
+import pickle
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ._sweep import Job
+
+_Rows = dict[str, NDArray[Any]]
+
+_HEAD = "sweep.json"
+
+
+class Folder:
+    """A folder with a head, which tells one sweep from another, and a file for each chunk that is done."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    @classmethod
+    def open(cls, path: "str | os.PathLike[str]") -> "Folder":
+        """A folder that holds a sweep."""
+        if not (Path(path) / _HEAD).is_file():
+            raise ValueError(f"folder: {path} holds no sweep (no {_HEAD})")
+        return cls(Path(path))
+
+    @classmethod
+    def create(
+        cls, path: "str | os.PathLike[str]", job: "Job", items: Any, chunk: int, more: dict[str, str]
+    ) -> "Folder":
+        """A folder for a sweep: a new one, or one that holds a part of the same sweep."""
+        path = Path(path)
+        head: dict[str, Any] = {"variations": len(items), "chunk": chunk, "keep": list(job.keep), **more}
+        head["solver"] = job.solver.__name__
+        head["vary"] = None if job.vary is None else f"{job.vary.__module__}.{job.vary.__qualname__}"
+        for name, part in (
+            ("problem", job.problem),
+            ("start", job.start),
+            ("settings", job.settings),
+            ("items", items),
+        ):
+            head[f"{name} (SHA-256)"] = hashlib.sha256(_pickled(name, part)).hexdigest()
+        path.mkdir(parents=True, exist_ok=True)
+        if (path / _HEAD).exists():
+            there = json.loads((path / _HEAD).read_text())
+            other = [name for name in sorted(head.keys() | there.keys()) if head.get(name) != there.get(name)]
+            if other:
+                raise ValueError(
+                    f"folder: {path} holds the results of another sweep, which differs in {', '.join(other)}"
+                )
+        else:
+            _write(path / _HEAD, json.dumps(head, indent=1).encode())
+        return cls(path)
+
+    def done(self) -> dict[int, _Rows]:
+        """The chunks that are done, by their numbers."""
+        chunks: dict[int, _Rows] = {}
+        for path in sorted(self._path.glob("chunk-*.npz")):
+            with np.load(path, allow_pickle=False) as arrays:
+                chunks[int(path.stem.removeprefix("chunk-"))] = {name: arrays[name] for name in arrays.files}
+        return chunks
+
+    def write(self, number: int, rows: _Rows) -> None:
+        """Keeps a chunk: its file is there when it is whole."""
+        path = self._path / f"chunk-{number:06d}.npz"
+        part = path.with_suffix(".part")
+        with open(part, "wb") as file:
+            np.savez(file, **rows)  # type: ignore[arg-type]
+        os.replace(part, path)
+
+
+def _pickled(name: str, part: Any) -> bytes:
+    try:
+        return pickle.dumps(part, protocol=5)
+    except (pickle.PicklingError, TypeError, AttributeError) as wrong:
+        raise ValueError(f"{name}: a sweep that is written to a folder must be able to pickle it: {wrong}") from wrong
+
+
+def _write(path: Path, data: bytes) -> None:
+    part = path.with_suffix(".part")
+    part.write_bytes(data)
+    os.replace(part, path)
