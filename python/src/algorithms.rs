@@ -1,6 +1,6 @@
 //! Dynamics and its derivatives: the library's functions one to one.
 //!
-//! Each call takes microseconds and keeps the interpreter's lock.
+//! A call for one state takes microseconds and keeps the interpreter's lock; one for many releases it.
 
 use crate::arrays::{Give, Number, Symmetric, give_named};
 use crate::functions::{any, functions, regular};
@@ -38,7 +38,7 @@ functions! {
 fn rnea(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
     condyle::rnea(model, data, &q, &v, &a, &f_ext)
 }
-batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> VECTOR { b.rnea(model, q, v, a, f_ext) }
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea(model, q, v, a, f_ext) }
 
 /// Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
 ///
@@ -56,7 +56,7 @@ fn aba(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None;
     regular(model)?;
     condyle::aba(model, data, &q, &v, &tau, &f_ext)
 }
-batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> VECTOR { b.aba(model, q, v, tau, f_ext) }
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> One { b.aba(model, q, v, tau, f_ext) }
 
 /// Forward dynamics by a method of choice: the acceleration of `aba`, nv numbers (rad/s², m/s²).
 ///
@@ -74,6 +74,9 @@ fn forward_dynamics(model, data;
     regular(model)?;
     condyle::forward_dynamics(model, data, &q, &v, &tau, &f_ext, method)
 }
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; method: MethodOf) -> One {
+    b.forward_dynamics(model, q, v, tau, f_ext, method)
+}
 
 /// The joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
 ///
@@ -86,7 +89,7 @@ fn forward_dynamics(model, data;
 fn crba(model, data; q: Position; out) {
     Symmetric(condyle::crba(model, data, &q))
 }
-batch b: any(q: Position) -> MATRIX { b.crba(model, q) }
+batch b: any(q: Position) -> One { b.crba(model, q) }
 
 /// The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 ///
@@ -100,7 +103,7 @@ fn minv(model, data; q: Position; out) {
     regular(model)?;
     Symmetric(condyle::minv(model, data, &q))
 }
-batch b: regular(q: Position) -> MATRIX { b.minv(model, q) }
+batch b: regular(q: Position) -> One { b.minv(model, q) }
 
 /// The nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 ///
@@ -108,7 +111,7 @@ batch b: regular(q: Position) -> MATRIX { b.minv(model, q) }
 fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
     condyle::nonlinear_effects(model, data, &q, &v)
 }
-batch b: any(q: Position, v: Tangent) -> VECTOR { b.nonlinear_effects(model, q, v) }
+batch b: any(q: Position, v: Tangent) -> One { b.nonlinear_effects(model, q, v) }
 
 /// The gravity efforts g(q), nv numbers, which hold the robot still: the efforts of `rnea` with v = a = 0.
 ///
@@ -121,7 +124,7 @@ batch b: any(q: Position, v: Tangent) -> VECTOR { b.nonlinear_effects(model, q, 
 fn gravity(model, data; q: Position; out) {
     condyle::gravity(model, data, &q)
 }
-batch b: any(q: Position) -> VECTOR { b.gravity(model, q) }
+batch b: any(q: Position) -> One { b.gravity(model, q) }
 
 /// The efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N); O(n).
 ///
@@ -129,6 +132,7 @@ batch b: any(q: Position) -> VECTOR { b.gravity(model, q) }
 fn static_torque(model, data; q: Position, f_ext: Forces = None; out) {
     condyle::static_torque(model, data, &q, &f_ext)
 }
+batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque(model, q, f_ext) }
 
 /// The Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 ///
@@ -142,6 +146,7 @@ fn static_torque(model, data; q: Position, f_ext: Forces = None; out) {
 fn coriolis_matrix(model, data; q: Position, v: Tangent; out) {
     condyle::coriolis_matrix(model, data, &q, &v)
 }
+batch b: any(q: Position, v: Tangent) -> One { b.coriolis_matrix(model, q, v) }
 
 /// The derivatives of `rnea` with respect to q, v and a, exact, in O(n depth), as
 /// `RneaDerivatives(dtau_dq, dtau_dv, dtau_da)`, each (nv, nv).
@@ -156,7 +161,7 @@ fn coriolis_matrix(model, data; q: Position, v: Tangent; out) {
 fn rnea_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
     condyle::rnea_derivatives(model, data, &q, &v, &a, &f_ext)
 }
-batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> RNEA_DERIVATIVES {
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaDerivatives") {
     b.rnea_derivatives(model, q, v, a, f_ext)
 }
 
@@ -175,7 +180,7 @@ fn aba_derivatives(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Fo
     regular(model)?;
     condyle::aba_derivatives(model, data, &q, &v, &tau, &f_ext)
 }
-batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> ABA_DERIVATIVES {
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> Named("AbaDerivatives") {
     b.aba_derivatives(model, q, v, tau, f_ext)
 }
 }

@@ -1,17 +1,18 @@
 //! Many states in one call: arguments with one axis more, for the states, and results likewise.
 //!
 //! An argument without that axis is shared by all states. What the library computes in lanes goes there in parts of some
-//! milliseconds, with the interpreter's lock released, and each part is written to the arrays that the caller gets;
-//! everything else is called state after state. Between parts and states signals are looked at.
+//! milliseconds, with the interpreter's lock released, and each part is written to the arrays that the caller gets; what needs
+//! no `Data` is computed state after state, likewise, and all else is called for each. Between parts and states signals are
+//! looked at.
 
 use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
 use crate::signals::{self, Signals};
-use condyle::{Batch, BatchAbaDerivatives, BatchRneaDerivatives, Force, Matrices, Scalar};
+use condyle::{Batch, Force, Scalar};
 use numpy::{Ix2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PyTuple, PyType};
 use std::iter;
 use std::ops::{Deref, Range};
 
@@ -150,56 +151,51 @@ impl Deref for Rows<'_> {
     }
 }
 
-/// The results of a function that computes in lanes: the named tuple of a single state, if they are several, and for each
-/// its name and its axes of length nv beside that of the states.
-pub(crate) struct Kind {
-    class: Option<&'static str>,
-    members: &'static [(&'static str, u32)],
+/// What the results of a function that computes in lanes are.
+#[derive(Clone, Copy)]
+pub(crate) enum Kind {
+    /// One array.
+    One,
+    /// The derivatives of an acceleration by q and by v.
+    Pair,
+    /// A named tuple of this class.
+    Named(&'static str),
+    /// That of all terms, which has a named tuple within.
+    AllTerms,
 }
 
-pub(crate) const VECTOR: Kind = Kind { class: None, members: &[("out", 1)] };
-pub(crate) const MATRIX: Kind = Kind { class: None, members: &[("out", 2)] };
-pub(crate) const RNEA_DERIVATIVES: Kind =
-    Kind { class: Some("RneaDerivatives"), members: &[("dtau_dq", 2), ("dtau_dv", 2), ("dtau_da", 2)] };
-pub(crate) const ABA_DERIVATIVES: Kind =
-    Kind { class: Some("AbaDerivatives"), members: &[("a", 1), ("da_dq", 2), ("da_dv", 2), ("da_dtau", 2)] };
+impl Kind {
+    /// The named tuple of these arrays.
+    fn assembled<'py>(self, py: Python<'py>, mut arrays: Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        match self {
+            Self::One => Ok(arrays.remove(0)),
+            Self::Pair => Ok(PyTuple::new(py, arrays)?.into_any()),
+            Self::Named(class) => named(&class_of(py, class)?, PyTuple::new(py, arrays)?),
+            Self::AllTerms => {
+                let centroidal = arrays.drain(2..9).collect();
+                arrays.insert(2, Self::Named("CentroidalMapRate").assembled(py, centroidal)?);
+                Self::Named("AllTerms").assembled(py, arrays)
+            }
+        }
+    }
 
-/// The results of some states, which know how to write themselves.
-pub(crate) trait Results {
-    /// Writes each result in C order.
-    fn write(&self, to: &mut [&mut [f64]]);
-}
-
-impl Results for &[f64] {
-    fn write(&self, to: &mut [&mut [f64]]) {
-        to[0].copy_from_slice(&self[..to[0].len()]);
+    /// The arrays that the caller gives for the results.
+    fn places<'py>(self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
+        match self {
+            Self::One => Ok(vec![out.cloned()]),
+            Self::Pair => members(out, &["da_dq", "da_dv"]),
+            Self::Named(class) if out.is_some() => {
+                let names: Vec<String> = class_of(py, class)?.getattr("_fields")?.extract()?;
+                members(out, &names.iter().map(String::as_str).collect::<Vec<_>>())
+            }
+            Self::Named(_) | Self::AllTerms => Ok(Vec::new()),
+        }
     }
 }
 
-impl Results for Matrices<'_, f64> {
-    fn write(&self, to: &mut [&mut [f64]]) {
-        self.write_rows(to[0]);
-    }
-}
-
-impl Results for BatchRneaDerivatives<'_, f64> {
-    fn write(&self, to: &mut [&mut [f64]]) {
-        [self.dtau_dq, self.dtau_dv, self.dtau_da]
-            .iter()
-            .zip(to.chunks_exact_mut(1))
-            .for_each(|(x, to)| Results::write(x, to));
-    }
-}
-
-impl Results for BatchAbaDerivatives<'_, f64> {
-    fn write(&self, to: &mut [&mut [f64]]) {
-        let (a, to) = to.split_at_mut(1);
-        Results::write(&self.a, a);
-        [self.da_dq, self.da_dv, self.da_dtau]
-            .iter()
-            .zip(to.chunks_exact_mut(1))
-            .for_each(|(x, to)| Results::write(x, to));
-    }
+/// A class of named tuples.
+fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
+    Ok(py.import("condyle._types")?.getattr(class)?.cast_into()?)
 }
 
 /// The number of states of a part, at most: the three matrices nv × nv of each are in a processor's own cache, of a megabyte,
@@ -221,21 +217,18 @@ pub(crate) fn part<'a, T>(of: &'a [T], some: &Range<usize>, states: usize) -> &'
 pub(crate) fn run<'py>(
     py: Python<'py>,
     batch: &mut Batch,
-    kind: &Kind,
-    (nv, states): (usize, usize),
+    kind: Kind,
+    states: usize,
     out: Option<&Bound<'py, PyAny>>,
-    mut compute: impl FnMut(&mut Batch, Range<usize>, &mut [&mut [f64]]) + Send,
+    mut compute: impl FnMut(&mut Batch, Range<usize>) + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let names: Vec<_> = kind.members.iter().map(|(name, _)| *name).collect();
-    let given = match kind.class {
-        None => vec![out.cloned()],
-        Some(_) => members(out, &names)?,
-    };
-    let mut given = given.into_iter().chain(iter::repeat(None));
-    let sizes: Vec<usize> = kind.members.iter().map(|(_, axes)| nv.pow(*axes)).collect();
+    compute(batch, 0..0); // for the shapes of the results
+    let shapes: Vec<Vec<usize>> = batch.last_shapes().map(<[_]>::to_vec).collect();
+    let mut given = kind.places(py, out)?.into_iter().chain(iter::repeat(None));
+    let sizes: Vec<usize> = shapes.iter().map(|shape| shape.iter().product()).collect();
     let mut arrays = Vec::new();
-    for (_, axes) in kind.members {
-        let shape = iter::once(states).chain(iter::repeat_n(nv, *axes as usize)).collect::<Vec<_>>();
+    for shape in &shapes {
+        let shape = iter::once(states).chain(shape.iter().copied()).collect::<Vec<_>>();
         arrays.push(place(py, given.next().flatten().as_ref(), &shape)?);
     }
     let mut borrowed = arrays.iter().map(writable).collect::<PyResult<Vec<_>>>()?;
@@ -245,9 +238,10 @@ pub(crate) fn run<'py>(
         let step = batch.capacity();
         for from in (0..states).step_by(step) {
             let some = from..states.min(from + step);
-            let places = numbers.iter_mut().zip(&sizes);
-            let mut to: Vec<_> = places.map(|(x, size)| &mut x[some.start * size..some.end * size]).collect();
-            compute(batch, some, &mut to);
+            compute(batch, some.clone());
+            for (k, (to, size)) in numbers.iter_mut().zip(&sizes).enumerate() {
+                batch.write_last(k, &mut to[some.start * size..some.end * size]);
+            }
             if signals.go_on().is_break() {
                 return;
             }
@@ -255,11 +249,34 @@ pub(crate) fn run<'py>(
     });
     signals.finish()?;
     drop(borrowed);
-    match kind.class {
-        None => Ok(out.cloned().unwrap_or_else(|| arrays.remove(0).into_any())),
-        Some(class) => {
-            let class = py.import("condyle._types")?.getattr(class)?.cast_into()?;
-            named(&class, PyTuple::new(py, arrays)?)
-        }
+    match (kind, out) {
+        (Kind::One, Some(out)) => Ok(out.clone()),
+        _ => kind.assembled(py, arrays.into_iter().map(Bound::into_any).collect()),
     }
+}
+
+/// Computes all states one after the other, with the interpreter's lock released, to `out` or to a new array.
+pub(crate) fn each<'py>(
+    py: Python<'py>,
+    states: usize,
+    shape: &[usize],
+    out: Option<&Bound<'py, PyAny>>,
+    mut compute: impl FnMut(usize, &mut [f64]) + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (size, all) = (shape.iter().product::<usize>(), iter::once(states).chain(shape.iter().copied()));
+    let array = place(py, out, &all.collect::<Vec<_>>())?;
+    let mut borrowed = writable(&array)?;
+    let numbers = borrowed.as_slice_mut()?;
+    let mut signals = Signals::new(signals::SHORT);
+    py.detach(|| {
+        for k in 0..states {
+            compute(k, &mut numbers[k * size..(k + 1) * size]);
+            if signals.go_on().is_break() {
+                return;
+            }
+        }
+    });
+    signals.finish()?;
+    drop(borrowed);
+    Ok(out.cloned().unwrap_or_else(|| array.into_any()))
 }

@@ -1,7 +1,7 @@
 //! The centre of mass, momentum and energies: the library's functions one to one.
 
 use crate::arrays::named_tuples;
-use crate::functions::functions;
+use crate::functions::{any, functions};
 use pyo3::prelude::*;
 
 named_tuples! {
@@ -22,6 +22,7 @@ functions! {
 fn com(model, data; q: Position; out) {
     condyle::forward_kinematics(model, data, &q).com()
 }
+batch b: any(q: Position) -> One { b.com(model, q) }
 
 /// The velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
 ///
@@ -29,6 +30,7 @@ fn com(model, data; q: Position; out) {
 fn com_velocity(model, data; q: Position, v: Tangent; out) {
     condyle::forward_velocities(model, data, &q, &v).com_velocity()
 }
+batch b: any(q: Position, v: Tangent) -> One { b.com_velocity(model, q, v) }
 
 /// The acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3 numbers
 /// (m/s²); O(n).
@@ -37,6 +39,7 @@ fn com_velocity(model, data; q: Position, v: Tangent; out) {
 fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
     condyle::forward_accelerations(model, data, &q, &v, &a).com_acceleration()
 }
+batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.com_acceleration(model, q, v, a) }
 
 /// The Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 ///
@@ -44,6 +47,7 @@ fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
 fn com_jacobian(model, data; q: Position; out) {
     condyle::centroidal_map(model, data, &q).Jcom
 }
+batch b: any(q: Position) -> One { b.com_jacobian(model, q) }
 
 /// The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
 /// `CentroidalMap(Ag, Ig, com, Jcom)`.
@@ -58,6 +62,7 @@ fn com_jacobian(model, data; q: Position; out) {
 fn centroidal_map(model, data; q: Position; out) {
     condyle::centroidal_map(model, data, &q)
 }
+batch b: any(q: Position) -> Named("CentroidalMap") { b.centroidal_map(model, q) }
 
 /// The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
 /// `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
@@ -67,6 +72,7 @@ fn centroidal_map(model, data; q: Position; out) {
 fn centroidal_map_rate(model, data; q: Position, v: Tangent; out) {
     condyle::centroidal_map_rate(model, data, &q, &v)
 }
+batch b: any(q: Position, v: Tangent) -> Named("CentroidalMapRate") { b.centroidal_map_rate(model, q, v) }
 
 /// The centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6 numbers
 /// (kg m/s, then kg m²/s); O(n).
@@ -75,6 +81,7 @@ fn centroidal_map_rate(model, data; q: Position, v: Tangent; out) {
 fn centroidal_momentum(model, data; q: Position, v: Tangent; out) {
     condyle::forward_velocities(model, data, &q, &v).centroidal_momentum()
 }
+batch b: any(q: Position, v: Tangent) -> One { b.centroidal_momentum(model, q, v) }
 
 /// The rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m). It equals the weight and
 /// the external forces about the centre of mass; O(n).
@@ -83,6 +90,7 @@ fn centroidal_momentum(model, data; q: Position, v: Tangent; out) {
 fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; out) {
     condyle::forward_accelerations(model, data, &q, &v, &a).centroidal_momentum_rate()
 }
+batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.centroidal_momentum_rate(model, q, v, a) }
 
 /// The kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
 ///
@@ -95,6 +103,7 @@ fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; ou
 fn kinetic_energy(model, data; q: Position, v: Tangent) {
     condyle::forward_velocities(model, data, &q, &v).kinetic_energy()
 }
+batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy(model, q, v) }
 
 /// The potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 ///
@@ -102,6 +111,7 @@ fn kinetic_energy(model, data; q: Position, v: Tangent) {
 fn potential_energy(model, data; q: Position) {
     condyle::forward_kinematics(model, data, &q).potential_energy()
 }
+batch b: any(q: Position) -> One { b.potential_energy(model, q) }
 
 /// The mechanical energy E = T + V (J); O(n).
 ///
@@ -109,6 +119,7 @@ fn potential_energy(model, data; q: Position) {
 fn mechanical_energy(model, data; q: Position, v: Tangent) {
     condyle::forward_velocities(model, data, &q, &v).mechanical_energy()
 }
+batch b: any(q: Position, v: Tangent) -> One { b.mechanical_energy(model, q, v) }
 
 /// All terms of the equations of motion, from one pass to the tips and one back, in O(n depth), as
 /// `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
@@ -123,4 +134,5 @@ fn mechanical_energy(model, data; q: Position, v: Tangent) {
 fn compute_all_terms(model, data; q: Position, v: Tangent) {
     condyle::compute_all_terms(model, data, &q, &v)
 }
+batch b: any(q: Position, v: Tangent) -> AllTerms { b.compute_all_terms(model, q, v) }
 }

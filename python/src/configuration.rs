@@ -47,6 +47,7 @@ fn neutral(model;) {
 fn integrate(model; q: Position, v: Tangent; out) {
     Computed::new([model.nq()], |moved| condyle::integrate(model, &q, &v, moved))
 }
+each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved) }
 
 /// The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
 ///
@@ -54,6 +55,7 @@ fn integrate(model; q: Position, v: Tangent; out) {
 fn difference(model; q0: Position, q1: Position; out) {
     Computed::new([model.nv()], |v| condyle::difference(model, &q0, &q1, v))
 }
+each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1, v) }
 
 /// The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
 ///
@@ -66,12 +68,18 @@ fn interpolate(model; q0: Position, q1: Position, t: Real; out) {
     condyle::interpolate(model, &q0, &q1, t, &mut tangent, &mut q);
     q
 }
+each(q0: Position, q1: Position; t: Real) -> [nq] |q| {
+    condyle::interpolate(model, q0, q1, t, &mut vec![0.0; model.nv()], q)
+}
 
 /// The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
 ///
 /// q0, q1: nq numbers.
 fn distance(model; q0: Position, q1: Position) {
     condyle::distance(model, &q0, &q1, &mut vec![Scalar::zero(); model.nv()])
+}
+each(q0: Position, q1: Position) -> [] |to| {
+    to[0] = condyle::distance(model, q0, q1, &mut vec![0.0; model.nv()])
 }
 
 /// The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
@@ -88,6 +96,10 @@ fn normalize(model; q: Position; out) {
     let mut q = q.to_vec();
     condyle::normalize(model, &mut q);
     q
+}
+each(q: Position) -> [nq] |to| {
+    to.copy_from_slice(q);
+    condyle::normalize(model, to)
 }
 
 /// The columns of X, tangent vectors at q ⊕ v, moved to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.

@@ -100,6 +100,8 @@ pub(crate) struct ConstraintSet {
     inner: condyle::ConstraintSet<f64>,
     /// The set for hyper-dual numbers, made when it is first needed after the targets changed.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
+    /// The sets for the lanes of a batch, made when they are first needed.
+    lanes: Option<Box<condyle::BatchConstraints>>,
     /// The constraints with their present targets.
     constraints: Vec<ContactConstraint>,
     nv: usize,
@@ -113,7 +115,21 @@ impl ConstraintSet {
         let (made_for, robot) = (MadeFor::with_geometry(model.get()), model.get().inner.clone());
         let mut inner = condyle::ConstraintSet::new(&robot, &constraints).map_err(exception)?;
         inner.proximal = proximal;
-        Ok(Self { inner, dual: None, constraints, nv: robot.nv(), made_for, robot })
+        Ok(Self { inner, dual: None, lanes: None, constraints, nv: robot.nv(), made_for, robot })
+    }
+
+    /// The same constraints for a batch.
+    pub(crate) fn side_by_side(
+        &mut self,
+        batch: &condyle::Batch,
+        model: &condyle::Model,
+    ) -> PyResult<&mut condyle::BatchConstraints> {
+        let fitting = self.lanes.take().filter(|lanes| lanes.fits(batch));
+        let lanes = match fitting {
+            Some(lanes) => lanes,
+            None => Box::new(batch.constraints(model, &self.constraints, self.inner.proximal).map_err(exception)?),
+        };
+        Ok(self.lanes.insert(lanes))
     }
 
     fn checked(&self, k: usize) -> PyResult<usize> {
@@ -220,12 +236,15 @@ impl ConstraintSet {
         let mut target = self.inner.target(k);
         aim(&mut target, placement, velocity, acceleration)?;
         self.inner.set_target(k, target).map_err(exception)?;
+        if let Some(lanes) = &mut self.lanes {
+            lanes.set_target(k, target).map_err(exception)?;
+        }
         self.constraints[k].target = target;
         self.dual = None;
         Ok(())
     }
 
-    /// The Jacobian J of the constraints, (rows, nv), at the state of the last call.
+    /// The Jacobian J of the constraints, (rows, nv), at the state of the last call for a single one.
     #[pyo3(signature = (out=None))]
     fn jacobian<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let mut J = DMatrix::zeros(self.inner.rows(), self.nv);
@@ -253,6 +272,9 @@ fn constrained_dynamics(model, data, constraints: ConstraintSet;
     regular(model)?;
     condyle::constrained_dynamics(model, data, constraints, &q, &v, &tau, &f_ext)
 }
+batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> Named("Constrained") {
+    b.constrained_dynamics(model, constraints, q, v, tau, f_ext)
+}
 
 /// The result of `constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as
 /// `ConstrainedDerivatives`.
@@ -270,6 +292,9 @@ fn constrained_dynamics_derivatives(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None; out) {
     regular(model)?;
     condyle::constrained_dynamics_derivatives(model, data, constraints, &q, &v, &tau, &f_ext)
+}
+batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> Named("ConstrainedDerivatives") {
+    b.constrained_dynamics_derivatives(model, constraints, q, v, tau, f_ext)
 }
 
 /// The result of `constrained_dynamics` and the linear equations between changes of q, v, τ and the changes of q̈ and λ
@@ -291,6 +316,9 @@ fn constrained_dynamics_equations(model, data, constraints: ConstraintSet;
     regular(model)?;
     condyle::constrained_dynamics_equations(model, data, constraints, &q, &v, &tau, &f_ext)
 }
+batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> Named("ConstrainedEquations") {
+    b.constrained_dynamics_equations(model, constraints, q, v, tau, f_ext)
+}
 
 /// The velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as
 /// `Impulse(v, lambda_, residual, redundant)`.
@@ -309,6 +337,9 @@ fn impulse_dynamics(model, data, constraints: ConstraintSet;
     regular(model)?;
     condyle::impulse_dynamics(model, data, constraints, &q, &v, Scalar::splat(restitution))
 }
+batch b, constraints: regular(q: Position, v: Tangent; restitution: Coefficient) -> Named("Impulse") {
+    b.impulse_dynamics(model, constraints, q, v, restitution)
+}
 
 /// The result of `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
 /// `ImpulseDerivatives`.
@@ -325,5 +356,8 @@ fn impulse_dynamics_derivatives(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
     regular(model)?;
     condyle::impulse_dynamics_derivatives(model, data, constraints, &q, &v, Scalar::splat(restitution))
+}
+batch b, constraints: regular(q: Position, v: Tangent; restitution: Coefficient) -> Named("ImpulseDerivatives") {
+    b.impulse_dynamics_derivatives(model, constraints, q, v, restitution)
 }
 }

@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// with another robot's model, a `ValueError`.
 ///
 /// model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
-/// several states side by side in vector registers; at most 1024.
+/// several states side by side in vector registers, and release the interpreter's lock; at most 1024.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.Data(arm)

@@ -1,7 +1,7 @@
 //! Derivatives beyond the first ones of `rnea` and `aba`: the library's functions one to one.
 
 use crate::arrays::{Array, Number, named_tuples};
-use crate::functions::{functions, regular};
+use crate::functions::{any, functions, regular};
 use crate::kinematics::motions;
 use condyle::{RneaSecondDerivatives, Scalar};
 use nalgebra::DMatrix;
@@ -50,6 +50,9 @@ fn rnea_input_derivative(model, data; q: Position, v: Tangent, a: Tangent, wrt: 
     condyle::rnea_derivatives(model, data, &q, &v, &a, &f_ext).with_respect_to(wrt, &mut dtau);
     dtau
 }
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces; wrt: InputOf) -> One {
+    b.rnea_input_derivative(model, q, v, a, f_ext, wrt)
+}
 
 /// The derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at
 /// most O(n²) a column.
@@ -67,6 +70,9 @@ fn aba_input_derivative(model, data; q: Position, v: Tangent, tau: Tangent, wrt:
     condyle::aba_derivatives(model, data, &q, &v, &tau, &f_ext).with_respect_to(wrt, &mut da);
     da
 }
+batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; wrt: InputOf) -> One {
+    b.aba_input_derivative(model, q, v, tau, f_ext, wrt)
+}
 
 /// The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
 /// (nv, nv); the other blocks are zero.
@@ -82,6 +88,9 @@ fn aba_input_derivative(model, data; q: Position, v: Tangent, tau: Tangent, wrt:
 fn rnea_hessian(model, data; q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
     condyle::rnea_hessian(model, data, &q, &v, &a, &f_ext, &lambda_)
 }
+batch b: any(q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Forces) -> Named("RneaHessian") {
+    b.rnea_hessian(model, q, v, a, f_ext, lambda_)
+}
 
 /// The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
 /// other blocks are zero.
@@ -91,6 +100,9 @@ fn rnea_hessian(model, data; q: Position, v: Tangent, a: Tangent, lambda_: Tange
 fn aba_hessian(model, data; q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
     regular(model)?;
     condyle::aba_hessian(model, data, &q, &v, &tau, &f_ext, &lambda_)
+}
+batch b: regular(q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces) -> Named("AbaHessian") {
+    b.aba_hessian(model, q, v, tau, f_ext, lambda_)
 }
 
 /// The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
@@ -110,6 +122,9 @@ fn rnea_second_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_e
     condyle::rnea_second_derivatives(model, data, &q, &v, &a, &f_ext, &mut tensors);
     tensors
 }
+batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaSecondDerivatives") {
+    b.rnea_second_derivatives(model, q, v, a, f_ext)
+}
 }
 
 motions! {
@@ -121,33 +136,33 @@ motions! {
 /// >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
 /// >>> bool((dv_dq[:, 0] == 0.0).all())  # turned as a whole, the arm moves as before
 /// True
-fn frame_velocity_derivative(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq);
+fn frame_velocity_derivative(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq) -> One;
 
 /// The derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative by
 /// the joint accelerations is the frame's Jacobian.
 ///
 /// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
 fn frame_acceleration_derivatives(frame: FrameOf)
-    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv);
+    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 
 /// The derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative
 /// by the joint accelerations is the frame's Jacobian.
 ///
 /// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
 fn frame_classical_acceleration_derivatives(frame: FrameOf)
-    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv);
+    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 
 /// The derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_velocity_derivative(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq);
+fn body_velocity_derivative(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq) -> One;
 
 /// The derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
 /// `frame_acceleration_derivatives` of its own frame.
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_acceleration_derivatives(body: BodyOf)
-    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv);
+    after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 }
 
 functions! {
@@ -164,6 +179,9 @@ functions! {
 fn centroidal_derivatives(model, data; q: Position, v: Tangent, a: Tangent; out) {
     condyle::centroidal_derivatives(model, data, &q, &v, &a)
 }
+batch b: any(q: Position, v: Tangent, a: Tangent) -> Named("CentroidalDerivatives") {
+    b.centroidal_derivatives(model, q, v, a)
+}
 
 /// The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
 /// `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
@@ -172,6 +190,7 @@ fn centroidal_derivatives(model, data; q: Position, v: Tangent, a: Tangent; out)
 fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
     condyle::energy_derivatives(model, data, &q, &v)
 }
+batch b: any(q: Position, v: Tangent) -> Named("EnergyDerivatives") { b.energy_derivatives(model, q, v) }
 
 /// The derivative ∂τ/∂q of `static_torque`, (nv, nv), and without forces that of `gravity`; exact, in O(n depth).
 ///
@@ -179,6 +198,7 @@ fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
 fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out) {
     condyle::static_torque_derivative(model, data, &q, &f_ext)
 }
+batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque_derivative(model, q, f_ext) }
 
 /// The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
 /// `CoriolisDerivatives(dq, dv)`, each (nv, nv).
@@ -193,4 +213,5 @@ fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out)
 fn coriolis_derivatives(model, data; q: Position, v: Tangent; out) {
     condyle::coriolis_derivatives(model, data, &q, &v)
 }
+batch b: any(q: Position, v: Tangent) -> Named("CoriolisDerivatives") { b.coriolis_derivatives(model, q, v) }
 }

@@ -13,7 +13,15 @@
 //! array or a tuple of arrays, or with `out` what was given as such. Scratch other than `data` stands after it, with its
 //! type. The call takes its scratch before it looks at any other argument, so that a second use of the same one, from
 //! wherever, is an error; it has done with its inputs before it writes to `out`, which may be one of them. Positions,
-//! tangent vectors and forces may be given for many states, with one axis more: then so are the results, see `batch.rs`.
+//! tangent vectors and forces may be given for many states, with one axis more: then so are the results, see `batch.rs`. A line
+//!
+//! ```text
+//! batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea(model, q, v, a, f_ext) }
+//! ```
+//!
+//! says how many states are computed: which check the robot must pass, the arguments, after a semicolon those that all states
+//! share, what kind of results there are, and the call of the library's `Batch`; `batch b, constraints: …` has constraints. A
+//! function without `Data` has a line of `each` instead, with the sizes of its result, and is called state after state.
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
@@ -219,7 +227,7 @@ macro_rules! shared {
                 Ok(Look { dual: $is_dual(given), states: None })
             })?
             fn read_all(_: &str, _: &Self::Given, _: &Model, _: usize, _: bool) -> PyResult<Self::All> {
-                unreachable!("{}: not an argument of what runs in lanes", stringify!($kind))
+                unreachable!("{}: all states share it", stringify!($kind))
             }
         }
     )*};
@@ -331,7 +339,10 @@ macro_rules! functions {
         $(#[$doc:meta])*
         fn $name:ident($model:ident $(, $data:ident $(, $scratch:ident: $Scratch:ident)?)?;
             $($arg:ident: $kind:ident $(= $default:tt)?),* $(; $out:ident)?) $body:block
-        $(batch $batch:ident: $check:ident($($all:ident: $all_kind:ident),*) -> $results:ident $in_lanes:block)?
+        $(batch $batch:ident $(, $set:ident)?: $check:ident($($all:ident: $all_kind:ident),*
+            $(; $($shared:ident: $shared_kind:ident),*)?) -> $kind_of:ident $(($class:literal))? $in_lanes:block)?
+        $(each($($of:ident: $of_kind:ident),* $(; $($same:ident: $same_kind:ident),*)?) -> [$($size:ident),*]
+            |$place:ident| $one:block)?
     )*) => {$(
         $(#[$doc])*
         #[pyfunction]
@@ -367,10 +378,22 @@ macro_rules! functions {
                 let copy = out.is_some();
                 $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all.given, $model, states, copy)?;)*
                 $(let $all = &$all[..];)*
+                $($(let $shared = <kinds::$shared_kind as Argument>::read(stringify!($shared), $shared, $model)?;)*)?
                 let lanes = data.batch($model, states);
-                return batch::run(py, lanes, &batch::$results, ($model.nv(), states), out, |$batch, some, to| {
+                $(let $set = scratch.side_by_side(lanes, $model)?;)?
+                return batch::run(py, lanes, batch::Kind::$kind_of $(($class))?, states, out, |$batch, some| {
                     $(let $all = batch::part($all, &some, states);)*
-                    batch::Results::write(&$in_lanes, to)
+                    $in_lanes;
+                });
+            })?
+            $(if let (Some(states), false) = (states, dual) {
+                let copy = out.is_some();
+                $(let $of = <kinds::$of_kind as Argument>::read_all(stringify!($of), &$of, $model, states, copy)?;)*
+                $(let $of = &$of[..];)*
+                $($(let $same = <kinds::$same_kind as Argument>::read(stringify!($same), $same, $model)?;)*)?
+                return batch::each(py, states, &[$($model.$size()),*], out, |k, $place| {
+                    $(let $of = batch::part($of, &(k..k + 1), states);)*
+                    $one
                 });
             })?
             // the same source for doubles and for hyper-dual numbers

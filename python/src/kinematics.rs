@@ -1,7 +1,7 @@
 //! Places and motions of bodies and frames: the library's functions one to one.
 
 use crate::arrays::Computed;
-use crate::functions::functions;
+use crate::functions::{any, functions};
 use pyo3::prelude::*;
 
 /// Declarations of functions of a frame or of a body. Each calls the method of the same name of what a pass gives: the
@@ -16,13 +16,16 @@ macro_rules! motions {
     ($(
         $(#[$doc:meta])*
         fn $name:ident($of:ident: $Of:ident) after $pass:ident($($arg:ident: $kind:ident),*)
-            $(fills ($($matrix:ident),+))?;
+            $(fills ($($matrix:ident),+))? -> $Kind:ident;
     )*) => {
         $crate::functions::functions! {$(
             $(#[$doc])*
             fn $name(model, data; $($arg: $kind,)* $of: $Of, reference: Reference = "local"; out) {
                 let motion = condyle::$pass(model, data, $(&$arg),*);
                 $crate::kinematics::motions!(@call model, motion, $name($of, reference) $($($matrix)+)?)
+            }
+            batch b: any($($arg: $kind),*; $of: $Of, reference: Reference) -> $Kind {
+                b.$name(model, $($arg,)* $of, reference)
             }
         )*}
     };
@@ -43,6 +46,7 @@ fn forward_kinematics(model, data; q: Position; out) {
     let placements = condyle::forward_kinematics(model, data, &q);
     (0..model.bodies().len()).map(|body| placements.body(body)).collect::<Vec<_>>()
 }
+batch b: any(q: Position) -> One { b.forward_kinematics(model, q) }
 
 /// The pose oXf of a frame in the world: a homogeneous matrix (4, 4) that takes coordinates in the frame to coordinates
 /// in the world; O(n).
@@ -56,6 +60,7 @@ fn forward_kinematics(model, data; q: Position; out) {
 fn frame_placement(model, data; q: Position, frame: FrameOf; out) {
     condyle::forward_kinematics(model, data, &q).frame(frame)
 }
+batch b: any(q: Position; frame: FrameOf) -> One { b.frame_placement(model, q, frame) }
 }
 
 functions! {
@@ -74,6 +79,9 @@ fn frame_jacobian(model, data; q: Position, frame: FrameOf, reference: Reference
         condyle::frame_jacobian_strided(model, &q, frame, reference, J, [model.nv(), 1]);
     })
 }
+batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
+    b.frame_jacobian(model, q, frame, reference)
+}
 
 /// The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 ///
@@ -91,6 +99,9 @@ fn body_jacobian(model, data; q: Position, body: BodyOf, reference: Reference = 
         condyle::body_jacobian_strided(model, &q, body, reference, J, [model.nv(), 1]);
     })
 }
+batch b: any(q: Position; body: BodyOf, reference: Reference) -> One {
+    b.body_jacobian(model, q, body, reference)
+}
 }
 
 motions! {
@@ -104,13 +115,13 @@ motions! {
 /// >>> J = condyle.frame_jacobian(arm, data, q, "tool")
 /// >>> np.allclose(condyle.frame_velocity(arm, data, q, v, "tool"), J @ v)
 /// True
-fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent);
+fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
 /// The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
 /// velocity as seen from the world, expressed in the reference; O(n).
 ///
 /// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
-fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
+fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
 /// The classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the reference
 /// (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the frame's
@@ -125,34 +136,34 @@ fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v
 /// >>> acceleration = condyle.frame_classical_acceleration(arm, data, q, v, a, "tool", "local_world_aligned")
 /// >>> np.allclose(acceleration, J @ a + dJ @ v)
 /// True
-fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
+fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
 /// The rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 ///
 /// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
 /// acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
 /// frame.
-fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ);
+fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 
 /// The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_velocity(body: BodyOf) after forward_velocities(q: Position, v: Tangent);
+fn body_velocity(body: BodyOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
 /// The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
 /// own frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
+fn body_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
 /// The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
 /// frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_classical_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent);
+fn body_classical_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
 /// The rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
-fn body_jacobian_rate(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dJ);
+fn body_jacobian_rate(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 }

@@ -1,7 +1,7 @@
 //! Dynamics and energies as linear functions of the inertial parameters, and the losses of joints: the library's
 //! functions one to one.
 
-use crate::functions::functions;
+use crate::functions::{any, functions};
 use condyle::Scalar;
 use pyo3::prelude::*;
 
@@ -19,6 +19,7 @@ functions! {
 fn joint_torque_regressor(model, data; q: Position, v: Tangent, a: Tangent; out) {
     condyle::joint_torque_regressor(model, data, &q, &v, &a)
 }
+batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.joint_torque_regressor(model, q, v, a) }
 
 /// The kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without the
 /// rotors, as a linear function of `Model.inertial_parameters`; O(n).
@@ -27,6 +28,7 @@ fn joint_torque_regressor(model, data; q: Position, v: Tangent, a: Tangent; out)
 fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
     condyle::kinetic_energy_regressor(model, data, &q, &v)
 }
+batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy_regressor(model, q, v) }
 
 /// The potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a linear
 /// function of `Model.inertial_parameters`; O(n).
@@ -35,6 +37,7 @@ fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
 fn potential_energy_regressor(model, data; q: Position; out) {
     condyle::potential_energy_regressor(model, data, &q)
 }
+batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 
 /// The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
 /// O(n).
@@ -51,6 +54,7 @@ fn passive_torque(model; v: Tangent, smoothing: Speed; out) {
     condyle::passive_torque(model, &v, smoothing, &mut tau);
     tau
 }
+each(v: Tangent; smoothing: Speed) -> [nv] |tau| { condyle::passive_torque(model, v, smoothing, tau) }
 
 /// The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
 /// other entries; O(n).
@@ -60,5 +64,8 @@ fn passive_torque_derivative(model; v: Tangent, smoothing: Speed; out) {
     let mut slope = vec![Scalar::zero(); model.nv()];
     condyle::passive_torque_derivative(model, &v, smoothing, &mut slope);
     slope
+}
+each(v: Tangent; smoothing: Speed) -> [nv] |slope| {
+    condyle::passive_torque_derivative(model, v, smoothing, slope)
 }
 }

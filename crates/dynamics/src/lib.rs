@@ -40,7 +40,19 @@ mod selection;
 pub mod simulation;
 mod workspace;
 
-pub use batch::{Batch, BatchAbaDerivatives, BatchRneaDerivatives, Matrices, StateMatrix};
+pub use batch::centroidal::{BatchAllTerms, BatchCentroidalMap, BatchCentroidalMapRate};
+pub use batch::constrained::{
+    BatchConstrained, BatchConstrainedDerivatives, BatchConstrainedEquations, BatchImpulse, BatchImpulseDerivatives,
+};
+pub use batch::constraints::BatchConstraints;
+pub use batch::derivatives::{
+    BatchAbaDerivatives, BatchAbaHessian, BatchCentroidalDerivatives, BatchCoriolisDerivatives, BatchEnergyDerivatives,
+    BatchRneaDerivatives, BatchRneaHessian,
+};
+pub use batch::group::StateMatrix;
+pub use batch::kinematics::BatchAccelerationDerivatives;
+pub use batch::results::{Matrices, Poses};
+pub use batch::{Batch, BatchNumber};
 pub use calls::centroidal::{centroidal_map, centroidal_map_rate, compute_all_terms};
 pub use calls::constrained_dynamics::{
     Constrained, ConstrainedDerivatives, ConstrainedEquations, constrained_dynamics, constrained_dynamics_derivatives,

@@ -304,36 +304,41 @@ impl<S: Scalar> Ltdl<S> {
         assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());
         let EliminationTree { swaps, parent, depth, first, .. } = &self.tree;
         let rows = X.as_mut_slice(); // row k is column k: X is symmetric
+        let mut root = 0; // of the tree: beside its places are zeros
         for k in 0..nv {
             if !go_on() {
                 return false;
             }
+            if parent[k] == NONE {
+                root = k;
+            }
             let L = &self.rows[first[k]..first[k] + depth[k]];
             let (above, rest) = rows.split_at_mut(k * nv);
-            let row = &mut rest[..k];
-            row.fill(S::zero());
+            rest[..nv].fill(S::zero());
+            let row = &mut rest[root..k];
+            let m = row.len();
             let (mut e, mut p) = (parent[k], depth[k]);
             while p >= 4 {
                 let (e1, e2, e3) = (parent[e], parent[parent[e]], parent[parent[parent[e]]]);
-                let (x0, x1) = (&above[e * nv..][..k], &above[e1 * nv..][..k]);
-                let (x2, x3) = (&above[e2 * nv..][..k], &above[e3 * nv..][..k]);
+                let (x0, x1) = (&above[e * nv + root..][..m], &above[e1 * nv + root..][..m]);
+                let (x2, x3) = (&above[e2 * nv + root..][..m], &above[e3 * nv + root..][..m]);
                 let (s0, s1, s2, s3) = (-L[p - 1], -L[p - 2], -L[p - 3], -L[p - 4]);
-                for j in 0..k {
+                for j in 0..m {
                     row[j] = x0[j].mul_add(s0, x1[j].mul_add(s1, x2[j].mul_add(s2, x3[j].mul_add(s3, row[j]))));
                 }
                 (e, p) = (parent[e3], p - 4);
             }
             while p > 0 {
-                axpy(-L[p - 1], &above[e * nv..], row);
+                axpy(-L[p - 1], &above[e * nv + root..], row);
                 (e, p) = (parent[e], p - 1);
             }
             let (mut diagonal, mut e) = (self.D_inv[k], parent[k]);
             for &L in L.iter().rev() {
-                diagonal = (-L).mul_add(row[e], diagonal);
+                diagonal = (-L).mul_add(row[e - root], diagonal);
                 e = parent[e];
             }
             rest[k] = diagonal;
-            for (column, &x) in above.chunks_exact_mut(nv).zip(&rest[..k]) {
+            for (column, &x) in above.chunks_exact_mut(nv).zip(&rest[..k]).skip(root) {
                 column[k] = x; // by symmetry
             }
         }

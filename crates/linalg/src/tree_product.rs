@@ -10,6 +10,7 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::{Kernel, Level, level};
 use condyle_spatial::kernel;
 use core::marker::PhantomData;
+use core::ops::Range;
 
 /// C = −A B, where column j of B has zeros but in the rows of `nonzero_rows[j]`.
 ///
@@ -18,18 +19,30 @@ use core::marker::PhantomData;
 /// a quarter as often.
 #[inline(always)]
 pub fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
-    let (n, mut j) = (nonzero_rows.len(), 0);
-    while j < n {
+    minus_block_product(A, B, C, nonzero_rows, &(0..nonzero_rows.len()));
+}
+
+/// Those rows and columns of C = −A B that are a block of the diagonal, where B has nothing beside it in these columns.
+#[inline(always)]
+pub fn minus_block_product<S: Scalar>(
+    A: &[S],
+    B: &[S],
+    C: &mut [S],
+    nonzero_rows: &[NonzeroRows],
+    block: &Range<usize>,
+) {
+    let (n, mut j) = (nonzero_rows.len(), block.start);
+    while j < block.end {
         let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
         let many = if *same_pattern >= 4 { 4 } else { 1 };
         let (b, c) = (&B[j * n..(j + many) * n], &mut C[j * n..(j + many) * n]);
         match (many, size_of::<S>()) {
-            (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n),
-            (4, 16..) => four_columns::<S, 2>(A, b, c, rows, n),
-            (4, _) => four_columns::<S, 8>(A, b, c, rows, n),
+            (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n, block),
+            (4, 16..) => four_columns::<S, 2>(A, b, c, rows, n, block),
+            (4, _) => four_columns::<S, 8>(A, b, c, rows, n, block),
             _ => {
-                c.fill(S::zero());
-                subtract_column(A, b, c, rows);
+                c[block.clone()].fill(S::zero());
+                subtract_column(A, b, c, rows, block);
             }
         }
         j += many;
@@ -134,30 +147,38 @@ fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&
     }
 }
 
-/// c −= A b, where b has zeros but in these rows.
+/// c −= A b in some of its rows, where b has zeros but in these rows.
 #[inline(always)]
-pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize]) {
-    let n = c.len();
+pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize], of_c: &Range<usize>) {
+    let (n, c) = (c.len(), &mut c[of_c.clone()]);
+    let (A, m) = (&A[of_c.start..], c.len());
     let (fours, rest) = rows.as_chunks::<4>();
     for &[k0, k1, k2, k3] in fours {
-        let (a0, a1) = (&A[k0 * n..(k0 + 1) * n], &A[k1 * n..(k1 + 1) * n]);
-        let (a2, a3) = (&A[k2 * n..(k2 + 1) * n], &A[k3 * n..(k3 + 1) * n]);
+        let (a0, a1) = (&A[k0 * n..k0 * n + m], &A[k1 * n..k1 * n + m]);
+        let (a2, a3) = (&A[k2 * n..k2 * n + m], &A[k3 * n..k3 * n + m]);
         let (b0, b1, b2, b3) = (-b[k0], -b[k1], -b[k2], -b[k3]);
-        for i in 0..n {
+        for i in 0..m {
             c[i] = a3[i].mul_add(b3, a2[i].mul_add(b2, a1[i].mul_add(b1, a0[i].mul_add(b0, c[i]))));
         }
     }
     for &k in rest {
-        axpy(-b[k], &A[k * n..(k + 1) * n], c);
+        axpy(-b[k], &A[k * n..k * n + m], c);
     }
 }
 
 /// The sums of `subtract_column`, in the same order, so that the bits are the same.
 #[inline(always)]
-fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], n: usize) {
+fn four_columns<S: Scalar, const N: usize>(
+    A: &[S],
+    B: &[S],
+    C: &mut [S],
+    rows: &[usize],
+    n: usize,
+    of_C: &Range<usize>,
+) {
     let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
-    let mut i = 0;
-    while i + N <= n {
+    let Range { start: mut i, end } = *of_C;
+    while i + N <= end {
         let mut c = [[S::zero(); N]; 4];
         for &k in rows {
             let a = &A[k * n + i..k * n + i + N];
@@ -173,7 +194,7 @@ fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: 
         }
         i += N;
     }
-    while i < n {
+    while i < end {
         let mut c = [S::zero(); 4];
         for &k in rows {
             let a = A[k * n + i];

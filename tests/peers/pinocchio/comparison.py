@@ -1,9 +1,11 @@
 """One robot in both libraries, states to compare them at, and what counts as equal."""
 
+import inspect
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +25,9 @@ ROOT_JOINTS = {
     "spherical": pin.JointModelSpherical,
     "translation": pin.JointModelTranslation,
 }
+
+BATCH, HERE = 11, 9
+"""How many states a batch has, more than a vector and no multiple of it, and which one of them is compared."""
 
 SELF_STATES = 20
 """At how many states Pinocchio is compared with itself."""
@@ -138,6 +143,8 @@ class State:
         self.f_ext = np.zeros((pair.ours.nbodies, 6))
         self.f_ext[pair.bodies] = rng.standard_normal((model.njoints, 6))
         self.pair = pair
+        self.in_batch = False
+        """Whether our functions are called for many states at once, of which this is one."""
 
     @cached_property
     def their_forces(self) -> "pin.StdVec_Force":
@@ -155,7 +162,32 @@ class State:
 
 def ours_of(state: State) -> Callable[..., np.ndarray]:
     """Our functions, with model and data filled in."""
-    return lambda function, *args: function(state.pair.ours, state.pair.data, *args)
+    model, data = state.pair.ours, state.pair.data
+    if not state.in_batch:
+        return lambda function, *args: function(model, data, *args)
+
+    others = {"q": np.stack([condyle.random_configuration(model, seed=k) for k in range(BATCH)])}
+
+    def together(name: str, arg: np.ndarray) -> np.ndarray:
+        if name not in others:
+            others[name] = np.random.default_rng(len(others)).standard_normal((BATCH, *arg.shape))
+        others[name][HERE] = arg
+        return others[name]
+
+    def call(function: Callable[..., Any], *args: Any) -> Any:
+        names = list(inspect.signature(function).parameters)[2:]
+        many = (together(n, x) if isinstance(x, np.ndarray) else x for n, x in zip(names, args, strict=False))
+        return of_state(function(model, data, *many))
+
+    return call
+
+
+def of_state(results: Any) -> Any:
+    """What a batch gives for the state that is compared."""
+    if not isinstance(results, tuple):
+        return results[HERE]
+    members = map(of_state, results)
+    return results._make(members) if hasattr(results, "_make") else tuple(members)
 
 
 def theirs_of(state: State) -> Callable[..., np.ndarray]:

@@ -176,3 +176,13 @@ def test_random_robots(seed: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", [name for name in LEGGED if name in ROBOTS])
 def test_legged_robots(name: str) -> None:
     check(load(name), 0)
+
+
+@pytest.mark.parametrize("name", [name for name in LEGGED if name in ROBOTS])
+def test_batches(name: str) -> None:
+    """Constrained dynamics and impacts, and their derivatives, in the lanes of a batch."""
+    (state,) = load(name).states(1, seed=50)
+    contacts = random_case(state, 50, False)
+    state.in_batch = True
+    check_dynamics(contacts)
+    check_impacts(contacts)

@@ -79,6 +79,24 @@ def test_forward_dynamics(pair: Pair) -> None:
         assert checks.check_forward_dynamics(state) == (pair.name not in SINGULAR)
 
 
+def test_batches(pair: Pair) -> None:
+    """Every function of a state, in the lanes of a batch."""
+    (state,) = pair.states(1, seed=50)
+    state.in_batch = True
+    checks.check_kinematics(state)
+    checks.check_motion(state)
+    checks.check_inverse_dynamics(state)
+    checks.check_crba(state)
+    checks.check_gravity(state)
+    checks.check_rnea_derivatives(state)
+    checks.check_centroidal(state)
+    checks.check_energy(state)
+    checks.check_equations_of_motion(state)
+    checks.check_motion_derivatives(state)
+    checks.check_effort_derivatives(state)
+    checks.check_forward_dynamics(state)
+
+
 def test_configuration(pair: Pair) -> None:
     for state in pair.states(STATES):
         checks.check_configuration(state)

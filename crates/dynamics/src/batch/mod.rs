@@ -2,35 +2,47 @@
 //!
 //! As many states as a vector register holds go through a pass side by side, each in a lane: by the processor's level that
 //! is eight or four in `f64`, sixteen or eight in `f32`, one at the baseline. Groups of them are spread over threads.
-//! Arguments and vectors lie state after state; matrices stay as the passes leave them, entry after entry, each for a
-//! whole group. A lane knows nothing of the others, and computes as a single call
-//! does at that level, so a state's numbers are the same to the last bit wherever it stands, in however long a batch, on
-//! however many threads.
+//! Arguments and results lie state after state; the matrices of RNEA, CRBA, ABA and M⁻¹ stay as the passes leave them, entry
+//! after entry, each for a whole group. A lane knows nothing of the others, and computes as a single call does at that level,
+//! so a state's numbers are the same to the last bit wherever it stands, in however long a batch, on however many threads.
+//!
+//! Each function is an entry of a table (`table.rs`), which calls that for a single state on lanes.
 
-mod pass;
+pub(crate) mod centroidal;
+pub(crate) mod constrained;
+pub(crate) mod constraints;
+pub(crate) mod derivatives;
+mod dynamics;
+pub(crate) mod group;
+pub(crate) mod kinematics;
+mod places;
+pub(crate) mod results;
+mod table;
+
 use crate::workspace::Gate;
+use alloc::vec;
 use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::Force;
 use condyle_spatial::block::Real;
 use condyle_spatial::level::{Level, level};
-use nalgebra::{Dyn, MatrixView};
-use pass::{
-    Aba, AbaDerivatives, Arguments, Crba, DA, DTAU, Gravity, Group, M, MINV, Minv, NonlinearEffects, Pass, Rnea,
-    RneaDerivatives,
-};
+use constraints::{BatchConstraints, Sets};
+use group::{ARGUMENTS, Arguments, FORCES, Group, Pass, enter};
+use places::{MOST_RESULTS, Places};
+use results::{Last, Shape, Taken};
+use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 
 /// Scratch and results for up to N states at once, on one or several threads.
 ///
 /// Every function takes its arguments as the one of the same name for a single state does, with those of all states one
 /// after the other: q has `states` · nq numbers, and how many states that is may change from call to call. Results stay
-/// until the next call. `T` is `f64` or `f32`. Of a robot without coordinates, of which nothing says how many states are
-/// meant, they are as many as there are forces for, or without forces as many as there is room for.
+/// until the next call. `T` is `f64`, or `f32` with the feature of that name. Of a robot without coordinates, of which
+/// nothing says how many states are meant, they are as many as there are forces for, or without forces as many as there is
+/// room for.
 ///
 /// Memory is allocated by [`new`](Self::new) for scratch, once for each thread, and for a vector of nv numbers for each
-/// state; by the first call of a function that gives matrices for those matrices, nv² numbers each; and by rayon for itself
-/// on more than one thread. The level of vector instructions is the one in use when the batch is made. Made for one thread,
+/// state; by the first call of a function that gives more than any before it, for what it gives; and by rayon for itself on
+/// more than one thread. The level of vector instructions is the one in use when the batch is made. Made for one thread,
 /// it never leaves the caller's; else it runs in the pool of rayon in which it is called, or else in the global one.
 ///
 /// ```
@@ -47,9 +59,19 @@ use pass::{
 pub struct Batch<T: Real = f64> {
     states: usize,
     lanes: InLanes<T>,
-    /// Shape: states × nv. Written by: all that return vectors.
-    vectors: Vec<T>,
+    /// The results that do not stay in lanes, of all states one after the other. Shape: states × that of the result. Written
+    /// by: all functions.
+    slots: [Vec<T>; MOST_RESULTS],
+    last: Last,
 }
+
+/// A number that batches are made of: `f64`, and with the feature `f32` that too.
+pub trait BatchNumber: Real {}
+
+impl BatchNumber for f64 {}
+
+#[cfg(feature = "f32")]
+impl BatchNumber for f32 {}
 
 /// Groups of as many states as the vectors of the level have lanes.
 #[derive(Debug)]
@@ -71,7 +93,10 @@ impl<T: Real> Batch<T> {
     /// # Panics
     /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
     /// [`MOST_STATES`](Self::MOST_STATES).
-    pub fn new(model: &Model, states: usize, threads: usize) -> Self {
+    pub fn new(model: &Model, states: usize, threads: usize) -> Self
+    where
+        T: BatchNumber,
+    {
         let (most_threads, most_states) = (Self::MOST_THREADS, Self::MOST_STATES);
         assert!(threads > 0, "threads: expected at least 1, found 0");
         assert!(threads <= most_threads, "threads: expected at most {most_threads}, found {threads}");
@@ -83,7 +108,8 @@ impl<T: Real> Batch<T> {
                 Level::Simd128 | Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
                 Level::Avx512 => InLanes::Long(Group::new(model, states, threads)),
             },
-            vectors: vec![T::zero(); states * model.nv()],
+            slots: core::array::from_fn(|k| if k == 0 { vec![T::zero(); states * model.nv()] } else { Vec::new() }),
+            last: Last::default(),
         }
     }
 
@@ -92,242 +118,105 @@ impl<T: Real> Batch<T> {
         self.states
     }
 
-    /// Checks the arguments and runs a pass over all states, with a vector for each of them or none; how many they are.
-    fn run(
-        &mut self,
-        pass: impl Pass<T>,
-        model: &Model,
-        names: [&str; 2],
-        from: Arguments<'_, T>,
-        has_vectors: bool,
-    ) -> usize {
-        match &self.lanes {
-            InLanes::Single(g) => g.check(model),
-            InLanes::Short(g) => g.check(model),
-            InLanes::Long(g) => g.check(model),
-        }
-        let bodies = model.nodes().len();
-        let states = match from.q.len().checked_div(model.nq()) {
-            Some(states) => states,
-            None if from.f_ext.is_empty() => self.states,
-            None => from.f_ext.len() / bodies,
+    /// The number of states that arguments are for: the first that has numbers says it, else the forces, else there are as
+    /// many as there is room for.
+    #[track_caller]
+    fn count(&self, model: &Model, given: &[Given<'_, T>]) -> usize {
+        let length = |at: usize| [model.nq(), model.nv(), model.nv(), model.nv(), 6 * model.nodes().len()][at];
+        let first = given.iter().find(|one| one.at != FORCES && length(one.at) > 0);
+        let forces = given.iter().find(|one| one.at == FORCES && !one.numbers.is_empty());
+        let states = match first.or(forces) {
+            None => self.states,
+            Some(one) => one.numbers.len() / length(one.at),
         };
-        assert!(
-            states * model.nq() == from.q.len() && states <= self.states,
-            "q: expected {} numbers for each of at most {} states, found {}",
-            model.nq(),
-            self.states,
-            from.q.len()
-        );
-        for (name, found) in names.into_iter().zip([from.v.len(), from.x.len()]).filter(|(name, _)| !name.is_empty()) {
-            check(name, found, states * model.nv());
-        }
-        let (found, forces) = (from.f_ext.len(), states * bodies);
-        assert!(
-            found == 0 || found == forces,
-            "f_ext: expected no force or {forces} (one for each body of each state), found {found}"
-        );
-        let vectors = &mut self.vectors[..if has_vectors { states * model.nv() } else { 0 }];
-        if states > 0 {
-            match &mut self.lanes {
-                InLanes::Single(g) => g.run(pass, model, states, from, vectors),
-                InLanes::Short(g) => g.run(pass, model, states, from, vectors),
-                InLanes::Long(g) => g.run(pass, model, states, from, vectors),
+        for (k, one) in given.iter().enumerate() {
+            let (name, each, found) = (one.name, length(one.at), one.numbers.len());
+            if one.at == FORCES {
+                let forces = states * model.nodes().len();
+                assert!(
+                    found == 0 || found == 6 * forces,
+                    "f_ext: expected no force or {forces} (one for each body of each state), found {}",
+                    found / 6
+                );
+            } else if k == 0 {
+                assert!(
+                    found == states * each && states <= self.states,
+                    "{name}: expected {each} numbers for each of at most {} states, found {found}",
+                    self.states
+                );
+            } else {
+                check(name, found, states * each);
             }
         }
         states
     }
 
-    fn vectors(&self, model: &Model, states: usize) -> &[T] {
-        &self.vectors[..states * model.nv()]
-    }
-
-    fn matrices(&self, kind: usize, states: usize) -> Matrices<'_, T> {
-        Matrices { of: &self.lanes, kind, states }
-    }
-
-    /// [`rnea`](crate::rnea()): τ of each state, nv numbers.
-    ///
-    /// q: nq numbers a state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
-    ///
-    /// # Panics
-    /// If an argument has the wrong length, there are more states than there is room for, or the batch was made for a
-    /// model of another tree; so do all below.
-    pub fn rnea(&mut self, model: &Model, q: &[T], v: &[T], a: &[T], f_ext: &[Force<T>]) -> &[T] {
-        let n = self.run(Rnea, model, ["v", "a"], Arguments { q, v, x: a, f_ext }, true);
-        self.vectors(model, n)
-    }
-
-    /// [`nonlinear_effects`](crate::nonlinear_effects): h of each state, nv numbers.
-    ///
-    /// q: nq numbers a state; v: nv.
-    ///
-    /// # Panics
-    /// As [`rnea`](Self::rnea).
-    pub fn nonlinear_effects(&mut self, model: &Model, q: &[T], v: &[T]) -> &[T] {
-        let n = self.run(NonlinearEffects, model, ["v", ""], Arguments { q, v, x: &[], f_ext: &[] }, true);
-        self.vectors(model, n)
-    }
-
-    /// [`gravity`](crate::gravity): g of each state, nv numbers.
-    ///
-    /// q: nq numbers a state.
-    ///
-    /// # Panics
-    /// As [`rnea`](Self::rnea).
-    pub fn gravity(&mut self, model: &Model, q: &[T]) -> &[T] {
-        let n = self.run(Gravity, model, ["", ""], Arguments { q, v: &[], x: &[], f_ext: &[] }, true);
-        self.vectors(model, n)
-    }
-
-    /// [`aba`](crate::aba()): q̈ of each state, nv numbers.
-    ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
-    ///
-    /// # Panics
-    /// As [`rnea`](Self::rnea), or if M is singular ([`Model::singular_joints`]).
-    pub fn aba(&mut self, model: &Model, q: &[T], v: &[T], tau: &[T], f_ext: &[Force<T>]) -> &[T] {
-        let n = self.run(Aba, model, ["v", "tau"], Arguments { q, v, x: tau, f_ext }, true);
-        self.vectors(model, n)
-    }
-
-    /// [`crba`](crate::crba()): M of each state, nv × nv.
-    ///
-    /// q: nq numbers a state.
-    ///
-    /// # Panics
-    /// As [`rnea`](Self::rnea).
-    pub fn crba(&mut self, model: &Model, q: &[T]) -> Matrices<'_, T> {
-        let n = self.run(Crba, model, ["", ""], Arguments { q, v: &[], x: &[], f_ext: &[] }, false);
-        self.matrices(M, n)
-    }
-
-    /// [`minv`](crate::minv()): M⁻¹ of each state, nv × nv.
-    ///
-    /// q: nq numbers a state.
-    ///
-    /// # Panics
-    /// As [`rnea`](Self::rnea), or if M is singular ([`Model::singular_joints`]).
-    pub fn minv(&mut self, model: &Model, q: &[T]) -> Matrices<'_, T> {
-        let n = self.run(Minv, model, ["", ""], Arguments { q, v: &[], x: &[], f_ext: &[] }, false);
-        self.matrices(MINV, n)
-    }
-
-    /// [`rnea_derivatives`](crate::rnea_derivatives()) of each state, three matrices nv × nv.
-    ///
-    /// q: nq numbers a state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
-    ///
-    /// # Panics
-    /// As [`rnea`](Self::rnea).
-    pub fn rnea_derivatives(
+    /// Checks the arguments and runs a pass over all states, to results of these shapes.
+    #[track_caller]
+    fn compute<P: Pass<T>>(
         &mut self,
+        pass: P,
         model: &Model,
-        q: &[T],
-        v: &[T],
-        a: &[T],
-        f_ext: &[Force<T>],
-    ) -> BatchRneaDerivatives<'_, T> {
-        let n = self.run(RneaDerivatives, model, ["v", "a"], Arguments { q, v, x: a, f_ext }, false);
-        let [dtau_dq, dtau_dv, dtau_da] = DTAU.map(|kind| self.matrices(kind, n));
-        BatchRneaDerivatives { dtau_dq, dtau_dv, dtau_da }
-    }
-
-    /// [`aba_derivatives`](crate::aba_derivatives()) of each state, nv numbers and three matrices nv × nv.
-    ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
-    ///
-    /// # Panics
-    /// As [`rnea`](Self::rnea), or if M is singular ([`Model::singular_joints`]).
-    pub fn aba_derivatives(
-        &mut self,
-        model: &Model,
-        q: &[T],
-        v: &[T],
-        tau: &[T],
-        f_ext: &[Force<T>],
-    ) -> BatchAbaDerivatives<'_, T> {
-        let n = self.run(AbaDerivatives, model, ["v", "tau"], Arguments { q, v, x: tau, f_ext }, true);
-        let [da_dq, da_dv, da_dtau] = [DA[0], DA[1], MINV].map(|kind| self.matrices(kind, n));
-        BatchAbaDerivatives { a: self.vectors(model, n), da_dq, da_dv, da_dtau }
-    }
-}
-
-/// A matrix of one state, whose entries do not lie next to each other.
-pub type StateMatrix<'b, T> = MatrixView<'b, T, Dyn, Dyn, Dyn, Dyn>;
-
-/// A matrix nv × nv for each state of a batch.
-#[derive(Clone, Copy, Debug)]
-pub struct Matrices<'b, T: Real> {
-    of: &'b InLanes<T>,
-    kind: usize,
-    states: usize,
-}
-
-impl<'b, T: Real> Matrices<'b, T> {
-    /// The matrix of state k: a view, which [`copy_from`](nalgebra::Matrix::copy_from) copies to a matrix of one's own.
-    ///
-    /// # Panics
-    /// If there are not so many states.
-    pub fn at(&self, k: usize) -> StateMatrix<'b, T> {
-        assert!(k < self.states, "k: expected a number below that of the states, {}, found {k}", self.states);
-        match self.of {
-            InLanes::Single(group) => group.matrix(self.kind, k),
-            InLanes::Short(group) => group.matrix(self.kind, k),
-            InLanes::Long(group) => group.matrix(self.kind, k),
+        given: &[Given<'_, T>],
+        (shapes, columns): (&[&[usize]], usize),
+        constraints: Option<&mut BatchConstraints<T>>,
+    ) -> Taken<'_, T> {
+        match &self.lanes {
+            InLanes::Single(g) => g.check(model),
+            InLanes::Short(g) => g.check(model),
+            InLanes::Long(g) => g.check(model),
         }
-    }
-
-    /// Writes those of all states one after the other, each by rows: nv² numbers a state.
-    ///
-    /// ```
-    /// use condyle_dynamics::{Batch, robots};
-    /// let arm = robots::arm7();
-    /// let (mut batch, q) = (Batch::new(&arm, 10, 1), vec![0.3; 70]);
-    /// let mut rows = vec![0.0; 10 * 7 * 7];
-    /// let M = batch.crba(&arm, &q);
-    /// M.write_rows(&mut rows);
-    /// assert_eq!(rows[9 * 49 + 7 + 2], M.at(9)[(1, 2)]);
-    /// ```
-    ///
-    /// # Panics
-    /// If `to` has not as many numbers.
-    pub fn write_rows(&self, to: &mut [T]) {
-        let n = if self.states == 0 { 0 } else { self.at(0).nrows() };
-        check("to", to.len(), self.states * n * n);
-        match self.of {
-            InLanes::Single(group) => group.write_rows(self.kind, to),
-            InLanes::Short(group) => group.write_rows(self.kind, to),
-            InLanes::Long(group) => group.write_rows(self.kind, to),
+        if let Some(constraints) = &constraints {
+            constraints.check(model);
+            assert!(constraints.fits(self), "constraints: made for another batch");
         }
+        let states = self.count(model, given);
+        let rows = constraints.as_ref().map_or(0, |constraints| constraints.rows());
+        let size = |&size: &usize| match size {
+            NV => model.nv(),
+            BODIES => model.nodes().len(),
+            PARAMETERS => 10 * (model.nodes().len() - 1),
+            ROWS => rows,
+            COLUMNS => columns,
+            other => other,
+        };
+        let mut last = Last { states, results: shapes.len(), ..Last::default() };
+        let first_kept = shapes.len() - P::KINDS.len();
+        for (k, shape) in shapes.iter().enumerate() {
+            last.shapes[k] = Shape::new(shape.iter().map(size));
+            last.kept[k] = k.checked_sub(first_kept).map(|kind| P::KINDS[kind]);
+        }
+        self.last = last;
+        let mut to: [&mut [T]; MOST_RESULTS] = Default::default();
+        for (k, (to, slot)) in to.iter_mut().zip(&mut self.slots).take(first_kept).enumerate() {
+            let size = last.shapes[k].len();
+            if slot.len() < self.states * size {
+                slot.resize(self.states * size, T::zero());
+            }
+            *to = &mut slot[..states * size];
+        }
+        let mut from = Arguments([&[] as &[T]; ARGUMENTS]);
+        for one in given {
+            from.0[one.at] = one.numbers;
+        }
+        let places = (from, Places::new(to, states), !P::KINDS.is_empty());
+        macro_rules! run {
+            ($group:ident, $kind:ident) => {{
+                $group.keep(P::KINDS, model.nv());
+                let sets = match constraints.map(|constraints| &mut constraints.sets) {
+                    Some(Sets::$kind(sets)) => &mut sets[..],
+                    _ => &mut [],
+                };
+                $group.run(&|of, to| enter(pass, of, to), model, states, sets, places);
+            }};
+        }
+        if states > 0 {
+            match &mut self.lanes {
+                InLanes::Single(group) => run!(group, Single),
+                InLanes::Short(group) => run!(group, Short),
+                InLanes::Long(group) => run!(group, Long),
+            }
+        }
+        Taken { batch: self, next: 0 }
     }
-
-    /// The matrices of all states.
-    pub fn iter(&self) -> impl Iterator<Item = StateMatrix<'b, T>> {
-        let this = *self;
-        (0..self.states).map(move |k| this.at(k))
-    }
-}
-
-/// The derivatives of τ = rnea(q, v, a) in many states: see [`RneaDerivatives`](crate::RneaDerivatives).
-#[derive(Clone, Copy, Debug)]
-pub struct BatchRneaDerivatives<'b, T: Real> {
-    /// ∂τ/∂q in the tangent space.
-    pub dtau_dq: Matrices<'b, T>,
-    /// ∂τ/∂v.
-    pub dtau_dv: Matrices<'b, T>,
-    /// ∂τ/∂a = M(q), armature included.
-    pub dtau_da: Matrices<'b, T>,
-}
-
-/// q̈ = aba(q, v, τ) and its derivatives in many states: see [`AbaDerivatives`](crate::AbaDerivatives).
-#[derive(Clone, Copy, Debug)]
-pub struct BatchAbaDerivatives<'b, T: Real> {
-    /// q̈ itself, nv numbers for each state.
-    pub a: &'b [T],
-    /// ∂q̈/∂q in the tangent space.
-    pub da_dq: Matrices<'b, T>,
-    /// ∂q̈/∂v.
-    pub da_dv: Matrices<'b, T>,
-    /// ∂q̈/∂τ = M(q)⁻¹.
-    pub da_dtau: Matrices<'b, T>,
 }

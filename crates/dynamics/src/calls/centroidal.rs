@@ -2,12 +2,11 @@
 
 use crate::data::Data;
 use crate::passes::all_terms::{self, AllTerms};
-use crate::passes::centroidal::{CentroidalMap, CentroidalMapRate, run_map, run_map_rate, shift_map, shift_rate};
+use crate::passes::centroidal::{CentroidalMap, CentroidalMapRate, run_map, run_map_rate};
 use crate::passes::frames::{Placements, Velocities};
 use crate::passes::kinematics::{positions, velocities};
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Scalar};
 
 /// Ag(q), the centroidal momentum matrix, with the centre of mass, its Jacobian and the inertia about it, in O(n).
@@ -36,7 +35,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq());
     positions(model, &mut data.world, q);
     run_map(model, &data.world, &mut data.centroidal);
-    shift_map(model, &mut data.centroidal)
+    data.centroidal.map()
 }
 
 /// Ag(q), dAg/dt along v, and the centroidal momentum hg = Ag v, with what [`centroidal_map`] gives, in O(n).
@@ -68,7 +67,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     positions(model, &mut data.world, q);
     velocities(model, &data.world, &mut data.moving, v);
     run_map_rate(model, &data.world, &data.moving, &mut data.centroidal);
-    shift_rate(model, &mut data.centroidal)
+    data.centroidal.map_rate()
 }
 
 /// M, h, Ag, dAg, hg, centre of mass, energies, and the Jacobians of all frames: what the equations of motion are made
@@ -105,14 +104,13 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     velocities(model, &data.world, &mut data.moving, v);
     all_terms::run(model, &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
     let kinematics = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
-    let moment = data.centroidal.IC[0].mass_com;
     AllTerms {
         kinematics,
         M: &data.all_terms.M,
         h: &data.all_terms.h,
         a: &data.all_terms.a,
-        centroidal: shift_rate(model, &mut data.centroidal),
-        kinetic_energy: (data.all_terms.twice + kinematics.rotors()) * S::splat(0.5),
-        potential_energy: Single::<S, R>::new(model).minus_gravity().dot(moment),
+        centroidal: data.centroidal.map_rate(),
+        kinetic_energy: data.all_terms.kinetic_energy,
+        potential_energy: data.all_terms.potential_energy,
     }
 }

@@ -6,7 +6,7 @@ use super::inverse_dynamics::check_arguments;
 use super::kinematics::{forward_accelerations, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
-use crate::derivatives::centroidal_derivatives::{self as centroidal, CentroidalDerivatives, shift};
+use crate::derivatives::centroidal_derivatives::{self as centroidal, CentroidalDerivatives};
 use crate::derivatives::{aba_derivatives as aba, rnea_derivatives as rnea};
 use crate::lanes::limbs::LaneView;
 use crate::passes::energy::{self, EnergyDerivatives};
@@ -302,7 +302,7 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
 ) -> CentroidalDerivatives<'d, S> {
     forward_accelerations(model, data, q, v, a);
     centroidal::run(model, &data.world, &data.moving, &mut data.centroidal_derivatives);
-    shift(model, &mut data.centroidal_derivatives)
+    data.centroidal_derivatives.view()
 }
 
 /// What `aba_derivatives` has left.

@@ -9,6 +9,7 @@ use condyle_spatial::{Constant, Inertia, Motion, Scalar, Se3, Vec3};
 
 /// The state at which inverse dynamics has been differentiated.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
@@ -19,6 +20,7 @@ pub(crate) struct State<'d, S, R> {
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     /// oXb, in the body's public frame.
+    #[inline(always)]
     pub(crate) fn pose(&self, b: usize) -> Se3<S> {
         if let Some(limbs) = self.limbs {
             return limbs.pose(b) * Se3::new(self.model.nodes()[b].axis_rotation.transpose(), Vec3::zero()).lift();
@@ -27,6 +29,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     }
 
     /// S of column k of joint i.
+    #[inline(always)]
     pub(crate) fn column(&self, i: usize, k: usize) -> Motion<S> {
         if let Some(limbs) = self.limbs {
             return limbs.column(i, k);
@@ -35,6 +38,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     }
 
     /// Velocity, and acceleration with gravity as the world's.
+    #[inline(always)]
     pub(crate) fn moving(&self, b: usize) -> (Motion<S>, Motion<S>) {
         if let Some(limbs) = self.limbs {
             return limbs.moving(b);
@@ -43,6 +47,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
     }
 
     /// Iᶜ.
+    #[inline(always)]
     pub(crate) fn carried(&self, i: usize) -> Inertia<S> {
         if let Some(limbs) = self.limbs {
             return limbs.carried(i);

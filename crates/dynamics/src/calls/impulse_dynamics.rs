@@ -3,7 +3,7 @@
 use crate::constraints::constrained_derivatives::{invert, respond_to_q};
 use crate::constraints::constrained_dynamics::{factorize, inertia, solve};
 use crate::constraints::constraint_set::ConstraintSet;
-use crate::constraints::impulse_dynamics::{approach, differentiate_motion, respond_to_v_before};
+use crate::constraints::impulse_dynamics::{approach, differentiate_motion, part, respond_to_v_before};
 use crate::constraints::kkt_derivatives::{load, turn};
 use crate::data::Data;
 use crate::derivatives::rnea_derivatives;
@@ -95,10 +95,7 @@ fn run<S: Scalar, R: Constant<S>>(
     factorize(d);
     approach(world, constraints, out, v, restitution);
     solve(constraints, &d.factor, &out.zero, &mut d.qdd); // Δ
-    for k in 0..v.len() {
-        out.v_after[k] = v[k] + d.qdd[k];
-        out.w[k] = v[k].mul_add(restitution, out.v_after[k]);
-    }
+    part(out, v, &d.qdd, restitution);
 }
 
 /// What [`impulse_dynamics_derivatives`] gives.

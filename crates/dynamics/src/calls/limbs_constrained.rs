@@ -45,7 +45,10 @@ register_kernel! {
 kernel! {
     /// λ from J M⁻¹ Jᵀ.
     fn decompose<S>(set: &mut ConstraintSet<S>) {
-        set.delassus.decompose(set.proximal, &mut set.lambda);
+        set.delassus.redundant = S::zero();
+        for island in &set.islands {
+            set.delassus.decompose(island, set.proximal, &mut set.lambda);
+        }
     }
 }
 

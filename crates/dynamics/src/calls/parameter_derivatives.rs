@@ -16,7 +16,7 @@ use super::differentiated::State;
 use crate::passes::regressor::{PARAMETERS, effort};
 use condyle_model::Model;
 use condyle_spatial::elementary::tanh;
-use condyle_spatial::{Act, Constant, Scalar};
+use condyle_spatial::{Act, Constant, Scalar, kernel};
 use nalgebra::DMatrix;
 
 /// An input of the dynamics beside position, velocity, acceleration and effort.
@@ -60,9 +60,43 @@ impl Input {
     }
 }
 
+/// Where entries of B go: to B, or with −M⁻¹ to −M⁻¹ B.
+struct Entries<'e, S> {
+    out: &'e mut [S],
+    Minv: Option<&'e DMatrix<S>>,
+    nv: usize,
+}
+
+impl<S: Scalar> Entries<'_, S> {
+    /// Adds to an entry of B.
+    #[inline(always)]
+    fn add(&mut self, row: usize, column: usize, x: S) {
+        let out = &mut self.out[column * self.nv..(column + 1) * self.nv];
+        match self.Minv {
+            None => out[row] += x,
+            Some(Minv) => {
+                let by_row = &Minv.as_slice()[row * self.nv..(row + 1) * self.nv]; // symmetric: a column is a row
+                for i in 0..self.nv {
+                    out[i] -= by_row[i] * x; // −M⁻¹ B
+                }
+            }
+        }
+    }
+}
+
+kernel! {
+    /// B, or −M⁻¹ B.
+    fn write<S, R>(state: State<'_, S, R>, input: Input, Minv: Option<&DMatrix<S>>, out: &mut [S]) {
+        out.fill(S::zero());
+        let nv = state.model.nv();
+        state.entries(input, &mut Entries { out, Minv, nv });
+    }
+}
+
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Gives each entry of B other than zero: to its coordinate (row), column, summand. An entry may be given in parts.
-    fn entries(&self, input: Input, mut give: impl FnMut(usize, usize, S)) {
+    /// Gives each entry of B other than zero. An entry may be given in parts.
+    #[inline(always)]
+    fn entries(&self, input: Input, to: &mut Entries<'_, S>) {
         let (model, pass) = (self.model, self.pass);
         match input {
             Input::Force(b) => {
@@ -70,17 +104,20 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
                 for (i, k) in self.columns(b) {
                     let column = &model.columns()[model.nodes()[i].column + k];
                     let S_b = oXb.act_inv(self.column(i, k)).scale(S::splat(-column.ratio)).to_array(); // −J_bᵀ
-                    (0..6).for_each(|k| give(column.coordinate, k, S_b[k]));
+                    for k in 0..6 {
+                        to.add(column.coordinate, k, S_b[k]);
+                    }
                 }
             }
             Input::Inertia(b) => {
-                assert!(b > 0, "input: the world has no inertia");
                 let (oXb, (v, a)) = (self.pose(b), self.moving(b));
                 let (v_b, a_b) = (oXb.act_inv(v), oXb.act_inv(a));
                 for (i, k) in self.columns(b) {
                     let column = &model.columns()[model.nodes()[i].column + k];
                     let y = effort(oXb.act_inv(self.column(i, k)).scale(S::splat(column.ratio)), v_b, a_b);
-                    (0..PARAMETERS).for_each(|k| give(column.coordinate, k, y[k]));
+                    for k in 0..PARAMETERS {
+                        to.add(column.coordinate, k, y[k]);
+                    }
                 }
             }
             Input::Gravity => {
@@ -88,24 +125,45 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
                     for k in 0..model.nodes()[i].joint.nv() {
                         let column = &model.columns()[model.nodes()[i].column + k];
                         let weight = (self.carried(i) * self.column(i, k)).linear.scale(S::splat(-column.ratio));
-                        (weight.to_array().into_iter().enumerate()).for_each(|(k, x)| give(column.coordinate, k, x));
+                        let weight = weight.to_array();
+                        for k in 0..3 {
+                            to.add(column.coordinate, k, weight[k]);
+                        }
                     }
                 }
             }
-            Input::Armature => (0..model.nv()).for_each(|k| give(k, k, pass.qdd[k])),
-            Input::Damping => (0..model.nv()).for_each(|k| give(k, k, pass.qd[k])),
+            Input::Armature => {
+                for k in 0..model.nv() {
+                    to.add(k, k, pass.qdd[k]);
+                }
+            }
+            Input::Damping => {
+                for k in 0..model.nv() {
+                    to.add(k, k, pass.qd[k]);
+                }
+            }
             Input::Friction { smoothing } => {
-                assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");
-                (0..model.nv()).for_each(|k| give(k, k, tanh(pass.qd[k] * S::splat(1.0 / smoothing))));
+                for k in 0..model.nv() {
+                    to.add(k, k, tanh(pass.qd[k] * S::splat(1.0 / smoothing)));
+                }
             }
         }
     }
+}
 
-    /// Fills a derivative with zeros, if it has the right shape.
-    fn clear(&self, name: &str, out: &mut DMatrix<S>, input: Input) {
-        let shape = (self.model.nv(), input.len(self.model));
-        assert!(out.shape() == shape, "{name}: expected {} × {}, found {:?}", shape.0, shape.1, out.shape());
-        out.fill(S::zero());
+impl Input {
+    /// Panics for an input that there is not, or a derivative of another shape.
+    #[track_caller]
+    fn check<R>(self, model: &Model<R>, name: &str, found: (usize, usize)) {
+        let shape = (model.nv(), self.len(model));
+        assert!(found == shape, "{name}: expected {} × {}, found {found:?}", shape.0, shape.1);
+        match self {
+            Self::Inertia(body) => assert!(body > 0, "input: the world has no inertia"),
+            Self::Friction { smoothing } => {
+                assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");
+            }
+            _ => {}
+        }
     }
 }
 
@@ -127,8 +185,15 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
     /// # Panics
     /// If `dtau` has not that shape, or the input names no moving body or a smoothing that is not positive.
     pub fn with_respect_to(&self, input: Input, dtau: &mut DMatrix<S>) {
-        self.state.clear("dtau", dtau, input);
-        self.state.entries(input, |row, column, x| dtau[(row, column)] += x);
+        input.check(self.state.model, "dtau", dtau.shape());
+        self.write_input(input, dtau.as_mut_slice());
+    }
+
+    /// ∂τ/∂(any other input), column by column.
+    pub(crate) fn write_input(&self, input: Input, dtau: &mut [S]) {
+        let model = self.state.model;
+        input.check(model, "dtau", (model.nv(), input.len(model)));
+        write(self.state, input, None, dtau);
     }
 }
 
@@ -149,11 +214,14 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
     /// # Panics
     /// If `da` has not that shape, or the input names no moving body or a smoothing that is not positive.
     pub fn with_respect_to(&self, input: Input, da: &mut DMatrix<S>) {
-        self.state.clear("da", da, input);
-        self.state.entries(input, |row, column, x| {
-            for i in 0..self.a.len() {
-                da[(i, column)] -= self.da_dtau[(i, row)] * x; // −M⁻¹ B
-            }
-        });
+        input.check(self.state.model, "da", da.shape());
+        self.write_input(input, da.as_mut_slice());
+    }
+
+    /// ∂q̈/∂(any other input), column by column.
+    pub(crate) fn write_input(&self, input: Input, da: &mut [S]) {
+        let model = self.state.model;
+        input.check(model, "da", (model.nv(), input.len(model)));
+        write(self.state, input, Some(self.da_dtau), da);
     }
 }

@@ -2,18 +2,10 @@
 
 use super::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
 use crate::data::Data;
-use crate::passes::frames::Placements;
-use crate::passes::regressor::{PARAMETERS, effort, pairing};
+use crate::passes::regressor;
 use condyle_model::Model;
-use condyle_model::layout::{Columns, Layout, Single};
-use condyle_spatial::{Act, Constant, Motion, Scalar};
+use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
-
-/// The rows of body i's ten parameters in a vector of all.
-#[inline(always)]
-fn of_body<S>(parameters: &mut [S], i: usize) -> &mut [S] {
-    &mut parameters[PARAMETERS * (i - 1)..PARAMETERS * i]
-}
 
 /// Y(q, v, a) with τ = Y π, in O(n · depth): inverse dynamics as a linear function of the inertias, armature apart.
 ///
@@ -43,22 +35,7 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
 ) -> &'d DMatrix<S> {
     forward_accelerations(model, data, q, v, a);
-    let l = Single::new(model);
-    let minus_g = l.minus_gravity();
-    let Y = data.regressor.torque.as_mut_slice();
-    Y.fill(S::zero());
-    for i in l.bodies() {
-        let oXb = Placements { model, world: &data.world }.body(i);
-        let a_i = Motion { linear: data.moving.a[i].linear + minus_g, ..data.moving.a[i] };
-        let (v_b, a_b) = (oXb.act_inv(data.moving.v[i]), oXb.act_inv(a_i));
-        for &c in l.support(i) {
-            let column = &model.columns()[c];
-            let S_b = oXb.act_inv(data.world.S[c]).scale(S::splat(column.ratio));
-            for (k, y) in effort(S_b, v_b, a_b).into_iter().enumerate() {
-                Y[column.coordinate + model.nv() * (PARAMETERS * (i - 1) + k)] += y; // τ_S = (y(S, a) − y(v × S, v)) · π_i
-            }
-        }
-    }
+    regressor::torque(model, &data.world, &data.moving, &mut data.regressor);
     &data.regressor.torque
 }
 
@@ -86,10 +63,7 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
 ) -> &'d [S] {
     forward_velocities(model, data, q, v);
-    for i in 1..model.nodes().len() {
-        let v_b = Placements { model, world: &data.world }.body(i).act_inv(data.moving.v[i]);
-        of_body(&mut data.regressor.kinetic, i).copy_from_slice(&pairing(v_b.scale(S::splat(0.5)), v_b)); // ½ y(v, v)
-    }
+    regressor::kinetic(model, &data.world, &data.moving, &mut data.regressor);
     &data.regressor.kinetic
 }
 
@@ -116,13 +90,6 @@ pub fn potential_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
 ) -> &'d [S] {
     forward_kinematics(model, data, q);
-    let minus_g = Single::<S, R>::new(model).minus_gravity();
-    for i in 1..model.nodes().len() {
-        let oXb = Placements { model, world: &data.world }.body(i);
-        let first = oXb.rotation.transpose_mul(minus_g);
-        let o = S::zero();
-        let row = [minus_g.dot(oXb.translation), first.x, first.y, first.z, o, o, o, o, o, o];
-        of_body(&mut data.regressor.potential, i).copy_from_slice(&row); // V_i = −g · p m − Rᵀ g · m c
-    }
+    regressor::potential(model, &data.world, &mut data.regressor);
     &data.regressor.potential
 }

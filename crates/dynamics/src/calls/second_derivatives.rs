@@ -120,17 +120,32 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     out: &mut RneaSecondDerivatives<S>,
 ) {
     check("out", out.lambda.len(), model.nv());
+    let RneaSecondDerivatives { dqdq, dvdq, dvdv, dadq, lambda } = out;
+    each_unit_hessian(model, data, [q, v, a], f_ext, lambda, |i, matrices| {
+        for (to, from) in [&mut dqdq[i], &mut dvdq[i], &mut dvdv[i], &mut dadq[i]].into_iter().zip(matrices) {
+            to.copy_from(from);
+        }
+    });
+}
+
+/// [`rnea_hessian`] for each unit vector in turn: gives its number and the matrices. lambda is scratch, overwritten.
+pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    [q, v, a]: [&[S]; 3],
+    f_ext: &[Force<S>],
+    lambda: &mut [S],
+    mut give: impl FnMut(usize, [&DMatrix<S>; 4]),
+) {
     check_arguments(model, data, q, v, a, f_ext);
     one_by_one(model, data, q, v, a, f_ext);
+    lambda.fill(S::zero());
     for i in 0..model.nv() {
-        out.lambda[i] = S::one();
-        rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &out.lambda);
-        out.lambda[i] = S::zero();
+        lambda[i] = S::one();
+        rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
+        lambda[i] = S::zero();
         let rnea::Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
-        out.dqdq[i].copy_from(dqdq);
-        out.dvdq[i].copy_from(dvdq);
-        out.dvdv[i].copy_from(dvdv);
-        out.dadq[i].copy_from(dadq);
+        give(i, [dqdq, dvdq, dvdv, dadq]);
     }
 }
 
@@ -183,10 +198,7 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     check_forward(model, data, q, v, tau, f_ext);
     in_turn(model, data, q, v, tau, f_ext);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);
-    for (i, mu) in mu.iter_mut().enumerate() {
-        let row = data.minv.matrix().column(i); // symmetric: a row is a column
-        *mu = row.iter().zip(lambda).fold(S::zero(), |sum, (&x, &l)| x.mul_add(l, sum)); // μ = M⁻¹ λ
-    }
+    aba::multiply(data.minv.matrix(), lambda, &mut mu); // μ = M⁻¹ λ
     rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &mu);
     data.aba_hessian.mu = mu;
     let (first, Minv) = (&data.aba_derivatives, data.minv.matrix());

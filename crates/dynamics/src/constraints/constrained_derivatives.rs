@@ -14,14 +14,16 @@
 //! programming for multi-phase rigid contact dynamics* (2018).
 
 use crate::constraints::constraint_set::ConstraintSet;
+use crate::constraints::islands::Island;
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::sparsity::NonzeroRows;
-use condyle_linalg::tree_product::{minus_product, subtract_column};
+use condyle_linalg::tree_product::{minus_block_product, subtract_column};
 use condyle_spatial::kernel;
 use condyle_spatial::{Force, Scalar};
+use core::ops::Range;
 use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
@@ -52,13 +54,19 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// C −= A B, where column j of B has zeros but in the rows `rows[j]`.
+/// C −= A B in some columns, and some rows of C, where column j of B has zeros but in the rows `rows[j]`.
 #[inline(always)]
-fn subtract_product<S: Scalar, R: AsRef<[usize]>>(A: &DMatrix<S>, B: &DMatrix<S>, C: &mut DMatrix<S>, rows: &[R]) {
+fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
+    A: &DMatrix<S>,
+    B: &DMatrix<S>,
+    C: &mut DMatrix<S>,
+    rows: &[R],
+    [of_C, columns]: [&Range<usize>; 2],
+) {
     let (n, m) = A.shape();
     let (A, B, C) = (A.as_slice(), B.as_slice(), C.as_mut_slice());
-    for (j, rows) in rows.iter().enumerate() {
-        subtract_column(A, &B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n], rows.as_ref());
+    for j in columns.clone() {
+        subtract_column(A, &B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n], rows[j].as_ref(), of_C);
     }
 }
 
@@ -67,36 +75,48 @@ impl<S: Scalar> ConstraintSet<S> {
     #[inline(always)]
     fn invert(&mut self, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
         factor.inverse(P); // M⁻¹
-        self.delassus.invert(self.proximal);
-        let (n, rows) = (self.nv, self.lambda.len());
-        let Self { U, Jbar, dlambda_dtau, .. } = self;
+        for k in 0..self.islands.len() {
+            self.invert_island(k, P);
+        }
+    }
+
+    /// The same of an island, for M⁻¹ in place of P.
+    #[inline(always)]
+    fn invert_island(&mut self, k: usize, P: &mut DMatrix<S>) {
+        let Self { U, Jbar, dlambda_dtau, delassus, proximal, .. } = self;
+        let (n, rows, island) = (self.nv, self.lambda.len(), &self.islands[k]);
+        let Range { start, end } = island.coordinates;
+        delassus.invert(island, *proximal);
         let (U, Jbar, Minv) = (U.as_mut_slice(), Jbar.as_mut_slice(), P.as_mut_slice());
-        U.fill(S::zero());
-        for plan in &self.plans {
+        for plan in &self.plans[island.constraints.clone()] {
             for r in 0..plan.rows() {
-                let (row, u) = (&self.J[plan.range(r)], &mut U[(plan.row + r) * n..][..n]);
+                let (row, u) = (&self.J[plan.range(r)], &mut U[island.of_column(plan.row + r, n)]);
+                u.fill(S::zero());
                 for (k, &coordinate) in plan.coordinates.iter().enumerate() {
-                    axpy(row[k], &Minv[coordinate * n..(coordinate + 1) * n], u); // U = M⁻¹ Jᵀ
+                    axpy(row[k], &Minv[island.of_column(coordinate, n)], u); // U = M⁻¹ Jᵀ
                 }
             }
         }
-        for j in 0..n {
+        if island.rows.is_empty() {
+            return;
+        }
+        for j in start..end {
             let row = &mut dlambda_dtau.as_mut_slice()[j * rows..(j + 1) * rows];
-            for r in 0..rows {
+            for r in island.rows.clone() {
                 row[r] = -U[r * n + j];
             }
-            self.delassus.solve(self.proximal, row); // ∂λ/∂τ = −J̄ᵀ = −Λ Uᵀ
-            for r in 0..rows {
+            delassus.solve(island, *proximal, row); // ∂λ/∂τ = −J̄ᵀ = −Λ Uᵀ
+            for r in island.rows.clone() {
                 Jbar[r * n + j] = -row[r];
             }
         }
-        for j in 0..n {
+        for j in start..end {
             let (above, rest) = Minv.split_at_mut(j * n);
-            let column = &mut rest[j..n];
-            for k in 0..rows {
-                axpy(-Jbar[k * n + j], &U[k * n + j..(k + 1) * n], column); // P = M⁻¹ − U J̄ᵀ
+            let column = &mut rest[j..end];
+            for k in island.rows.clone() {
+                axpy(-Jbar[k * n + j], &U[k * n + j..k * n + end], column); // P = M⁻¹ − U J̄ᵀ
             }
-            for i in 0..j {
+            for i in start..j {
                 rest[i] = above[i * n + j];
             }
         }
@@ -115,16 +135,28 @@ struct Equations<'e, S> {
     c: &'e DMatrix<S>,
     nonzero_rows: &'e [NonzeroRows],
     touching: &'e [Vec<usize>],
+    islands: &'e [Island],
 }
 
 impl<S: Scalar> Equations<'_, S> {
     #[inline(always)]
     fn solve(self, da: &mut DMatrix<S>, dlambda: &mut DMatrix<S>) {
-        minus_product(self.P.as_slice(), self.r.as_slice(), da.as_mut_slice(), self.nonzero_rows); // −P r − J̄ c
-        subtract_product(self.Jbar, self.c, da, self.touching);
-        dlambda.as_mut_slice().fill(S::zero());
-        subtract_product(self.inertia, self.c, dlambda, self.touching);
-        subtract_product(self.dlambda_dtau, self.r, dlambda, self.nonzero_rows); // J̄ᵀ r − Λ c
+        let (n, rows) = (da.nrows(), dlambda.nrows());
+        for island in self.islands {
+            let columns = &island.coordinates;
+            island.clear_beside(da.as_mut_slice(), n, S::zero());
+            let (P, r) = (self.P.as_slice(), self.r.as_slice());
+            minus_block_product(P, r, da.as_mut_slice(), self.nonzero_rows, columns); // −P r − J̄ c
+            if island.rows.is_empty() {
+                continue;
+            }
+            subtract_product(self.Jbar, self.c, da, self.touching, [columns, columns]);
+            for j in columns.clone() {
+                dlambda.as_mut_slice()[island.rows_of_column(j, rows)].fill(S::zero());
+            }
+            subtract_product(self.inertia, self.c, dlambda, self.touching, [&island.rows, columns]);
+            subtract_product(self.dlambda_dtau, self.r, dlambda, self.nonzero_rows, [&island.rows, columns]); // J̄ᵀ r − Λ c
+        }
     }
 }
 
@@ -132,17 +164,17 @@ impl<S: Scalar> ConstraintSet<S> {
     /// The derivatives of acceleration and forces with respect to q, for r and `dgamma_dq`.
     #[inline(always)]
     fn respond_to_q(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, dgamma_dq, dlambda_dq, .. } = self;
+        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, dgamma_dq, dlambda_dq, .. } = self;
         let (c, inertia) = (dgamma_dq, &delassus.inverse);
-        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching }.solve(da, dlambda_dq);
+        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching, islands }.solve(da, dlambda_dq);
     }
 
     /// The same with respect to v, for r and `dgamma_dv`.
     #[inline(always)]
     fn respond_to_v(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, dgamma_dv, dlambda_dv, .. } = self;
+        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, dgamma_dv, dlambda_dv, .. } = self;
         let (c, inertia) = (dgamma_dv, &delassus.inverse);
-        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching }.solve(da, dlambda_dv);
+        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching, islands }.solve(da, dlambda_dv);
     }
 }
 

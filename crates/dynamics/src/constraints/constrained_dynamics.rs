@@ -131,8 +131,11 @@ impl<S: Scalar> ConstraintSet<S> {
         for r in 0..b.len() {
             self.lambda[r] = -b[r]; // −(γ + J M⁻¹ (τ − h))
         }
-        self.delassus.multiply(&self.plans, &self.J, factor);
-        self.delassus.decompose(self.proximal, &mut self.lambda);
+        self.delassus.redundant = S::zero();
+        for island in &self.islands {
+            self.delassus.multiply(&self.plans, island, &self.J, factor);
+            self.delassus.decompose(island, self.proximal, &mut self.lambda);
+        }
         x.copy_from_slice(effort);
         self.add_effort(x);
         factor.solve(x); // q̈ = M⁻¹ (τ − h + Jᵀ λ)

@@ -3,6 +3,7 @@
 use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_lanes::ConstraintLanes;
 use crate::constraints::delassus::Delassus;
+use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, Proximal, nonzero_rows, touching};
 use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
@@ -18,6 +19,9 @@ use nalgebra::DMatrix;
 ///
 /// All memory is allocated here. Make one set for each combination of contacts, and change where they shall be through
 /// [`set_target`](Self::set_target); the [`Data`](crate::Data) can be the same for all sets.
+///
+/// Of several robots in one model that no constraint ties together, each costs what it costs alone, but for the zeros between
+/// them in matrices, if the constraints of each stand one after the other.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, robots};
@@ -35,6 +39,7 @@ pub struct ConstraintSet<S> {
     /// How redundant constraints share their forces; may be changed between calls.
     pub proximal: Proximal,
     pub(crate) plans: Vec<Plan>,
+    pub(crate) islands: Vec<Island>,
     pub(crate) targets: Vec<Target<S>>,
     pub(crate) nv: usize,
     /// The hash of the robot that it was made for: the frames and the axes of its joints are in it.
@@ -82,6 +87,7 @@ impl<S: Scalar> ConstraintSet<S> {
         Ok(Self {
             proximal: Proximal::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
+            islands: Island::of(model, &plans),
             nv,
             geometry: model.geometry_hash(),
             nonzero_rows: nonzero_rows(model, &plans),

@@ -2,14 +2,17 @@
 //!
 //! With M = Lᵀ D L, the rows of Y = J L⁻¹ have entries only where J's have, or nearer to the root, and J M⁻¹ Jᵀ = Y D⁻¹ Yᵀ
 //! needs what two constraints share and nothing else. It is factorised as C E Cᵀ with C unit lower triangular. A row that
-//! depends on rows before it has no pivot but rounding; its force is set to zero. Source: Featherstone, *Exploiting
+//! depends on rows before it has no pivot but rounding; its force is set to zero. Each [island](Island) is factorised by
+//! itself, in its columns and rows of what is kept for all. Source: Featherstone, *Exploiting
 //! sparsity in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
 
+use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, Proximal};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::{axpy, dot};
 use condyle_spatial::Scalar;
+use core::ops::Range;
 use nalgebra::DMatrix;
 
 /// A pivot smaller than this many roundings of its diagonal entry is none.
@@ -17,7 +20,7 @@ const ROUNDINGS: f64 = 1e3;
 
 /// Columns are stored in steps of this many numbers, so that loops over them have no remainder. What stands above the
 /// diagonal, or behind the last row, has no meaning.
-const fn step<S: Scalar>() -> usize {
+pub(crate) const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { STEP } else { 1 }
 }
 
@@ -76,13 +79,14 @@ impl<S: Scalar> Delassus<S> {
 
     /// J M⁻¹ Jᵀ, for the rows of J on their places.
     #[inline(always)]
-    pub(crate) fn multiply(&mut self, plans: &[Plan], J: &[S], M: &Ltdl<S>) {
+    pub(crate) fn multiply(&mut self, plans: &[Plan], island: &Island, J: &[S], M: &Ltdl<S>) {
         let D_inv = M.inverse_diagonal();
-        self.Y.copy_from_slice(J);
-        let (G, stride) = (&mut self.CE, self.stride);
-        G.fill(S::zero());
-        for (i, plan) in plans.iter().enumerate() {
+        self.clear(island);
+        let (G, stride, first) = (&mut self.CE, self.stride, island.constraints.start);
+        for i in island.constraints.clone() {
+            let plan = &plans[i];
             let Plan { places, shared, second, .. } = plan;
+            self.Y[plan.start..plan.end()].copy_from_slice(&J[plan.start..plan.end()]);
             for r in 0..plan.rows() {
                 let (y, z) = (&mut self.Y[plan.range(r)], &mut self.Z[plan.range(r)]);
                 for (j, &k) in places.iter().enumerate().rev() {
@@ -96,7 +100,7 @@ impl<S: Scalar> Delassus<S> {
                     z[j] = y[j] * D_inv[k];
                 }
             }
-            for (other, runs) in plans[..=i].iter().zip(&plan.common) {
+            for (other, runs) in plans[first..=i].iter().zip(&plan.common[first..]) {
                 for r in 0..plan.rows() {
                     let z = &self.Z[plan.range(r)];
                     for c in 0..if other.row == plan.row { r + 1 } else { other.rows() } {
@@ -112,105 +116,121 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// J M⁻¹ Jᵀ + μ 1 = C E Cᵀ, for J M⁻¹ Jᵀ in place of C E, and λ in place of b, as `solve` gives it: b goes along as one
-    /// more row.
+    /// Zeros in place of J M⁻¹ Jᵀ of an island, and in the row after it.
     #[inline(always)]
-    pub(crate) fn decompose(&mut self, proximal: Proximal, lambda: &mut [S]) {
+    pub(crate) fn clear(&mut self, Island { rows, .. }: &Island) {
+        for j in rows.clone() {
+            self.CE[j * self.stride + j - j % step::<S>()..][..room::<S>(rows, j)].fill(S::zero());
+        }
+    }
+
+    /// J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island, for J M⁻¹ Jᵀ in place of C E, and λ in place of b, as `solve` gives it: b goes
+    /// along as one more row. The islands' rows without a pivot are counted together, from `redundant` on.
+    #[inline(always)]
+    pub(crate) fn decompose(&mut self, island: &Island, proximal: Proximal, lambda: &mut [S]) {
         let Self { CE, rows, E_inv, stride, .. } = self;
-        let (n, stride) = (E_inv.len(), *stride);
+        let (Range { start, end: n }, stride) = (island.rows.clone(), *stride);
         let smallest = epsilon::<S>() * S::splat(ROUNDINGS);
-        for j in 0..n {
+        for j in start..n {
             CE[j * (stride + 1)] += S::splat(proximal.mu);
             CE[j * stride + n] = lambda[j];
         }
-        self.redundant = S::zero();
-        for j in 0..n {
+        for j in start..n {
             let (left, column) = CE.split_at_mut(j * stride);
             let (first, row) = (j - j % step::<S>(), &mut rows[j * stride..(j + 1) * stride]);
-            let column = &mut column[first..stride];
+            let column = &mut column[first..][..room::<S>(&island.rows, j)];
             let diagonal = column[j - first];
-            for k in 0..j {
+            for k in start..j {
                 row[k] = left[k * stride + j];
             }
-            subtract(left, stride, first, &row[..j], E_inv, column); // G_ij − Σ C_ik E_k C_jk
+            let left = &left[start * stride..];
+            subtract(left, stride, first, &row[start..j], &E_inv[start..], column); // G_ij − Σ C_ik E_k C_jk
             let pivot = column[j - first];
             let kept = (diagonal * smallest).lt(pivot);
             E_inv[j] = S::select(kept, S::select(kept, pivot, S::one()).recip(), S::zero());
             self.redundant += S::select(kept, S::zero(), S::one());
             self.x[j] = column[n - first]; // y = C⁻¹ b
         }
-        self.back_substitute();
-        self.repeat(proximal, lambda);
+        self.back_substitute(&island.rows);
+        self.repeat(island, proximal, lambda);
     }
 
-    /// λ in place of b: J M⁻¹ Jᵀ λ = b, by proximal iterations if there are any.
+    /// λ in place of b, of an island: J M⁻¹ Jᵀ λ = b, by proximal iterations if there are any.
     #[inline(always)]
-    pub(crate) fn solve(&mut self, proximal: Proximal, lambda: &mut [S]) {
-        self.x[..lambda.len()].copy_from_slice(lambda);
-        self.substitute(0);
-        self.back_substitute();
-        self.repeat(proximal, lambda);
+    pub(crate) fn solve(&mut self, island: &Island, proximal: Proximal, lambda: &mut [S]) {
+        self.x[island.rows.clone()].copy_from_slice(&lambda[island.rows.clone()]);
+        self.substitute(&island.rows, island.rows.start);
+        self.back_substitute(&island.rows);
+        self.repeat(island, proximal, lambda);
     }
 
     /// λ in place of b, for what comes first in place of x.
     #[inline(always)]
-    fn repeat(&mut self, proximal: Proximal, lambda: &mut [S]) {
-        let (n, mu) = (lambda.len(), S::splat(proximal.mu));
+    fn repeat(&mut self, Island { rows, .. }: &Island, proximal: Proximal, lambda: &mut [S]) {
+        let mu = S::splat(proximal.mu);
         for _ in 1..rounds(proximal) {
-            for r in 0..n {
+            for r in rows.clone() {
                 self.x[r] = self.x[r].mul_add(mu, lambda[r]); // b + μ λ'
             }
-            self.substitute(0);
-            self.back_substitute();
+            self.substitute(rows, rows.start);
+            self.back_substitute(rows);
         }
-        lambda.copy_from_slice(&self.x[..n]);
+        lambda[rows.clone()].copy_from_slice(&self.x[rows.clone()]);
     }
 
-    /// Λ: the map from b to λ.
+    /// Λ of an island: the map from b to λ. It has zeros beside.
     #[inline(always)]
-    pub(crate) fn invert(&mut self, proximal: Proximal) {
+    pub(crate) fn invert(&mut self, Island { rows, .. }: &Island, proximal: Proximal) {
         let (n, mu) = (self.E_inv.len(), S::splat(proximal.mu));
-        for j in 0..n {
-            self.x.fill(S::zero());
+        for j in rows.clone() {
+            self.x[rows.clone()].fill(S::zero());
             self.x[j] = S::one();
-            self.substitute(j);
-            self.back_substitute();
+            self.substitute(rows, j);
+            self.back_substitute(rows);
             for _ in 1..rounds(proximal) {
-                for x in &mut self.x {
+                for x in &mut self.x[rows.clone()] {
                     *x = *x * mu;
                 }
                 self.x[j] += S::one();
-                self.substitute(0);
-                self.back_substitute(); // Λ = (G + μ)⁻¹ (1 + μ Λ')
+                self.substitute(rows, rows.start);
+                self.back_substitute(rows); // Λ = (G + μ)⁻¹ (1 + μ Λ')
             }
-            self.inverse.as_mut_slice()[j * n..(j + 1) * n].copy_from_slice(&self.x[..n]);
+            let column = &mut self.inverse.as_mut_slice()[j * n..(j + 1) * n];
+            column[rows.clone()].copy_from_slice(&self.x[rows.clone()]);
         }
     }
 
-    /// y = C⁻¹ b in place of x, for b that is zero before `start`.
+    /// y = C⁻¹ b in place of x in some rows, for b that is zero before `start`.
     #[inline(always)]
-    fn substitute(&mut self, start: usize) {
+    fn substitute(&mut self, rows: &Range<usize>, start: usize) {
         let Self { CE, E_inv, x, y, stride, .. } = self;
-        let n = E_inv.len();
-        y[..start].fill(S::zero());
-        for j in start..n {
+        y[rows.start..start].fill(S::zero());
+        for j in start..rows.end {
             let first = j - j % step::<S>();
+            let n = room::<S>(rows, j);
             y[j] = x[j];
-            update(-(x[j] * E_inv[j]), &CE[j * *stride + first..], &mut x[first..]); // b_i − C_ij y_j
+            update(-(x[j] * E_inv[j]), &CE[j * *stride + first..], &mut x[first..first + n]); // b_i − C_ij y_j
         }
-        x[..n].copy_from_slice(&y[..n]);
+        x[rows.clone()].copy_from_slice(&y[rows.clone()]);
     }
 
-    /// C⁻ᵀ E⁻¹ y in place of x, for y in place of x.
+    /// C⁻ᵀ E⁻¹ y in place of x in some rows, for y in place of x.
     #[inline(always)]
-    fn back_substitute(&mut self) {
+    fn back_substitute(&mut self, range: &Range<usize>) {
         let Self { rows, E_inv, x, stride, .. } = self;
-        for j in (0..E_inv.len()).rev() {
-            let x_j = x[j] * E_inv[j];
-            update(-x_j, &rows[j * *stride..], &mut x[..j.next_multiple_of(step::<S>())]); // y_k − E_k C_jk x_j
+        let first = range.start - range.start % step::<S>();
+        for j in range.clone().rev() {
+            let (x_j, row) = (x[j] * E_inv[j], &rows[j * *stride + first..]);
+            update(-x_j, row, &mut x[first..j.next_multiple_of(step::<S>())]); // y_k − E_k C_jk x_j
             x[j] = x_j;
         }
     }
+}
+
+/// How many numbers of column j there are in rows that end with these and one more, in whole steps.
+#[inline(always)]
+fn room<S: Scalar>(rows: &Range<usize>, j: usize) -> usize {
+    (rows.end + 1).next_multiple_of(step::<S>()) - (j - j % step::<S>())
 }
 
 /// y += x s, in whole steps.

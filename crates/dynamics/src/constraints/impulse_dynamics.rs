@@ -17,6 +17,7 @@
 
 use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
+use crate::constraints::islands::clear_rows;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
 use alloc::vec::Vec;
@@ -71,6 +72,16 @@ kernel! {
 }
 
 kernel! {
+    /// v⁺ = v + Δ and w = v⁺ + ε v.
+    pub(crate) fn part<S>(d: &mut Workspace<S>, v: &[S], change: &[S], restitution: S) {
+        for k in 0..v.len() {
+            d.v_after[k] = v[k] + change[k];
+            d.w[k] = v[k].mul_add(restitution, d.v_after[k]);
+        }
+    }
+}
+
+kernel! {
     /// c, for bodies that are placed.
     pub(crate) fn differentiate_motion<S, R>(
         model: &Model<R>,
@@ -79,7 +90,7 @@ kernel! {
         set: &mut ConstraintSet<S>,
     ) {
         spread(&Single::new(model), world, d);
-        set.dgamma_dq.as_mut_slice().fill(S::zero());
+        clear_rows(&set.islands, &mut set.dgamma_dq);
         for (plan, target) in set.plans.iter().zip(&set.targets) {
             let ends = FramePair::new(plan, target, world, &d.velocity, &d.velocity);
             let value = &set.error[plan.row..plan.row + plan.rows()];
@@ -124,14 +135,15 @@ impl<S: Scalar> ConstraintSet<S> {
         for k in 0..n {
             dv[k * (n + 1)] = S::one();
         }
-        for plan in &self.plans {
-            for r in 0..plan.rows() {
-                let (J, row) = (&self.J[plan.range(r)], plan.row + r);
-                for (k, &coordinate) in plan.coordinates.iter().enumerate() {
-                    let x = J[k] * scale;
-                    axpy(x, &Jbar[row * n..(row + 1) * n], &mut dv[coordinate * n..(coordinate + 1) * n]);
-                    let column = &mut dlambda[coordinate * rows..(coordinate + 1) * rows];
-                    axpy(x, &inertia[row * rows..(row + 1) * rows], column);
+        for island in &self.islands {
+            for plan in &self.plans[island.constraints.clone()] {
+                for r in 0..plan.rows() {
+                    let (J, row) = (&self.J[plan.range(r)], plan.row + r);
+                    for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                        let (x, own) = (J[k] * scale, island.rows_of_column(coordinate, rows));
+                        axpy(x, &Jbar[island.of_column(row, n)], &mut dv[island.of_column(coordinate, n)]);
+                        axpy(x, &inertia[island.rows_of_column(row, rows)], &mut dlambda[own]);
+                    }
                 }
             }
         }

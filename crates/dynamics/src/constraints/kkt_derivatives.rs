@@ -15,6 +15,7 @@
 use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::{Columns, FramePair};
 use crate::constraints::constraint_set::ConstraintSet;
+use crate::constraints::islands::clear_rows;
 use crate::derivatives::rnea_derivatives;
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::World;
@@ -150,9 +151,9 @@ kernel! {
     pub(crate) fn differentiate_motion<S>(set: &mut ConstraintSet<S>, world: &World<S>, bodies: &rnea_derivatives::Bodies<S>) {
         let rnea_derivatives::Bodies { v, a, Psid, Psidd, PsidSd, .. } = bodies;
         let columns = Columns { S: &world.S, Psid, Psidd, PsidSd };
-        let ConstraintSet { plans, targets, error, dgamma_dq, dgamma_dv, .. } = set;
-        dgamma_dq.as_mut_slice().fill(S::zero());
-        dgamma_dv.as_mut_slice().fill(S::zero());
+        let ConstraintSet { plans, islands, targets, error, dgamma_dq, dgamma_dv, .. } = set;
+        clear_rows(islands, dgamma_dq);
+        clear_rows(islands, dgamma_dv);
         for (plan, target) in plans.iter().zip(targets.iter()) {
             let ends = FramePair::new(plan, target, world, v, a);
             let error = &error[plan.row..plan.row + plan.rows()];

@@ -8,5 +8,6 @@ pub(crate) mod constraint_motion;
 pub(crate) mod constraint_set;
 mod delassus;
 pub(crate) mod impulse_dynamics;
+pub(crate) mod islands;
 pub(crate) mod kkt_derivatives;
 pub(crate) mod plan;

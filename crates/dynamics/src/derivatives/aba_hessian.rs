@@ -66,6 +66,21 @@ impl<S: Scalar> Workspace<S> {
 }
 
 kernel! {
+    /// μ = M⁻¹ λ.
+    pub(crate) fn multiply<S>(Minv: &DMatrix<S>, lambda: &[S], mu: &mut [S]) {
+        let n = mu.len();
+        for i in 0..n {
+            let row = &Minv.as_slice()[i * n..(i + 1) * n]; // symmetric: a row is a column
+            let mut sum = S::zero();
+            for k in 0..n {
+                sum = row[k].mul_add(lambda[k], sum);
+            }
+            mu[i] = sum;
+        }
+    }
+}
+
+kernel! {
     /// After `aba_derivatives` and the Hessian of φ.
     pub(crate) fn run<S>(
         coupled: &[NonzeroRows],

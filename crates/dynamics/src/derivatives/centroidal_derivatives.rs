@@ -78,6 +78,23 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
+impl<S> Workspace<S> {
+    /// What `run` has left.
+    pub(crate) fn view(&self) -> CentroidalDerivatives<'_, S> {
+        CentroidalDerivatives {
+            dh_dq: &self.dh_dq,
+            dh_dv: &self.drate_da,
+            drate_dq: &self.drate_dq,
+            drate_dv: &self.drate_dv,
+            drate_da: &self.drate_da,
+            dcom_dq: &self.dcom_dq,
+            dvcom_dq: &self.dvcom_dq,
+            dacom_dq: &self.dacom_dq,
+            dacom_dv: &self.dacom_dv,
+        }
+    }
+}
+
 /// The derivatives about the world's origin, for bodies whose velocities and accelerations are known.
 #[inline(always)]
 fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
@@ -116,7 +133,7 @@ fn moved<S: Scalar>(dcom: Vec3<S>, f: Vec3<S>) -> Force<S> {
 
 /// The derivatives about the centre of mass, after `pass`.
 #[inline(always)]
-pub(crate) fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalDerivatives<'d, S> {
+fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let per_mass = d.IC[0].mass.recip();
     let com = d.IC[0].mass_com.scale(per_mass);
     let (p, f) = (d.BC[0].momentum.linear, d.F[0].linear);
@@ -137,17 +154,6 @@ pub(crate) fn shift<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>)
                 to[(i, j)] = from[(i, j)] * per_mass;
             }
         }
-    }
-    CentroidalDerivatives {
-        dh_dq: &d.dh_dq,
-        dh_dv: &d.drate_da,
-        drate_dq: &d.drate_dq,
-        drate_dv: &d.drate_dv,
-        drate_da: &d.drate_da,
-        dcom_dq: &d.dcom_dq,
-        dvcom_dq: &d.dvcom_dq,
-        dacom_dq: &d.dacom_dq,
-        dacom_dv: &d.dacom_dv,
     }
 }
 
@@ -178,5 +184,6 @@ kernel! {
     /// For bodies whose accelerations are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
+        shift(model, d);
     }
 }

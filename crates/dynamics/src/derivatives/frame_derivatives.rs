@@ -16,16 +16,42 @@
 
 use crate::passes::frames::{Accelerations, ReferenceFrame, Velocities, add, clear};
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::{Act, Constant, Cross, Motion, Scalar, Se3};
+use condyle_spatial::{Act, Constant, Cross, Motion, Scalar, Se3, kernel};
 use nalgebra::DMatrix;
+
+kernel! {
+    /// ∂v/∂q of a frame at oXf on a body.
+    fn velocity_derivative<S, R>(
+        of: Velocities<'_, S, R>,
+        body: usize,
+        oXf: &Se3<S>,
+        reference: ReferenceFrame,
+        dv_dq: &mut DMatrix<S>,
+    ) {
+        clear("dv_dq", dv_dq, of.model.nv());
+        let (l, oXr, v) = (Single::<S, R>::new(of.model), reference.pose(*oXf), of.moving.v[body]);
+        let mut i = body;
+        while i > 0 {
+            let parent = of.model.nodes()[i].parent;
+            for c in l.column(i)..l.column(i) + l.joint(i).nv() {
+                let S_c = of.world.S[c];
+                let Psid = of.moving.v[parent].cross(S_c); // Ψ̇ = v_λ × S
+                let r = reference.velocity(*oXf, S_c);
+                add(of.model, dv_dq, c, oXr.act_inv((S_c - r).cross(v) + Psid)); // S × v + Ψ̇ − r × v
+            }
+            i = parent;
+        }
+    }
+}
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ∂v/∂q of a body's velocity, as for [`frame_velocity_derivative`](Self::frame_velocity_derivative).
     ///
     /// # Panics
     /// If there is no such body, or `dv_dq` is not 6 × nv.
+    #[inline(always)]
     pub fn body_velocity_derivative(&self, body: usize, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
-        self.velocity_derivative(body, self.body(body), reference, dv_dq);
+        velocity_derivative(*self, body, &self.body(body), reference, dv_dq);
     }
 
     /// ∂v/∂q of the six numbers v of a [frame's velocity](Self::frame_velocity), 6 × nv, linear rows first. dv_dq is
@@ -45,31 +71,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// If there is no such frame, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     pub fn frame_velocity_derivative(&self, frame: usize, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
-        self.velocity_derivative(self.model.frames()[frame].body, self.frame(frame), reference, dv_dq);
-    }
-
-    #[inline(always)]
-    fn velocity_derivative(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
-        clear("dv_dq", dv_dq, self.model.nv());
-        let (oXr, v) = (reference.pose(oXf), self.moving.v[body]);
-        self.each_column(body, |c, parent| {
-            let S_c = self.world.S[c];
-            let Psid = self.moving.v[parent].cross(S_c); // Ψ̇ = v_λ × S
-            let r = reference.velocity(oXf, S_c);
-            add(self.model, dv_dq, c, oXr.act_inv((S_c - r).cross(v) + Psid)); // S × v + Ψ̇ − r × v
-        });
-    }
-
-    /// Each column that moves a body, and the body on which its joint sits.
-    #[inline(always)]
-    fn each_column(&self, body: usize, mut of: impl FnMut(usize, usize)) {
-        let l = Single::<S, R>::new(self.model);
-        let mut i = body;
-        while i > 0 {
-            let parent = self.model.nodes()[i].parent;
-            (0..l.joint(i).nv()).for_each(|k| of(l.column(i) + k, parent));
-            i = parent;
-        }
+        velocity_derivative(*self, self.model.frames()[frame].body, &self.frame(frame), reference, dv_dq);
     }
 }
 
@@ -81,12 +83,43 @@ struct Column<S> {
     a_v: Motion<S>,
 }
 
+kernel! {
+    /// ∂a/∂q and ∂a/∂v of a frame at oXf on a body; of the classical acceleration, for the frame's velocity.
+    fn acceleration_derivatives<S, R>(
+        of: Accelerations<'_, S, R>,
+        body: usize,
+        oXf: &Se3<S>,
+        reference: ReferenceFrame,
+        velocity: Option<&Motion<S>>,
+        da_dq: &mut DMatrix<S>,
+        da_dv: &mut DMatrix<S>,
+    ) {
+        clear("da_dq", da_dq, of.model.nv());
+        clear("da_dv", da_dv, of.model.nv());
+        let (l, mut i) = (Single::<S, R>::new(of.model), body);
+        while i > 0 {
+            let parent = of.model.nodes()[i].parent;
+            for c in l.column(i)..l.column(i) + l.joint(i).nv() {
+                let mut d = of.column(body, *oXf, reference, c, parent);
+                if let Some(v) = velocity {
+                    d.a_q.linear += d.v_q.angular.cross(v.linear) + v.angular.cross(d.v_q.linear); // δω × v + ω × δv
+                    d.a_v.linear += d.v_v.angular.cross(v.linear) + v.angular.cross(d.v_v.linear);
+                }
+                add(of.model, da_dq, c, d.a_q);
+                add(of.model, da_dv, c, d.a_v);
+            }
+            i = parent;
+        }
+    }
+}
+
 impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// ∂a/∂q and ∂a/∂v of a body's spatial acceleration, as for
     /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives).
     ///
     /// # Panics
     /// If there is no such body, or a matrix is not 6 × nv.
+    #[inline(always)]
     pub fn body_acceleration_derivatives(
         &self,
         body: usize,
@@ -94,7 +127,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DMatrix<S>,
         da_dv: &mut DMatrix<S>,
     ) {
-        self.acceleration_derivatives(body, self.body(body), reference, da_dq, da_dv);
+        acceleration_derivatives(*self, body, &self.body(body), reference, None, da_dq, da_dv);
     }
 
     /// ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's spatial acceleration](Self::frame_acceleration), each 6 × nv,
@@ -102,6 +135,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame, or a matrix is not 6 × nv.
+    #[inline(always)]
     pub fn frame_acceleration_derivatives(
         &self,
         frame: usize,
@@ -109,24 +143,8 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DMatrix<S>,
         da_dv: &mut DMatrix<S>,
     ) {
-        self.acceleration_derivatives(self.model.frames()[frame].body, self.frame(frame), reference, da_dq, da_dv);
-    }
-
-    fn acceleration_derivatives(
-        &self,
-        body: usize,
-        oXf: Se3<S>,
-        reference: ReferenceFrame,
-        da_dq: &mut DMatrix<S>,
-        da_dv: &mut DMatrix<S>,
-    ) {
-        clear("da_dq", da_dq, self.model.nv());
-        clear("da_dv", da_dv, self.model.nv());
-        self.each_column(body, |c, parent| {
-            let d = self.column(body, oXf, reference, c, parent);
-            add(self.model, da_dq, c, d.a_q);
-            add(self.model, da_dv, c, d.a_v);
-        });
+        let body = self.model.frames()[frame].body;
+        acceleration_derivatives(*self, body, &self.frame(frame), reference, None, da_dq, da_dv);
     }
 
     /// ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's classical acceleration](Self::frame_classical_acceleration),
@@ -148,6 +166,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame, or a matrix is not 6 × nv.
+    #[inline(always)]
     pub fn frame_classical_acceleration_derivatives(
         &self,
         frame: usize,
@@ -155,18 +174,8 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DMatrix<S>,
         da_dv: &mut DMatrix<S>,
     ) {
-        clear("da_dq", da_dq, self.model.nv());
-        clear("da_dv", da_dv, self.model.nv());
-        let (body, oXf) = (self.model.frames()[frame].body, self.frame(frame));
-        let v = self.frame_velocity(frame, reference);
-        let turning = |d: Motion<S>| d.angular.cross(v.linear) + v.angular.cross(d.linear); // δω × v + ω × δv
-        self.each_column(body, |c, parent| {
-            let mut d = self.column(body, oXf, reference, c, parent);
-            d.a_q.linear += turning(d.v_q);
-            d.a_v.linear += turning(d.v_v);
-            add(self.model, da_dq, c, d.a_q);
-            add(self.model, da_dv, c, d.a_v);
-        });
+        let (body, v) = (self.model.frames()[frame].body, self.frame_velocity(frame, reference));
+        acceleration_derivatives(*self, body, &self.frame(frame), reference, Some(&v), da_dq, da_dv);
     }
 
     /// The derivatives of a body's motion by the coordinate of column c, whose joint sits on `parent`.

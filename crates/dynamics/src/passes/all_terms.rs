@@ -3,16 +3,18 @@
 //! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects share placements,
 //! velocities, the bodies' inertias in the world's frame and the columns Iᶜ S.
 
+use crate::passes::answers::answers;
 use crate::passes::centroidal::{self, CentroidalMapRate};
 use crate::passes::coriolis::Coriolis;
+use crate::passes::energy::rotors;
 use crate::passes::frames::{ReferenceFrame, Velocities, classical};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_model::Model;
-use condyle_model::layout::{Pairs, Single};
+use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
 use nalgebra::DMatrix;
 
 /// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
@@ -27,8 +29,10 @@ pub(crate) struct Workspace<S> {
     pub M: DMatrix<S>,
     /// Shape: nv. Written by: `pass`.
     pub h: Vec<S>,
-    /// Twice the kinetic energy of the bodies. Written by: `pass`.
-    pub twice: S,
+    /// Twice that of the bodies, then the kinetic energy. Written by: `pass`, then by `run`.
+    pub kinetic_energy: S,
+    /// Written by: `run`.
+    pub potential_energy: S,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -38,7 +42,8 @@ impl<S: Scalar> Workspace<S> {
             f: filled(Force::zero, size.bodies),
             M: zero_matrix(size.nv, size.nv),
             h: filled(S::zero, size.nv),
-            twice: S::zero(),
+            kinetic_energy: S::zero(),
+            potential_energy: S::zero(),
         }
     }
 }
@@ -50,7 +55,7 @@ fn pass<L: Pairs>(
     World { oX, S, .. }: &World<L::S>,
     Moving { v, dS, qd, .. }: &Moving<L::S>,
     centroidal::Workspace { IC, BC, F, dF, .. }: &mut centroidal::Workspace<L::S>,
-    Workspace { a, f, M, h, twice }: &mut Workspace<L::S>,
+    Workspace { a, f, M, h, kinetic_energy: twice, .. }: &mut Workspace<L::S>,
 ) {
     (IC[0], BC[0]) = (Inertia::zero(), Coriolis::zero());
     a[0] = Motion::new(l.minus_gravity(), Vec3::zero());
@@ -97,6 +102,7 @@ fn pass<L: Pairs>(
 
 /// The results of [`compute_all_terms`](crate::compute_all_terms()).
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct AllTerms<'d, S, R = f64> {
     /// Placements and velocities of bodies and frames, and their Jacobians J and dJ/dt, on demand.
     pub kinematics: Velocities<'d, S, R>,
@@ -115,7 +121,7 @@ pub struct AllTerms<'d, S, R = f64> {
     pub(crate) a: &'d [Motion<S>],
 }
 
-impl<S: Scalar, R: Constant<S>> AllTerms<'_, S, R> {
+answers! {
     /// J̇ v of a frame along the world's axes: p̈ of its origin and ω̇ where q̈ = 0 (m/s², rad/s²), in O(1). With J of
     /// [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's classical acceleration.
     ///
@@ -132,12 +138,12 @@ impl<S: Scalar, R: Constant<S>> AllTerms<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame.
-    pub fn frame_drift(&self, frame: usize) -> Motion<S> {
+    fn frame_drift(of: AllTerms, frame: usize) -> Motion = Motion::zero(); {
         let reference = ReferenceFrame::LocalWorldAligned;
-        let origin = reference.pose(self.kinematics.frame(frame));
-        let body = self.kinematics.placements.model.frames()[frame].body;
-        let v = self.kinematics.frame_velocity(frame, reference);
-        classical(origin.act_inv(self.a[body] - self.a[0]), v)
+        let origin = reference.pose(of.kinematics.frame(frame));
+        let body = of.kinematics.placements.model.frames()[frame].body;
+        let v = of.kinematics.frame_velocity(frame, reference);
+        classical(origin.act_inv(of.a[body] - of.a[0]), v)
     }
 }
 
@@ -150,6 +156,10 @@ kernel! {
         centroidal: &mut centroidal::Workspace<S>,
         d: &mut Workspace<S>,
     ) {
-        pass(&Single::new(model), world, moving, centroidal, d);
+        let l = Single::new(model);
+        pass(&l, world, moving, centroidal, d);
+        d.kinetic_energy = (d.kinetic_energy + rotors(model, &moving.qd)) * S::splat(0.5);
+        d.potential_energy = l.minus_gravity().dot(centroidal.IC[0].mass_com); // −gᵀ Σ m c
+        centroidal::shift_rate(model, centroidal);
     }
 }

@@ -6,6 +6,7 @@
 //! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved computation
 //! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
 
+use crate::passes::answers::answers;
 use crate::passes::coriolis::Coriolis;
 use crate::passes::frames::{Accelerations, Velocities};
 use crate::passes::kinematics::{Moving, World};
@@ -14,7 +15,7 @@ use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Cross, Force, Inertia, Scalar, Se3, Vec3};
 use nalgebra::DMatrix;
 
 /// In the world's frame, but for what is said to be about the centre of mass.
@@ -35,6 +36,18 @@ pub(crate) struct Workspace<S> {
     pub dAg: DMatrix<S>,
     /// Shape: 3 × nv. Written by: `shift_map`.
     pub Jcom: DMatrix<S>,
+    /// Written by: `shift_map`, `shift_rate`.
+    pub whole: Whole<S>,
+}
+
+/// The robot as if it were one body: of which its rate has the last two alone.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Whole<S> {
+    pub Ig: Inertia<S>,
+    pub com: Vec3<S>,
+    pub hg: Force<S>,
+    pub com_velocity: Vec3<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -47,7 +60,20 @@ impl<S: Scalar> Workspace<S> {
             Ag: zero_matrix(6, size.nv),
             dAg: zero_matrix(6, size.nv),
             Jcom: zero_matrix(3, size.nv),
+            whole: Whole { Ig: Inertia::zero(), com: Vec3::zero(), hg: Force::zero(), com_velocity: Vec3::zero() },
         }
+    }
+
+    /// What `run_map` has left.
+    pub(crate) fn map(&self) -> CentroidalMap<'_, S> {
+        let Self { Ag, Jcom, whole: Whole { Ig, com, .. }, .. } = self;
+        CentroidalMap { Ag, Ig: *Ig, com: *com, Jcom }
+    }
+
+    /// What `run_map_rate` has left.
+    pub(crate) fn map_rate(&self) -> CentroidalMapRate<'_, S> {
+        let Self { Ag, dAg, Jcom, whole: Whole { Ig, com, hg, com_velocity }, .. } = self;
+        CentroidalMapRate { Ag, dAg, hg: *hg, Ig: *Ig, com: *com, com_velocity: *com_velocity, Jcom }
     }
 }
 
@@ -109,7 +135,7 @@ pub(crate) fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
 
 /// Shifts the map to the centre of mass, after `map` or `map_rate`.
 #[inline(always)]
-pub(crate) fn shift_map<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalMap<'d, S> {
+fn shift_map<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let I = d.IC[0];
     let per_mass = I.mass.recip();
     let com = I.mass_com.scale(per_mass);
@@ -123,13 +149,13 @@ pub(crate) fn shift_map<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace
         }
     }
     let Ig = Se3::new(condyle_spatial::Mat3::identity(), -com).act(I);
-    let Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero but for rounding
-    CentroidalMap { Ag: &d.Ag, Ig, com, Jcom: &d.Jcom }
+    d.whole.Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero but for rounding
+    d.whole.com = com;
 }
 
 /// Shifts the map and its rate to the centre of mass, after `map_rate`.
 #[inline(always)]
-pub(crate) fn shift_rate<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspace<S>) -> CentroidalMapRate<'d, S> {
+pub(crate) fn shift_rate<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let (I, momentum) = (d.IC[0], d.BC[0].momentum);
     let per_mass = I.mass.recip();
     let (com, com_velocity) = (I.mass_com.scale(per_mass), momentum.linear.scale(per_mass));
@@ -139,9 +165,9 @@ pub(crate) fn shift_rate<'d, S: Scalar, R>(model: &Model<R>, d: &'d mut Workspac
         dA.angular -= com_velocity.cross(F.linear);
         add(model, &mut d.dAg, c, dA);
     }
-    let CentroidalMap { Ig, .. } = shift_map(model, d);
-    let hg = about(com, momentum);
-    CentroidalMapRate { Ag: &d.Ag, dAg: &d.dAg, hg, Ig, com, com_velocity, Jcom: &d.Jcom }
+    shift_map(model, d);
+    d.whole.hg = about(com, momentum);
+    d.whole.com_velocity = com_velocity;
 }
 
 /// The part of hg = Ag(q) v that depends on the position. The axes are the world's.
@@ -159,6 +185,7 @@ pub struct CentroidalMap<'d, S> {
 
 /// hg = Ag(q) v, and what its rate dhg = Ag a + dAg v depends on. The axes are the world's.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct CentroidalMapRate<'d, S> {
     /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
     pub Ag: &'d DMatrix<S>,
@@ -180,6 +207,7 @@ kernel! {
     /// For bodies that are placed.
     pub(crate) fn run_map<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         map(&Single::new(model), world, d);
+        shift_map(model, d);
     }
 }
 
@@ -187,39 +215,37 @@ kernel! {
     /// For bodies whose velocities are known.
     pub(crate) fn run_map_rate<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         map_rate(&Single::new(model), world, moving, d);
+        shift_rate(model, d);
     }
 }
 
-impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
+answers! {
     /// hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, along the world's axes (kg m/s,
     /// kg m²/s), in O(n).
     ///
     /// Not a number if nothing that moves has a mass. Allocates nothing.
-    #[inline(always)]
-    pub fn centroidal_momentum(&self) -> Force<S> {
-        let l = Single::<S, R>::new(self.model);
+    fn centroidal_momentum(of: Velocities) -> Force = Force::zero(); {
+        let l = Single::<S, R>::new(of.model);
         let mut momentum = Force::zero();
         for i in l.bodies() {
-            let oX = &self.world.oX[i];
-            momentum += oX.act(l.inertia(i) * oX.act_inv(self.moving.v[i])); // I v
+            let oX = &of.world.oX[i];
+            momentum += oX.act(l.inertia(i) * oX.act_inv(of.moving.v[i])); // I v
         }
-        about(self.com(), momentum)
+        about(of.com(), momentum)
     }
-}
 
-impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// dhg = Σ I_i a_i + v_i ×* I_i v_i, the rate of the centroidal momentum, along the world's axes (N, N m), in O(n):
     /// the weight and the external forces, about the centre of mass.
     ///
     /// Not a number if nothing that moves has a mass. Allocates nothing.
-    pub fn centroidal_momentum_rate(&self) -> Force<S> {
-        let l = Single::<S, R>::new(self.model);
+    fn centroidal_momentum_rate(of: Accelerations) -> Force = Force::zero(); {
+        let l = Single::<S, R>::new(of.model);
         let mut rate = Force::zero();
         for i in l.bodies() {
-            let (oX, I) = (&self.world.oX[i], l.inertia(i));
-            let (v, a) = (oX.act_inv(self.moving.v[i]), oX.act_inv(self.moving.a[i]));
+            let (oX, I) = (&of.world.oX[i], l.inertia(i));
+            let (v, a) = (oX.act_inv(of.moving.v[i]), oX.act_inv(of.moving.a[i]));
             rate += oX.act(I * a + v.cross(I * v)); // I a + v ×* I v
         }
-        about(self.com(), rate) // ċ × m ċ = 0
+        about(of.com(), rate) // ċ × m ċ = 0
     }
 }

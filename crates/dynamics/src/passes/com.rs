@@ -9,6 +9,7 @@
 //! where (v, ω) and (a, α) are its spatial velocity and acceleration. What is fixed to the world does not count. The
 //! Jacobian is part of [`centroidal_map`](crate::centroidal_map).
 
+use crate::passes::answers::answers;
 use crate::passes::frames::{Accelerations, Placements, Velocities};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Scalar, Vec3};
@@ -33,7 +34,9 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
         }
         (mass, moment)
     }
+}
 
+answers! {
     /// c = Σ m_i c_i / Σ m_i, the centre of mass of the moving bodies in the world's frame (m), in O(n).
     ///
     /// Not a number if nothing that moves has a mass. Allocates nothing.
@@ -45,39 +48,34 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// let com = forward_kinematics(&quadruped, &mut data, &neutral(&quadruped)).com();
     /// assert!(f64::abs(com.y) < 1e-12); // left and right weigh the same
     /// ```
-    #[inline(always)]
-    pub fn com(&self) -> Vec3<S> {
-        let (mass, moment) = self.mass_and_moment();
+    fn com(of: Placements) -> Vec3 = Vec3::zero(); {
+        let (mass, moment) = of.mass_and_moment();
         moment.scale(mass.recip())
     }
-}
 
-impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ċ, the velocity of the centre of mass of the moving bodies in the world's frame (m/s), in O(n).
     ///
     /// Not a number if nothing that moves has a mass. Allocates nothing.
-    pub fn com_velocity(&self) -> Vec3<S> {
-        let l = Single::<S, R>::new(self.model);
+    fn com_velocity(of: Velocities) -> Vec3 = Vec3::zero(); {
+        let l = Single::<S, R>::new(of.model);
         let (mut mass, mut momentum) = (S::zero(), Vec3::zero());
         for i in l.bodies() {
-            let ((m, h), v) = (self.first_moment(&l, i), self.moving.v[i]);
+            let ((m, h), v) = (of.first_moment(&l, i), of.moving.v[i]);
             mass += m;
             momentum += v.linear.scale_add(m, v.angular.cross(h)); // m ċ = m v + ω × h
         }
         momentum.scale(mass.recip())
     }
-}
 
-impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// c̈, the acceleration of the centre of mass of the moving bodies in the world's frame (m/s²), without gravity, in
     /// O(n).
     ///
     /// Not a number if nothing that moves has a mass. Allocates nothing.
-    pub fn com_acceleration(&self) -> Vec3<S> {
-        let l = Single::<S, R>::new(self.model);
+    fn com_acceleration(of: Accelerations) -> Vec3 = Vec3::zero(); {
+        let l = Single::<S, R>::new(of.model);
         let (mut mass, mut force) = (S::zero(), Vec3::zero());
         for i in l.bodies() {
-            let ((m, h), v, a) = (self.first_moment(&l, i), self.moving.v[i], self.moving.a[i]);
+            let ((m, h), v, a) = (of.first_moment(&l, i), of.moving.v[i], of.moving.a[i]);
             let momentum = v.linear.scale_add(m, v.angular.cross(h));
             mass += m;
             force += a.linear.scale_add(m, a.angular.cross(h)) + v.angular.cross(momentum); // m a + α × h + ω × m ċ

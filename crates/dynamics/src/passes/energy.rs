@@ -1,5 +1,6 @@
 //! Kinetic and potential energy, and their derivatives: sums over the moving bodies.
 
+use crate::passes::answers::{Number, answers};
 use crate::passes::frames::{Placements, Velocities};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled};
@@ -9,18 +10,16 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
 
-impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
+answers! {
     /// V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), 0 at the world's
     /// origin, in O(n).
     ///
     /// Allocates nothing.
-    pub fn potential_energy(&self) -> S {
-        let (_, moment) = self.mass_and_moment();
-        Single::<S, R>::new(self.model).minus_gravity().dot(moment) // −gᵀ Σ m c
+    fn potential_energy(of: Placements) -> Number = S::zero(); {
+        let (_, moment) = of.mass_and_moment();
+        Single::<S, R>::new(of.model).minus_gravity().dot(moment) // −gᵀ Σ m c
     }
-}
 
-impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// T = ½ Σ v_iᵀ I_i v_i + ½ Σ armature q̇², the kinetic energy of the moving bodies and the rotors (J), in O(n). It
     /// is ½ q̇ᵀ M q̇.
     ///
@@ -35,32 +34,32 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// let M = crba(&arm, &mut data, &[0.3; 7]);
     /// assert!(f64::abs(energy - 0.5 * v.dot(&(M * &v))) < 1e-14);
     /// ```
-    pub fn kinetic_energy(&self) -> S {
-        let l = Single::<S, R>::new(self.model);
-        let mut twice = self.rotors();
+    fn kinetic_energy(of: Velocities) -> Number = S::zero(); {
+        let l = Single::<S, R>::new(of.model);
+        let mut twice = rotors(of.model, &of.moving.qd);
         for i in l.bodies() {
-            let v = self.world.oX[i].act_inv(self.moving.v[i]); // in the body
+            let v = of.world.oX[i].act_inv(of.moving.v[i]); // in the body
             twice += v.dot(l.inertia(i) * v);
         }
         twice * S::splat(0.5)
     }
 
-    /// Σ armature q̇², twice the kinetic energy of the rotors.
-    #[inline(always)]
-    pub(crate) fn rotors(&self) -> S {
-        let mut twice = S::zero();
-        for (&armature, &qd) in self.model.armature().iter().zip(&self.moving.qd) {
-            twice += armature.lift() * qd * qd;
-        }
-        twice
-    }
-
     /// E = T + V, the mechanical energy (J), in O(n): its rate is the power of the efforts and the external forces.
     ///
     /// Allocates nothing.
-    pub fn mechanical_energy(&self) -> S {
-        self.kinetic_energy() + self.potential_energy()
+    fn mechanical_energy(of: Velocities) -> Number = S::zero(); {
+        of.kinetic_energy() + of.potential_energy()
     }
+}
+
+/// Σ armature q̇², twice the kinetic energy of the rotors.
+#[inline(always)]
+pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S {
+    let mut twice = S::zero();
+    for (&armature, &qd) in model.armature().iter().zip(qd) {
+        twice += armature.lift() * qd * qd;
+    }
+    twice
 }
 
 /// In the world's frame.

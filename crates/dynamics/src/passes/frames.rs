@@ -9,10 +9,11 @@
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), sections 2.10 (differentiation) and 2.11
 //! (acceleration). Each question about one body or frame costs O(1), a Jacobian O(depth + nv); nothing allocates.
 
+use crate::passes::answers::answers;
 use crate::passes::kinematics::{Moving, World};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
-use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3, kernel};
 use core::ops::Deref;
 use nalgebra::DMatrix;
 
@@ -110,33 +111,130 @@ pub(crate) fn clear<S: Scalar>(name: &str, J: &mut DMatrix<S>, nv: usize) {
     J.as_mut_slice().fill(S::zero());
 }
 
-impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
+/// The classical acceleration of the point at a frame's origin: v̇ + ω × v, of its spatial acceleration and velocity.
+#[inline(always)]
+pub(crate) fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
+    Motion::new(a.linear + v.angular.cross(v.linear), a.angular)
+}
+
+answers! {
     /// oXb: the pose of a body in the world, in the frame that the URDF gives it.
     ///
     /// # Panics
     /// If there is no such body.
-    #[inline(always)]
-    pub fn body(&self, body: usize) -> Se3<S> {
-        let zXb = Se3::new(self.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
-        self.world.oX[body] * zXb.lift()
+    fn body(of: Placements, body: usize) -> Se3 = Se3::identity(); {
+        let zXb = Se3::new(of.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
+        of.world.oX[body] * zXb.lift()
     }
 
     /// oXf: the pose of a frame in the world.
     ///
     /// # Panics
     /// If there is no such frame.
-    #[inline(always)]
-    pub fn frame(&self, frame: usize) -> Se3<S> {
-        let frame = &self.model.frames()[frame];
-        self.body(frame.body) * frame.placement.lift()
+    fn frame(of: Placements, frame: usize) -> Se3 = Se3::identity(); {
+        let frame = &of.model.frames()[frame];
+        of.body(frame.body) * frame.placement.lift()
     }
 
+    /// The spatial velocity of a body: of its point at the origin of the reference frame (m/s), and of its rotation
+    /// (rad/s).
+    ///
+    /// # Panics
+    /// If there is no such body.
+    fn body_velocity(of: Velocities, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+        reference.pose(of.body(body)).act_inv(of.moving.v[body])
+    }
+
+    /// The spatial velocity of a frame: of its body's point at the origin of the reference frame (m/s), and of its
+    /// rotation (rad/s).
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    fn frame_velocity(of: Velocities, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+        reference.pose(of.frame(frame)).act_inv(of.moving.v[of.model.frames()[frame].body])
+    }
+
+    /// The spatial acceleration of a body (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
+    /// the world, expressed in the reference frame.
+    ///
+    /// # Panics
+    /// If there is no such body.
+    fn body_acceleration(of: Accelerations, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+        reference.pose(of.body(body)).act_inv(of.moving.a[body])
+    }
+
+    /// The spatial acceleration of a frame (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
+    /// the world, expressed in the reference frame.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    fn frame_acceleration(of: Accelerations, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+        reference.pose(of.frame(frame)).act_inv(of.moving.a[of.model.frames()[frame].body])
+    }
+
+    /// The classical acceleration of a body's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
+    /// rotation (rad/s²).
+    ///
+    /// # Panics
+    /// If there is no such body.
+    fn body_classical_acceleration(of: Accelerations, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+        classical(of.body_acceleration(body, reference), of.body_velocity(body, reference))
+    }
+
+    /// The classical acceleration of a frame's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
+    /// rotation (rad/s²). In `LocalWorldAligned` it is p̈ of the frame's origin. Source: Featherstone (2008), section
+    /// 2.11.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    fn frame_classical_acceleration(of: Accelerations, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+        classical(of.frame_acceleration(frame, reference), of.frame_velocity(frame, reference))
+    }
+}
+
+kernel! {
+    /// J of a frame at oXf on a body.
+    fn jacobian<S, R>(
+        of: Placements<'_, S, R>,
+        body: usize,
+        oXf: &Se3<S>,
+        reference: ReferenceFrame,
+        J: &mut DMatrix<S>,
+    ) {
+        clear("J", J, of.model.nv());
+        let oXr = reference.pose(*oXf);
+        for &c in Single::<S, R>::new(of.model).support(body) {
+            add(of.model, J, c, oXr.act_inv(of.world.S[c])); // J = oXr⁻¹ S
+        }
+    }
+}
+
+kernel! {
+    /// dJ/dt of a frame at oXf on a body.
+    fn jacobian_rate<S, R>(
+        of: Velocities<'_, S, R>,
+        body: usize,
+        oXf: &Se3<S>,
+        reference: ReferenceFrame,
+        dJ: &mut DMatrix<S>,
+    ) {
+        clear("dJ", dJ, of.model.nv());
+        let (oXr, v_r) = (reference.pose(*oXf), reference.velocity(*oXf, of.moving.v[body]));
+        for &c in Single::<S, R>::new(of.model).support(body) {
+            let s = of.moving.dS[c] - v_r.cross(of.world.S[c]);
+            add(of.model, dJ, c, oXr.act_inv(s)); // dJ/dt = oXr⁻¹ (Ṡ − v_r × S)
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// The Jacobian J of a body, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
     ///
     /// # Panics
     /// If there is no such body, or `J` is not 6 × nv.
+    #[inline(always)]
     pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        self.jacobian(body, self.body(body), reference, J);
+        jacobian(*self, body, &self.body(body), reference, J);
     }
 
     /// The Jacobian J of a frame, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
@@ -145,46 +243,19 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// If there is no such frame, or `J` is not 6 × nv.
     #[inline(always)]
     pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        self.jacobian(self.model.frames()[frame].body, self.frame(frame), reference, J);
-    }
-
-    #[inline(always)]
-    fn jacobian(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        clear("J", J, self.model.nv());
-        let oXr = reference.pose(oXf);
-        for &c in Single::<S, R>::new(self.model).support(body) {
-            add(self.model, J, c, oXr.act_inv(self.world.S[c])); // J = oXr⁻¹ S
-        }
+        jacobian(*self, self.model.frames()[frame].body, &self.frame(frame), reference, J);
     }
 }
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
-    /// The spatial velocity of a body: of its point at the origin of the reference frame (m/s), and of its rotation
-    /// (rad/s).
-    ///
-    /// # Panics
-    /// If there is no such body.
-    pub fn body_velocity(&self, body: usize, reference: ReferenceFrame) -> Motion<S> {
-        reference.pose(self.body(body)).act_inv(self.moving.v[body])
-    }
-
-    /// The spatial velocity of a frame: of its body's point at the origin of the reference frame (m/s), and of its
-    /// rotation (rad/s).
-    ///
-    /// # Panics
-    /// If there is no such frame.
-    #[inline(always)]
-    pub fn frame_velocity(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
-        reference.pose(self.frame(frame)).act_inv(self.moving.v[self.model.frames()[frame].body])
-    }
-
     /// The rate dJ/dt of a body's Jacobian, 6 × nv, as for [`frame_jacobian_rate`](Self::frame_jacobian_rate). dJ is
     /// overwritten.
     ///
     /// # Panics
     /// If there is no such body, or `dJ` is not 6 × nv.
+    #[inline(always)]
     pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
-        self.jacobian_rate(body, self.body(body), reference, dJ);
+        jacobian_rate(*self, body, &self.body(body), reference, dJ);
     }
 
     /// The rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. dJ is overwritten.
@@ -208,62 +279,8 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     ///
     /// # Panics
     /// If there is no such frame, or `dJ` is not 6 × nv.
-    pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
-        self.jacobian_rate(self.model.frames()[frame].body, self.frame(frame), reference, dJ);
-    }
-
     #[inline(always)]
-    fn jacobian_rate(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
-        clear("dJ", dJ, self.model.nv());
-        let (oXr, v_r) = (reference.pose(oXf), reference.velocity(oXf, self.moving.v[body]));
-        for &c in Single::<S, R>::new(self.model).support(body) {
-            let s = self.moving.dS[c] - v_r.cross(self.world.S[c]);
-            add(self.model, dJ, c, oXr.act_inv(s)); // dJ/dt = oXr⁻¹ (Ṡ − v_r × S)
-        }
-    }
-}
-
-/// The classical acceleration of the point at a frame's origin: v̇ + ω × v, of its spatial acceleration and velocity.
-#[inline(always)]
-pub(crate) fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
-    Motion::new(a.linear + v.angular.cross(v.linear), a.angular)
-}
-
-impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
-    /// The spatial acceleration of a body (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
-    /// the world, expressed in the reference frame.
-    ///
-    /// # Panics
-    /// If there is no such body.
-    pub fn body_acceleration(&self, body: usize, reference: ReferenceFrame) -> Motion<S> {
-        reference.pose(self.body(body)).act_inv(self.moving.a[body])
-    }
-
-    /// The spatial acceleration of a frame (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
-    /// the world, expressed in the reference frame.
-    ///
-    /// # Panics
-    /// If there is no such frame.
-    pub fn frame_acceleration(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
-        reference.pose(self.frame(frame)).act_inv(self.moving.a[self.model.frames()[frame].body])
-    }
-
-    /// The classical acceleration of a body's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
-    /// rotation (rad/s²).
-    ///
-    /// # Panics
-    /// If there is no such body.
-    pub fn body_classical_acceleration(&self, body: usize, reference: ReferenceFrame) -> Motion<S> {
-        classical(self.body_acceleration(body, reference), self.body_velocity(body, reference))
-    }
-
-    /// The classical acceleration of a frame's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
-    /// rotation (rad/s²). In `LocalWorldAligned` it is p̈ of the frame's origin. Source: Featherstone (2008), section
-    /// 2.11.
-    ///
-    /// # Panics
-    /// If there is no such frame.
-    pub fn frame_classical_acceleration(&self, frame: usize, reference: ReferenceFrame) -> Motion<S> {
-        classical(self.frame_acceleration(frame, reference), self.frame_velocity(frame, reference))
+    pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
+        jacobian_rate(*self, self.model.frames()[frame].body, &self.frame(frame), reference, dJ);
     }
 }

@@ -5,6 +5,7 @@
 
 pub(crate) mod aba;
 pub(crate) mod all_terms;
+pub(crate) mod answers;
 pub(crate) mod centroidal;
 mod com;
 pub(crate) mod coriolis;

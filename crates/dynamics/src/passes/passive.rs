@@ -13,8 +13,8 @@
 
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::Scalar;
 use condyle_spatial::elementary::tanh;
+use condyle_spatial::{Scalar, kernel};
 
 /// τ = −d v − f tanh(v/ε): the efforts of damping and smoothed friction, in O(n).
 ///
@@ -38,9 +38,16 @@ use condyle_spatial::elementary::tanh;
 /// If an argument has the wrong length, or `smoothing` is not positive.
 pub fn passive_torque<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, tau: &mut [S]) {
     check_arguments(model, v, smoothing, "tau", tau.len());
-    for k in 0..model.nv() {
-        let friction = tanh(v[k] * S::splat(1.0 / smoothing)) * S::splat(model.friction()[k]);
-        tau[k] = v[k].mul_add(S::splat(-model.damping()[k]), -friction); // −d v − f tanh(v/ε)
+    losses(model.damping(), model.friction(), v, smoothing, tau);
+}
+
+kernel! {
+    /// −d v − f tanh(v/ε).
+    fn losses<S>(damping: &[f64], friction: &[f64], v: &[S], smoothing: f64, tau: &mut [S]) {
+        for k in 0..tau.len() {
+            let friction = tanh(v[k] * S::splat(1.0 / smoothing)) * S::splat(friction[k]);
+            tau[k] = v[k].mul_add(S::splat(-damping[k]), -friction); // −d v − f tanh(v/ε)
+        }
     }
 }
 
@@ -60,10 +67,17 @@ pub fn passive_torque<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, t
 /// If an argument has the wrong length, or `smoothing` is not positive.
 pub fn passive_torque_derivative<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, dtau_dv: &mut [S]) {
     check_arguments(model, v, smoothing, "dtau_dv", dtau_dv.len());
-    for k in 0..model.nv() {
-        let t = tanh(v[k] * S::splat(1.0 / smoothing));
-        let slope = (S::one() - t * t) * S::splat(model.friction()[k] / smoothing);
-        dtau_dv[k] = -S::splat(model.damping()[k]) - slope; // −d − f/ε (1 − tanh²)
+    slopes(model.damping(), model.friction(), v, smoothing, dtau_dv);
+}
+
+kernel! {
+    /// −d − f/ε (1 − tanh²(v/ε)).
+    fn slopes<S>(damping: &[f64], friction: &[f64], v: &[S], smoothing: f64, dtau_dv: &mut [S]) {
+        for k in 0..dtau_dv.len() {
+            let t = tanh(v[k] * S::splat(1.0 / smoothing));
+            let slope = (S::one() - t * t) * S::splat(friction[k] / smoothing);
+            dtau_dv[k] = -S::splat(damping[k]) - slope; // −d − f/ε (1 − tanh²)
+        }
     }
 }
 

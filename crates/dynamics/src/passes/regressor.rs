@@ -11,9 +11,14 @@
 //! Source: Atkeson, An, Hollerbach, *Estimation of inertial parameters of manipulator loads and links* (1986);
 //! the form y makes the 6 × 10 matrices of that paper superfluous.
 
+use crate::passes::frames::Placements;
+use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
-use condyle_spatial::{Cross, Motion, Scalar};
+use condyle_model::Model;
+use condyle_model::layout::{Columns, Layout, Single};
+use condyle_spatial::kernel;
+use condyle_spatial::{Act, Cross, Motion, Scalar};
 use nalgebra::DMatrix;
 
 /// The number of numbers that describe the inertia of a body.
@@ -63,6 +68,62 @@ pub(crate) fn pairing<S: Scalar>(m: Motion<S>, w: Motion<S>) -> [S; PARAMETERS] 
 /// y(S, a) − y(v × S, v): the effort at a column S of a body with velocity v and acceleration a, per parameter.
 #[inline(always)]
 pub(crate) fn effort<S: Scalar>(column: Motion<S>, v: Motion<S>, a: Motion<S>) -> [S; PARAMETERS] {
-    let (linear, quadratic) = (pairing(column, a), pairing(v.cross(column), v));
-    core::array::from_fn(|k| linear[k] - quadratic[k])
+    let (mut y, quadratic) = (pairing(column, a), pairing(v.cross(column), v));
+    for k in 0..PARAMETERS {
+        y[k] -= quadratic[k];
+    }
+    y
+}
+
+/// The rows of body i's ten parameters in a vector of all.
+#[inline(always)]
+fn of_body<S>(parameters: &mut [S], i: usize) -> &mut [S] {
+    &mut parameters[PARAMETERS * (i - 1)..PARAMETERS * i]
+}
+
+kernel! {
+    /// Y of the efforts, for bodies whose accelerations are known.
+    pub(crate) fn torque<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        let l = Single::new(model);
+        let minus_g = l.minus_gravity();
+        let Y = d.torque.as_mut_slice();
+        Y.fill(S::zero());
+        for i in l.bodies() {
+            let oXb = Placements { model, world }.body(i);
+            let a_i = Motion { linear: moving.a[i].linear + minus_g, ..moving.a[i] };
+            let (v_b, a_b) = (oXb.act_inv(moving.v[i]), oXb.act_inv(a_i));
+            for &c in l.support(i) {
+                let column = &model.columns()[c];
+                let S_b = oXb.act_inv(world.S[c]).scale(S::splat(column.ratio));
+                let y = effort(S_b, v_b, a_b);
+                for k in 0..PARAMETERS {
+                    Y[column.coordinate + model.nv() * (PARAMETERS * (i - 1) + k)] += y[k]; // τ_S = (y(S, a) − y(v × S, v)) · π_i
+                }
+            }
+        }
+    }
+}
+
+kernel! {
+    /// y of the kinetic energy, for bodies whose velocities are known.
+    pub(crate) fn kinetic<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
+        for i in 1..model.nodes().len() {
+            let v_b = Placements { model, world }.body(i).act_inv(moving.v[i]);
+            of_body(&mut d.kinetic, i).copy_from_slice(&pairing(v_b.scale(S::splat(0.5)), v_b)); // ½ y(v, v)
+        }
+    }
+}
+
+kernel! {
+    /// y of the potential energy, for bodies that are placed.
+    pub(crate) fn potential<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
+        let minus_g = Single::<S, R>::new(model).minus_gravity();
+        for i in 1..model.nodes().len() {
+            let oXb = Placements { model, world }.body(i);
+            let first = oXb.rotation.transpose_mul(minus_g);
+            let o = S::zero();
+            let row = [minus_g.dot(oXb.translation), first.x, first.y, first.z, o, o, o, o, o, o];
+            of_body(&mut d.potential, i).copy_from_slice(&row); // V_i = −g · p m − Rᵀ g · m c
+        }
+    }
 }

@@ -21,6 +21,7 @@ mod guarantees;
 mod identities;
 mod inertial_parameters;
 mod inputs;
+mod islands;
 mod kinematics;
 mod limbs;
 mod mimic;

@@ -3,30 +3,20 @@
 use crate::common::table::Input;
 use crate::common::{fixed, rng};
 use crate::counting::{allocations, bytes};
+use crate::table::{Found, States, constraints, table};
 use crate::{each_level, models};
 use condyle_dynamics::{
-    Batch, Data, Force, Matrices, Model, aba, aba_derivatives, crba, gravity, minv, nonlinear_effects, rnea,
-    rnea_derivatives,
+    Batch, ConstraintSet, ContactConstraint, Data, Force, Matrices, Model, Proximal, ReferenceFrame, Se3, Target,
+    robots,
 };
 
-/// The arguments of many states, one after the other.
-struct States {
-    one: Vec<Input<f64>>,
-    q: Vec<f64>,
-    v: Vec<f64>,
-    x: Vec<f64>,
-    f_ext: Vec<Force<f64>>,
+fn random(model: &Model, n: usize, seed: u64) -> Vec<Input<f64>> {
+    let mut rng = rng(seed);
+    (0..n).map(|_| Input::random(model, &mut rng)).collect()
 }
 
-impl States {
-    fn random(model: &Model, n: usize, seed: u64) -> Self {
-        let mut rng = rng(seed);
-        let one: Vec<_> = (0..n).map(|_| Input::random(model, &mut rng)).collect();
-        let all = |part: fn(&Input<f64>) -> &[f64]| one.iter().flat_map(part).copied().collect::<Vec<f64>>();
-        let (q, v, x) = (all(|i| &i.q), all(|i| &i.v), all(|i| &i.x));
-        let f_ext = one.iter().flat_map(|i| &i.f_ext).copied().collect();
-        Self { one, q, v, x, f_ext }
-    }
+fn states(model: &Model, n: usize, seed: u64) -> States<f64> {
+    States::of(&random(model, n, seed))
 }
 
 /// What two ways of rounding leave, relative to the largest entry: some hundred roundings of a matrix of condition 1e3.
@@ -36,12 +26,12 @@ const ROUNDING: f64 = 1e-11;
 #[test]
 fn matrices_by_rows() {
     for model in models(2) {
-        let (n, states) = (model.nv(), 19);
-        let s = States::random(&model, states, 5);
-        let mut batch = Batch::new(&model, states, 2);
+        let (n, count) = (model.nv(), 19);
+        let s = states(&model, count, 5);
+        let mut batch = Batch::new(&model, count, 2);
         // what is symmetric may be written by columns, which then are rows up to rounding
         let check = |matrices: Matrices<'_, f64>, symmetric: bool| {
-            let mut rows = vec![f64::NAN; states * n * n];
+            let mut rows = vec![f64::NAN; count * n * n];
             matrices.write_rows(&mut rows);
             for (M, rows) in matrices.iter().zip(rows.chunks_exact(n * n)) {
                 let allowed = if symmetric { ROUNDING * M.amax() } else { 0.0 };
@@ -62,106 +52,75 @@ fn matrices_by_rows() {
     }
 }
 
-/// Everything that a batch computes, in turn.
-fn of_batch(model: &Model, b: &mut Batch, s: &States, numbers: &mut Vec<f64>) {
-    let m = model;
-    numbers.clear();
-    numbers.extend_from_slice(b.rnea(m, &s.q, &s.v, &s.x, &s.f_ext));
-    numbers.extend_from_slice(b.rnea(m, &s.q, &s.v, &s.x, &[]));
-    numbers.extend_from_slice(b.nonlinear_effects(m, &s.q, &s.v));
-    numbers.extend_from_slice(b.gravity(m, &s.q));
-    numbers.extend_from_slice(b.aba(m, &s.q, &s.v, &s.x, &s.f_ext));
-    b.crba(m, &s.q).iter().for_each(|M| numbers.extend(M.iter()));
-    b.minv(m, &s.q).iter().for_each(|M| numbers.extend(M.iter()));
-    let d = b.rnea_derivatives(m, &s.q, &s.v, &s.x, &s.f_ext);
-    [d.dtau_dq, d.dtau_dv, d.dtau_da].iter().flat_map(|x| x.iter()).for_each(|x| numbers.extend(x.iter()));
-    let d = b.aba_derivatives(m, &s.q, &s.v, &s.x, &s.f_ext);
-    numbers.extend_from_slice(d.a);
-    [d.da_dq, d.da_dv, d.da_dtau].iter().flat_map(|x| x.iter()).for_each(|x| numbers.extend(x.iter()));
-}
-
-/// The same by single calls.
-fn one_by_one(model: &Model, s: &States) -> Vec<f64> {
-    let (m, d) = (model, &mut Data::new(model));
-    let mut numbers = Vec::new();
-    let mut each = |call: &mut dyn FnMut(&Input<f64>, &mut Vec<f64>)| s.one.iter().for_each(|i| call(i, &mut numbers));
-    each(&mut |i, to| to.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &i.f_ext)));
-    each(&mut |i, to| to.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &[])));
-    each(&mut |i, to| to.extend_from_slice(nonlinear_effects(m, d, &i.q, &i.v)));
-    each(&mut |i, to| to.extend_from_slice(gravity(m, d, &i.q)));
-    each(&mut |i, to| to.extend_from_slice(aba(m, d, &i.q, &i.v, &i.x, &i.f_ext)));
-    each(&mut |i, to| to.extend_from_slice(crba(m, d, &i.q).as_slice()));
-    each(&mut |i, to| to.extend_from_slice(minv(m, d, &i.q).as_slice()));
-    for k in 0..3 {
-        each(&mut |i, to| {
-            let r = rnea_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
-            to.extend_from_slice([r.dtau_dq, r.dtau_dv, r.dtau_da][k].as_slice());
-        });
-    }
-    each(&mut |i, to| to.extend_from_slice(aba_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext).a));
-    for k in 0..3 {
-        each(&mut |i, to| {
-            let r = aba_derivatives(m, d, &i.q, &i.v, &i.x, &i.f_ext);
-            to.extend_from_slice([r.da_dq, r.da_dv, r.da_dtau][k].as_slice());
-        });
-    }
-    numbers
-}
-
-/// Whatever the number of states, full groups or not, and of threads; and on one thread, once each function has been called,
+/// Whatever the number of states, full groups or not, and of threads; and on one thread, once a function has been called,
 /// without allocating.
 #[test]
 fn every_state_is_a_single_call() {
     const MOST: usize = 19;
-    let all = models(3);
+    let all = models(2);
+    let table = table::<f64>();
     each_level(|level| {
         for (seed, model) in all.iter().enumerate() {
-            let mut batches = [1, 2, 3].map(|threads| Batch::new(model, MOST, threads));
-            let first = States::random(model, 1, 0);
-            batches.iter_mut().for_each(|batch| of_batch(model, batch, &first, &mut Vec::new()));
-            for n in [1, 8, MOST] {
-                let states = States::random(model, n, seed as u64);
-                let expected = one_by_one(model, &states);
-                let mut found = Vec::with_capacity(expected.len());
-                for (batch, threads) in batches.iter_mut().zip(1..) {
-                    let count = allocations(|| of_batch(model, batch, &states, &mut found));
-                    assert!(found == expected, "{n} states, {threads} threads, {level}, on\n{model}");
-                    assert!(threads > 1 || count == 0, "{count} allocations on\n{model}");
+            let inputs = random(model, MOST, seed as u64);
+            let (held, proximal) = constraints(model);
+            let (mut data, mut set) = (Data::new(model), ConstraintSet::new(model, &held).unwrap());
+            set.proximal = proximal;
+            let mut batches = [1, 2, 3].map(|threads| {
+                let batch = Batch::new(model, MOST, threads);
+                let constraints = batch.constraints(model, &held, proximal).unwrap();
+                (batch, constraints)
+            });
+            for row in &table {
+                for n in [1, 8, MOST] {
+                    let (mut expected, all) = (Found::default(), States::of(&inputs[..n]));
+                    for input in &inputs[..n] {
+                        expected.again();
+                        (row.one)(model, &mut data, &mut set, input, &mut expected);
+                    }
+                    for ((batch, constraints), threads) in batches.iter_mut().zip(1..) {
+                        for call in ["first", "second"] {
+                            let mut found = expected.emptied();
+                            let count = allocations(|| (row.many)(model, batch, constraints, &all, &mut found));
+                            found.again();
+                            expected.again();
+                            let name = row.name;
+                            assert!(found == expected, "{name}: {n} states, {threads} threads, {level}, on\n{model}");
+                            let once = n > 1 || call == "second";
+                            assert!(threads > 1 || !once || count == 0, "{name}: {count} allocations on\n{model}");
+                        }
+                    }
                 }
             }
         }
     });
 }
 
+/// In each function.
 #[test]
 fn a_state_that_is_not_a_number_stays_alone() {
+    const STATES: usize = 9;
     let model = &models(1)[1];
+    let (held, proximal) = constraints(model);
     each_level(|level| {
-        let (mut batch, mut states) = (Batch::new(model, 9, 1), States::random(model, 9, 0));
-        let clean = batch.aba(model, &states.q, &states.v, &states.x, &[]).to_vec();
-        let nv = model.nv();
-        states.v[4 * nv] = f64::NAN;
-        let broken = batch.aba(model, &states.q, &states.v, &states.x, &[]);
-        assert!(broken[4 * nv..5 * nv].iter().any(|a| a.is_nan()));
-        assert!(broken[..4 * nv] == clean[..4 * nv] && broken[5 * nv..] == clean[5 * nv..], "{level}");
-    });
-}
-
-/// Twice as many lanes; nothing is fused in a single call in `f32`, so not the same bits.
-#[test]
-fn in_single_precision() {
-    const TOLERANCE: f32 = 1e-3; // 1e4 units of the last place, for cancellation over some 20 bodies
-    let model = &models(0)[1];
-    each_level(|level| {
-        let states = States::random(model, 19, 0);
-        let narrow = |x: &[f64]| x.iter().map(|&x| x as f32).collect::<Vec<_>>();
-        let (q, v, a) = (narrow(&states.q), narrow(&states.v), narrow(&states.x));
-        let mut batch = Batch::<f32>::new(model, 19, 1);
-        let tau = batch.rnea(model, &q, &v, &a, &[]);
-        let mut wide = Batch::new(model, 19, 1);
-        let expected = wide.rnea(model, &states.q, &states.v, &states.x, &[]);
-        let largest = narrow(expected).iter().fold(1.0, |m: f32, x| m.max(x.abs()));
-        assert!(tau.iter().zip(narrow(expected)).all(|(x, y)| (x - y).abs() < TOLERANCE * largest), "{level}");
+        let mut batch = Batch::new(model, STATES, 1);
+        let mut constraints = batch.constraints(model, &held, proximal).unwrap();
+        let (clean, mut broken) = (states(model, STATES, 0), states(model, STATES, 0));
+        let (nq, nv) = (model.nq(), model.nv());
+        broken.q[4 * nq..5 * nq].fill(f64::NAN);
+        broken.v[4 * nv..5 * nv].fill(f64::NAN);
+        for row in table::<f64>() {
+            let [mut expected, mut found] = [Found::default(), Found::default()];
+            (row.many)(model, &mut batch, &mut constraints, &clean, &mut expected);
+            (row.many)(model, &mut batch, &mut constraints, &broken, &mut found);
+            let mut any = false;
+            for (found, expected) in found.results.iter().zip(&expected.results) {
+                let size = found.len() / STATES;
+                any |= found[4 * size..5 * size].iter().any(|x| x.is_nan());
+                let beside = found[..4 * size] == expected[..4 * size] && found[5 * size..] == expected[5 * size..];
+                assert!(beside, "{}, {level}", row.name);
+            }
+            assert!(any, "{}, {level}", row.name);
+        }
     });
 }
 
@@ -195,7 +154,7 @@ fn memory_by_state() {
     let q: Vec<f64> = condyle_dynamics::neutral(model).repeat(STATES[1]);
     let zero = vec![0.0; nv * STATES[1]];
     type Call = fn(&mut Batch, &Model, &[f64], &[f64]);
-    let calls: [(&str, usize, usize, Call); 8] = [
+    let calls: [(&str, usize, usize, Call); 11] = [
         ("rnea", 1, 0, |b, m, q, v| _ = b.rnea(m, q, v, v, &[])),
         ("nonlinear_effects", 1, 0, |b, m, q, v| _ = b.nonlinear_effects(m, q, v)),
         ("gravity", 1, 0, |b, m, q, _| _ = b.gravity(m, q)),
@@ -204,6 +163,9 @@ fn memory_by_state() {
         ("minv", 1, 1, |b, m, q, _| _ = b.minv(m, q)),
         ("rnea_derivatives", 1, 3, |b, m, q, v| _ = b.rnea_derivatives(m, q, v, v, &[])),
         ("aba_derivatives", 1, 3, |b, m, q, v| _ = b.aba_derivatives(m, q, v, v, &[])),
+        ("coriolis_matrix", 0, 1, |b, m, q, v| _ = b.coriolis_matrix(m, q, v)),
+        ("rnea_hessian", 0, 4, |b, m, q, v| _ = b.rnea_hessian(m, q, v, v, &[], v)),
+        ("body_velocity", 1, 0, |b, m, q, v| _ = b.body_velocity(m, q, v, 1, ReferenceFrame::Local)),
     ];
     each_level(|level| {
         for (name, vectors, matrices, call) in calls {
@@ -241,4 +203,59 @@ fn too_few_velocities() {
 fn another_robot() {
     let [arm, quadruped, _] = crate::common::embedded();
     _ = Batch::<f64>::new(&arm, 2, 1).gravity(&quadruped, &condyle_dynamics::neutral(&quadruped));
+}
+
+/// What is expected of the whole robot holds without coordinates too.
+#[test]
+fn every_function_without_coordinates() {
+    let model = &fixed();
+    let inputs = random(model, 3, 0);
+    each_level(|level| {
+        let mut batch = Batch::new(model, 3, 2);
+        let (held, proximal) = constraints(model);
+        let mut constraints = batch.constraints(model, &held, proximal).unwrap();
+        let (mut data, mut set) = (Data::new(model), ConstraintSet::new(model, &held).unwrap());
+        for row in table::<f64>() {
+            let [mut expected, mut found] = [Found::default(), Found::default()];
+            for input in &inputs {
+                expected.again();
+                (row.one)(model, &mut data, &mut set, input, &mut expected);
+            }
+            (row.many)(model, &mut batch, &mut constraints, &States::of(&inputs), &mut found);
+            let bits = |of: &Found<f64>| of.results.iter().flatten().map(|x| x.to_bits() << 1).collect::<Vec<_>>(); // NaN of either sign
+            assert_eq!(bits(&found), bits(&expected), "{}, {level}", row.name);
+        }
+    });
+}
+
+/// Targets move all states.
+#[test]
+fn targets_of_constraints() {
+    let model = &robots::arm7();
+    let tool = ContactConstraint { kp: 100.0, ..ContactConstraint::point(model.frame("tool").unwrap()) };
+    let inputs = random(model, 5, 0);
+    let s = States::of(&inputs);
+    let target = Target { placement: Se3::new(Se3::identity().rotation, [0.1, 0.2, 0.3].into()), ..Target::identity() };
+    let mut batch = Batch::new(model, 5, 2);
+    let mut constraints = batch.constraints(model, &[tool], Proximal::default()).unwrap();
+    let before = batch.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a.to_vec();
+    constraints.set_target(0, target).unwrap();
+    assert_eq!((constraints.rows(), constraints.range(0)), (3, 0..3));
+    let after = batch.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a.to_vec();
+    assert!(before.iter().zip(&after).all(|(x, y)| x != y));
+    let tool = ContactConstraint { target, ..tool };
+    let mut anew = batch.constraints(model, &[tool], Proximal::default()).unwrap();
+    assert_eq!(after, batch.constrained_dynamics(model, &mut anew, &s.q, &s.v, &s.x, &[]).a);
+    let wrong = Target { placement: Se3::new(target.placement.rotation, [f64::NAN; 3].into()), ..target };
+    assert!(constraints.set_target(0, wrong).is_err());
+    assert_eq!(after, batch.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a);
+}
+
+#[test]
+#[should_panic(expected = "constraints: made for another batch")]
+fn constraints_of_another_batch() {
+    let model = &robots::arm7();
+    let mut constraints = Batch::<f64>::new(model, 2, 2).constraints(model, &[], Proximal::default()).unwrap();
+    let (q, v) = ([0.0; 7], [0.0; 7]);
+    _ = Batch::<f64>::new(model, 2, 1).constrained_dynamics(model, &mut constraints, &q, &v, &v, &[]);
 }

@@ -9,6 +9,7 @@ mod counting;
 mod batch;
 mod duals;
 mod lanes;
+mod table;
 
 use condyle_dynamics::Model;
 use condyle_dynamics::level::{Level, pin};

@@ -61,9 +61,16 @@ impl ConstraintLanes {
             }
         }
         all.carry_on::<V, N>(&set.plans, left, &mut set.J);
+        if all.nv == 0 {
+            for island in &set.islands {
+                set.delassus.clear(island);
+            }
+        }
         // SAFETY: `Fused` is a transparent wrapper of `f64`.
         let (G, stride): (&mut [f64], _) = (unsafe { renamed(&mut set.delassus.CE[..]) }, set.delassus.stride);
-        all.multiply::<V, N>(set.lambda.len(), G, stride);
+        if all.nv > 0 {
+            all.multiply::<V, N>(set.lambda.len(), G, stride);
+        }
         for (of, plan) in rows.iter().zip(&set.plans) {
             for (j, runs) in &of.beside {
                 let other = &set.plans[*j];

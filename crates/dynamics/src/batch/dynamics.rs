@@ -1,0 +1,144 @@
+//! Dynamics of many states, and what is linear in the inertias.
+
+use super::group::{M, MINV};
+use super::results::Matrices;
+use super::table::{NV, PARAMETERS, batched};
+use crate::calls::forward_dynamics::{aba, forward_dynamics};
+use crate::calls::inertia::{crba, minv};
+use crate::calls::inverse_dynamics::{coriolis_matrix, gravity, nonlinear_effects, rnea, static_torque};
+use crate::calls::regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
+use crate::passes::factored_dynamics::ForwardDynamicsMethod;
+use crate::passes::passive::{passive_torque, passive_torque_derivative};
+
+batched! {
+    /// [`rnea`](crate::rnea()): τ of each state, nv numbers.
+    ///
+    /// q: nq numbers a state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    ///
+    /// # Panics
+    /// If an argument has the wrong length, there are more states than there is room for, or the batch was made for a
+    /// model of another tree; so do all below.
+    fn rnea(model, data, to; q, v, a, f_ext) -> &[T] [[NV]] { to.numbers(rnea(model, data, q, v, a, f_ext)); }
+
+    /// [`nonlinear_effects`](crate::nonlinear_effects): h of each state, nv numbers.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn nonlinear_effects(model, data, to; q, v) -> &[T] [[NV]] { to.numbers(nonlinear_effects(model, data, q, v)); }
+
+    /// [`gravity`](crate::gravity): g of each state, nv numbers.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn gravity(model, data, to; q) -> &[T] [[NV]] { to.numbers(gravity(model, data, q)); }
+
+    /// [`static_torque`](crate::static_torque()): τ of each state, nv numbers.
+    ///
+    /// q: nq numbers a state; f_ext: a force on each body in its frame, or empty for none.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn static_torque(model, data, to; q, f_ext) -> &[T] [[NV]] { to.numbers(static_torque(model, data, q, f_ext)); }
+
+    /// [`coriolis_matrix`](crate::coriolis_matrix): C of each state, nv × nv.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn coriolis_matrix(model, data, to; q, v) -> Matrices<'_, T> [[NV, NV]] {
+        to.matrix(coriolis_matrix(model, data, q, v));
+    }
+
+    /// [`aba`](crate::aba()): q̈ of each state, nv numbers.
+    ///
+    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if M is singular ([`Model::singular_joints`](crate::Model::singular_joints)).
+    fn aba(model, data, to; q, v, tau, f_ext) -> &[T] [[NV]] { to.numbers(aba(model, data, q, v, tau, f_ext)); }
+
+    /// [`forward_dynamics`](crate::forward_dynamics()): q̈ of each state by a method of choice, nv numbers.
+    ///
+    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    ///
+    /// # Panics
+    /// As [`aba`](Self::aba).
+    fn forward_dynamics(model, data, to; q, v, tau, f_ext; method: Option<ForwardDynamicsMethod>) -> &[T] [[NV]] {
+        to.numbers(forward_dynamics(model, data, q, v, tau, f_ext, method));
+    }
+
+    /// [`crba`](crate::crba()): M of each state, nv × nv.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn crba(model, data, to; q) -> Matrices<'_, T> [[NV, NV]] keeps [crba.M: M] { crba(model, data, q); }
+
+    /// [`minv`](crate::minv()): M⁻¹ of each state, nv × nv.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// # Panics
+    /// As [`aba`](Self::aba).
+    fn minv(model, data, to; q) -> Matrices<'_, T> [[NV, NV]] keeps [minv.Minv: MINV] { minv(model, data, q); }
+
+    /// [`passive_torque`](crate::passive_torque): τ of each state, nv numbers.
+    ///
+    /// v: nv numbers a state; smoothing: ε > 0.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if `smoothing` is not positive.
+    fn passive_torque(model, data, to; v; smoothing: f64) -> &[T] [[NV]] with wide {
+        let tau = &mut wide[..v.len()];
+        passive_torque(model, v, smoothing, tau);
+        to.numbers(tau);
+    }
+
+    /// [`passive_torque_derivative`](crate::passive_torque_derivative): the diagonal of ∂τ/∂v of each state, nv numbers.
+    ///
+    /// v: nv numbers a state; smoothing: ε > 0.
+    ///
+    /// # Panics
+    /// As [`passive_torque`](Self::passive_torque).
+    fn passive_torque_derivative(model, data, to; v; smoothing: f64) -> &[T] [[NV]] with wide {
+        let slope = &mut wide[..v.len()];
+        passive_torque_derivative(model, v, smoothing, slope);
+        to.numbers(slope);
+    }
+
+    /// [`joint_torque_regressor`](crate::joint_torque_regressor): Y of each state, nv × 10 (bodies − 1).
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn joint_torque_regressor(model, data, to; q, v, a) -> Matrices<'_, T> [[NV, PARAMETERS]] {
+        to.matrix(joint_torque_regressor(model, data, q, v, a));
+    }
+
+    /// [`kinetic_energy_regressor`](crate::kinetic_energy_regressor): y of each state, 10 (bodies − 1) numbers.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn kinetic_energy_regressor(model, data, to; q, v) -> &[T] [[PARAMETERS]] {
+        to.numbers(kinetic_energy_regressor(model, data, q, v));
+    }
+
+    /// [`potential_energy_regressor`](crate::potential_energy_regressor): y of each state, 10 (bodies − 1) numbers.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn potential_energy_regressor(model, data, to; q) -> &[T] [[PARAMETERS]] {
+        to.numbers(potential_energy_regressor(model, data, q));
+    }
+}

@@ -1,0 +1,285 @@
+//! The work of a batch: groups of states, a lane for each, spread over threads.
+
+use super::places::Places;
+use crate::constraints::constraint_set::ConstraintSet;
+use crate::data::Data;
+use crate::workspace::{filled, zero_matrix};
+use alloc::vec::Vec;
+use condyle_linalg::threads;
+use condyle_model::Model;
+use condyle_spatial::Force;
+use condyle_spatial::block::{Block, MOST, Real, Strided, flat_mut, gather, lanes, scatter_matrix};
+use condyle_spatial::simd::Kernel;
+use nalgebra::{DMatrix, DMatrixView, Dyn, MatrixView};
+
+/// A matrix of one state, whose entries do not lie next to each other.
+pub type StateMatrix<'b, T> = MatrixView<'b, T, Dyn, Dyn, Dyn, Dyn>;
+
+/// Groups of as many states as a scalar has lanes, and who computes them.
+#[derive(Debug)]
+pub(super) struct Group<S: Block> {
+    /// The workers, one for each thread.
+    workers: Vec<Worker<S>>,
+    /// The most groups of as many states as there are lanes.
+    groups: usize,
+    /// The matrices of each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
+    matrices: Vec<[DMatrix<S>; KINDS]>,
+}
+
+/// The matrices of a group of states that stay in lanes, each nv × nv and each written by one pass alone, so that zeros stay
+/// zero.
+pub(super) const M: usize = 0;
+
+pub(super) const MINV: usize = 1;
+
+pub(super) const DTAU: [usize; 3] = [2, 3, 4];
+
+pub(super) const DA: [usize; 2] = [5, 6];
+
+/// The kinds that are symmetric: the two numbers of a pair differ by rounding at most, and either may stand for both.
+const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
+
+pub(super) const KINDS: usize = 7;
+
+/// The arguments of a state, by their places: q; v; an acceleration or an effort; λ of a contraction; forces.
+pub(super) const ARGUMENTS: usize = 5;
+
+pub(super) const FORCES: usize = ARGUMENTS - 1;
+
+/// The scratch of a thread.
+#[derive(Debug)]
+struct Worker<S: Block> {
+    data: Data<S>,
+    /// The arguments, a state in each lane. Shape: nq, nv, nv, nv. Written by: `one_by_one`.
+    numbers: [Vec<S>; FORCES],
+    /// Shape: bodies or none. Written by: `one_by_one`.
+    f_ext: Vec<Force<S>>,
+    /// Scratch of passes. Shape: 6 × nv.
+    six: [DMatrix<S>; 2],
+    /// Scratch of passes. Shape: nv × the greater one of nv and 10.
+    wide: Vec<S>,
+}
+
+impl<S: Block> Worker<S> {
+    fn new(model: &Model) -> Self {
+        let (nq, nv) = (model.nq(), model.nv());
+        Self {
+            data: Data::new(model),
+            numbers: [nq, nv, nv, nv].map(|n| filled(S::zero, n)),
+            f_ext: Vec::with_capacity(model.nodes().len()),
+            six: [zero_matrix(6, nv), zero_matrix(6, nv)],
+            wide: filled(S::zero, nv * nv.max(10)),
+        }
+    }
+}
+
+/// A group of states, as a pass sees it.
+pub(super) struct States<'w, S: Block> {
+    pub model: &'w Model,
+    pub data: &'w mut Data<S>,
+    pub q: &'w [S],
+    pub v: &'w [S],
+    pub x: &'w [S],
+    pub lambda: &'w [S],
+    pub f_ext: &'w [Force<S>],
+    pub constraints: Option<&'w mut ConstraintSet<S>>,
+    /// Scratch. Shape: 6 × nv.
+    pub six: &'w mut [DMatrix<S>; 2],
+    /// Scratch. Shape: nv × the greater one of nv and 10.
+    pub wide: &'w mut [S],
+    /// The matrices that stay in lanes, if the pass has some.
+    pub kept: Option<&'w mut [DMatrix<S>; KINDS]>,
+}
+
+/// The work on a group of states: it calls a function of this crate, and puts its results to their places.
+pub(super) trait Pass<T: Real>: Copy + Sync {
+    /// The kinds of matrices that it leaves in lanes.
+    const KINDS: &'static [usize];
+
+    /// To be inlined into the code of the level.
+    fn run<S: Block<Number = T>>(self, states: States<'_, S>, to: &mut Places<'_, T>);
+}
+
+struct Entered<'a, 'b, 'c, T, S: Block<Number = T>, P>(P, States<'a, S>, &'b mut Places<'c, T>);
+
+impl<T: Real, S: Block<Number = T>, P: Pass<T>> Kernel for Entered<'_, '_, '_, T, S, P> {
+    #[inline(always)]
+    fn run(self) {
+        self.0.run(self.1, self.2);
+    }
+}
+
+/// Runs a pass with the instructions of its lanes.
+pub(super) fn enter<T: Real, S: Block<Number = T>>(pass: impl Pass<T>, of: States<'_, S>, to: &mut Places<'_, T>) {
+    S::enter(Entered(pass, of, to));
+}
+
+/// A pass for one kind of lanes. What spreads states is compiled once for all of them.
+pub(super) type Work<'f, T, S> = dyn Fn(States<'_, S>, &mut Places<'_, T>) + Sync + 'f;
+
+/// The arguments of some states; empty where a function takes none.
+#[derive(Clone, Copy)]
+pub(super) struct Arguments<'a, T>(pub [&'a [T]; ARGUMENTS]);
+
+impl<T> Arguments<'_, T> {
+    /// The arguments of the first `n` of `states` states, and of the others.
+    fn split(self, n: usize, states: usize) -> (Self, Self) {
+        let parts = self.0.map(|of| of.split_at(of.len() / states * n));
+        (Self(parts.map(|part| part.0)), Self(parts.map(|part| part.1)))
+    }
+}
+
+/// The places for the results of some states: vectors and matrices of each, and matrices that stay in lanes, if there are.
+struct Results<'a, S: Block> {
+    numbers: Places<'a, S::Number>,
+    matrices: &'a mut [[DMatrix<S>; KINDS]],
+}
+
+impl<S: Block> Results<'_, S> {
+    /// The places of the first `n` of `states` states, and of the others.
+    fn split(self, n: usize, states: usize) -> (Self, Self) {
+        let numbers = self.numbers.split(n, states);
+        let matrices = self.matrices.split_at_mut(n.div_ceil(S::LANES).min(self.matrices.len()));
+        (Self { numbers: numbers.0, matrices: matrices.0 }, Self { numbers: numbers.1, matrices: matrices.1 })
+    }
+}
+
+/// Those who compute: workers, and for each the constraints, if the pass has some.
+struct Team<'a, S: Block> {
+    workers: &'a mut [Worker<S>],
+    sets: &'a mut [ConstraintSet<S>],
+}
+
+/// All states, by all threads.
+fn spread<T: Real, S: Block<Number = T>>(
+    work: &Work<'_, T, S>,
+    model: &Model,
+    team: Team<'_, S>,
+    states: usize,
+    from: Arguments<'_, T>,
+    to: Results<'_, S>,
+) {
+    let (groups, count) = (states.div_ceil(S::LANES), team.workers.len());
+    if count == 1 || groups < 2 {
+        return one_by_one(work, model, team, states, from, to);
+    }
+    let (some, others) = team.workers.split_at_mut(count / 2);
+    let sets = team.sets.split_at_mut(some.len().min(team.sets.len()));
+    let (some, others) = (Team { workers: some, sets: sets.0 }, Team { workers: others, sets: sets.1 });
+    let n = (groups * (count / 2) / count).max(1) * S::LANES;
+    let (first, second) = (from.split(n, states), to.split(n, states));
+    threads::join(
+        || spread(work, model, some, n, first.0, second.0),
+        || spread(work, model, others, states - n, first.1, second.1),
+    );
+}
+
+/// All groups, by one thread.
+fn one_by_one<T: Real, S: Block<Number = T>>(
+    work: &Work<'_, T, S>,
+    model: &Model,
+    Team { workers, sets }: Team<'_, S>,
+    mut states: usize,
+    mut from: Arguments<'_, T>,
+    mut to: Results<'_, S>,
+) {
+    let Worker { data, numbers, f_ext, six, wide } = &mut workers[0];
+    let mut constraints = sets.first_mut();
+    while states > 0 {
+        let n = states.min(S::LANES);
+        let (here, others) = from.split(n, states);
+        let (mut place, places) = to.split(n, states);
+        for (given, to) in here.0.iter().zip(&mut *numbers) {
+            if !given.is_empty() {
+                gather(given, n, to);
+            }
+        }
+        f_ext.resize(here.0[FORCES].len() / (6 * n), Force::zero());
+        gather(here.0[FORCES], n, flat_mut(f_ext));
+        let [q, v, x, lambda] = &*numbers;
+        let (kept, constraints) = (place.matrices.first_mut(), constraints.as_deref_mut());
+        let group = States { model, data, q, v, x, lambda, f_ext, constraints, six, wide, kept };
+        work(group, &mut place.numbers);
+        (states, from, to) = (states - n, others, places);
+    }
+}
+
+impl<S: Block> Group<S> {
+    pub(super) fn new(model: &Model, states: usize, threads: usize) -> Self {
+        Self {
+            workers: (0..threads).map(|_| Worker::new(model)).collect(),
+            groups: states.div_ceil(S::LANES),
+            matrices: Vec::new(),
+        }
+    }
+
+    /// The number of threads.
+    pub(super) fn threads(&self) -> usize {
+        self.workers.len()
+    }
+
+    /// Panics unless this was made for a model of the same tree.
+    pub(super) fn check(&self, model: &Model) {
+        self.workers[0].data.check(model);
+    }
+
+    /// Makes the matrices of a pass, for as many states as there is room for, if it is run for the first time.
+    pub(super) fn keep(&mut self, kinds: &[usize], nv: usize) {
+        if kinds.is_empty() {
+            return;
+        }
+        self.matrices.resize_with(self.groups, || core::array::from_fn(|_| zero_matrix(0, 0)));
+        for matrices in &mut self.matrices {
+            for &kind in kinds {
+                if matrices[kind].nrows() != nv {
+                    matrices[kind] = zero_matrix(nv, nv);
+                }
+            }
+        }
+    }
+
+    /// Runs a pass over all states; `has_matrices` says whether it leaves some in lanes.
+    pub(super) fn run<T: Real>(
+        &mut self,
+        work: &Work<'_, T, S>,
+        model: &Model,
+        states: usize,
+        sets: &mut [ConstraintSet<S>],
+        (from, numbers, has_matrices): (Arguments<'_, T>, Places<'_, T>, bool),
+    ) where
+        S: Block<Number = T>,
+    {
+        let matrices = if has_matrices { &mut self.matrices[..] } else { &mut [] };
+        let team = Team { workers: &mut self.workers, sets };
+        spread(work, model, team, states, from, Results { numbers, matrices });
+    }
+
+    /// A matrix of state k, in its lane.
+    pub(super) fn matrix(&self, kind: usize, k: usize) -> StateMatrix<'_, S::Number> {
+        let matrix = &self.matrices[k / S::LANES][kind];
+        let n = matrix.nrows();
+        let lane = lanes(matrix.as_slice()).get(k % S::LANES..).unwrap_or_default();
+        DMatrixView::from_slice_with_strides(lane, n, n, S::LANES, S::LANES * n)
+    }
+
+    /// The matrices of the first states, as many as there is room for, each by rows.
+    pub(super) fn write_rows(&self, kind: usize, to: &mut [S::Number]) {
+        let n = self.matrices.first().map_or(0, |matrices| matrices[kind].nrows());
+        if n == 0 {
+            return;
+        }
+        for (matrices, to) in self.matrices.iter().zip(to.chunks_mut(S::LANES * n * n)) {
+            let (vectors, mut each) = (matrices[kind].as_slice(), <[&mut [S::Number]; MOST]>::default());
+            let mut states = 0;
+            for to in to.chunks_exact_mut(n * n) {
+                each[states] = to;
+                states += 1;
+            }
+            let (strides, shape) = match SYMMETRIC.contains(&kind) {
+                true => ([n * n, 1], [1, n * n]), // its columns are its rows
+                false => ([1, n], [n, n]),
+            };
+            scatter_matrix(&Strided { vectors, strides, shape, negative: false }, &mut each[..states], n);
+        }
+    }
+}

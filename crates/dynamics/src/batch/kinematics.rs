@@ -1,0 +1,227 @@
+//! Places and motions of bodies and frames in many states.
+
+use super::results::{Matrices, Poses, Take, Taken, results};
+use super::table::{BODIES, NV, batched};
+use crate::calls::kinematics::{
+    body_jacobian, forward_accelerations, forward_kinematics, forward_velocities, frame_jacobian,
+};
+use crate::passes::frames::ReferenceFrame;
+use condyle_spatial::block::Real;
+
+results! {
+    /// The derivatives of an acceleration in many states.
+    BatchAccelerationDerivatives {
+        /// ∂a/∂q in the tangent space, 6 × nv.
+        da_dq: Matrices<'b, T>,
+        /// ∂a/∂v, 6 × nv.
+        da_dv: Matrices<'b, T>,
+    }
+}
+
+batched! {
+    /// [`forward_kinematics`](crate::forward_kinematics): oXb of all bodies in each state, in the order of the bodies.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Batch, Data, forward_kinematics, robots};
+    /// let arm = robots::arm7();
+    /// let (q, mut batch) = ([0.3; 7].repeat(10), Batch::new(&arm, 10, 1));
+    /// let hand = batch.forward_kinematics(&arm, &q).at(9, 7);
+    /// assert_eq!(hand, forward_kinematics(&arm, &mut Data::new(&arm), &[0.3; 7]).body(7));
+    /// ```
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea).
+    fn forward_kinematics(model, data, to; q) -> Poses<'_, T> [[BODIES, 4, 4]] {
+        let (placements, n) = (forward_kinematics(model, data, q), model.bodies().len());
+        for body in 0..n {
+            to.pose(0, [body, n], placements.body(body));
+        }
+    }
+
+    /// [`Placements::frame`](crate::Placements::frame): oXf of a frame in each state, its only pose.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_placement(model, data, to; q; frame: usize) -> Poses<'_, T> [[4, 4]] {
+        to.pose(0, [0, 1], forward_kinematics(model, data, q).frame(frame));
+    }
+
+    /// [`frame_jacobian`](crate::frame_jacobian): J of each state, 6 × nv.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_jacobian(model, data, to; q; frame: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]] with six {
+        frame_jacobian(model, q, frame, reference, &mut six[0]);
+        to.matrix(&six[0]);
+    }
+
+    /// [`body_jacobian`](crate::body_jacobian): J of each state, 6 × nv.
+    ///
+    /// q: nq numbers a state.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such body.
+    fn body_jacobian(model, data, to; q; body: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]] with six {
+        body_jacobian(model, q, body, reference, &mut six[0]);
+        to.matrix(&six[0]);
+    }
+
+    /// [`Velocities::frame_velocity`](crate::Velocities::frame_velocity): v of each state, six numbers.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_velocity(model, data, to; q, v; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        to.numbers(&forward_velocities(model, data, q, v).frame_velocity(frame, reference).to_array());
+    }
+
+    /// [`Velocities::body_velocity`](crate::Velocities::body_velocity): v of each state, six numbers.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such body.
+    fn body_velocity(model, data, to; q, v; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        to.numbers(&forward_velocities(model, data, q, v).body_velocity(body, reference).to_array());
+    }
+
+    /// [`Accelerations::frame_acceleration`](crate::Accelerations::frame_acceleration): a of each state, six numbers.
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_acceleration(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        to.numbers(&forward_accelerations(model, data, q, v, a).frame_acceleration(frame, reference).to_array());
+    }
+
+    /// [`Accelerations::body_acceleration`](crate::Accelerations::body_acceleration): a of each state, six numbers.
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such body.
+    fn body_acceleration(model, data, to; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        to.numbers(&forward_accelerations(model, data, q, v, a).body_acceleration(body, reference).to_array());
+    }
+
+    /// [`Accelerations::frame_classical_acceleration`](crate::Accelerations::frame_classical_acceleration): v̇ + ω × v, ω̇ of each state, six numbers.
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_classical_acceleration(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        to.numbers(&forward_accelerations(model, data, q, v, a).frame_classical_acceleration(frame, reference).to_array());
+    }
+
+    /// [`Accelerations::body_classical_acceleration`](crate::Accelerations::body_classical_acceleration): v̇ + ω × v, ω̇ of each state, six numbers.
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such body.
+    fn body_classical_acceleration(model, data, to; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        to.numbers(&forward_accelerations(model, data, q, v, a).body_classical_acceleration(body, reference).to_array());
+    }
+
+    /// [`Velocities::frame_jacobian_rate`](crate::Velocities::frame_jacobian_rate): dJ/dt of each state, 6 × nv.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_jacobian_rate(model, data, to; q, v; frame: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
+    with six {
+        forward_velocities(model, data, q, v).frame_jacobian_rate(frame, reference, &mut six[0]);
+        to.matrix(&six[0]);
+    }
+
+    /// [`Velocities::body_jacobian_rate`](crate::Velocities::body_jacobian_rate): dJ/dt of each state, 6 × nv.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such body.
+    fn body_jacobian_rate(model, data, to; q, v; body: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
+    with six {
+        forward_velocities(model, data, q, v).body_jacobian_rate(body, reference, &mut six[0]);
+        to.matrix(&six[0]);
+    }
+
+    /// [`Velocities::frame_velocity_derivative`](crate::Velocities::frame_velocity_derivative): ∂v/∂q of each state, 6 × nv.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_velocity_derivative(model, data, to; q, v; frame: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
+    with six {
+        forward_velocities(model, data, q, v).frame_velocity_derivative(frame, reference, &mut six[0]);
+        to.matrix(&six[0]);
+    }
+
+    /// [`Velocities::body_velocity_derivative`](crate::Velocities::body_velocity_derivative): ∂v/∂q of each state, 6 × nv.
+    ///
+    /// q: nq numbers a state; v: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such body.
+    fn body_velocity_derivative(model, data, to; q, v; body: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
+    with six {
+        forward_velocities(model, data, q, v).body_velocity_derivative(body, reference, &mut six[0]);
+        to.matrix(&six[0]);
+    }
+
+    /// [`Accelerations::frame_acceleration_derivatives`](crate::Accelerations::frame_acceleration_derivatives) of each
+    /// state, 6 × nv.
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_acceleration_derivatives(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame)
+    -> BatchAccelerationDerivatives<'_, T> [[6, NV], [6, NV]] with six {
+        let [by_q, by_v] = six;
+        forward_accelerations(model, data, q, v, a).frame_acceleration_derivatives(frame, reference, by_q, by_v);
+        to.matrix(by_q);
+        to.matrix(by_v);
+    }
+
+    /// [`Accelerations::body_acceleration_derivatives`](crate::Accelerations::body_acceleration_derivatives) of each
+    /// state, 6 × nv.
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such body.
+    fn body_acceleration_derivatives(model, data, to; q, v, a; body: usize, reference: ReferenceFrame)
+    -> BatchAccelerationDerivatives<'_, T> [[6, NV], [6, NV]] with six {
+        let [by_q, by_v] = six;
+        forward_accelerations(model, data, q, v, a).body_acceleration_derivatives(body, reference, by_q, by_v);
+        to.matrix(by_q);
+        to.matrix(by_v);
+    }
+
+    /// [`Accelerations::frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives) of each
+    /// state, 6 × nv.
+    ///
+    /// q: nq numbers a state; v, a: nv.
+    ///
+    /// # Panics
+    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    fn frame_classical_acceleration_derivatives(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame)
+    -> BatchAccelerationDerivatives<'_, T> [[6, NV], [6, NV]] with six {
+        let [by_q, by_v] = six;
+        forward_accelerations(model, data, q, v, a).frame_classical_acceleration_derivatives(frame, reference, by_q, by_v);
+        to.matrix(by_q);
+        to.matrix(by_v);
+    }
+}

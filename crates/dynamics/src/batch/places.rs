@@ -1,0 +1,92 @@
+//! The places to which passes of a batch put their results: of each state, one after the other.
+
+use condyle_spatial::block::{Block, MOST, Real, Strided, scatter, scatter_matrix};
+use condyle_spatial::{Inertia, Se3};
+use nalgebra::DMatrix;
+
+/// The most results of a function.
+pub(super) const MOST_RESULTS: usize = 12;
+
+/// The places for the results of some states, of which passes fill one after the other.
+pub(super) struct Places<'a, T> {
+    /// The numbers of all these states; of those results that a function does not have, none.
+    to: [&'a mut [T]; MOST_RESULTS],
+    states: usize,
+    /// The result that is written next.
+    next: usize,
+}
+
+impl<'a, T> Places<'a, T> {
+    pub(super) fn new(to: [&'a mut [T]; MOST_RESULTS], states: usize) -> Self {
+        Self { to, states, next: 0 }
+    }
+
+    /// The places of the first `n` of `states` states, and of the others.
+    pub(super) fn split(self, n: usize, states: usize) -> (Self, Self) {
+        let mut others: [&mut [T]; MOST_RESULTS] = Default::default();
+        let mut k = 0;
+        let first = self.to.map(|of| {
+            let (some, rest) = of.split_at_mut(of.len() / states * n);
+            others[k] = rest;
+            k += 1;
+            some
+        });
+        (Self::new(first, n), Self::new(others, states - n))
+    }
+}
+
+impl<T: Real> Places<'_, T> {
+    /// Writes some numbers of each state.
+    #[inline(never)]
+    pub(super) fn numbers<S: Block<Number = T>>(&mut self, x: &[S]) {
+        scatter(x, self.states, self.to[self.next]);
+        self.next += 1;
+    }
+
+    /// Writes a matrix of each state, by rows.
+    pub(super) fn matrix<S: Block<Number = T>>(&mut self, x: &DMatrix<S>) {
+        self.columns(x.as_slice(), x.ncols());
+    }
+
+    /// Writes a matrix of each state, of so many columns, by rows.
+    pub(super) fn columns<S: Block<Number = T>>(&mut self, x: &[S], columns: usize) {
+        self.part(self.next, [0, 1], x, columns);
+        self.next += 1;
+    }
+
+    /// Writes matrix k of n, of a result that is so many matrices.
+    #[inline(never)]
+    pub(super) fn part<S: Block<Number = T>>(&mut self, result: usize, [k, n]: [usize; 2], x: &[S], columns: usize) {
+        if x.is_empty() {
+            return;
+        }
+        let (size, rows) = (x.len(), x.len() / columns);
+        let mut each: [&mut [T]; MOST] = Default::default();
+        for (place, to) in each.iter_mut().zip(self.to[result].chunks_exact_mut(n * size)) {
+            *place = &mut to[k * size..(k + 1) * size];
+        }
+        let matrix = Strided { vectors: x, strides: [1, rows], shape: [rows, columns], negative: false };
+        scatter_matrix(&matrix, &mut each[..self.states], columns);
+    }
+
+    /// Writes pose k of n, of a result that is so many poses, as a homogeneous matrix.
+    #[inline(always)]
+    pub(super) fn pose<S: Block<Number = T>>(&mut self, result: usize, k: [usize; 2], X: Se3<S>) {
+        let Se3 { rotation: R, translation: p } = X;
+        let (o, e) = (S::zero(), S::one());
+        let columns = [R.x.x, R.x.y, R.x.z, o, R.y.x, R.y.y, R.y.z, o, R.z.x, R.z.y, R.z.z, o, p.x, p.y, p.z, e];
+        self.part(result, k, &columns, 4);
+    }
+
+    /// Writes the inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī].
+    #[inline(always)]
+    pub(super) fn inertia<S: Block<Number = T>>(&mut self, I: &Inertia<S>) {
+        let mut columns = [S::zero(); 36];
+        let axes = I.rotational.full().columns();
+        for k in 0..3 {
+            columns[7 * k] = I.mass;
+            columns[6 * (3 + k) + 3..6 * (4 + k)].copy_from_slice(&axes[k].to_array());
+        }
+        self.columns(&columns, 6);
+    }
+}

@@ -1,0 +1,225 @@
+//! What a batch gives: vectors, matrices and poses of each state, and structs of them.
+
+use super::group::StateMatrix;
+use super::places::MOST_RESULTS;
+use super::{Batch, InLanes};
+use condyle_linalg::check;
+use condyle_spatial::block::Real;
+use condyle_spatial::{Mat3, Se3, Vec3};
+use nalgebra::DMatrixView;
+
+/// The shape of a result for one state: no sizes for a number, one for a vector, two for a matrix, three for so many matrices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Shape {
+    sizes: [usize; 3],
+    rank: usize,
+}
+
+impl Shape {
+    /// A shape of some sizes, at most three.
+    pub(super) fn new(given: impl Iterator<Item = usize>) -> Self {
+        let (mut sizes, mut rank) = ([1; 3], 0);
+        for size in given {
+            sizes[rank] = size;
+            rank += 1;
+        }
+        Self { sizes, rank }
+    }
+
+    fn sizes(&self) -> &[usize] {
+        &self.sizes[..self.rank]
+    }
+
+    /// The number of its numbers.
+    pub(super) fn len(self) -> usize {
+        self.sizes.iter().product()
+    }
+
+    /// As one matrix: of several, one below the other.
+    fn matrix(self) -> [usize; 2] {
+        let [a, b, c] = self.sizes;
+        if self.rank == 3 { [a * b, c] } else { [a, b] }
+    }
+}
+
+/// The results of the last call of a batch: how many states there were, the shape of each result, and which kind of matrix it
+/// is, if these stay in lanes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Last {
+    pub states: usize,
+    pub results: usize,
+    pub shapes: [Shape; MOST_RESULTS],
+    pub kept: [Option<usize>; MOST_RESULTS],
+}
+
+/// Results that are taken one after the other.
+pub(super) struct Taken<'b, T: Real> {
+    pub batch: &'b Batch<T>,
+    pub next: usize,
+}
+
+/// A kind of results.
+pub(super) trait Take<'b, T: Real> {
+    fn take(from: &mut Taken<'b, T>) -> Self;
+}
+
+/// Numbers of each state, one state after the other.
+impl<'b, T: Real> Take<'b, T> for &'b [T] {
+    fn take(from: &mut Taken<'b, T>) -> Self {
+        let (k, Batch { slots, last, .. }) = (from.next, from.batch);
+        from.next += 1;
+        &slots[k][..last.states * last.shapes[k].len()]
+    }
+}
+
+impl<'b, T: Real> Take<'b, T> for Matrices<'b, T> {
+    fn take(from: &mut Taken<'b, T>) -> Self {
+        let (k, Batch { lanes, last, .. }) = (from.next, from.batch);
+        let (states, shape) = (last.states, last.shapes[k].matrix());
+        match last.kept[k] {
+            None => Self { of: Stored::ByRows(<&[T]>::take(from)), shape, states },
+            Some(kind) => {
+                from.next += 1;
+                Self { of: Stored::InLanes(lanes, kind), shape, states }
+            }
+        }
+    }
+}
+
+impl<'b, T: Real> Take<'b, T> for Poses<'b, T> {
+    fn take(from: &mut Taken<'b, T>) -> Self {
+        let (shape, states) = (from.batch.last.shapes[from.next], from.batch.last.states);
+        Self { numbers: <&[T]>::take(from), each: shape.len() / 16, states }
+    }
+}
+
+/// A matrix for each state of a batch.
+#[derive(Clone, Copy, Debug)]
+pub struct Matrices<'b, T: Real> {
+    of: Stored<'b, T>,
+    shape: [usize; 2],
+    states: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Stored<'b, T: Real> {
+    /// As the passes leave them, and of which kind they are.
+    InLanes(&'b InLanes<T>, usize),
+    /// One after the other, each by rows.
+    ByRows(&'b [T]),
+}
+
+impl<'b, T: Real> Matrices<'b, T> {
+    /// The matrix of state k: a view, which [`copy_from`](nalgebra::Matrix::copy_from) copies to a matrix of one's own.
+    ///
+    /// # Panics
+    /// If there are not so many states.
+    pub fn at(&self, k: usize) -> StateMatrix<'b, T> {
+        check_state(k, self.states);
+        let [m, n] = self.shape;
+        match self.of {
+            Stored::InLanes(InLanes::Single(group), kind) => group.matrix(kind, k),
+            Stored::InLanes(InLanes::Short(group), kind) => group.matrix(kind, k),
+            Stored::InLanes(InLanes::Long(group), kind) => group.matrix(kind, k),
+            Stored::ByRows(rows) => DMatrixView::from_slice_with_strides(&rows[k * m * n..(k + 1) * m * n], m, n, n, 1),
+        }
+    }
+
+    /// Writes those of all states one after the other, each by rows.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Batch, robots};
+    /// let arm = robots::arm7();
+    /// let (mut batch, q) = (Batch::new(&arm, 10, 1), vec![0.3; 70]);
+    /// let mut rows = vec![0.0; 10 * 7 * 7];
+    /// let M = batch.crba(&arm, &q);
+    /// M.write_rows(&mut rows);
+    /// assert_eq!(rows[9 * 49 + 7 + 2], M.at(9)[(1, 2)]);
+    /// ```
+    ///
+    /// # Panics
+    /// If `to` has not as many numbers.
+    pub fn write_rows(&self, to: &mut [T]) {
+        let [m, n] = self.shape;
+        check("to", to.len(), self.states * m * n);
+        match self.of {
+            Stored::InLanes(InLanes::Single(group), kind) => group.write_rows(kind, to),
+            Stored::InLanes(InLanes::Short(group), kind) => group.write_rows(kind, to),
+            Stored::InLanes(InLanes::Long(group), kind) => group.write_rows(kind, to),
+            Stored::ByRows(rows) => to.copy_from_slice(rows),
+        }
+    }
+
+    /// The matrices of all states.
+    pub fn iter(&self) -> impl Iterator<Item = StateMatrix<'b, T>> {
+        let this = *self;
+        (0..self.states).map(move |k| this.at(k))
+    }
+}
+
+/// Some poses for each state of a batch.
+#[derive(Clone, Copy, Debug)]
+pub struct Poses<'b, T> {
+    /// Homogeneous matrices by rows.
+    numbers: &'b [T],
+    each: usize,
+    states: usize,
+}
+
+impl<T: Real> Poses<'_, T> {
+    /// Pose number i of state k.
+    ///
+    /// # Panics
+    /// If there are not so many states, or poses.
+    pub fn at(&self, k: usize, i: usize) -> Se3<T> {
+        check_state(k, self.states);
+        assert!(i < self.each, "i: expected a number below that of the poses, {}, found {i}", self.each);
+        let x = &self.numbers[16 * (k * self.each + i)..];
+        let column = |j: usize| Vec3::new(x[j], x[4 + j], x[8 + j]);
+        Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3))
+    }
+}
+
+#[track_caller]
+fn check_state(k: usize, states: usize) {
+    assert!(k < states, "k: expected a number below that of the states, {states}, found {k}");
+}
+
+/// Structs of results, of which the single call's struct says what they are.
+macro_rules! results {
+    ($($(#[$doc:meta])* $Name:ident { $($(#[$member_doc:meta])* $member:ident: $Kind:ty,)* })*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub struct $Name<'b, T: Real> {
+            $($(#[$member_doc])* pub $member: $Kind,)*
+        }
+
+        impl<'b, T: Real> Take<'b, T> for $Name<'b, T> {
+            fn take(from: &mut Taken<'b, T>) -> Self {
+                Self { $($member: Take::take(from)),* }
+            }
+        }
+    )*};
+}
+pub(super) use results;
+
+impl<T: Real> Batch<T> {
+    /// The sizes of each result of the last call, for one state.
+    #[doc(hidden)]
+    pub fn last_shapes(&self) -> impl Iterator<Item = &[usize]> {
+        self.last.shapes[..self.last.results].iter().map(Shape::sizes)
+    }
+
+    /// Writes result k of the last call, of all states one after the other, each by rows.
+    ///
+    /// # Panics
+    /// If there is no such result, or `to` has not as many numbers.
+    #[doc(hidden)]
+    pub fn write_last(&self, k: usize, to: &mut [T]) {
+        let mut from = Taken { batch: self, next: k };
+        match self.last.kept[k] {
+            None => to.copy_from_slice(Take::take(&mut from)),
+            Some(_) => Matrices::take(&mut from).write_rows(to),
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Several robots in one model: those that no constraint ties together are computed as if each were alone.
+
+use crate::common::{Worst, normal, random_pose, rng};
+use condyle_dynamics::{
+    ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Proximal, WORLD, constrained_dynamics,
+    constrained_dynamics_derivatives, constrained_dynamics_equations, impulse_dynamics, impulse_dynamics_derivatives,
+    random_configuration, robots,
+};
+use nalgebra::DMatrix;
+
+/// Sums of the same numbers in another order, times the condition numbers of M and of J M⁻¹ Jᵀ.
+const SAME: f64 = 1e-9;
+
+/// A robot, the frames that touch, and whether these are held whole.
+struct Part {
+    model: Model,
+    feet: &'static [&'static str],
+    rigid: bool,
+}
+
+/// An arm that touches, a quadruped, one that falls, a humanoid on two soles, and an arm again.
+fn parts() -> Vec<Part> {
+    const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
+    let part = |model, feet, rigid| Part { model, feet, rigid };
+    vec![
+        part(robots::arm7(), &["tool"], false),
+        part(robots::quadruped(), &FEET, false),
+        part(robots::quadruped(), &[], false),
+        part(robots::humanoid(), &["left_sole", "right_sole"], true),
+        part(robots::arm7(), &["tool"], true),
+    ]
+}
+
+/// All robots side by side, in one model.
+fn together(parts: &[Part]) -> Model {
+    let (mut builder, mut rng) = (ModelBuilder::new("all"), rng(7));
+    for (k, part) in parts.iter().enumerate() {
+        builder.append(WORLD, random_pose(&mut rng), &part.model, &format!("{k}_"));
+    }
+    builder.build().unwrap()
+}
+
+/// The robot's model in the world of the whole one: the same, placed where it stands there.
+fn alone(k: usize, parts: &[Part]) -> Model {
+    let (mut builder, mut rng) = (ModelBuilder::new("one"), rng(7));
+    let placement = (0..=k).map(|_| random_pose(&mut rng)).last().unwrap();
+    builder.append(WORLD, placement, &parts[k].model, &format!("{k}_"));
+    builder.build().unwrap()
+}
+
+fn contacts(k: usize, part: &Part, model: &Model) -> Vec<ContactConstraint> {
+    let contact = |foot: &&str| {
+        let frame = model.frame(&format!("{k}_{foot}")).unwrap();
+        let of = if part.rigid { ContactConstraint::rigid(frame) } else { ContactConstraint::point(frame) };
+        ContactConstraint { kp: 2.0, kd: 3.0, ..of }
+    };
+    part.feet.iter().map(contact).collect()
+}
+
+/// Where the coordinates of a robot stand in the whole model: of q, and of v.
+fn places(one: &Model, whole: &Model) -> [Vec<usize>; 2] {
+    let mut all = [Vec::new(), Vec::new()];
+    for body in &one.bodies()[1..] {
+        let there = &whole.bodies()[whole.joint(&body.joint_name).unwrap()];
+        all[0].extend(there.idx_q..there.idx_q + body.joint.nq());
+        all[1].extend(there.idx_v..there.idx_v + body.joint.nv());
+    }
+    all
+}
+
+fn pick(of: &[f64], at: &[usize]) -> Vec<f64> {
+    at.iter().map(|&k| of[k]).collect()
+}
+
+/// The entries of a matrix in some rows and columns; all others in these rows are zero.
+fn block(of: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
+    let beside = |column: &usize| !columns.contains(column);
+    let zeros = (0..of.ncols()).filter(beside).all(|column| rows.iter().all(|&row| of[(row, column)] == 0.0));
+    assert!(zeros, "an entry of two robots");
+    columns.iter().flat_map(|&column| rows.iter().map(move |&row| of[(row, column)])).collect()
+}
+
+/// Each function on the whole model, and on each robot by itself; with limbs side by side, and body by body. A set that ties
+/// two robots was used on the same `Data` before.
+#[test]
+fn each_robot_is_as_it_is_alone() {
+    let (parts, mut worst) = (parts(), Worst::new("robots alone and together", SAME));
+    for limbs in [true, false] {
+        let whole = together(&parts).with_limbs(limbs);
+        let mut rng = rng(1);
+        let q = random_configuration(&whole, &mut rng);
+        let [v, tau] = [(); 2].map(|()| normal(&mut rng, whole.nv()));
+        let all: Vec<_> = parts.iter().enumerate().flat_map(|(k, part)| contacts(k, part, &whole)).collect();
+        let (mut data, mut set) = (Data::new(&whole), ConstraintSet::new(&whole, &all).unwrap());
+        let tied = [whole.frame("0_tool").unwrap(), whole.frame("4_tool").unwrap()];
+        let tie = ContactConstraint { other: Some(tied[1]), ..ContactConstraint::rigid(tied[0]) };
+        let mut tied = ConstraintSet::new(&whole, &[tie]).unwrap();
+        constrained_dynamics_derivatives(&whole, &mut data, &mut tied, &q, &v, &tau, &[]);
+        impulse_dynamics_derivatives(&whole, &mut data, &mut tied, &q, &v, 0.0);
+
+        let d = constrained_dynamics(&whole, &mut data, &mut set, &q, &v, &tau, &[]);
+        let (a, lambda) = (d.a.to_vec(), d.lambda.to_vec());
+        let d = constrained_dynamics_derivatives(&whole, &mut data, &mut set, &q, &v, &tau, &[]);
+        assert_eq!(d.redundant, 0.0);
+        let squares = [d.da_dq, d.da_dv, d.da_dtau].map(Clone::clone);
+        let wides = [d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau].map(Clone::clone);
+        let inertia = d.inertia.clone();
+        let d = constrained_dynamics_equations(&whole, &mut data, &mut set, &q, &v, &tau, &[]);
+        let equations = [d.M, d.dtau_dq, d.dtau_dv].map(Clone::clone);
+        let drifts = [d.dgamma_dq, d.dgamma_dv].map(Clone::clone);
+        let after = impulse_dynamics(&whole, &mut data, &mut set, &q, &v, 0.3).v.to_vec();
+        let d = impulse_dynamics_derivatives(&whole, &mut data, &mut set, &q, &v, 0.3);
+        let jumps = [d.dv_dq, d.dv_dv].map(Clone::clone);
+        let impulses = [d.dlambda_dq, d.dlambda_dv].map(Clone::clone);
+
+        let mut row = 0;
+        for (k, part) in parts.iter().enumerate() {
+            let one = alone(k, &parts).with_limbs(limbs);
+            let [at_q, at] = places(&one, &whole);
+            let mut set = ConstraintSet::new(&one, &contacts(k, part, &one)).unwrap();
+            let rows: Vec<usize> = (row..row + set.rows()).collect();
+            row += set.rows();
+            let (mut data, q, v, tau) = (Data::new(&one), pick(&q, &at_q), pick(&v, &at), pick(&tau, &at));
+            let mut same = |found: &[f64], expected: &[f64]| worst.see(&one, found, expected);
+            let d = constrained_dynamics(&one, &mut data, &mut set, &q, &v, &tau, &[]);
+            same(&pick(&a, &at), d.a);
+            same(&pick(&lambda, &rows), d.lambda);
+            let d = constrained_dynamics_derivatives(&one, &mut data, &mut set, &q, &v, &tau, &[]);
+            for (found, expected) in squares.iter().zip([d.da_dq, d.da_dv, d.da_dtau]) {
+                same(&block(found, &at, &at), expected.as_slice());
+            }
+            for (found, expected) in wides.iter().zip([d.dlambda_dq, d.dlambda_dv, d.dlambda_dtau]) {
+                same(&block(found, &rows, &at), expected.as_slice());
+            }
+            same(&block(&inertia, &rows, &rows), d.inertia.as_slice());
+            let d = constrained_dynamics_equations(&one, &mut data, &mut set, &q, &v, &tau, &[]);
+            for (found, expected) in equations.iter().zip([d.M, d.dtau_dq, d.dtau_dv]) {
+                same(&block(found, &at, &at), expected.as_slice());
+            }
+            for (found, expected) in drifts.iter().zip([d.dgamma_dq, d.dgamma_dv]) {
+                same(&block(found, &rows, &at), expected.as_slice());
+            }
+            same(&pick(&after, &at), impulse_dynamics(&one, &mut data, &mut set, &q, &v, 0.3).v);
+            let d = impulse_dynamics_derivatives(&one, &mut data, &mut set, &q, &v, 0.3);
+            for (found, expected) in jumps.iter().zip([d.dv_dq, d.dv_dv]) {
+                same(&block(found, &at, &at), expected.as_slice());
+            }
+            for (found, expected) in impulses.iter().zip([d.dlambda_dq, d.dlambda_dv]) {
+                same(&block(found, &rows, &at), expected.as_slice());
+            }
+        }
+    }
+}
+
+/// Constraints in any order, and robots that are tied together by loops, with damping and several rounds: the order of the
+/// constraints, which decides where islands can be told apart, changes nothing but the order of the rows.
+#[test]
+fn the_order_of_constraints_changes_nothing() {
+    let (parts, mut worst) = (parts(), Worst::new("orders of constraints", SAME));
+    let whole = together(&parts);
+    let mut rng = rng(2);
+    let q = random_configuration(&whole, &mut rng);
+    let [v, tau] = [(); 2].map(|()| normal(&mut rng, whole.nv()));
+    let mut all: Vec<_> = parts.iter().enumerate().flat_map(|(k, part)| contacts(k, part, &whole)).collect();
+    let [one, other] = ["1_LF_foot", "3_right_sole"].map(|name| whole.frame(name).unwrap());
+    all.insert(5, ContactConstraint { other: Some(other), ..ContactConstraint::point(one) }); // after the quadruped's
+    let mut turned = all.clone();
+    turned.rotate_left(3);
+    let (last, middle) = (turned.len() - 1, turned.len() / 2);
+    turned.swap(0, last);
+    turned.swap(1, middle);
+    let mut found = [all.clone(), turned.clone()].map(|constraints| {
+        let (mut data, mut set) = (Data::new(&whole), ConstraintSet::new(&whole, &constraints).unwrap());
+        set.proximal = Proximal { mu: 1e-3, iterations: 3 };
+        let mut order: Vec<usize> = Vec::new();
+        for constraint in &all {
+            let k = constraints.iter().position(|other| other == constraint).unwrap();
+            order.extend(set.range(k));
+        }
+        let d = constrained_dynamics_derivatives(&whole, &mut data, &mut set, &q, &v, &tau, &[]);
+        let rows = |of: &DMatrix<f64>| DMatrix::from_fn(of.nrows(), of.ncols(), |i, j| of[(order[i], j)]);
+        let inertia = DMatrix::from_fn(order.len(), order.len(), |i, j| d.inertia[(order[i], order[j])]);
+        let numbers: [Vec<f64>; 7] = [
+            d.a.to_vec(),
+            pick(d.lambda, &order),
+            d.da_dq.as_slice().to_vec(),
+            d.da_dv.as_slice().to_vec(),
+            rows(d.dlambda_dq).as_slice().to_vec(),
+            rows(d.dlambda_dtau).as_slice().to_vec(),
+            inertia.as_slice().to_vec(),
+        ];
+        numbers
+    });
+    let [first, second] = &mut found;
+    for (x, y) in second.iter().zip(&*first) {
+        worst.see(&whole, x, y);
+    }
+}
+
+/// A robot that is not a number leaves the others as they are.
+#[test]
+fn a_robot_that_is_not_a_number_stays_alone() {
+    let parts = parts();
+    let whole = together(&parts).with_limbs(false);
+    let mut rng = rng(3);
+    let q = random_configuration(&whole, &mut rng);
+    let [v, tau] = [(); 2].map(|()| normal(&mut rng, whole.nv()));
+    let all: Vec<_> = parts.iter().enumerate().flat_map(|(k, part)| contacts(k, part, &whole)).collect();
+    let (mut data, mut set) = (Data::new(&whole), ConstraintSet::new(&whole, &all).unwrap());
+    let clean = constrained_dynamics(&whole, &mut data, &mut set, &q, &v, &tau, &[]).a.to_vec();
+    let at = places(&alone(1, &parts), &whole)[1].clone();
+    let mut broken = tau.clone();
+    broken[at[0]] = f64::NAN;
+    let found = constrained_dynamics(&whole, &mut data, &mut set, &q, &v, &broken, &[]).a.to_vec();
+    for k in 0..whole.nv() {
+        assert!(if at.contains(&k) { found[k].is_nan() } else { found[k] == clean[k] }, "coordinate {k}");
+    }
+}
