@@ -71,7 +71,7 @@ Contacts, loops, impacts: `ContactConstraint`, `ConstraintSet`, `constrained_dyn
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
-Many solves: `sweep` (`Variations`), in this process or on a Ray cluster
+Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL`, of vector instructions
 Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
     (poses, motions, forces), `conventions` (other libraries' numbers), `casadi`, `pinocchio` (its spelling),
     `crocoddyl` (its problems) and `viz` (pictures; all four imported by themselves)

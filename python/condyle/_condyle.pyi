@@ -807,7 +807,7 @@ class ConstraintSet:
         """
 
     def jacobian(self, out: _Array | None = None) -> _Array:
-        """The Jacobian J of the constraints, (rows, nv), at the state of the last call."""
+        """The Jacobian J of the constraints, (rows, nv), at the state of the last call for a single one."""
 
 def constrained_dynamics(
     model: Model,
@@ -938,7 +938,7 @@ class Data:
     with another robot's model, a `ValueError`.
 
     model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
-    several states side by side in vector registers; at most 1024.
+    several states side by side in vector registers, and release the interpreter's lock; at most 1024.
 
     >>> arm = condyle.robots.arm7()
     >>> condyle.Data(arm)

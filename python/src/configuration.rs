@@ -47,7 +47,7 @@ fn neutral(model;) {
 fn integrate(model; q: Position, v: Tangent; out) {
     Computed::new([model.nq()], |moved| condyle::integrate(model, &q, &v, moved))
 }
-each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved) }
+each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved); }
 
 /// The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
 ///
@@ -55,7 +55,7 @@ each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, 
 fn difference(model; q0: Position, q1: Position; out) {
     Computed::new([model.nv()], |v| condyle::difference(model, &q0, &q1, v))
 }
-each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1, v) }
+each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1, v); }
 
 /// The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
 ///

@@ -378,7 +378,7 @@ macro_rules! functions {
                 let copy = out.is_some();
                 $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all.given, $model, states, copy)?;)*
                 $(let $all = &$all[..];)*
-                $($(let $shared = <kinds::$shared_kind as Argument>::read(stringify!($shared), $shared, $model)?;)*)?
+                $($(let $shared = <kinds::$shared_kind as Argument>::read(stringify!($shared), $shared.given, $model)?;)*)?
                 let lanes = data.batch($model, states);
                 $(let $set = scratch.side_by_side(lanes, $model)?;)?
                 return batch::run(py, lanes, batch::Kind::$kind_of $(($class))?, states, out, |$batch, some| {
@@ -388,9 +388,9 @@ macro_rules! functions {
             })?
             $(if let (Some(states), false) = (states, dual) {
                 let copy = out.is_some();
-                $(let $of = <kinds::$of_kind as Argument>::read_all(stringify!($of), &$of, $model, states, copy)?;)*
+                $(let $of = <kinds::$of_kind as Argument>::read_all(stringify!($of), &$of.given, $model, states, copy)?;)*
                 $(let $of = &$of[..];)*
-                $($(let $same = <kinds::$same_kind as Argument>::read(stringify!($same), $same, $model)?;)*)?
+                $($(let $same = <kinds::$same_kind as Argument>::read(stringify!($same), $same.given, $model)?;)*)?
                 return batch::each(py, states, &[$($model.$size()),*], out, |k, $place| {
                     $(let $of = batch::part($of, &(k..k + 1), states);)*
                     $one

@@ -54,7 +54,7 @@ fn passive_torque(model; v: Tangent, smoothing: Speed; out) {
     condyle::passive_torque(model, &v, smoothing, &mut tau);
     tau
 }
-each(v: Tangent; smoothing: Speed) -> [nv] |tau| { condyle::passive_torque(model, v, smoothing, tau) }
+each(v: Tangent; smoothing: Speed) -> [nv] |tau| { condyle::passive_torque(model, v, smoothing, tau); }
 
 /// The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
 /// other entries; O(n).

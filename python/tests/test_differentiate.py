@@ -102,7 +102,7 @@ CASES: dict[str, Case] = {
     "static_torque_derivative": lambda r, q, v: condyle.static_torque_derivative(r.model, r.data, q, r.f_ext),
     "transport": lambda r, q, v: condyle.transport(r.model, v, np.outer(v, [1.0, 2.0])),
 }
-NOT_OF_A_STATE = {"gradient", "hessian", "jacobian", "load", "neutral", "random_configuration"}
+NOT_OF_A_STATE = {"gradient", "hessian", "jacobian", "load", "neutral", "random_configuration", "sweep"}
 
 
 def held(r: Robot) -> condyle.ConstraintSet:
