@@ -101,6 +101,7 @@ def plot(solution: Solution, model: Model, dt: float | None = None) -> "Figure":
     for name, label in (("cost", "cost"), ("stop", "expected decrease"), ("gap", "largest gap")):
         axes[3].plot(iterations, _positive([getattr(one, name) for one in solution.trace]), ".-", label=label)
     axes[3].set_yscale("log")
+    axes[3].xaxis.get_major_locator().set_params(integer=True)
     axes[3].set_xlabel("iteration")
     axes[3].legend(loc="upper right", fontsize="small")
     axes[3].set_title(f"{solution.status}: cost {solution.cost:.6g}", fontsize="medium")

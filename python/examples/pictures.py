@@ -1,0 +1,56 @@
+"""Pictures of a motion: plots of a solution, the zeros of a matrix, and playback in the browser.
+
+    python python/examples/pictures.py [--stay]
+
+Needs `pip install condyle[viz]`. It leaves plot.png and spy.png in the folder where it runs; with --stay the page stays
+until Enter is pressed.
+"""
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")  # pictures go into files; without this line `matplotlib.pyplot.show()` puts them on the screen
+
+import numpy as np
+from gait import Gait
+
+import condyle
+from condyle import viz
+
+FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
+DT = 0.01  # s
+
+robot = condyle.robots.quadruped()
+q = condyle.neutral(robot)
+q[7:] = [0.0, 0.7, -1.4] * 4  # knees bent
+
+gait = Gait(robot, q, FEET, DT)
+gait.stand(10)
+gait.step([1, 2], 0.08, 0.06, 20)  # right front and left hind
+gait.step([0, 3], 0.08, 0.06, 20)
+gait.stand(20)
+solution = gait.solve()
+print(f"FDDP: {solution.status} after {len(solution.trace)} iterations, {len(gait.stages)} knots")
+
+# Positions, velocities, controls, and the way of the solver.
+viz.plot(solution, robot, DT).savefig("plot.png", dpi=110)
+
+# The inertia matrix has zeros where the legs do not see each other; its inverse has not, since the trunk moves.
+M, Minv = (f(robot, condyle.Data(robot), q) for f in (condyle.crba, condyle.minv))
+viz.spy(M, robot).savefig("spy.png", dpi=110)
+print(f"zeros: {(M == 0.0).sum()} of M, {(abs(Minv) < 1e-12).sum()} of its inverse, {M.size} entries each")
+
+# The page: the robot's own shapes, an arrow for each contact force, a slider.
+Path("quadruped.urdf").write_text(condyle.robots.QUADRUPED)
+player = viz.play(robot, solution.xs[:, : robot.nq], DT, solution.forces, "quadruped.urdf")
+print(player)
+for knot in (0, 20, 40):
+    player.show(knot)
+    held = [name for name, force in solution.forces[knot].items() if np.linalg.norm(force) > 1.0]
+    print(f"at {knot * DT:.2f} s the robot stands on {', '.join(held)}")
+player.play()
+if "--stay" in sys.argv:
+    input(f"Open {player.url}; Enter ends it. ")
+player.close()
