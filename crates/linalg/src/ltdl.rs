@@ -314,7 +314,7 @@ impl<S: Scalar> Ltdl<S> {
             }
             let L = &self.rows[first[k]..first[k] + depth[k]];
             let (above, rest) = rows.split_at_mut(k * nv);
-            rest[..nv].fill(S::zero());
+            rest[..k].fill(S::zero());
             let row = &mut rest[root..k];
             let m = row.len();
             let (mut e, mut p) = (parent[k], depth[k]);
@@ -338,7 +338,7 @@ impl<S: Scalar> Ltdl<S> {
                 e = parent[e];
             }
             rest[k] = diagonal;
-            for (column, &x) in above.chunks_exact_mut(nv).zip(&rest[..k]).skip(root) {
+            for (column, &x) in above.chunks_exact_mut(nv).zip(&rest[..k]) {
                 column[k] = x; // by symmetry
             }
         }

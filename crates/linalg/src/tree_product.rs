@@ -19,7 +19,7 @@ use core::ops::Range;
 /// a quarter as often.
 #[inline(always)]
 pub fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
-    minus_block_product(A, B, C, nonzero_rows, &(0..nonzero_rows.len()));
+    minus_block_product(A, B, C, nonzero_rows, 0..nonzero_rows.len());
 }
 
 /// Those rows and columns of C = −A B that are a block of the diagonal, where B has nothing beside it in these columns.
@@ -29,20 +29,21 @@ pub fn minus_block_product<S: Scalar>(
     B: &[S],
     C: &mut [S],
     nonzero_rows: &[NonzeroRows],
-    block: &Range<usize>,
+    block: Range<usize>,
 ) {
     let (n, mut j) = (nonzero_rows.len(), block.start);
-    while j < block.end {
+    let Range { start, end } = block;
+    while j < end {
         let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
         let many = if *same_pattern >= 4 { 4 } else { 1 };
         let (b, c) = (&B[j * n..(j + many) * n], &mut C[j * n..(j + many) * n]);
         match (many, size_of::<S>()) {
-            (4, 64..) => four_columns::<S, 4>(A, b, c, rows, n, block),
-            (4, 16..) => four_columns::<S, 2>(A, b, c, rows, n, block),
-            (4, _) => four_columns::<S, 8>(A, b, c, rows, n, block),
+            (4, 64..) => four_columns::<S, 4>(A, b, c, rows, [n, start, end]),
+            (4, 16..) => four_columns::<S, 2>(A, b, c, rows, [n, start, end]),
+            (4, _) => four_columns::<S, 8>(A, b, c, rows, [n, start, end]),
             _ => {
-                c[block.clone()].fill(S::zero());
-                subtract_column(A, b, c, rows, block);
+                c[start..end].fill(S::zero());
+                subtract_column(A, b, c, rows, start..end);
             }
         }
         j += many;
@@ -149,9 +150,10 @@ fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&
 
 /// c −= A b in some of its rows, where b has zeros but in these rows.
 #[inline(always)]
-pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize], of_c: &Range<usize>) {
-    let (n, c) = (c.len(), &mut c[of_c.clone()]);
-    let (A, m) = (&A[of_c.start..], c.len());
+pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize], of_c: Range<usize>) {
+    let (n, A) = (c.len(), &A[of_c.start..]);
+    let c = &mut c[of_c];
+    let m = c.len();
     let (fours, rest) = rows.as_chunks::<4>();
     for &[k0, k1, k2, k3] in fours {
         let (a0, a1) = (&A[k0 * n..k0 * n + m], &A[k1 * n..k1 * n + m]);
@@ -168,16 +170,9 @@ pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize],
 
 /// The sums of `subtract_column`, in the same order, so that the bits are the same.
 #[inline(always)]
-fn four_columns<S: Scalar, const N: usize>(
-    A: &[S],
-    B: &[S],
-    C: &mut [S],
-    rows: &[usize],
-    n: usize,
-    of_C: &Range<usize>,
-) {
+fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], [n, start, end]: [usize; 3]) {
     let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
-    let Range { start: mut i, end } = *of_C;
+    let mut i = start;
     while i + N <= end {
         let mut c = [[S::zero(); N]; 4];
         for &k in rows {

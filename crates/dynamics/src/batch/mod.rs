@@ -199,7 +199,7 @@ impl<T: Real> Batch<T> {
         for one in given {
             from.0[one.at] = one.numbers;
         }
-        let places = (from, Places::new(to, states), !P::KINDS.is_empty());
+        let places = (from, Places::new(to, first_kept, states), !P::KINDS.is_empty());
         macro_rules! run {
             ($group:ident, $kind:ident) => {{
                 $group.keep(P::KINDS, model.nv());

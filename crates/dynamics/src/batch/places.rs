@@ -2,6 +2,7 @@
 
 use condyle_spatial::block::{Block, MOST, Real, Strided, scatter, scatter_matrix};
 use condyle_spatial::{Inertia, Se3};
+use core::mem;
 use nalgebra::DMatrix;
 
 /// The most results of a function.
@@ -11,27 +12,28 @@ pub(super) const MOST_RESULTS: usize = 12;
 pub(super) struct Places<'a, T> {
     /// The numbers of all these states; of those results that a function does not have, none.
     to: [&'a mut [T]; MOST_RESULTS],
+    /// The number of those that it has.
+    results: usize,
     states: usize,
     /// The result that is written next.
     next: usize,
 }
 
 impl<'a, T> Places<'a, T> {
-    pub(super) fn new(to: [&'a mut [T]; MOST_RESULTS], states: usize) -> Self {
-        Self { to, states, next: 0 }
+    /// The places for so many results.
+    pub(super) fn new(to: [&'a mut [T]; MOST_RESULTS], results: usize, states: usize) -> Self {
+        Self { to, results, states, next: 0 }
     }
 
     /// The places of the first `n` of `states` states, and of the others.
-    pub(super) fn split(self, n: usize, states: usize) -> (Self, Self) {
-        let mut others: [&mut [T]; MOST_RESULTS] = Default::default();
-        let mut k = 0;
-        let first = self.to.map(|of| {
-            let (some, rest) = of.split_at_mut(of.len() / states * n);
-            others[k] = rest;
-            k += 1;
-            some
-        });
-        (Self::new(first, n), Self::new(others, states - n))
+    pub(super) fn split(mut self, n: usize, states: usize) -> (Self, Self) {
+        let mut others = Self::new(Default::default(), self.results, states - n);
+        for (first, other) in self.to[..self.results].iter_mut().zip(&mut others.to) {
+            let each = first.len() / states;
+            (*first, *other) = mem::take(first).split_at_mut(each * n);
+        }
+        self.states = n;
+        (self, others)
     }
 }
 

@@ -66,7 +66,7 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
     let (n, m) = A.shape();
     let (A, B, C) = (A.as_slice(), B.as_slice(), C.as_mut_slice());
     for j in columns.clone() {
-        subtract_column(A, &B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n], rows[j].as_ref(), of_C);
+        subtract_column(A, &B[j * m..(j + 1) * m], &mut C[j * n..(j + 1) * n], rows[j].as_ref(), of_C.clone());
     }
 }
 
@@ -146,7 +146,7 @@ impl<S: Scalar> Equations<'_, S> {
             let columns = &island.coordinates;
             island.clear_beside(da.as_mut_slice(), n, S::zero());
             let (P, r) = (self.P.as_slice(), self.r.as_slice());
-            minus_block_product(P, r, da.as_mut_slice(), self.nonzero_rows, columns); // −P r − J̄ c
+            minus_block_product(P, r, da.as_mut_slice(), self.nonzero_rows, columns.clone()); // −P r − J̄ c
             if island.rows.is_empty() {
                 continue;
             }
