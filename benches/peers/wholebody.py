@@ -5,12 +5,12 @@
 
 Robots that stand, walk and trot while they are pushed are recorded (benches/peers/wholebody.rs), and the recordings
 are replayed: each tick counts by the least of its replays, so that other work on the machine does not; the p99 of all
-stands beside it. Ours: a whole tick, from state to torques, on cones and on pyramids, each back end in the form that
-it takes by itself, and its assembly (kinematics, rows and condensing) alone. ProxQP, quadprog, DAQP, eiquadprog
-(TSID's) and ours: a solve alone, on pyramids, of the window's consecutive programs, in both forms, warm-started where
-they offer it. All run on one core, for some minutes after the build. With --write the table goes into
-crates/wholebody/README.md. Talos and ANYmal come from example-robot-data. Needs Linux, Rust, Python 3 with venv and a
-C++ compiler; everything else is installed under target/peers.
+stands beside it. Ours: a whole tick, from state to torques, on cones and on pyramids, by each back end, and its
+assembly (kinematics, rows and condensing) alone. ProxQP, quadprog, DAQP, eiquadprog (TSID's) and ours: a solve alone,
+on pyramids, of the window's consecutive programs, in both forms, warm-started where they offer it. All run on one
+core, for some minutes after the build. With --write the table goes into crates/wholebody/README.md. Talos and ANYmal
+come from example-robot-data. Needs Linux, Rust, Python 3 with venv and a C++ compiler; everything else is installed
+under target/peers.
 """
 
 import argparse

@@ -135,7 +135,7 @@ fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
             );
             let solves = (ticks.len() * replays) as f64;
             let what = json!({
-                "backend": name, "part": "tick", "friction": friction_name, "form": "automatic",
+                "backend": name, "part": "tick", "friction": friction_name, "form": "condensed",
                 "iterations": f64::from(iterations) / solves, "unsolved": unsolved / replays,
             });
             print(robot, motion, what, &times);

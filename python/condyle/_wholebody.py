@@ -89,8 +89,8 @@ class Settings(NamedTuple):
     """The damping of the safe command that follows: −D v, D in this part of the greatest effort for 1 rad/s (s/rad)."""
     backend: Literal["interior_point", "clarabel"] = "interior_point"
     """The solver: our own dense interior point method, warm-started from the last tick, or clarabel."""
-    form: Literal["automatic", "condensed", "full"] = "automatic"
-    """The unknowns: what the elimination of base and contacts leaves, all of (q̈, f), or the faster of them."""
+    form: Literal["condensed", "full"] = "condensed"
+    """The unknowns: what the elimination of base and contacts leaves, or, for comparison, all of (q̈, f)."""
     warm_start: bool = True
     """Whether the solver begins at the last tick's solution, if it can."""
     tolerance: float = 1e-9

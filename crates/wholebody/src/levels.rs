@@ -20,10 +20,6 @@ const WIDENED: f64 = 1e-7;
 /// A row whose coefficients all have become smaller than this part of what they were is decided by what is held.
 const DECIDED: f64 = 1e-9;
 
-/// Up to so many limited torques, about as many unknowns as an elimination leaves, a sparse solver takes less time for the
-/// condensed program: ANYmal's 12 took 0.22 ms instead of 0.37 ms, Talos's 32 1.8 ms instead of 1.0 ms.
-const FEW: usize = 20;
-
 /// What the solver of a priority gets.
 enum Given {
     /// A program without equalities.
@@ -52,9 +48,8 @@ impl Levels {
         let given = |(level, &objective): (usize, &usize)| match (form, settings.backend) {
             // What former priorities hold may depend on contacts and base: only an elimination sees that.
             _ if level > 0 => Given::condensed(capacity, objective),
-            (Form::Condensed, _) | (Form::Automatic, Backend::InteriorPoint) => Given::condensed(capacity, objective),
-            (Form::Automatic, Backend::Clarabel) if dense <= FEW => Given::condensed(capacity, objective),
-            (Form::Automatic | Form::Full, Backend::Clarabel) => Given::Lifted(Lifted::new(capacity, dense, objective)),
+            (Form::Condensed, _) => Given::condensed(capacity, objective),
+            (Form::Full, Backend::Clarabel) => Given::Lifted(Lifted::new(capacity, dense, objective)),
             (Form::Full, Backend::InteriorPoint) => Given::Full(ConeProgram::new(capacity)),
         };
         let given: Vec<Given> = rows.iter().enumerate().map(given).collect();

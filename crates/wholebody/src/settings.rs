@@ -31,13 +31,10 @@ pub enum Backend {
 /// In which unknowns the program is solved; the solution is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// What is fastest: condensed for our own solver, whose matrices are dense, and for robots of few joints; in full for
-    /// clarabel, which keeps zeros, on others.
-    Automatic,
     /// The rows of the base and of the contacts are eliminated first.
     Condensed,
-    /// All of (q̈, f), with equalities; for clarabel with more unknowns, for limited torques and for what tasks miss, so that
-    /// its matrices have more zeros. Priorities after the first are condensed all the same.
+    /// All of (q̈, f), with equalities, for comparison: it takes longer. For clarabel there are more unknowns, for limited torques
+    /// and for what tasks miss, so that its matrices have more zeros. Priorities after the first are condensed all the same.
     Full,
 }
 
@@ -130,7 +127,7 @@ impl Default for Settings {
             hold_ticks: 5,
             damping: 0.02,
             backend: Backend::InteriorPoint,
-            form: Form::Automatic,
+            form: Form::Condensed,
             warm_start: true,
             tolerance: 1e-9,
             max_iterations: 50,

@@ -61,10 +61,9 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
             other => return Err(wrong_word("backend", "'interior_point' or 'clarabel'", other)),
         },
         form: match get("form")?.extract::<String>()?.as_str() {
-            "automatic" => Form::Automatic,
             "condensed" => Form::Condensed,
             "full" => Form::Full,
-            other => return Err(wrong_word("form", "'automatic', 'condensed' or 'full'", other)),
+            other => return Err(wrong_word("form", "'condensed' or 'full'", other)),
         },
         warm_start: get("warm_start")?.extract()?,
         tolerance: get("tolerance")?.extract()?,
@@ -104,7 +103,6 @@ pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, Py
         s.damping.give(py, None)?,
         if s.backend == Backend::Clarabel { "clarabel" } else { "interior_point" }.into_pyobject(py)?.into_any(),
         match s.form {
-            Form::Automatic => "automatic",
             Form::Condensed => "condensed",
             Form::Full => "full",
         }

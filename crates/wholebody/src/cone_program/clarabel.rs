@@ -4,16 +4,30 @@
 //! (sizes, and which bounds are finite or equal) a solver is built once and kept, so that contact sets that come back cost an
 //! update of numbers. Its pattern holds all entries that were not zero so far: where one becomes so, as when a robot leaves a
 //! symmetric posture, the solver is built again. Clarabel allocates once in each solve; a new shape or pattern allocates more.
+//!
+//! Most limits of a robot are far away in most ticks. A row of G is left out until a solution came close to it; one that
+//! violates it is solved for again, with it. So the solution is that of all rows.
 
 use super::{ConeProgram, Multipliers, Outcome, Settings, Size, Solver, Start, Status};
 use ::clarabel::algebra::CscMatrix;
 use ::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+use condyle_linalg::dot;
+use std::time::Instant;
 
 /// What is added to diagonals before a factor is refined: clarabel's own 1e-8 asks for a refinement of each solve.
 const REGULARISATION: f64 = 1e-11;
 
 /// Shapes that are kept; the one not used for the longest time makes room.
 const KEPT: usize = 16;
+
+/// A row is close where the rest to a bound is less than this part of the width between its bounds (or of the one bound).
+const CLOSE: f64 = 0.1;
+
+/// So many solutions in a row must be away from a row of G for it to be left out again: its return builds a solver.
+const PATIENCE: u32 = 1000;
+
+/// So many solves have all rows after one without some of them failed.
+const RETRIES: u32 = 10;
 
 /// A row of clarabel's A x + s = b.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +63,14 @@ impl Row {
         }
     }
 
+    /// Whether solutions were close to it of late, or it is no limit that they could be away from.
+    fn matters(self, away: &[u32]) -> bool {
+        match self {
+            Row::Lower(i) | Row::Upper(i) => away[i] < PATIENCE,
+            Row::Equality(_) | Row::Fixed(_) | Row::Cone(_) => true,
+        }
+    }
+
     /// How many of its coefficients are not zero.
     fn count(self, program: &ConeProgram) -> usize {
         let (matrix, i) = match self {
@@ -65,13 +87,12 @@ fn nonzeros(x: &[f64]) -> usize {
 }
 
 /// Writes clarabel's rows of a program: those of the zero cone, of the orthant, of the second-order cones.
-fn list_rows(program: &ConeProgram, rows: &mut Vec<Row>) -> [usize; 2] {
+fn list_rows(program: &ConeProgram, rows: &mut Vec<Row>) {
     let Size { equalities, rows: m, cone_rows, .. } = program.size;
     let (lower, upper) = (&program.lower[..m], &program.upper[..m]);
     rows.clear();
     rows.extend((0..equalities).map(Row::Equality));
     rows.extend((0..m).filter(|&i| lower[i] == upper[i]).map(Row::Fixed));
-    let zeros = rows.len();
     for i in (0..m).filter(|&i| lower[i] != upper[i]) {
         if lower[i] > f64::NEG_INFINITY {
             rows.push(Row::Lower(i));
@@ -80,15 +101,18 @@ fn list_rows(program: &ConeProgram, rows: &mut Vec<Row>) -> [usize; 2] {
             rows.push(Row::Upper(i));
         }
     }
-    let orthant = rows.len() - zeros;
     rows.extend((0..cone_rows).map(Row::Cone));
-    [zeros, orthant]
 }
 
 /// A solver for one shape.
 struct Shape {
     size: Size,
     cones: Vec<usize>,
+    /// All rows.
+    all: Vec<Row>,
+    /// How many solutions in a row were away from each row of G.
+    away: Vec<u32>,
+    /// The rows that the solver has.
     rows: Vec<Row>,
     /// Entries of P's upper triangle and of A, column by column.
     entries: [Vec<(usize, usize)>; 2],
@@ -99,15 +123,16 @@ struct Shape {
 }
 
 impl Shape {
-    /// For the entries of a program that are not zero, and some more.
+    /// For the rows that matter, with the entries of a program that are not zero, and some more.
     fn new(
         program: &ConeProgram,
-        rows: Vec<Row>,
-        counts: [usize; 2],
+        all: Vec<Row>,
+        away: Vec<u32>,
         more: [Vec<(usize, usize)>; 2],
         settings: &Settings,
     ) -> Self {
         let n = program.size.unknowns;
+        let rows: Vec<Row> = all.iter().copied().filter(|row| row.matters(&away)).collect();
         let kept = |k: usize, (i, j)| more[k].binary_search_by_key(&(j, i), |&(i, j)| (j, i)).is_ok();
         let in_P = (0..n).flat_map(|j| (0..=j).map(move |i| (i, j)));
         let in_A = (0..n).flat_map(|j| (0..rows.len()).map(move |i| (i, j)));
@@ -121,19 +146,19 @@ impl Shape {
             let starts = (0..=n).map(|j| entries[k].partition_point(|e| e.1 < j)).collect();
             CscMatrix::new(m, n, starts, entries[k].iter().map(|e| e.0).collect(), values[k].clone())
         };
-        let mut cones = vec![SupportedConeT::ZeroConeT(counts[0]), SupportedConeT::NonnegativeConeT(counts[1])];
+        let zeros = rows.iter().filter(|row| matches!(row, Row::Equality(_) | Row::Fixed(_))).count();
+        let orthant = rows.len() - zeros - program.size.cone_rows;
+        let mut cones = vec![SupportedConeT::ZeroConeT(zeros), SupportedConeT::NonnegativeConeT(orthant)];
         cones.extend(program.cones.iter().map(|&dim| match dim {
             1 => SupportedConeT::NonnegativeConeT(1),
             _ => SupportedConeT::SecondOrderConeT(dim),
         }));
-        let Settings { tolerance, max_iterations, time_limit } = *settings;
+        let Settings { tolerance, .. } = *settings;
         let settings = DefaultSettings {
             verbose: false,
             tol_feas: tolerance,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
-            max_iter: max_iterations,
-            time_limit,
             // Refined as far as asked for: clarabel's own 1e-13 costs a sixth of the time.
             iterative_refinement_reltol: tolerance,
             iterative_refinement_abstol: tolerance,
@@ -148,7 +173,25 @@ impl Shape {
             DefaultSolver::new(&csc(n, 0), &program.c[..n], &csc(rows.len(), 1), &right_side, &cones, settings)
                 .expect("shapes and cones agree by construction");
         let (size, cones, linear) = (program.size, program.cones.clone(), program.c[..n].to_vec());
-        Self { size, cones, rows, entries, values, linear, right_side, solver }
+        Self { size, cones, all, away, rows, entries, values, linear, right_side, solver }
+    }
+
+    /// Notes which rows of G a solution is close to; whether it violates one that the solver has not.
+    fn compare(&mut self, program: &ConeProgram, x: &[f64]) -> bool {
+        let mut violated = false;
+        for (i, away) in self.away.iter_mut().enumerate() {
+            let (lower, upper, y) = (program.lower[i], program.upper[i], dot(&program.row(i)[..x.len()], x));
+            let width = if (upper - lower).is_finite() { upper - lower } else { lower.abs().min(upper.abs()) };
+            violated |= *away >= PATIENCE && (y < lower || y > upper);
+            let close = y < lower + CLOSE * width || y > upper - CLOSE * width;
+            *away = if close { 0 } else { away.saturating_add(1) };
+        }
+        violated
+    }
+
+    /// Whether the solver has the rows that matter.
+    fn is_complete(&self) -> bool {
+        self.all.iter().filter(|row| row.matters(&self.away)).eq(&self.rows)
     }
 
     /// Whether all entries of a program that are not zero are in the pattern, whose numbers are taken then.
@@ -187,6 +230,15 @@ fn gather(program: &ConeProgram, rows: &[Row], entries: &[Vec<(usize, usize)>; 2
     ]
 }
 
+/// Sets the limits of a solver, which allocates where they are others.
+fn limit(solver: &mut DefaultSolver<f64>, max_iter: u32, time_limit: f64) {
+    let given = solver.settings();
+    if (given.max_iter, given.time_limit) != (max_iter, time_limit) {
+        let settings = DefaultSettings { max_iter, time_limit, ..given.clone() };
+        solver.update_settings(settings).expect("both may change");
+    }
+}
+
 /// The interior point method of clarabel.
 pub(crate) struct Clarabel {
     settings: Settings,
@@ -220,37 +272,41 @@ impl Clarabel {
 
     /// Makes the solver of the program's shape the last of the list, with the program's numbers.
     fn prepare(&mut self, program: &ConeProgram) {
-        let counts = list_rows(program, &mut self.rows);
+        list_rows(program, &mut self.rows);
         let found = self
             .shapes
             .iter()
-            .position(|shape| shape.size == program.size && shape.cones == program.cones && shape.rows == self.rows);
-        let mut more = [Vec::new(), Vec::new()];
+            .position(|shape| shape.size == program.size && shape.cones == program.cones && shape.all == self.rows);
+        let (mut away, mut more) = (Vec::new(), [Vec::new(), Vec::new()]);
         if let Some(k) = found {
             self.shapes[k..].rotate_left(1);
-            if self.shapes.last_mut().expect("just found").update(program) {
+            let shape = self.shapes.last_mut().expect("just found");
+            let complete = shape.is_complete();
+            if complete && shape.update(program) {
                 return;
             }
-            more = self.shapes.pop().expect("just found").entries;
+            let Shape { away: before, entries: [in_P, in_A], .. } = self.shapes.pop().expect("just found");
+            (away, more) = (before, [in_P, if complete { in_A } else { Vec::new() }]);
         }
         if self.shapes.len() == KEPT {
             self.shapes.remove(0);
         }
-        self.shapes.push(Shape::new(program, self.rows.clone(), counts, more, &self.settings));
+        away.resize(program.size.rows, PATIENCE);
+        self.shapes.push(Shape::new(program, self.rows.clone(), away, more, &self.settings));
     }
-}
 
-impl Solver for Clarabel {
-    fn solve(&mut self, program: &ConeProgram, _start: Start) -> Outcome {
-        assert_eq!(program.capacity(), self.capacity, "the program's capacity");
-        self.size = program.size;
-        if let Err(status) = program.check() {
-            return Outcome { iterations: 0, warm: false, reduced: false, stopped: Some(status) };
-        }
+    /// Solves with the rows that solutions were not away from, in what former rounds left of iterations and time.
+    fn solve_with_rows(&mut self, program: &ConeProgram, iterations: u32, started: Instant) -> Outcome {
         self.prepare(program);
+        let Settings { max_iterations, time_limit, .. } = self.settings;
         let Self { shapes, x, y, z, w, .. } = self;
-        let Shape { solver, rows, .. } = shapes.last_mut().expect("just prepared");
+        let Shape { solver, rows, all, .. } = shapes.last_mut().expect("just prepared");
+        // Where rows are left out, half of the iterations are kept for the case that this was wrong.
+        let share = |most: u32| if rows.len() < all.len() { most.div_ceil(2) } else { most };
+        let elapsed = if iterations == 0 { 0.0 } else { started.elapsed().as_secs_f64() };
+        limit(solver, share(max_iterations - iterations), time_limit - elapsed);
         solver.solve();
+        limit(solver, share(max_iterations), time_limit);
         let solution = &solver.solution;
         let stopped = match solution.status {
             SolverStatus::Solved | SolverStatus::AlmostSolved => None,
@@ -274,6 +330,38 @@ impl Solver for Clarabel {
         }
         let reduced = solution.status == SolverStatus::AlmostSolved;
         Outcome { iterations: solution.iterations, warm: false, reduced, stopped }
+    }
+}
+
+impl Solver for Clarabel {
+    fn solve(&mut self, program: &ConeProgram, _start: Start) -> Outcome {
+        assert_eq!(program.capacity(), self.capacity, "the program's capacity");
+        self.size = program.size;
+        if let Err(status) = program.check() {
+            return Outcome { iterations: 0, warm: false, reduced: false, stopped: Some(status) };
+        }
+        let (started, mut iterations) = (Instant::now(), 0);
+        for round in 0.. {
+            let outcome = self.solve_with_rows(program, iterations, started);
+            iterations += outcome.iterations;
+            let outcome = Outcome { iterations, ..outcome };
+            let shape = self.shapes.last_mut().expect("just solved");
+            let complete = shape.rows.len() == shape.all.len();
+            let failed = outcome.stopped.is_some() || outcome.reduced;
+            let done = match outcome.stopped {
+                Some(Status::Infeasible | Status::TimeLimit) => true, // so it would be with all rows
+                _ if failed => complete,
+                _ => !shape.compare(program, &self.x[..program.size.unknowns]),
+            };
+            if done {
+                return outcome;
+            }
+            if failed || round > 0 {
+                let soon = PATIENCE - if failed { RETRIES } else { 1 };
+                shape.away.iter_mut().for_each(|away| *away = (*away).min(soon)); // so all rows matter now
+            }
+        }
+        unreachable!("in the third round no row is left out")
     }
 
     fn x(&self) -> &[f64] {

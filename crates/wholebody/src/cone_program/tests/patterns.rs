@@ -1,7 +1,7 @@
-//! clarabel's patterns grow with the numbers.
+//! clarabel's patterns grow with the numbers, and its rows with the solutions that they bind.
 
 use super::random::{Draw, Kind};
-use crate::cone_program::{Clarabel, ConeProgram, Settings, Solver, Start};
+use crate::cone_program::{Clarabel, ConeProgram, Settings, Size, Solver, Start, Status};
 
 /// Of x, of size one; both solves have the tolerance 1e-9.
 const AGREEMENT: f64 = 1e-6;
@@ -33,5 +33,71 @@ fn numbers_come_where_there_were_zeros() {
         assert_eq!(kept.solve(&sparse, Start::Cold).stopped, {
             Clarabel::new(full.capacity(), Settings::default()).solve(&sparse, Start::Cold).stopped
         });
+    }
+}
+
+/// ½ ‖x − a‖² within −1 ≤ x ≤ 1, whose solution is a cut off.
+fn within_a_box(a: [f64; 3]) -> ConeProgram {
+    let mut program = ConeProgram::new(Size { unknowns: 3, equalities: 0, rows: 3, cone_rows: 0 });
+    for i in 0..3 {
+        program.P[(i, i)] = 1.0;
+        program.Gt[(i, i)] = 1.0;
+        program.c[i] = -a[i];
+    }
+    program.lower.fill(-1.0);
+    program.upper.fill(1.0);
+    program
+}
+
+/// The limits that a solution violates are found in the same solve, with their multipliers, whatever came before.
+#[test]
+fn limits_that_were_far_away_bind() {
+    let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());
+    for a in
+        [[0.1, 0.2, -0.3], [0.5, 7.0, 0.0], [-2.0, 0.95, 3.0], [0.0, 0.0, 0.0], [9.0, -9.0, 9.0], [0.3, -0.99, 20.0]]
+    {
+        for _ in 0..2 {
+            assert_eq!(kept.solve(&within_a_box(a), Start::Cold).stopped, None);
+            for i in 0..3 {
+                let x = a[i].clamp(-1.0, 1.0);
+                assert!((kept.x()[i] - x).abs() < AGREEMENT, "{a:?}: {:?}", kept.x());
+                // x − a = z
+                assert!((kept.multipliers().rows[i] - (x - a[i])).abs() < AGREEMENT * (1.0 + a[i].abs()), "{a:?}");
+            }
+        }
+    }
+}
+
+/// Rows that are left out do not make a program unbounded, and their solve counts towards the limits.
+#[test]
+fn rows_left_out_change_no_status() {
+    let mut program = within_a_box([0.5, 0.5, 4.0]);
+    program.P[(2, 2)] = 0.0;
+    let solve = |settings| {
+        let mut solver = Clarabel::new(program.capacity(), settings);
+        (solver.solve(&program, Start::Cold), solver.x()[2])
+    };
+    let (outcome, x) = solve(Settings::default());
+    assert_eq!(outcome.stopped, None);
+    assert!((x - 1.0).abs() < AGREEMENT, "{x}");
+    for max_iterations in 1..outcome.iterations {
+        let (outcome, _) = solve(Settings { max_iterations, ..Settings::default() });
+        assert_eq!(outcome.iterations, max_iterations);
+        assert!(outcome.reduced || outcome.stopped == Some(Status::IterationLimit), "{outcome:?}");
+    }
+}
+
+/// A row that was away for long is left out again, and comes back.
+#[test]
+fn limits_come_and_go() {
+    let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());
+    for _ in 0..2 {
+        for (a, times) in [([2.0; 3], 3), ([0.0; 3], 1100)] {
+            for _ in 0..times {
+                assert_eq!(kept.solve(&within_a_box(a), Start::Cold).stopped, None);
+                assert!((kept.x()[1] - a[1].clamp(-1.0, 1.0)).abs() < AGREEMENT);
+            }
+        }
+        assert!(kept.multipliers().rows.iter().all(|&z| z == 0.0), "left out, so exactly zero");
     }
 }
