@@ -2,6 +2,8 @@
 #![allow(non_snake_case)]
 
 mod common;
+#[path = "../../dynamics/tests/common/mod.rs"]
+mod trees;
 
 use common::{Program, assert_equal, folder, is_there};
 use condyle_codegen::{FUNCTIONS, Function, Language, Settings, functions, record};
@@ -16,12 +18,18 @@ use nalgebra::DMatrix;
 use num_dual::Dual64;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use trees::Tree;
 
 /// Sums in another order: what is recorded is not what lanes compute.
 const ROUNDING: f64 = 1e-12;
 
 /// As above, where M⁻¹ or Λ stands in between: it amplifies roundings by its condition.
 const THROUGH_INVERSE: f64 = 1e-11;
+
+/// The same times the condition of M of trees whose bodies are as they come.
+fn bound_of_trees(name: &str) -> f64 {
+    if bound(name) == ROUNDING { ROUNDING } else { 1e-9 }
+}
 
 fn all_robots() -> [(&'static str, Model, Settings); 3] {
     let with = |model: &Model, names: &[&str]| Settings {
@@ -172,6 +180,49 @@ fn what_is_recorded_is_what_the_library_computes() {
             all.iter().zip(inputs).map(|(f, x)| f.evaluate(&x.iter().map(|x| &x[..]).collect::<Vec<_>>())).collect()
         },
     );
+}
+
+/// Trees with every kind of joint, and joints that follow others.
+#[test]
+fn random_robots() {
+    for seed in 0..4 {
+        let mut rng = StdRng::seed_from_u64(seed);
+        let tree = if seed % 2 == 0 { Tree::random(&mut rng) } else { Tree::random_with_mimics(&mut rng) };
+        let model = tree.build();
+        let last = format!("f{}", tree.parts.len());
+        let settings = Settings {
+            constraints: vec![ContactConstraint::point(model.frame(&last).unwrap())],
+            frames: vec!["f1".to_owned(), last],
+            ..Settings::default()
+        };
+        let names: Vec<_> = FUNCTIONS.into_iter().filter(|&name| name != "aba_hessian" || seed == 0).collect();
+        let all = functions(&model, &names, &settings).unwrap();
+        let state = state(&model, &mut rng);
+        let inputs: Vec<_> = all.iter().map(|f| arguments(f, &state)).collect();
+        let recorded = all.iter().zip(&inputs).map(|(f, x)| f.evaluate(&x.iter().map(|x| &x[..]).collect::<Vec<_>>()));
+        for (function, found) in all.iter().zip(recorded) {
+            let expected = expected(&model, &settings, &function.name, &state, &[]);
+            assert_equal(
+                &format!("recorded, tree {seed}"),
+                function,
+                &found,
+                &expected,
+                bound_of_trees(&function.name),
+            );
+        }
+        if seed > 1 || !is_there("cc") {
+            continue;
+        }
+        let short = |f: &&Function| ["rnea", "aba", "crba", "frames", "centroidal"].contains(&&*f.name);
+        let some: Vec<_> = all.iter().filter(short).cloned().collect();
+        let inputs: Vec<_> = some.iter().map(|f| arguments(f, &state)).collect();
+        let flags = ["-O0", "-fsanitize=undefined", "-fno-sanitize-recover"];
+        let found = Program::c(&folder(&format!("c_tree_{seed}")), &some, Language::C, &flags).run(&inputs);
+        for (function, found) in some.iter().zip(found) {
+            let expected = expected(&model, &settings, &function.name, &state, &[]);
+            assert_equal(&format!("C, tree {seed}"), function, &found, &expected, bound_of_trees(&function.name));
+        }
+    }
 }
 
 #[test]

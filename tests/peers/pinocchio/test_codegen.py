@@ -91,16 +91,21 @@ def test_beside_the_library(name: str, tmp_path: Path) -> None:
             assert np.abs(a - b).max() <= bound * (1.0 + np.abs(b).max()), (name, function)
 
 
+def library(folder: Path) -> str:
+    """Compiles all C of a folder to robot.so; the name of the robot in it."""
+    sources = sorted(path.name for path in folder.glob("*.c"))
+    flags = ["-O1", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
+    subprocess.run([compiler, *flags, *sources, "-o", "robot.so", "-lm"], cwd=folder, check=True)
+    return next(file for file in sources if not file.endswith("_casadi.c")).removesuffix(".c")
+
+
 def test_external(tmp_path: Path) -> None:
     """CasADi finds each function, its arrays by name and shape, and takes what it leaves out for zeros."""
     pair = load("panda")
     model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
     for file, text in condyle.codegen.source(model, ["rnea", "crba"], "c-casadi").items():
         (tmp_path / file).write_text(text, encoding="utf-8")
-    sources = sorted(path.name for path in tmp_path.glob("*.c"))
-    flags = ["-O1", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
-    subprocess.run([compiler, *flags, *sources, "-o", "robot.so", "-lm"], cwd=tmp_path, check=True)
-    stem = next(file for file in sources if not file.endswith("_casadi.c")).removesuffix(".c")
+    stem = library(tmp_path)
     rnea = casadi.external(f"{stem}_rnea_casadi", str(tmp_path / "robot.so"))
     assert rnea.name_in() == ["q", "v", "a"]
     assert rnea.name_out() == ["tau"]
@@ -118,3 +123,35 @@ def test_external(tmp_path: Path) -> None:
     q = casadi.MX.sym("q", model.nq)
     trace = casadi.Function("trace", [q], [casadi.trace(crba(q))])
     assert abs(float(trace(state.q)) - np.trace(M)) <= BOUND * (1.0 + np.trace(M))
+
+
+def test_jacobians_of_externals(tmp_path: Path) -> None:
+    """CasADi differentiates a function by the derivatives that stand beside it, also inside of an expression."""
+    pair = load("panda")
+    model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
+    names = ["rnea", "aba", "rnea_derivatives", "aba_derivatives"]
+    for file, text in condyle.codegen.source(model, names, "c-casadi").items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    stem = library(tmp_path)
+    rnea, aba = (casadi.external(f"{stem}_{name}_casadi", str(tmp_path / "robot.so")) for name in ("rnea", "aba"))
+    assert rnea.jacobian().name_out() == ["jac_tau_q", "jac_tau_v", "jac_tau_a"]
+    q, v, x = (casadi.MX.sym(name, model.nv) for name in "qvx")
+    state = [np.asarray(x, float) for x in (state.q, state.v, state.a)]
+    for f, derivatives in [(rnea, pinocchio.computeRNEADerivatives), (aba, pinocchio.computeABADerivatives)]:
+        data = theirs.createData()
+        by_q, by_v, M = derivatives(theirs, data, *state)
+        expected = [by_q, by_v, np.triu(M) + np.triu(M, 1).T]
+        twice = casadi.sin(2.0 * f(q, v, x))
+        jacobian = casadi.Function("jacobian", [q, v, x], [casadi.jacobian(twice, casadi.vertcat(q, v, x))])
+        value = np.array(f(*state)).ravel()
+        chained = 2.0 * np.cos(2.0 * value)[:, None] * np.hstack(expected)
+        assert np.abs(np.array(jacobian(*state)) - chained).max() <= BOUND * (1.0 + np.abs(chained).max())
+
+
+def test_positions_with_quaternions_have_no_jacobian() -> None:
+    """Derivatives along the tangent are none by the numbers of q."""
+    for robot, expected in [("panda", True), ("anymal", False)]:
+        text = "".join(condyle.codegen.source(load(robot).ours, ["rnea", "rnea_derivatives"], "c-casadi").values())
+        assert ("jac_" in text) == expected, robot
+    text = "".join(condyle.codegen.source(load("panda").ours, ["rnea"], "c-casadi").values())
+    assert "jac_" not in text

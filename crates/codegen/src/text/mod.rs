@@ -38,7 +38,8 @@ pub enum Language {
     /// The same with eight states, on numbers of type `float`.
     CFloatEight,
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
-    /// `robot_aba_casadi` for `robot_aba`.
+    /// `robot_aba_casadi` for `robot_aba`, with its Jacobian where `robot_aba_derivatives` is there too and the robot has no
+    /// quaternions and points on circles.
     CCasadi,
     /// A module of Rust on `f64` that needs no `std`.
     Rust,
