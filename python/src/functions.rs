@@ -34,6 +34,7 @@ use numpy::{Ix1, Ix2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyInt, PyString};
+use std::ops::Range;
 
 /// A kind of argument.
 pub(crate) trait Argument<'a, 'py> {
@@ -63,8 +64,14 @@ pub(crate) trait Argument<'a, 'py> {
     fn look(_name: &str, _given: &Self::Given, _model: &Model) -> PyResult<Look> {
         Ok(Look::default())
     }
-    /// Reads the argument for so many states; as a copy, if the array may change before all are computed.
-    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize, copy: bool) -> PyResult<Self::All>;
+    /// Reads the argument for so many states; as a copy, if results are written where it lies before all are computed.
+    fn read_all(
+        name: &str,
+        given: &Self::Given,
+        model: &Model,
+        states: usize,
+        written: &[Range<usize>],
+    ) -> PyResult<Self::All>;
 }
 
 /// An argument of a call, and its numbers if it could be read at once.
@@ -147,9 +154,12 @@ macro_rules! vectors {
                 given: &Self::Given,
                 model: &Model,
                 states: usize,
-                copy: bool,
+                written: &[Range<usize>],
             ) -> PyResult<Self::All> {
                 let rows = batch::all(name, given, 1, states, model.$length())?;
+                let addresses = rows.as_ptr_range();
+                let [start, end] = [addresses.start, addresses.end].map(<*const f64>::addr);
+                let copy = written.iter().any(|place| place.start < end && start < place.end);
                 Ok(if copy { batch::Rows::Copy(rows.to_vec()) } else { batch::Rows::Array(rows) })
             }
         }
@@ -187,7 +197,13 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     fn look(name: &str, given: &Self::Given, model: &Model) -> PyResult<Look> {
         given.map_or(Ok(Look::default()), |given| batch::look(name, given, &[model.bodies().len(), 6]))
     }
-    fn read_all(name: &str, given: &Self::Given, model: &Model, states: usize, _: bool) -> PyResult<Self::All> {
+    fn read_all(
+        name: &str,
+        given: &Self::Given,
+        model: &Model,
+        states: usize,
+        _: &[Range<usize>],
+    ) -> PyResult<Self::All> {
         let Some(given) = given else { return Ok(Vec::new()) };
         Ok(batch::forces(&batch::all(name, given, 2, states, 6 * model.bodies().len())?))
     }
@@ -226,7 +242,7 @@ macro_rules! shared {
             $(fn look(_: &str, given: &Self::Given, _: &Model) -> PyResult<Look> {
                 Ok(Look { dual: $is_dual(given), states: None })
             })?
-            fn read_all(_: &str, _: &Self::Given, _: &Model, _: usize, _: bool) -> PyResult<Self::All> {
+            fn read_all(_: &str, _: &Self::Given, _: &Model, _: usize, _: &[Range<usize>]) -> PyResult<Self::All> {
                 unreachable!("{}: all states share it", stringify!($kind))
             }
         }
@@ -375,8 +391,8 @@ macro_rules! functions {
             };
             $(if let (Some(states), false) = (states, dual) {
                 $check($model)?;
-                let copy = out.is_some();
-                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all.given, $model, states, copy)?;)*
+                let written = &$crate::arrays::destinations(out);
+                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all.given, $model, states, written)?;)*
                 $(let $all = &$all[..];)*
                 $($(let $shared = <kinds::$shared_kind as Argument>::read(stringify!($shared), $shared.given, $model)?;)*)?
                 let lanes = data.batch($model, states);
@@ -387,8 +403,8 @@ macro_rules! functions {
                 });
             })?
             $(if let (Some(states), false) = (states, dual) {
-                let copy = out.is_some();
-                $(let $of = <kinds::$of_kind as Argument>::read_all(stringify!($of), &$of.given, $model, states, copy)?;)*
+                let written = &$crate::arrays::destinations(out);
+                $(let $of = <kinds::$of_kind as Argument>::read_all(stringify!($of), &$of.given, $model, states, written)?;)*
                 $(let $of = &$of[..];)*
                 $($(let $same = <kinds::$same_kind as Argument>::read(stringify!($same), $same.given, $model)?;)*)?
                 return batch::each(py, states, &[$($model.$size()),*], out, |k, $place| {

@@ -14,7 +14,8 @@ pub(crate) use input::{
     vector,
 };
 pub(crate) use output::{
-    Array, Computed, Give, Symmetric, class, give_named, members, named, named_tuples, output, place, writable,
+    Array, Computed, Give, Symmetric, class, destinations, give_named, members, named, named_tuples, output, place,
+    writable,
 };
 pub(crate) use read_only::read_only;
 

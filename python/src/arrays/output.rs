@@ -388,6 +388,15 @@ pub(crate) fn members<'py>(
     Ok(members.into_iter().map(Some).collect())
 }
 
+/// The addresses that the results of a batch are written to.
+pub(crate) fn destinations(out: Option<&Bound<'_, PyAny>>) -> Vec<Range<usize>> {
+    let Some(out) = out else { return Vec::new() };
+    match out.try_iter() {
+        Ok(members) if !out.is_instance_of::<PyUntypedArray>() => members.flatten().map(|one| memory(&one)).collect(),
+        _ => vec![memory(out)],
+    }
+}
+
 /// The addresses of the numbers of a C-contiguous array of doubles; none of anything else, which is refused later.
 fn memory(array: &Bound<'_, PyAny>) -> Range<usize> {
     let Ok(array) = array.cast::<PyArrayDyn<f64>>() else { return 0..0 };

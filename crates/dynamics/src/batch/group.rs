@@ -179,28 +179,28 @@ fn one_by_one<T: Real, S: Block<Number = T>>(
     work: &Work<'_, T, S>,
     model: &Model,
     Team { workers, sets }: Team<'_, S>,
-    mut states: usize,
-    mut from: Arguments<'_, T>,
-    mut to: Results<'_, S>,
+    states: usize,
+    from: Arguments<'_, T>,
+    to: Results<'_, S>,
 ) {
     let Worker { data, numbers, f_ext, six, wide } = &mut workers[0];
-    let mut constraints = sets.first_mut();
-    while states > 0 {
-        let n = states.min(S::LANES);
-        let (here, others) = from.split(n, states);
-        let (mut place, places) = to.split(n, states);
-        for (given, to) in here.0.iter().zip(&mut *numbers) {
-            if !given.is_empty() {
-                gather(given, n, to);
-            }
+    let Results { numbers: mut places, matrices } = to;
+    let (mut constraints, mut matrices) = (sets.first_mut(), matrices.iter_mut());
+    let sizes = from.0.map(|of| of.len() / states.max(1));
+    f_ext.resize(sizes[FORCES] / 6, Force::zero());
+    for first in (0..states).step_by(S::LANES) {
+        let n = (states - first).min(S::LANES);
+        let of = |k: usize| &from.0[k][first * sizes[k]..][..n * sizes[k]];
+        for (k, to) in numbers.iter_mut().enumerate().filter(|&(k, _)| sizes[k] > 0) {
+            gather(of(k), n, to);
         }
-        f_ext.resize(here.0[FORCES].len() / (6 * n), Force::zero());
-        gather(here.0[FORCES], n, flat_mut(f_ext));
+        if !f_ext.is_empty() {
+            gather(of(FORCES), n, flat_mut(f_ext));
+        }
+        places.go_to(first, n);
         let [q, v, x, lambda] = &*numbers;
-        let (kept, constraints) = (place.matrices.first_mut(), constraints.as_deref_mut());
-        let group = States { model, data, q, v, x, lambda, f_ext, constraints, six, wide, kept };
-        work(group, &mut place.numbers);
-        (states, from, to) = (states - n, others, places);
+        let (kept, constraints) = (matrices.next(), constraints.as_deref_mut());
+        work(States { model, data, q, v, x, lambda, f_ext, constraints, six, wide, kept }, &mut places);
     }
 }
 

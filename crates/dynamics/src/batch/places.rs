@@ -8,12 +8,15 @@ use nalgebra::DMatrix;
 /// The most results of a function.
 pub(super) const MOST_RESULTS: usize = 12;
 
-/// The places for the results of some states, of which passes fill one after the other.
+/// The places for the results of states, of which passes fill one after the other for some states at a time.
 pub(super) struct Places<'a, T> {
-    /// The numbers of all these states; of those results that a function does not have, none.
+    /// The numbers of all states; of those results that a function does not have, none.
     to: [&'a mut [T]; MOST_RESULTS],
     /// The number of those that it has.
     results: usize,
+    /// The first of the states that are written now.
+    first: usize,
+    /// How many they are.
     states: usize,
     /// The result that is written next.
     next: usize,
@@ -22,7 +25,12 @@ pub(super) struct Places<'a, T> {
 impl<'a, T> Places<'a, T> {
     /// The places for so many results.
     pub(super) fn new(to: [&'a mut [T]; MOST_RESULTS], results: usize, states: usize) -> Self {
-        Self { to, results, states, next: 0 }
+        Self { to, results, first: 0, states, next: 0 }
+    }
+
+    /// Goes to so many states from this one on.
+    pub(super) fn go_to(&mut self, first: usize, states: usize) {
+        (self.first, self.states, self.next) = (first, states, 0);
     }
 
     /// The places of the first `n` of `states` states, and of the others.
@@ -41,7 +49,7 @@ impl<T: Real> Places<'_, T> {
     /// Writes some numbers of each state.
     #[inline(never)]
     pub(super) fn numbers<S: Block<Number = T>>(&mut self, x: &[S]) {
-        scatter(x, self.states, self.to[self.next]);
+        scatter(x, self.states, &mut self.to[self.next][self.first * x.len()..][..self.states * x.len()]);
         self.next += 1;
     }
 
@@ -64,7 +72,8 @@ impl<T: Real> Places<'_, T> {
         }
         let (size, rows) = (x.len(), x.len() / columns);
         let mut each: [&mut [T]; MOST] = Default::default();
-        for (place, to) in each.iter_mut().zip(self.to[result].chunks_exact_mut(n * size)) {
+        let all = &mut self.to[result][self.first * n * size..];
+        for (place, to) in each.iter_mut().zip(all.chunks_exact_mut(n * size)).take(self.states) {
             *place = &mut to[k * size..(k + 1) * size];
         }
         let matrix = Strided { vectors: x, strides: [1, rows], shape: [rows, columns], negative: false };

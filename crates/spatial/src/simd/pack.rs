@@ -26,8 +26,11 @@ pub trait Block: Scalar {
 /// after the other in `from`. If there are fewer rows than lanes, the last one fills up.
 #[inline]
 pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
-    let n = to.len();
-    gather_rows(&core::array::from_fn::<_, MOST, _>(|k| &from[k.min(rows - 1) * n..][..n])[..rows], to);
+    let (n, mut each) = (to.len(), [&from[..0]; MOST]);
+    for (k, row) in each[..rows].iter_mut().enumerate() {
+        *row = &from[k * n..][..n];
+    }
+    gather_rows(&each[..rows], to);
 }
 
 /// Rows of numbers become vectors, as in [`gather`], for rows that stand anywhere.
