@@ -266,7 +266,7 @@ function makePlayer(times, show) {
   const start = times[0], end = times.at(-1), scrub = $("scrub"), play = $("play");
   const seconds = element("b"), knot = element("span");
   $("clock").replaceChildren(seconds, ` / ${end.toFixed(2)} s`, knot);
-  let t = start, playing = false, held = false, before = null;
+  let t = start, playing = false, held = false, before = null, next = null;
   Object.assign(scrub, { min: start, max: end, step: times.length > 1 ? (end - start) / (times.length - 1) : 1 });
 
   function seek(to) {
@@ -291,7 +291,8 @@ function makePlayer(times, show) {
   function frame(stamp) {
     if (!playing) return;
     if (before != null && !held) {
-      let to = t + ((stamp - before) / 1000) * Number($("speed").value);
+      // a page that was hidden, or a slow frame, goes on where it was
+      let to = t + (Math.min(stamp - before, 250) / 1000) * Number($("speed").value);
       if (to >= end) {
         if ($("loop").getAttribute("aria-pressed") === "true") to = start + ((to - end) % (end - start || 1));
         else run(false);
@@ -299,13 +300,14 @@ function makePlayer(times, show) {
       seek(to);
     }
     before = stamp;
-    requestAnimationFrame(frame);
+    next = requestAnimationFrame(frame);
   }
   function run(yes) {
     if (yes && !playing) {
       if (t >= end - 1e-9) seek(start);
       before = null;
-      requestAnimationFrame(frame);
+      cancelAnimationFrame(next);
+      next = requestAnimationFrame(frame);
     }
     playing = yes;
     if (!yes) remember();
