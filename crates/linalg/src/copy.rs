@@ -9,10 +9,7 @@ use crate::vectors::copy;
 compiled! {
     /// OUT = A, on `rows` rows and `columns` columns.
     pub fn copy_matrix<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
-        let [rows, columns] = shape;
-        for j in 0..columns {
-            copy::<V>(&mut out[j * ldo..], &a.data[j * a.stride..][..rows]);
-        }
+        copy_block::<V>(out, ldo, a, shape);
     }
 
     /// The lower triangle of OUT = that of A, both square of `size` rows.
@@ -44,10 +41,34 @@ compiled! {
     }
 }
 
+/// OUT = A, on `rows` rows and `columns` columns, without a function call.
+#[inline(always)]
+pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
+    let [rows, columns] = shape;
+    if columns == 0 {
+        return;
+    }
+    assert!(holds(a.data, a.stride, shape) && holds(out, ldo, shape), "a matrix ends before the last of its entries");
+    for j in 0..columns {
+        let (at, from) = (j * ldo, j * a.stride);
+        // SAFETY: column j of those that were found to be inside.
+        let (to, x) = unsafe { (out.get_unchecked_mut(at..at + rows), a.data.get_unchecked(from..from + rows)) };
+        copy::<V>(to, x);
+    }
+}
+
 #[inline(always)]
 fn lower<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
+    if size == 0 {
+        return;
+    }
+    let inside = holds(a.data, a.stride, [size; 2]) && holds(out, ldo, [size; 2]);
+    assert!(inside, "a matrix ends before the last of its entries");
     for j in 0..size {
-        copy::<V>(&mut out[j * ldo + j..], &a.data[j * a.stride + j..][..size - j]);
+        let (at, from, rows) = (j * ldo + j, j * a.stride + j, size - j);
+        // SAFETY: column j of those that were found to be inside, from its diagonal on.
+        let (to, x) = unsafe { (out.get_unchecked_mut(at..at + rows), a.data.get_unchecked(from..from + rows)) };
+        copy::<V>(to, x);
     }
 }
 

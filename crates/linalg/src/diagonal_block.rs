@@ -1,7 +1,8 @@
 //! A block on the diagonal of a Cholesky factor, and the rows below it, whose columns stay in registers while they are solved.
+#![allow(unsafe_code)]
 
 use crate::registers::Vector;
-use crate::tile::{View, next_strip, tile_rows};
+use crate::tile::{View, has_strip, next_strip, tile_rows};
 
 /// A block on the diagonal of L, of `width` ≤ COLUMNS columns: column after column, and 1 by its diagonal.
 pub(crate) struct DiagonalBlock<const COLUMNS: usize> {
@@ -93,6 +94,7 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         length: usize,
     ) {
         let mut x = difference::<V, S, COLUMNS>(c, ldc, i, self.width, a, b, length);
+        assert!(has_strip::<V, S>(c, ldc, i, self.width), "a matrix ends before its tile");
         for j in 0..COLUMNS {
             if j < self.width {
                 for p in 0..j {
@@ -104,7 +106,9 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
                 for s in 0..S {
                     x[j][s] = x[j][s].mul(V::splat(self.inverse[j]));
                 }
-                store(&x[j], c, j * ldc + i);
+                let at = j * ldc + i;
+                // SAFETY: column j of the strip, all of which was found to be inside.
+                store(&x[j], unsafe { c.get_unchecked_mut(at..at + S * V::N) }, 0);
             }
         }
     }
@@ -122,9 +126,12 @@ fn difference<V: Vector, const S: usize, const COLUMNS: usize>(
     length: usize,
 ) -> [[V; S]; COLUMNS] {
     let mut tile = tile_rows::<V, S, COLUMNS>(a, i, b, 0, length);
+    assert!(has_strip::<V, S>(c, ldc, i, width), "a matrix ends before its tile");
     for j in 0..COLUMNS {
         if j < width {
-            let column = &c[j * ldc + i..][..S * V::N];
+            let at = j * ldc + i;
+            // SAFETY: column j of the strip, all of which was found to be inside.
+            let column = unsafe { c.get_unchecked(at..at + S * V::N) };
             for s in 0..S {
                 tile[j][s] = V::load(&column[s * V::N..]).sub(tile[j][s]);
             }

@@ -39,7 +39,7 @@ pub mod tree_product;
 mod vectors;
 
 pub use cholesky::Cholesky;
-pub use copy::{copy_lower, copy_matrix, copy_symmetric, transpose, transpose_negated};
+pub use copy::{copy_block, copy_lower, copy_matrix, copy_symmetric, transpose, transpose_negated};
 pub use elimination_tree::ColumnTree;
 pub use factor::{backward_solve, eliminate, forward_solve, solve_right, solve_transposed};
 pub use ltdl::Ltdl;

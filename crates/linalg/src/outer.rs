@@ -3,7 +3,7 @@
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
-use crate::tile::{SLACK, add_outer, next_strip};
+use crate::tile::{SLACK, add_outer, has_strip, next_strip};
 use crate::vectors::copy_scaled;
 use alloc::vec::Vec;
 
@@ -92,10 +92,10 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
     }
 }
 
-/// The number of columns that one bit of a [`mask`] stands for, in rows of `stride` numbers.
+/// The number of columns that one bit of a [`mask`] stands for, in rows of `stride` numbers: a power of two.
 #[inline(always)]
 pub fn block(stride: usize) -> usize {
-    8 * stride.div_ceil(8 * 64)
+    8 * stride.div_ceil(8 * 64).next_power_of_two()
 }
 
 /// The outer product of a row on the left with one on the right.
@@ -109,7 +109,7 @@ struct Product {
 /// A product that some columns of the sum have a part in.
 #[derive(Debug, Clone, Copy, Default)]
 struct Active {
-    /// The place of the left row, and that of the columns in the right row.
+    /// The places of both rows.
     at: [usize; 2],
     /// The mask of the left row.
     mask: u64,
@@ -216,18 +216,23 @@ compiled! {
     fn add_products<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: Sum<'_>, active: &mut [Active]) {
         let Sum { rows, stride, size, products } = sum;
         assert!(size + SLACK <= stride, "rows without slack");
-        let (wide, count) = (block(stride), rows.len() / stride);
+        let (wide, count) = (block(stride).trailing_zeros(), rows.len() / stride);
         for Product { rows: [left, right], .. } in products {
             assert!(*left < count && *right < count, "a product of rows that there are not");
         }
-        let mut j = 0;
+        assert!(active.len() >= products.len(), "too little scratch");
+        let (mut j, mut many, mut listed) = (0, 0, 0);
         while j < size {
-            let (columns, mut many) = (bits(wide, j, COLUMNS.min(size - j)), 0);
-            for product in products {
-                if product.masks[1] & columns != 0 {
+            let columns = bits(wide, j, COLUMNS.min(size - j));
+            if columns != listed {
+                (many, listed) = (0, columns);
+                for product in products {
                     let [left, right] = product.rows;
-                    active[many] = Active { at: [left * stride, right * stride + j], mask: product.masks[0] };
-                    many += 1;
+                    debug_assert!(many < active.len());
+                    // SAFETY: there are as many places as products, and each takes one at most.
+                    let place = unsafe { active.get_unchecked_mut(many) };
+                    *place = Active { at: [left * stride, right * stride], mask: product.masks[0] };
+                    many += usize::from(product.masks[1] & columns != 0);
                 }
             }
             let (active, mut i) = (&active[..many], j);
@@ -250,17 +255,17 @@ compiled! {
     }
 }
 
-/// The bits of a [`mask`] for some numbers, of which each stands for `wide` numbers.
+/// The bits of a [`mask`] for some numbers, of which each stands for 2ʷⁱᵈᵉ numbers.
 #[inline(always)]
-fn bits(wide: usize, from: usize, length: usize) -> u64 {
-    let (first, last) = (from / wide, (from + length - 1) / wide);
+fn bits(wide: u32, from: usize, length: usize) -> u64 {
+    let (first, last) = (from >> wide, (from + length - 1) >> wide);
     (2_u64 << (last - first)).wrapping_sub(1) << first
 }
 
 /// H[i.., j..] += the products of which a strip of S registers of rows has a part.
 ///
 /// # Safety
-/// Each product's left row has S registers of numbers from i on, and its right row COLUMNS numbers where it says.
+/// Each product's left row has S registers of numbers from i on, and its right row COLUMNS numbers from j on.
 #[inline(always)]
 unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
     h: &mut [f64],
@@ -276,17 +281,21 @@ unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
             continue;
         }
         let [left, right] = product.at;
-        debug_assert!((left + i + S * V::N).max(right + COLUMNS) <= sum.rows.len());
+        debug_assert!((left + i + S * V::N).max(right + j + COLUMNS) <= sum.rows.len());
         // SAFETY: by the caller.
         let (strip, row) = unsafe {
             let from = |at: usize, count| core::slice::from_raw_parts(sum.rows.as_ptr().add(at), count);
-            (from(left + i, S * V::N), from(right, COLUMNS))
+            (from(left + i, S * V::N), from(right + j, COLUMNS))
         };
         add_outer(&mut tile, strip, row);
     }
+    let (at, columns) = (j * ldh + i, COLUMNS.min(sum.size - j));
+    assert!(has_strip::<V, S>(h, ldh, at, columns), "a matrix ends before its tile");
     for jj in 0..COLUMNS {
-        if jj < sum.size - j {
-            let column = &mut h[(j + jj) * ldh + i..][..S * V::N];
+        if jj < columns {
+            let at = at + jj * ldh;
+            // SAFETY: column jj of the strip, all of which was found to be inside.
+            let column = unsafe { h.get_unchecked_mut(at..at + S * V::N) };
             for s in 0..S {
                 let place = &mut column[s * V::N..];
                 V::load(place).add(tile[jj][s]).store(place);

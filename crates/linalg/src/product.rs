@@ -1,4 +1,5 @@
 //! Products and sums of matrices.
+#![allow(unsafe_code)]
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
@@ -141,11 +142,14 @@ compiled! {
                 }
                 continue;
             }
-            for (k, x) in x[..rows - 1].chunks_exact(V::N).enumerate() {
-                let x = V::load(x);
-                sums[k % 2] = x.mul_add(x, sums[k % 2]);
+            let (last, mut i) = (rows - V::N, 0);
+            while i < last {
+                // SAFETY: i + N < rows.
+                let x = V::load(unsafe { x.get_unchecked(i..i + V::N) });
+                sums = [x.mul_add(x, sums[1]), sums[0]];
+                i += V::N;
             }
-            let x = V::load(&x[rows - V::N..]);
+            let x = V::load(&x[last..]);
             sums[0] = x.mul_add(x, sums[0]);
         }
         let mut numbers = [0.0; SLACK];

@@ -133,6 +133,12 @@ pub(crate) enum Store {
     Subtract,
 }
 
+/// Whether a matrix has S registers of rows in so many columns, one at least, from a place on.
+#[inline(always)]
+pub(crate) fn has_strip<V: Vector, const S: usize>(data: &[f64], stride: usize, at: usize, columns: usize) -> bool {
+    at <= data.len() && holds(&data[at..], stride, [S * V::N, columns])
+}
+
 /// Stores the first `columns` columns of a tile in C, from entry (i, j) on.
 #[inline(always)]
 fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
@@ -143,9 +149,13 @@ fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     tile: &[[V; S]; COLUMNS],
     how: Store,
 ) {
+    let at = j * ldc + i;
+    assert!(has_strip::<V, S>(c, ldc, at, columns), "a matrix ends before its tile");
     for jj in 0..COLUMNS {
         if jj < columns {
-            let column = &mut c[(j + jj) * ldc + i..][..S * V::N];
+            let at = at + jj * ldc;
+            // SAFETY: column jj of the strip, all of which was found to be inside.
+            let column = unsafe { c.get_unchecked_mut(at..at + S * V::N) };
             for s in 0..S {
                 let place = &mut column[s * V::N..];
                 let product = tile[jj][s];

@@ -1,4 +1,5 @@
 //! Operations on vectors, and of a matrix on a vector.
+#![allow(unsafe_code)]
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
@@ -110,20 +111,34 @@ pub fn max_abs(x: &[f64]) -> f64 {
 
 /// to = x, without the function call that copying a few numbers would be.
 #[inline(always)]
-#[allow(clippy::manual_memcpy)] // that is the call
 pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
     let length = x.len();
     let to = &mut to[..length];
-    if length < V::N {
-        for i in 0..length {
-            to[i] = x[i];
+    // the last numbers may overlap what was copied before
+    match length {
+        0 => {}
+        1 => to[0] = x[0],
+        2..4 => copy_ends::<2>(to, x),
+        4..8 if length < V::N => copy_ends::<4>(to, x),
+        _ => {
+            let (last, mut i) = (length - V::N, 0);
+            while i < last {
+                // SAFETY: i + N < length, and both have so many numbers.
+                unsafe { V::load(x.get_unchecked(i..i + V::N)).store(to.get_unchecked_mut(i..i + V::N)) };
+                i += V::N;
+            }
+            V::load(&x[last..]).store(&mut to[last..]);
         }
-        return;
     }
-    for (to, x) in to[..length - 1].chunks_exact_mut(V::N).zip(x[..length - 1].chunks_exact(V::N)) {
-        V::load(x).store(to);
-    }
-    V::load(&x[length - V::N..]).store(&mut to[length - V::N..]); // may overlap what was copied before
+}
+
+/// Copies the first M numbers and the last M.
+#[inline(always)]
+fn copy_ends<const M: usize>(to: &mut [f64], x: &[f64]) {
+    let last = x.len() - M;
+    let (first, end): ([f64; M], [f64; M]) = (core::array::from_fn(|k| x[k]), core::array::from_fn(|k| x[last + k]));
+    to[..M].copy_from_slice(&first);
+    to[last..].copy_from_slice(&end);
 }
 
 /// to = a x, without a function call.
@@ -137,9 +152,11 @@ pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
         }
         return;
     }
-    let (a, last) = (V::splat(a), length - V::N);
-    for (to, x) in to[..length - 1].chunks_exact_mut(V::N).zip(x[..length - 1].chunks_exact(V::N)) {
-        V::load(x).mul(a).store(to);
+    let (a, last, mut i) = (V::splat(a), length - V::N, 0);
+    while i < last {
+        // SAFETY: i + N < length, and both have so many numbers.
+        unsafe { V::load(x.get_unchecked(i..i + V::N)).mul(a).store(to.get_unchecked_mut(i..i + V::N)) };
+        i += V::N;
     }
     V::load(&x[last..]).mul(a).store(&mut to[last..]);
 }

@@ -128,8 +128,14 @@ pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
 fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]) {
     padded[..x.len()].copy_from_slice(x);
     padded[x.len()] = Fused(0.0);
+    let padded = &padded[..=x.len()];
     for (Source { from: [i, j, k, l], ratio, offset }, to) in sources.iter().zip(to) {
-        let x = Four::from_array([padded[*i].0, padded[*j].0, padded[*k].0, padded[*l].0]);
+        let number = |at: &usize| {
+            debug_assert!(*at < padded.len());
+            // SAFETY: a plan's sources are places in a vector of the robot's, or the one past its end.
+            unsafe { padded.get_unchecked(*at) }.0
+        };
+        let x = Four::from_array([number(i), number(j), number(k), number(l)]);
         *to = x.mul_add(Four::from_array(*ratio), Four::from_array(*offset));
     }
 }
@@ -138,8 +144,11 @@ fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]
 #[inline(always)]
 pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
     let numbers = lanes(from);
+    assert!(numbers.len() == LANES * plan.state.coordinates.len(), "lanes of another robot");
     for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
-        *to = Fused(numbers[at]);
+        debug_assert!(at < numbers.len());
+        // SAFETY: a plan's places are those of its coordinates in the lanes, all of which are there.
+        *to = Fused(unsafe { *numbers.get_unchecked(at) });
     }
     for &(k, at, ratio) in &plan.state.followers {
         to[k] += Fused(numbers[at] * ratio);

@@ -27,7 +27,7 @@ use super::super::workspace::Workspace;
 use super::euler::Steps;
 use super::{Controls, Curvature, Form};
 use condyle_linalg::{
-    OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_level, copy, copy_matrix, eliminate,
+    OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_level, copy, copy_block, copy_matrix, eliminate,
     solve_transposed, subtract_product, transpose,
 };
 
@@ -189,34 +189,31 @@ impl Vectorized for WriteRows<'_> {
         // Π and N on the unknowns and δv; unknowns from `forces` on are forces
         let forces = imp.own.last().map_or(0, |own| own[1] + own[2]);
         for &[c, k, length] in &imp.own {
-            for j in 0..length {
-                let column = &mut H[(k + j) * ld..][..ld];
-                let (Pi, N) = (&Pi[(c + j) * ldn..][..nv], &N[(c + j) * ldn..][..nv]);
-                for &[cc, kk, length] in &imp.own {
-                    if kk >= k {
-                        copy::<V>(&mut column[kk..], &Pi[cc..cc + length]);
-                    }
-                }
-                for k in forces..m {
-                    column[k] = 0.0;
-                }
-                copy::<V>(&mut column[m..], Pi);
-                copy::<V>(&mut column[m + nv..], N);
-                column[all] = py[c + j];
+            for &[cc, kk, rows] in imp.own.iter().filter(|own| own[1] >= k) {
+                copy_block::<V>(&mut H[k * ld + kk..], ld, View::new(&Pi[c * ldn + cc..], ldn), [rows, length]);
+            }
+            let (Pi, N) = (View::new(&Pi[c * ldn..], ldn), View::new(&N[c * ldn..], ldn));
+            copy_block::<V>(&mut H[k * ld + m..], ld, Pi, [nv, length]);
+            copy_block::<V>(&mut H[k * ld + m + nv..], ld, N, [nv, length]);
+            for (j, p) in py[c..c + length].iter().enumerate() {
+                let column = &mut H[(k + j) * ld..][..=all];
+                column[forces..m].fill(0.0);
+                column[all] = *p;
             }
         }
         for k in forces..m {
             H[k * ld + k..][..=all - k].fill(0.0);
         }
+        let Q = View::new(node.Q.as_slice(), n);
+        copy_block::<V>(&mut H[m * ld + m..], ld, View::new(Pi, ldn), [nv, nv]);
+        copy_block::<V>(&mut H[m * ld + m + nv..], ld, View::new(N, ldn), [nv, nv]);
+        copy_block::<V>(&mut H[(m + nv) * (ld + 1)..], ld, Q, [nv, nv]);
+        let (q, diagonal) = (node.q.as_slice(), &imp.diagonal[..nv]);
         for j in 0..nv {
-            let column = &mut H[(m + j) * ld..][..ld];
-            copy::<V>(&mut column[m + j..], &Pi[j * ldn + j..][..nv - j]);
-            copy::<V>(&mut column[m + nv..], &N[j * ldn..][..nv]);
-            column[m + j] += imp.diagonal[j];
-            column[all] = py[j] + node.q[nv + j];
-            let column = &mut H[(m + nv + j) * ld..][..ld];
-            copy::<V>(&mut column[m + nv + j..], &node.Q.as_slice()[j * n + j..][..nv - j]);
-            column[all] = node.q[j];
+            let column = &mut H[(m + j) * ld..][..=all];
+            column[m + j] += diagonal[j];
+            column[all] = py[j] + q[nv + j];
+            H[(m + nv + j) * ld + all] = q[j];
         }
 
         // Uᵀ (R + ϱ 1) U and Gᵀ a″ G
