@@ -1,4 +1,4 @@
-"""Models in Pinocchio's spelling: from files, from each other, and the two that are built in."""
+"""Models in Pinocchio's spelling: from files, from each other, and those that are built in."""
 
 import os
 from collections.abc import Sequence
@@ -34,6 +34,11 @@ def buildSampleModelManipulator() -> Model:
 def buildSampleModelHumanoid() -> Model:
     """Pinocchio's humanoid of 28 joints on a free-flyer."""
     return Model(samples.humanoid())
+
+
+def buildSampleModelHumanoidRandom() -> Model:
+    """A humanoid of the same form as Pinocchio's, on a free-flyer; its numbers are others, drawn by NumPy."""
+    return Model(samples.random_humanoid())
 
 
 def buildReducedModel(model: Model, joints: Sequence[int], q: ArrayLike) -> Model:

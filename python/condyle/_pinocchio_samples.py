@@ -1,10 +1,10 @@
-"""The two robots that are built into Pinocchio: an arm of six joints, and a humanoid of five such limbs."""
+"""The robots that are built into Pinocchio: an arm of six joints, a humanoid of such limbs, and a random one."""
 
 import numpy as np
 
 from ._condyle import WORLD, BodyId, Joint, Model, ModelBuilder
 from ._inertia import Inertia
-from .algebra import SE3, Motion, exp6
+from .algebra import SE3, Motion, exp3, exp6
 
 _LIGHT = Inertia.from_com(0.1, np.zeros(3), 0.01 * np.eye(3))
 _ROD = Inertia.from_com(1.0, [0.0, 0.0, 0.5], np.eye(3))
@@ -22,22 +22,31 @@ _LIMB = (
 
 
 def _link(
-    robot: ModelBuilder, prefix: str, name: str, on: BodyId, axis: list[float], at: SE3, inertia: Inertia
+    robot: ModelBuilder,
+    name: str,
+    on: BodyId,
+    joint: Joint,
+    at: SE3,
+    inertia: Inertia,
+    limits: tuple[float, float, float, float] | None = (-3.14, 3.14, 10.0, 10.0),
 ) -> BodyId:
-    """A body on a revolute joint, with the limits that all joints of these robots have."""
+    """A body on a joint, with frames for both; limits: of the position, of the velocity, and of the effort."""
+    least, most, velocity, effort = limits or (None,) * 4
+    position = None if least is None or most is None else (least, most)
+    names = f"{name}_body", f"{name}_joint"
     body = robot.body(
-        f"{prefix}{name}_body",
+        names[0],
         on,
-        Joint.revolute(axis),
+        joint,
         at.homogeneous,
         inertia,
-        joint_name=f"{prefix}{name}_joint",
-        position=(-3.14, 3.14),
-        velocity=10.0,
-        effort=10.0,
+        joint_name=names[1],
+        position=position,
+        velocity=velocity,
+        effort=effort,
     )
-    robot.frame(f"{prefix}{name}_joint", body, kind="joint")
-    robot.frame(f"{prefix}{name}_body", body, kind="link")
+    robot.frame(names[1], body, kind="joint")
+    robot.frame(names[0], body, kind="link")
     return body
 
 
@@ -48,7 +57,7 @@ def _limb(robot: ModelBuilder, prefix: str, on: BodyId, begin: SE3, foot: bool =
             at = begin
         elif name == "wrist2" and foot:  # a quarter of a turn about y
             at = exp6(Motion(np.zeros(3), [0.0, np.pi / 2.0, 0.0])) * at
-        on = _link(robot, prefix, name, on, axis, at, inertia)
+        on = _link(robot, f"{prefix}{name}", on, Joint.revolute(axis), at, inertia)
         for link in links:
             robot.frame(f"{prefix}{link}_body", on, kind="link")
 
@@ -71,10 +80,37 @@ def humanoid() -> Model:
 
     _limb(robot, "rleg_", base, at(-0.2, -0.1), foot=True)
     _limb(robot, "lleg_", base, at(0.2, -0.1), foot=True)
-    chest = _link(robot, "", "chest1", base, _X, SE3.identity(), _LIGHT)
-    chest = _link(robot, "", "chest2", chest, _Y, SE3.identity(), _ROD)
-    head = _link(robot, "", "head1", chest, _X, SE3(np.eye(3), _UP), _LIGHT)
-    _link(robot, "", "head2", head, _Y, SE3.identity(), _ROD)
+    chest = _link(robot, "chest1", base, Joint.revolute(_X), SE3.identity(), _LIGHT)
+    chest = _link(robot, "chest2", chest, Joint.revolute(_Y), SE3.identity(), _ROD)
+    head = _link(robot, "head1", chest, Joint.revolute(_X), SE3(np.eye(3), _UP), _LIGHT)
+    _link(robot, "head2", head, Joint.revolute(_Y), SE3.identity(), _ROD)
     _limb(robot, "rarm_", chest, at(-0.3, 1.0))
     _limb(robot, "larm_", chest, at(0.3, 1.0))
+    return robot.build()
+
+
+def random_humanoid() -> Model:
+    """A humanoid of 26 joints on a free-flyer, whose placements, inertias and limits NumPy's generator draws."""
+    robot, draw = ModelBuilder(""), np.random.random
+
+    def link(name: str, on: BodyId, axis: list[float]) -> BodyId:
+        at = SE3(exp3(np.pi * (2.0 * draw(3) - 1.0)), 2.0 * draw(3) - 1.0)
+        least, *others = 2.0 * draw(4)
+        return _link(robot, name, on, Joint.revolute(axis), at, inertia(), (-least, *others))
+
+    def inertia() -> Inertia:
+        mass, size, turned = 0.1 + 2.0 * draw(), 0.1 + draw(3), exp3(np.pi * (2.0 * draw(3) - 1.0))
+        about = turned @ Inertia.from_box(mass, size).rotational @ turned.T
+        return Inertia.from_com(mass, 2.0 * draw(3) - 1.0, about)
+
+    def limb(name: str, on: BodyId) -> None:
+        for k, axis in enumerate((_X, _Y, _Z, _Y, _Y, _X), 1):
+            on = link(f"{name}{k}", on, axis)
+
+    base = _link(robot, "root", WORLD, Joint.free_flyer(), SE3.identity(), inertia(), None)
+    limb("lleg", base)
+    limb("rleg", base)
+    chest = link("chest", link("torso1", base, _Y), _Z)
+    limb("rarm", chest)
+    limb("larm", chest)
     return robot.build()

@@ -34,6 +34,7 @@ from ._pinocchio_build import buildModelFromUrdf as buildModelFromUrdf
 from ._pinocchio_build import buildModelFromXML as buildModelFromXML
 from ._pinocchio_build import buildReducedModel as buildReducedModel
 from ._pinocchio_build import buildSampleModelHumanoid as buildSampleModelHumanoid
+from ._pinocchio_build import buildSampleModelHumanoidRandom as buildSampleModelHumanoidRandom
 from ._pinocchio_build import buildSampleModelManipulator as buildSampleModelManipulator
 from ._pinocchio_build import loadReferenceConfigurations as loadReferenceConfigurations
 from ._pinocchio_build import loadReferenceConfigurationsFromXML as loadReferenceConfigurationsFromXML

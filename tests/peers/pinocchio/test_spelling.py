@@ -184,6 +184,40 @@ def test_robots_that_are_built_in(name: str) -> None:
     )
 
 
+def test_humanoid_of_random_numbers() -> None:
+    """It has the form of Pinocchio's; its derivatives, as Pinocchio's examples take them, are what Pinocchio finds."""
+    np.random.seed(1)
+    model = condyle.pinocchio.buildSampleModelHumanoidRandom()
+    form = pinocchio.buildSampleModelHumanoidRandom()
+    assert model.names == list(form.names) and model.parents == list(form.parents) and model.nv == form.nv
+    assert [(f.name, f.parentJoint) for f in model.frames[1:]] == [
+        (f.name, f.parentJoint) for f in list(form.frames)[1:]
+    ]
+    assert list(model.ours.joint_types[1:]) == ["free_flyer"] + ["revolute"] * 26
+    model.lowerPositionLimit[:7], model.upperPositionLimit[:7] = -np.ones(7), np.ones(7)
+    q, (v, a) = condyle.pinocchio.randomConfiguration(model), np.random.rand(2, model.nv)
+    found = []
+    for pin, m in ((condyle.pinocchio, model), (pinocchio, model.ours.to_pinocchio())):
+        data, out = m.createData(), []
+        pin.computeRNEADerivatives(m, data, q, v, a)
+        out += [data.dtau_dq.copy(), data.dtau_dv.copy(), data.M.copy()]
+        pin.computeABADerivatives(m, data, q, v, a)
+        out += [data.ddq_dq.copy(), data.ddq_dv.copy(), data.Minv.copy()]
+        pin.computeForwardKinematicsDerivatives(m, data, q, v, a)
+        joint = m.getJointId("rleg6_joint")
+        for axes in (pin.ReferenceFrame.WORLD, pin.ReferenceFrame.LOCAL):
+            out += [x.copy() for x in pin.getJointVelocityDerivatives(m, data, joint, axes)]
+            out += [x.copy() for x in pin.getJointAccelerationDerivatives(m, data, joint, axes)]
+        found.append(out)
+    for k, (ours, theirs) in enumerate(zip(*found, strict=True)):
+        if k in (2, 5):  # of M and M⁻¹ Pinocchio fills the upper triangle
+            ours, theirs = np.triu(ours), np.triu(theirs)
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=SAME * (1.0 + np.abs(theirs).max()))
+    np.random.seed(1)
+    again = condyle.pinocchio.buildSampleModelHumanoidRandom()
+    assert np.array_equal(again.upperPositionLimit[7:], model.upperPositionLimit[7:])
+
+
 def test_derivatives_of_kinematics() -> None:
     found = []
     for pin in (condyle.pinocchio, pinocchio):
