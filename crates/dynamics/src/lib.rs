@@ -83,8 +83,6 @@ pub use calls::second_derivatives::{
     AbaHessian, RneaHessian, RneaSecondDerivatives, aba_hessian, rnea_hessian, rnea_second_derivatives,
 };
 pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
-#[doc(hidden)]
-pub use condyle_model::integrate_jacobian_groups;
 pub use condyle_model::{
     Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, IntegrateArgument, Joint, JointOptions, Limits, Mimic,
     Model, ModelBuilder, WORLD, Warning, difference, difference_jacobian, distance, inertial_parameters, integrate,
@@ -92,6 +90,8 @@ pub use condyle_model::{
 };
 #[cfg(feature = "loaders")]
 pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};
+#[doc(hidden)]
+pub use condyle_model::{difference_jacobian_groups, integrate_jacobian_groups};
 pub use condyle_spatial::{
     Act, Constant, Cross, Force, Inertia, Mat3, Motion, Quaternion, Scalar, Se3, Sym3, Vec3, level, lie,
 };

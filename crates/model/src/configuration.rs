@@ -226,6 +226,16 @@ pub enum DifferenceArgument {
     To,
 }
 
+impl DifferenceArgument {
+    /// The sign s for which the Jacobian is s · J_log(s · d).
+    fn sign<S: Scalar>(self) -> S {
+        match self {
+            Self::From => -S::one(),
+            Self::To => S::one(),
+        }
+    }
+}
+
 /// ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁, nv × nv, block-diagonal, between tangent spaces, given d = q₁ ⊖ q₀.
 ///
 /// d: nv numbers; J is overwritten. Allocates nothing.
@@ -233,11 +243,7 @@ pub enum DifferenceArgument {
 /// # Panics
 /// If `d` has not nv numbers or `J` is not nv × nv.
 pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
-    let sign = match argument {
-        DifferenceArgument::From => -S::one(), // −J_log(−d)
-        DifferenceArgument::To => S::one(),
-    };
-    block_diagonal(model, ("d", d), GroupJacobian::Log, sign, J);
+    block_diagonal(model, ("d", d), GroupJacobian::Log, argument.sign(), J);
 }
 
 /// sign · J(sign · v), joint by joint, for a tangent vector v with the name that its caller gave it.
@@ -261,9 +267,15 @@ pub fn integrate_jacobian_groups<S: Scalar>(model: &Model, v: &[S], argument: In
     group_blocks(model, v, argument.jacobian(), S::one(), J);
 }
 
+/// The blocks of [`difference_jacobian`] for joints whose positions are no vector space; all else in J stays.
+#[doc(hidden)]
+pub fn difference_jacobian_groups<S: Scalar>(model: &Model, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
+    group_blocks(model, d, GroupJacobian::Log, argument.sign(), J);
+}
+
 /// The blocks of sign · J(sign · v) for joints whose positions are no vector space.
 fn group_blocks<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, sign: S, J: &mut DMatrix<S>) {
-    for Space { joint, v: iv, .. } in &model.tree.spaces {
+    for Space { joint, v: iv, .. } in model.tree.spaces.iter().filter(|space| !space.joint.commutes()) {
         let mut signed = [S::zero(); 6];
         for (signed, &v) in signed.iter_mut().zip(&v[iv.clone()]) {
             *signed = v * sign;
@@ -272,8 +284,9 @@ fn group_blocks<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, s
         let columns = map.columns();
         for (k, &column) in joint.axes().iter().enumerate() {
             let column = columns[column].scale(sign).to_array();
-            for (r, &row) in joint.axes().iter().enumerate() {
-                J[(iv.start + r, iv.start + k)] = column[row];
+            let to = &mut J.as_mut_slice()[(iv.start + k) * model.nv() + iv.start..];
+            for (to, &row) in to.iter_mut().zip(joint.axes()) {
+                *to = column[row];
             }
         }
     }

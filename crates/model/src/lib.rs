@@ -71,12 +71,12 @@ mod variants;
 pub use body::{Body, Frame, FrameKind, Limits};
 pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
 pub use condyle_spatial::{Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
-#[doc(hidden)]
-pub use configuration::integrate_jacobian_groups;
 pub use configuration::{
     DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,
     interpolate, neutral, normalize, random_configuration, transport,
 };
+#[doc(hidden)]
+pub use configuration::{difference_jacobian_groups, integrate_jacobian_groups};
 pub use error::{Error, Warning};
 #[cfg(feature = "loaders")]
 pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};

@@ -145,11 +145,20 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             }
             return;
         }
+        let last = |down: usize, along: usize| {
+            let (down, along) = ((rows - 1).checked_mul(down)?, (columns - 1).checked_mul(along)?);
+            down.checked_add(along)
+        };
+        let fits = |last: Option<usize>, length: usize| last.is_some_and(|last| last < length);
+        let (entry, place) = (last(down, along), last(stride, 1));
+        assert!(fits(entry, from.len()), "a matrix ends before its last entry");
+        assert!(to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())), "no place for the last entry");
         for i in 0..rows {
             let mut j = 0;
             loop {
                 for k in 0..S::LANES {
-                    block[k] = from[i * down + (j + k) * along];
+                    // SAFETY: row i < rows, and column j + k < columns; the last entry is there.
+                    block[k] = *unsafe { from.get_unchecked(i * down + (j + k) * along) };
                 }
                 if negative {
                     for k in 0..S::LANES {
@@ -158,7 +167,9 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
                 }
                 S::transpose(&mut block[..S::LANES]);
                 for (k, to) in to.iter_mut().enumerate() {
-                    block[k].store(&mut to[i * stride + j..]);
+                    let at = i * stride + j;
+                    // SAFETY: as above; there are as many columns as lanes, at least.
+                    block[k].store(unsafe { to.get_unchecked_mut(at..at + S::LANES) });
                 }
                 if j + S::LANES >= columns {
                     break;

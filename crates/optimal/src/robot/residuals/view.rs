@@ -9,7 +9,7 @@ use crate::lq::{Hessian, LqNode};
 use crate::robot::capabilities::Output;
 use crate::robot::knot::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::state::{groups, state_difference};
-use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian};
+use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian_groups};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -22,7 +22,7 @@ pub(crate) struct Scratch {
     pub dd: Vec<f64>,
     /// The rows of all Jacobians.
     pub rows: Rows,
-    /// The Jacobian of the difference of configurations. Shape: nv × nv.
+    /// The Jacobian of the difference of configurations, of which the blocks of groups are read. Shape: nv × nv.
     D: DMatrix<f64>,
     /// The coordinates of each group of positions that is no vector space.
     groups: Vec<Range<usize>>,
@@ -231,7 +231,7 @@ impl ResidualView<'_> {
         if s.groups.is_empty() {
             return;
         }
-        difference_jacobian(model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
+        difference_jacobian_groups(model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
         for group in &s.groups {
             let (start, size) = (group.start, group.len());
             let mut D = [[0.0; 6]; 6]; // row by row
