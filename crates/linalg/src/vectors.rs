@@ -3,18 +3,54 @@
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
-use crate::tile::{SLACK, View};
+use crate::tile::{SLACK, View, holds};
 
 compiled! {
     /// y += α A x.
     pub fn add_scaled_product<V, COLUMNS>(y: &mut [f64], alpha: f64, a: View<'_>, x: &[f64]) {
-        for k in 0..x.len() {
-            let (factor, column) = (alpha * x[k], &a.data[k * a.stride..][..y.len()]);
-            for (y, a) in y.iter_mut().zip(column) {
-                *y += a * factor;
-            }
+        let rows = y.len();
+        if rows == 0 || x.is_empty() {
+            return;
         }
+        assert!(holds(a.data, a.stride, [rows, x.len()]), "a matrix ends before the last of its entries");
+        if rows < V::N {
+            for (k, x) in x.iter().enumerate() {
+                let (factor, column) = (alpha * x, &a.data[k * a.stride..][..rows]);
+                for i in 0..rows {
+                    y[i] = condyle_spatial::Scalar::mul_add(column[i], factor, y[i]);
+                }
+            }
+            return;
+        }
+        // SAFETY: the last register begins N rows before the end, and the others before it.
+        let sum = |y: &[f64], i: usize| unsafe { scaled_rows::<V>(y, alpha, a, x, i) };
+        let (last, mut i) = (rows - V::N, 0);
+        let end = sum(y, last); // before the rows that it shares with another register are written
+        while i < last {
+            sum(y, i).store(&mut y[i..]);
+            i += V::N;
+        }
+        end.store(&mut y[last..]);
     }
+}
+
+/// y + α A x on a register of rows.
+///
+/// # Safety
+/// y has a register of numbers from row i on, and so has each of as many columns of A as x has numbers.
+#[inline(always)]
+unsafe fn scaled_rows<V: Vector>(y: &[f64], alpha: f64, a: View<'_>, x: &[f64], i: usize) -> V {
+    debug_assert!(i + V::N <= y.len() && (x.len() - 1) * a.stride + i + V::N <= a.data.len());
+    let (alpha, mut at) = (V::splat(alpha), i);
+    // SAFETY: by the caller.
+    let mut sum = V::load(unsafe { y.get_unchecked(i..i + V::N) });
+    for x in x {
+        // SAFETY: by the caller.
+        let column = V::load(unsafe { a.data.get_unchecked(at..at + V::N) });
+        sum = column.mul_add(alpha.mul(V::splat(*x)), sum);
+        at += a.stride;
+    }
+    sum
 }
 
 compiled! {
@@ -180,6 +216,12 @@ mod tests {
                     a[j * ld + i] = entry(i, j);
                 }
                 let x: Vec<f64> = (0..columns).map(|j| entry(7, j)).collect();
+                let mut y = vec![1.0; rows];
+                add_scaled_product(&mut y, 0.5, View::new(&a, ld), &x);
+                for i in 0..rows {
+                    let expected = 1.0 + 0.5 * (0..columns).map(|j| entry(i, j) * x[j]).sum::<f64>();
+                    assert!((y[i] - expected).abs() < TOLERANCE);
+                }
                 let mut y = vec![1.0; rows + 4 * SLACK];
                 add_product_vector(&mut y, rows, View::new(&a, ld), &x);
                 for i in 0..rows {

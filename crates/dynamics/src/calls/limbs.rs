@@ -3,6 +3,7 @@
 
 use crate::data::Data;
 use crate::derivatives::rnea_derivatives;
+use crate::lanes::limbs::forces::six;
 use crate::lanes::limbs::lanes::{Limbs, numbers};
 use crate::lanes::limbs::pass::{Arguments, Scratch, load, scatter};
 use crate::lanes::limbs::{LANES, Plan};
@@ -167,13 +168,13 @@ pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Dat
     let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
     for i in 1..oX.len() {
         let ((step, lane), column) = (plan.place(i), model.nodes()[i].column);
-        let pose = |k: usize| S::splat(poses[(12 * step + k) * LANES + lane]);
-        let axis = |k: usize| Vec3::new(pose(k), pose(k + 1), pose(k + 2));
+        let pose = &poses[12 * LANES * step + lane..][..11 * LANES + 1];
+        let number = |k: usize| S::splat(pose[k * LANES]);
+        let axis = |k: usize| Vec3::new(number(k), number(k + 1), number(k + 2));
         oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));
         for k in 0..model.nodes()[i].joint.nv() {
-            let slot = plan.steps[step].idx_v + k;
-            let number = |r: usize| S::splat(motions[(6 * slot + r) * LANES + lane]);
-            columns[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(number));
+            let motion = six(motions, (plan.steps[step].idx_v + k, lane));
+            columns[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(|r| S::splat(motion[r * LANES])));
         }
     }
     *placed = PlacementCache::Bodies;
