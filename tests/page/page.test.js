@@ -10,13 +10,14 @@ import { pathToFileURL } from "node:url";
 import puppeteer from "puppeteer-core";
 
 const folder = process.env.PAGES;
+const PATIENCE = 300_000; // ms: pictures are drawn without a graphics card, beside whatever else the machine does
 let browser;
 
 before(async () => {
   const own = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
   const executablePath = process.env.CHROMIUM ?? own ?? (await (await import("@sparticuz/chromium")).default.executablePath());
   browser = await puppeteer.launch({
-    executablePath, headless: "shell", env: { ...process.env, LC_ALL: "en_US.UTF-8", LANG: "en_US.UTF-8", LANGUAGE: "en" },
+    executablePath, headless: "shell", timeout: PATIENCE, protocolTimeout: PATIENCE, env: { ...process.env, LC_ALL: "en_US.UTF-8", LANG: "en_US.UTF-8", LANGUAGE: "en" },
     args: ["--no-sandbox", "--lang=en-US", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
   });
 });
@@ -25,13 +26,14 @@ after(() => browser?.close());
 /** Opens a page; what it complains of and asks for is collected. */
 async function open(name, { hash = "#t=0", width = 900, height = 640, dark = false } = {}) {
   const page = await browser.newPage();
+  page.setDefaultTimeout(PATIENCE);
   const wrong = [];
   page.on("console", (message) => { if (["error", "warn", "warning"].includes(message.type()) && !/GPU stall|GL Driver/.test(message.text())) wrong.push(message.text()); });
   page.on("pageerror", (error) => wrong.push(error.message));
   page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) wrong.push(request.url()); });
   await page.setViewport({ width, height });
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: dark ? "dark" : "light" }]);
-  await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + hash, { waitUntil: "load", timeout: 120_000 });
+  await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + hash, { waitUntil: "load" });
   await settled(page);
   return { page, wrong };
 }
@@ -152,6 +154,7 @@ test("meshes of three kinds of files are drawn in their colours, where they belo
 for (const name of ["trot", "talos"]) {
   test(`${name}: the script of a frame, measured (ms)`, { skip: !existsSync(join(folder, `${name}.html`)) }, async () => {
     const page = await browser.newPage();
+    page.setDefaultTimeout(PATIENCE);
     await page.setViewport({ width: 480, height: 400 }); // small: without a GPU a frame's pixels take longer than its script
     // all that asks to run before a frame is drawn runs under a clock; callbacks of one frame have one time stamp
     await page.evaluateOnNewDocument(() => {
@@ -163,7 +166,7 @@ for (const name of ["trot", "talos"]) {
         window.frames_ms.set(stamp, (window.frames_ms.get(stamp) ?? 0) + performance.now() - begin);
       });
     });
-    await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + "#t=0", { waitUntil: "load", timeout: 120_000 });
+    await page.goto(pathToFileURL(join(folder, `${name}.html`)).href + "#t=0", { waitUntil: "load" });
     await settled(page);
     await page.evaluate(() => { window.frames_ms.clear(); document.getElementById("loop").click(); document.getElementById("play").click(); });
     const enough = page.waitForFunction(() => window.frames_ms.size > 120, { timeout: 30_000 });
