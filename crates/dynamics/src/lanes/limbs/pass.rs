@@ -99,6 +99,8 @@ impl<'a> Arguments<'a> {
 pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
     gather(&plan.state.positions, &mut to.padded, from.q, &mut to.q);
     if !from.v.is_empty() {
+        let nv = plan.state.leaders.len();
+        assert!(from.v.len() == nv && from.x.len() == nv, "vectors of another robot");
         gather(&plan.state.coordinates, &mut to.padded, from.v, &mut to.v);
         gather(&plan.state.coordinates, &mut to.padded, from.x, &mut to.x);
     }
