@@ -27,6 +27,16 @@ pub(crate) fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }
 
+/// The most coordinates of an arm whose M is inverted whole: so many entries of a column are registers, and loops over them
+/// are none. The sparse factor of an arm of seven takes five times the instructions.
+pub(crate) const WHOLE: usize = 8;
+
+/// Whether M⁻¹ of a chain, which has no zeros, comes from M without a factor.
+pub(crate) fn inverse_of_whole<R>(model: &Model<R>) -> bool {
+    let chain = model.columns().iter().enumerate().all(|(k, column)| column.depth == k);
+    chain && !model.has_mimic() && model.nv() <= WHOLE
+}
+
 /// Whether −M⁻¹ B is solved by the articulated bodies. Joints must not share coordinates.
 pub(crate) fn solve_by_tree(columns: &[Column], nv: usize) -> bool {
     let depths: usize = columns.iter().map(|c| c.depth).sum();

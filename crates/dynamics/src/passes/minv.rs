@@ -1,13 +1,14 @@
-//! The inverse of the joint-space inertia matrix, in one of two ways.
+//! The inverse of the joint-space inertia matrix, in one of three ways.
 //!
-//! From M by its sparse factor ([`Ltdl`]), in O(n d) operations a column, where the rows of the factor are short; else,
+//! From M without a factor, by Gauss and Jordan (which needs no pivots where M is positive definite), for short chains; from M by
+//! its sparse factor ([`Ltdl`]), in O(n d) operations a column, where the rows of the factor are short; else,
 //! and without M, by Carpentier, *Analytical inverse of the joint space inertia matrix* (2018): the articulated-body
 //! algorithm for all unit efforts at once, of which only those in the subtree of a joint reach it, in O(n) a column. In
 //! the world's frame one array of bias forces serves all bodies.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
-use crate::selection::inverse_by_factor;
+use crate::selection::{WHOLE, inverse_by_factor, inverse_of_whole};
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
@@ -32,6 +33,8 @@ pub(crate) struct Workspace<S> {
     pub factor: Ltdl<S>,
     /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
     pub by_factor: bool,
+    /// Whether M is inverted whole. Written by: `new`.
+    pub whole: bool,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -39,6 +42,7 @@ impl<S: Scalar> Workspace<S> {
         let factor = Ltdl::new(model);
         Self {
             by_factor: inverse_by_factor(model, factor.nonzeros()),
+            whole: inverse_of_whole(model),
             factor,
             P: filled(S::zero, 6 * size.columns),
             A: filled(S::zero, (1 + size.depth) * 6 * size.columns),
@@ -55,6 +59,50 @@ impl<S> Workspace<S> {
 
     pub(crate) fn matrix(&self) -> &DMatrix<S> {
         &self.Minv
+    }
+}
+
+/// X = M⁻¹ for at most `WHOLE` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
+///
+/// ```text
+/// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
+/// ```
+///
+/// of which the lower triangle is read: in lanes it is all that is computed, of a single number whole columns are, which
+/// are registers.
+#[inline(always)]
+fn invert_whole<S: Scalar>(M: &DMatrix<S>, X: &mut DMatrix<S>) {
+    let n = X.nrows();
+    assert!(M.nrows() == n && n <= WHOLE, "M: expected {n} × {n}, found {:?}", M.shape());
+    let mut A = [[S::zero(); WHOLE]; WHOLE]; // column by column
+    for (column, from) in A.iter_mut().zip(M.as_slice().chunks_exact(n.max(1))) {
+        column[..n].copy_from_slice(from);
+    }
+    for k in 0..n {
+        let (mut c, d) = (A[k], A[k][k].recip());
+        for i in 0..k {
+            c[i] = A[i][k];
+        }
+        let mut scaled = c;
+        for i in 0..WHOLE {
+            scaled[i] = c[i] * d;
+        }
+        for j in 0..n {
+            let (factor, rows) = (-scaled[j], if S::LANES == 1 { 0..WHOLE } else { j..n });
+            for i in rows {
+                A[j][i] = c[i].mul_add(factor, A[j][i]);
+            }
+        }
+        for j in 0..k {
+            A[j][k] = scaled[j];
+        }
+        A[k] = scaled;
+        A[k][k] = -d;
+    }
+    for j in 0..n {
+        for i in j..n {
+            (X[(i, j)], X[(j, i)]) = (-A[j][i], -A[j][i]);
+        }
     }
 }
 
@@ -112,6 +160,9 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
 kernel! {
     /// M⁻¹ from M.
     pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &DMatrix<S>) {
+        if d.whole {
+            return invert_whole(M, &mut d.Minv);
+        }
         d.factor.factorize(M);
         d.factor.inverse(&mut d.Minv);
     }
