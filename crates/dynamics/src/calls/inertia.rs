@@ -39,7 +39,8 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
 /// M(q)⁻¹, the accelerations for unit efforts, in O(n²).
 ///
 /// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018); on trees with
-/// short branches, and where joints share a coordinate (mimic), by the factor of Featherstone (2005) ([`Ltdl`](crate::Ltdl)).
+/// short branches, and where joints share a coordinate (mimic), by the factor of Featherstone (2005) ([`Ltdl`](crate::Ltdl));
+/// on chains of at most eight coordinates from M by Gauss and Jordan.
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, minv, robots};
