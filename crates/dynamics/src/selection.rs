@@ -27,14 +27,14 @@ pub(crate) fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }
 
-/// The most coordinates of an arm whose M is inverted whole: so many entries of a column are registers, and loops over them
+/// The most coordinates of an arm whose M is inverted without a factor: so many entries of a column are registers, and loops over them
 /// are none. The sparse factor of an arm of seven takes five times the instructions.
-pub(crate) const WHOLE: usize = 8;
+pub(crate) const SHORT_CHAIN: usize = 8;
 
 /// Whether M⁻¹ of a chain, which has no zeros, comes from M without a factor.
-pub(crate) fn inverse_of_whole<R>(model: &Model<R>) -> bool {
+pub(crate) fn inverse_by_gauss_jordan<R>(model: &Model<R>) -> bool {
     let chain = model.columns().iter().enumerate().all(|(k, column)| column.depth == k);
-    chain && !model.has_mimic() && model.nv() <= WHOLE
+    chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
 }
 
 /// Whether −M⁻¹ B is solved by the articulated bodies. Joints must not share coordinates.

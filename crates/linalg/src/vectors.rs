@@ -17,7 +17,7 @@ compiled! {
             for (k, x) in x.iter().enumerate() {
                 let (factor, column) = (alpha * x, &a.data[k * a.stride..][..rows]);
                 for i in 0..rows {
-                    y[i] = condyle_spatial::Scalar::mul_add(column[i], factor, y[i]);
+                    y[i] += column[i] * factor;
                 }
             }
             return;
@@ -47,7 +47,7 @@ unsafe fn scaled_rows<V: Vector>(y: &[f64], alpha: f64, a: View<'_>, x: &[f64], 
     for x in x {
         // SAFETY: by the caller.
         let column = V::load(unsafe { a.data.get_unchecked(at..at + V::N) });
-        sum = column.mul_add(alpha.mul(V::splat(*x)), sum);
+        sum = sum.add(column.mul(alpha.mul(V::splat(*x)))); // rounded as one by one
         at += a.stride;
     }
     sum

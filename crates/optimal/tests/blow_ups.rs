@@ -63,7 +63,7 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         let last = trace.last().unwrap();
         assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
         // the iterate before the blow-up: its cost and gap are in the trace, one record apart
-        assert!(solution.cost < 1e-6 * last.cost, "{} of {}", solution.cost, last.cost);
+        assert!(solution.cost < 1e5, "{}", solution.cost);
         assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
         let (mut nodes, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
         problem.calc(&solution.xs, &solution.us, &mut nodes, &mut numbers);

@@ -8,7 +8,7 @@
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
-use crate::selection::{WHOLE, inverse_by_factor, inverse_of_whole};
+use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
@@ -33,8 +33,8 @@ pub(crate) struct Workspace<S> {
     pub factor: Ltdl<S>,
     /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
     pub by_factor: bool,
-    /// Whether M is inverted whole. Written by: `new`.
-    pub whole: bool,
+    /// Whether M is inverted without a factor. Written by: `new`.
+    pub by_gauss_jordan: bool,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -42,7 +42,7 @@ impl<S: Scalar> Workspace<S> {
         let factor = Ltdl::new(model);
         Self {
             by_factor: inverse_by_factor(model, factor.nonzeros()),
-            whole: inverse_of_whole(model),
+            by_gauss_jordan: inverse_by_gauss_jordan(model),
             factor,
             P: filled(S::zero, 6 * size.columns),
             A: filled(S::zero, (1 + size.depth) * 6 * size.columns),
@@ -62,7 +62,7 @@ impl<S> Workspace<S> {
     }
 }
 
-/// X = M⁻¹ for at most `WHOLE` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
+/// X = M⁻¹ for at most `SHORT_CHAIN` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
 ///
 /// ```text
 /// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
@@ -71,10 +71,10 @@ impl<S> Workspace<S> {
 /// of which the lower triangle is read: in lanes it is all that is computed, of a single number whole columns are, which
 /// are registers.
 #[inline(always)]
-fn invert_whole<S: Scalar>(M: &DMatrix<S>, X: &mut DMatrix<S>) {
+fn gauss_jordan<S: Scalar>(M: &DMatrix<S>, X: &mut DMatrix<S>) {
     let n = X.nrows();
-    assert!(M.nrows() == n && n <= WHOLE, "M: expected {n} × {n}, found {:?}", M.shape());
-    let mut A = [[S::zero(); WHOLE]; WHOLE]; // column by column
+    assert!(M.nrows() == n && n <= SHORT_CHAIN, "M: expected {n} × {n}, found {:?}", M.shape());
+    let mut A = [[S::zero(); SHORT_CHAIN]; SHORT_CHAIN]; // column by column
     for (column, from) in A.iter_mut().zip(M.as_slice().chunks_exact(n.max(1))) {
         column[..n].copy_from_slice(from);
     }
@@ -84,11 +84,11 @@ fn invert_whole<S: Scalar>(M: &DMatrix<S>, X: &mut DMatrix<S>) {
             c[i] = A[i][k];
         }
         let mut scaled = c;
-        for i in 0..WHOLE {
+        for i in 0..SHORT_CHAIN {
             scaled[i] = c[i] * d;
         }
         for j in 0..n {
-            let (factor, rows) = (-scaled[j], if S::LANES == 1 { 0..WHOLE } else { j..n });
+            let (factor, rows) = (-scaled[j], if S::LANES == 1 { 0..SHORT_CHAIN } else { j..n });
             for i in rows {
                 A[j][i] = c[i].mul_add(factor, A[j][i]);
             }
@@ -160,8 +160,8 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
 kernel! {
     /// M⁻¹ from M.
     pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &DMatrix<S>) {
-        if d.whole {
-            return invert_whole(M, &mut d.Minv);
+        if d.by_gauss_jordan {
+            return gauss_jordan(M, &mut d.Minv);
         }
         d.factor.factorize(M);
         d.factor.inverse(&mut d.Minv);
