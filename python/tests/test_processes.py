@@ -165,6 +165,7 @@ LONG = {
             kept = solver.solution
             assert kept.status == "interrupted", kept.status
             assert np.isfinite(kept.cost) and kept.cost in [now.cost for now in kept.trace]  # the best, not the last
+            assert not kept.trace[-1].cost < kept.cost
     """,
     "resume": """
         problem, xs, us = reach(100)
