@@ -30,10 +30,19 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     for (k, row) in each[..rows].iter_mut().enumerate() {
         *row = &from[k * n..][..n];
     }
+    let mut last = [S::Number::zero(); MOST];
+    if n < S::LANES && 2 * n >= S::LANES && rows > 0 {
+        // each row with the beginning of the next one, so that it is as long as a vector, and nothing after the last
+        for (k, row) in each[..rows - 1].iter_mut().enumerate() {
+            *row = &from[k * n..][..S::LANES];
+        }
+        last[..n].copy_from_slice(each[rows - 1]);
+        each[rows - 1] = &last[..S::LANES];
+    }
     gather_rows(&each[..rows], to);
 }
 
-/// Rows of numbers become vectors, as in [`gather`], for rows that stand anywhere.
+/// Rows of numbers become vectors, as in [`gather`], for rows that stand anywhere; they may be longer than `to`.
 #[inline]
 pub fn gather_rows<S: Block>(from: &[&[S::Number]], to: &mut [S]) {
     S::enter(Gather(from, to));
@@ -90,6 +99,15 @@ impl<S: Block> Kernel for Gather<'_, S> {
         let Self(from, to) = self;
         let n = to.len();
         let row = |k: usize| from[k.min(from.len() - 1)];
+        if n < S::LANES && from.iter().all(|row| row.len() >= S::LANES) {
+            let mut block = [S::zero(); MOST];
+            for k in 0..S::LANES {
+                block[k] = S::load(&row(k)[..S::LANES]);
+            }
+            S::transpose(&mut block[..S::LANES]);
+            to.copy_from_slice(&block[..n]);
+            return;
+        }
         if n < S::LANES {
             let mut lanes = [S::Number::zero(); MOST];
             for (i, to) in to.iter_mut().enumerate() {
@@ -114,6 +132,25 @@ impl<S: Block> Kernel for Gather<'_, S> {
     }
 }
 
+/// Writes as many vectors as there are lanes, or minus them, to `to[k][at..]` what is in lane k.
+///
+/// # Safety
+/// There is a place for as many numbers as a vector has.
+#[inline(always)]
+unsafe fn write_tile<S: Block>(block: &mut [S; MOST], negative: bool, to: &mut [&mut [S::Number]], at: usize) {
+    if negative {
+        for k in 0..S::LANES {
+            block[k] = -block[k];
+        }
+    }
+    S::transpose(&mut block[..S::LANES]);
+    for (k, to) in to.iter_mut().enumerate() {
+        debug_assert!(at + S::LANES <= to.len());
+        // SAFETY: by the caller.
+        block[k].store(unsafe { to.get_unchecked_mut(at..at + S::LANES) });
+    }
+}
+
 struct Scatter<'a, 'b, S: Block>(Strided<'a, S>, &'a mut [&'b mut [S::Number]], usize);
 
 impl<S: Block> Kernel for Scatter<'_, '_, S> {
@@ -131,6 +168,38 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             return;
         }
         let mut block = [S::zero(); MOST];
+        let last = |down: usize, along: usize| {
+            let (down, along) = ((rows - 1).checked_mul(down)?, (columns - 1).checked_mul(along)?);
+            down.checked_add(along)
+        };
+        let fits = |last: Option<usize>, length: usize| last.is_some_and(|last| last < length);
+        let (entry, place) = (last(down, along), last(stride, 1));
+        assert!(fits(entry, from.len()), "a matrix ends before its last entry");
+        assert!(to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())), "no place for the last entry");
+        if columns < S::LANES && stride == columns && rows * columns >= S::LANES {
+            // narrow rows, one after the other, as if they were one
+            let (n, mut first, mut i, mut j) = (rows * columns, 0, 0, 0);
+            loop {
+                for k in 0..S::LANES {
+                    // SAFETY: row i < rows, and column j < columns; the last entry is there.
+                    block[k] = *unsafe { from.get_unchecked(i * down + j * along) };
+                    j += 1;
+                    if j == columns {
+                        (i, j) = (i + 1, 0);
+                    }
+                }
+                // SAFETY: the last entry has a place, and the tile ends with it or before.
+                unsafe { write_tile(&mut block, negative, to, first) };
+                first += S::LANES;
+                if first >= n {
+                    return;
+                }
+                if first + S::LANES > n {
+                    first = n - S::LANES; // the last tile overlaps the one before
+                    (i, j) = (first / columns, first % columns);
+                }
+            }
+        }
         if columns < S::LANES {
             let mut numbers = [S::Number::zero(); MOST];
             for i in 0..rows {
@@ -145,14 +214,6 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             }
             return;
         }
-        let last = |down: usize, along: usize| {
-            let (down, along) = ((rows - 1).checked_mul(down)?, (columns - 1).checked_mul(along)?);
-            down.checked_add(along)
-        };
-        let fits = |last: Option<usize>, length: usize| last.is_some_and(|last| last < length);
-        let (entry, place) = (last(down, along), last(stride, 1));
-        assert!(fits(entry, from.len()), "a matrix ends before its last entry");
-        assert!(to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())), "no place for the last entry");
         for i in 0..rows {
             let mut j = 0;
             loop {
@@ -160,17 +221,8 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
                     // SAFETY: row i < rows, and column j + k < columns; the last entry is there.
                     block[k] = *unsafe { from.get_unchecked(i * down + (j + k) * along) };
                 }
-                if negative {
-                    for k in 0..S::LANES {
-                        block[k] = -block[k];
-                    }
-                }
-                S::transpose(&mut block[..S::LANES]);
-                for (k, to) in to.iter_mut().enumerate() {
-                    let at = i * stride + j;
-                    // SAFETY: as above; there are as many columns as lanes, at least.
-                    block[k].store(unsafe { to.get_unchecked_mut(at..at + S::LANES) });
-                }
+                // SAFETY: as above; there are as many columns as lanes, at least.
+                unsafe { write_tile(&mut block, negative, to, i * stride + j) };
                 if j + S::LANES >= columns {
                     break;
                 }
@@ -292,7 +344,15 @@ mod tests {
 
     impl<S: Block<Number: From<u16> + PartialEq>> Kernel for Back<S> {
         fn run(self) {
-            let n = 3 * S::LANES + 2;
+            for n in [3 * S::LANES + 2, S::LANES.max(2) - 1, S::LANES.div_ceil(2)] {
+                Self::of(n);
+            }
+        }
+    }
+
+    impl<S: Block<Number: From<u16> + PartialEq>> Back<S> {
+        #[inline(always)]
+        fn of(n: usize) {
             let rows: Vec<S::Number> = (0..(n * S::LANES) as u16).map(From::from).collect();
             let mut vectors = vec![S::zero(); n];
             gather(&rows, S::LANES, &mut vectors);
@@ -315,12 +375,15 @@ mod tests {
                 (0..S::LANES).for_each(|k| assert!(back[k * n..][..n] == rows[k.min(some - 1) * n..][..n]));
             }
             // as a matrix, and minus its transpose, of as many columns and of fewer than lanes
-            for columns in [n, 1] {
+            for (columns, more) in [(n, 3), (1, 3), (n, 0), (1, 0), (2, 0), (2, 3)] {
+                if !n.is_multiple_of(columns) {
+                    continue;
+                }
                 let shape = [n / columns, columns];
                 let upright = Strided { vectors: &vectors, strides: [columns, 1], shape, negative: false };
                 let turned = Strided { strides: [1, shape[1]], shape: [shape[1], shape[0]], negative: true, ..upright };
                 for (matrix, sign) in [(upright, 1.0), (turned, -1.0)] {
-                    let ([m, n], stride) = (matrix.shape, matrix.shape[1] + 3);
+                    let ([m, n], stride) = (matrix.shape, matrix.shape[1] + more);
                     let mut back = vec![S::Number::zero(); S::LANES * m * stride];
                     let mut places: Vec<_> = back.chunks_exact_mut(m * stride).collect();
                     scatter_matrix(&matrix, &mut places, stride);
