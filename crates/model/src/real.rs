@@ -11,9 +11,8 @@ fn real<S: Scalar>(x: S) -> f64 {
     if let Some(&x) = (&x as &dyn Any).downcast_ref::<f64>() {
         return x;
     }
-    let holds = |mask: S::Mask| S::select(mask, S::one(), S::zero()) == S::one();
-    let is_below = |y: f64| holds(x.lt(S::splat(y)));
-    let equals = |y: f64| !is_below(y) && !holds(S::splat(y).lt(x));
+    let is_below = |y: f64| S::all(x.lt(S::splat(y)));
+    let equals = |y: f64| !is_below(y) && !S::all(S::splat(y).lt(x));
     if equals(0.0) && equals(1.0) {
         return f64::NAN;
     }

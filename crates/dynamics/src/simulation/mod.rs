@@ -230,7 +230,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
                 variational::step(model, data, &mut self.variational, &self.settings, input, state, (q, v))
             }
         };
-        if !self.v_next.iter().all(|v| everywhere::<S>(v.abs().lt(S::splat(f64::MAX)))) {
+        if !self.v_next.iter().all(|v| S::all(v.abs().lt(S::splat(f64::MAX)))) {
             return if status.is_done() { Status::NotFinite } else { status };
         }
         if status.is_done() {
@@ -262,12 +262,6 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
         (self.tau, self.f_ext) = (tau, f_ext);
         status
     }
-}
-
-/// Whether a mask holds in every lane.
-#[inline(always)]
-fn everywhere<S: Scalar>(mask: S::Mask) -> bool {
-    S::select(mask, S::one(), S::zero()) == S::one()
 }
 
 /// aba(q, v, τ + passive torque).

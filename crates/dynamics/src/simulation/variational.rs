@@ -20,7 +20,7 @@
 //! moves freely: Ad(y)ᵀ only expresses it in the body's new frame. Source: Marsden and West (2001), section 2.3, for the
 //! midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. In coordinates v = M(q)⁻¹ p.
 
-use super::{Input, Settings, Status, everywhere, lagrangian, lu, tangent};
+use super::{Input, Settings, Status, lagrangian, lu, tangent};
 use crate::calls::inertia::crba;
 use crate::data::Data;
 use crate::passes::kinematics::place;
@@ -191,7 +191,7 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
             size += inside.abs() + d.carried[k].abs() + (d.pushed[k] * half).abs();
         }
         // The step that follows squares the error, and completes the derivatives of dual numbers.
-        converged = everywhere::<S>(error.lt(size * S::splat(settings.tolerance)));
+        converged = S::all(error.lt(size * S::splat(settings.tolerance)));
         slope(model, d, h);
         lu::factorize(&mut d.slope, model.nv());
         lu::solve(&d.slope, &mut d.residual);

@@ -22,33 +22,48 @@ use crate::scalar::Scalar;
 /// ```
 #[inline(always)]
 pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
-    const INVERSE_FACTORIAL: [f64; 4] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0];
     let small = t.lt(S::one());
-    // the series, for t < 1 (elsewhere of a harmless number)
-    let ts = S::select(small, t, S::zero());
+    if S::all(small) {
+        return stumpff_near(t);
+    }
+    // each of a number that is harmless where the other is meant
+    let far = stumpff_far(S::select(small, S::one(), t));
+    if !S::any(small) {
+        return far;
+    }
+    let mut c = stumpff_near(S::select(small, t, S::zero()));
+    for k in 0..6 {
+        c[k] = S::select(small, c[k], far[k]);
+    }
+    c
+}
+
+/// 1/k!.
+const INVERSE_FACTORIAL: [f64; 4] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0];
+
+/// The series, for t < 1.
+#[inline(always)]
+fn stumpff_near<S: Scalar>(t: S) -> [S; 6] {
     let (s4, s5) =
-        (stumpff_series::<S, 4>(ts) * S::splat(1.0 / 24.0), stumpff_series::<S, 5>(ts) * S::splat(1.0 / 120.0));
-    let s3 = S::splat(INVERSE_FACTORIAL[3]) - ts * s5;
-    let s2 = S::splat(INVERSE_FACTORIAL[2]) - ts * s4;
-    let s1 = S::splat(INVERSE_FACTORIAL[1]) - ts * s3;
-    let s0 = S::splat(INVERSE_FACTORIAL[0]) - ts * s2;
-    // the closed forms, for t ≥ 1
-    let tl = S::select(small, S::one(), t);
-    let angle = tl.sqrt();
+        (stumpff_series::<S, 4>(t) * S::splat(1.0 / 24.0), stumpff_series::<S, 5>(t) * S::splat(1.0 / 120.0));
+    let s3 = S::splat(INVERSE_FACTORIAL[3]) - t * s5;
+    let s2 = S::splat(INVERSE_FACTORIAL[2]) - t * s4;
+    let s1 = S::splat(INVERSE_FACTORIAL[1]) - t * s3;
+    let s0 = S::splat(INVERSE_FACTORIAL[0]) - t * s2;
+    [s0, s1, s2, s3, s4, s5]
+}
+
+/// The closed forms, for t ≥ 1.
+#[inline(always)]
+fn stumpff_far<S: Scalar>(t: S) -> [S; 6] {
+    let angle = t.sqrt();
     let (sin, cos) = angle.sin_cos();
-    let (r, l0, l1) = (tl.recip(), cos, sin * angle.recip());
+    let (r, l0, l1) = (t.recip(), cos, sin * angle.recip());
     let l2 = (S::splat(INVERSE_FACTORIAL[0]) - l0) * r;
     let l3 = (S::splat(INVERSE_FACTORIAL[1]) - l1) * r;
     let l4 = (S::splat(INVERSE_FACTORIAL[2]) - l2) * r;
     let l5 = (S::splat(INVERSE_FACTORIAL[3]) - l3) * r;
-    [
-        S::select(small, s0, l0),
-        S::select(small, s1, l1),
-        S::select(small, s2, l2),
-        S::select(small, s3, l3),
-        S::select(small, s4, l4),
-        S::select(small, s5, l5),
-    ]
+    [l0, l1, l2, l3, l4, l5]
 }
 
 /// k! cₖ(t) for t < 1 by Horner's rule: 1 − t/((k+1)(k+2)) (1 − t/((k+3)(k+4)) (…)), to the last term a double can see.
@@ -79,16 +94,30 @@ pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     // θ = 2 atan(n/w), n = |v|; θ/n → (2/w)(1 − r/3 + r²/5 − …), r = n²/w², near 0
     let n2 = v.norm_squared();
     let small = n2.lt(S::splat(1e-3));
-    let n = S::select(small, S::one(), n2).sqrt();
-    let far = n.atan2(w) * n.recip();
-    let w_near = S::select(small, w, S::one());
-    let r = S::select(small, n2, S::zero()) * (w_near * w_near).recip();
+    let half = if S::all(small) {
+        log3_near(n2, w)
+    } else {
+        let n = S::select(small, S::one(), n2).sqrt();
+        let far = n.atan2(w) * n.recip();
+        if S::any(small) {
+            let near = log3_near(S::select(small, n2, S::zero()), S::select(small, w, S::one()));
+            S::select(small, near, far)
+        } else {
+            far
+        }
+    };
+    v.scale(half * S::splat(2.0))
+}
+
+/// The series of θ/(2n).
+#[inline(always)]
+fn log3_near<S: Scalar>(n2: S, w: S) -> S {
+    let r = n2 * (w * w).recip();
     let mut sum = S::splat(1.0 / 15.0);
     for k in [13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
         sum = S::splat(1.0 / k) - r * sum;
     }
-    let near = sum * w_near.recip();
-    v.scale(S::select(small, near, far) * S::splat(2.0))
+    sum * w.recip()
 }
 
 /// 1/θ² − (cot(θ/2))/(2θ) of t = θ², the coefficient of w×² in the inverse Jacobians: (c₂ − c₃)/(4 c₁) at θ/2.

@@ -140,6 +140,14 @@ impl<S: Scalar> Scalar for LaneDual<S> {
     fn or(a: S::Mask, b: S::Mask) -> S::Mask {
         S::or(a, b)
     }
+    #[inline(always)]
+    fn all(mask: S::Mask) -> bool {
+        S::all(mask)
+    }
+    #[inline(always)]
+    fn any(mask: S::Mask) -> bool {
+        S::any(mask)
+    }
 }
 
 impl<S: Scalar> Constant<LaneDual<S>> for LaneDual<S> {

@@ -90,6 +90,18 @@ pub trait Scalar:
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Whether at least one of the masks holds.
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Whether a mask holds in every lane; `false` also where that is not known, because a program is being recorded.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        Self::select(mask, Self::one(), Self::zero()) == Self::one()
+    }
+    /// Whether a mask holds in some lane; `true` also where that is not known.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        Self::select(mask, Self::zero(), Self::one()) != Self::one()
+    }
 
     /// 0.
     #[inline(always)]

@@ -275,4 +275,12 @@ impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask {
         T::Register::or(a, b)
     }
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        !Self::any(Self::zero().lt(Self::select(mask, Self::zero(), Self::one())))
+    }
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        T::Register::any(mask)
+    }
 }
