@@ -14,6 +14,9 @@ use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Motion, Scalar, Se3, Vec3, kernel};
 
+/// The number of joints whose sines and cosines are computed at once.
+const AT_ONCE: usize = 4;
+
 kernel! {
     /// J of a frame at iXf on a body, in O(depth); the strides are the distances from one row of J to the next, and from one
     /// column to the next.
@@ -30,16 +33,26 @@ kernel! {
         let l = Single::new(model);
         let (mut i, mut X) = (body, iXf);
         while i > 0 {
-            let joint = l.joint(i);
-            for k in 0..joint.nv() {
-                let column = &model.columns()[l.column(i) + k];
-                let S = X.act_inv(joint.column(&Se3::identity(), k)).scale(S::splat(column.ratio)); // J = iXf⁻¹ S
-                for (row, S) in S.to_array().into_iter().enumerate() {
-                    J[row * strides[0] + column.coordinate * strides[1]] += S;
-                }
+            // some joints at a time, for the sake of their sines and cosines
+            let (mut some, mut n) = ([0; AT_ONCE], 0);
+            while i > 0 && n < AT_ONCE {
+                some[n] = i;
+                n += 1;
+                i = model.nodes()[i].parent;
             }
-            X = Joint::placement(&l, i, q) * X; // λXf = λXi iXf
-            i = model.nodes()[i].parent;
+            let (mut sin, mut cos) = ([S::zero(); AT_ONCE], [S::one(); AT_ONCE]);
+            Joint::sin_cos_of(&l, some[..n].iter().copied().enumerate(), q, &mut sin, &mut cos);
+            for (k, &i) in some[..n].iter().enumerate() {
+                let joint = l.joint(i);
+                for k in 0..joint.nv() {
+                    let column = &model.columns()[l.column(i) + k];
+                    let S = X.act_inv(joint.column(&Se3::identity(), k)).scale(S::splat(column.ratio)); // J = iXf⁻¹ S
+                    for (row, S) in S.to_array().into_iter().enumerate() {
+                        J[row * strides[0] + column.coordinate * strides[1]] += S;
+                    }
+                }
+                X = Joint::placement_with(&l, i, q, sin[k], cos[k]) * X; // λXf = λXi iXf
+            }
         }
         let turn = match reference {
             ReferenceFrame::Local => return,

@@ -29,17 +29,28 @@ impl Joint {
     /// The sine and cosine of the angle by which each joint turns about z (0 and 1 where it does not), all of them at once.
     #[inline(always)]
     pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
-        let (sin, cos) = (&mut sin[..], &mut cos[..]);
-        for i in l.bodies() {
+        Self::sin_cos_of(l, l.bodies().zip(l.bodies()), q, &mut sin[..], &mut cos[..]);
+    }
+
+    /// The same of some joints, each with the place at which its sine and cosine go.
+    #[inline(always)]
+    pub fn sin_cos_of<L: Layout>(
+        l: &L,
+        joints: impl Iterator<Item = (usize, usize)> + Clone,
+        q: &[L::S],
+        sin: &mut [L::S],
+        cos: &mut [L::S],
+    ) {
+        for (k, i) in joints.clone() {
             if let Self::Revolute { .. } | Self::Helical { .. } = l.joint(i) {
-                sin[i] = l.position(q, i, 0);
+                sin[k] = l.position(q, i, 0);
             }
         }
         L::S::sin_cos_of_all(sin, cos);
-        for i in l.bodies() {
+        for (k, i) in joints {
             match l.joint(i) {
-                Self::Continuous { .. } => (cos[i], sin[i]) = (l.position(q, i, 0), l.position(q, i, 1)),
-                Self::Planar => (cos[i], sin[i]) = (l.position(q, i, 2), l.position(q, i, 3)),
+                Self::Continuous { .. } => (cos[k], sin[k]) = (l.position(q, i, 0), l.position(q, i, 1)),
+                Self::Planar => (cos[k], sin[k]) = (l.position(q, i, 2), l.position(q, i, 3)),
                 _ => {}
             }
         }
