@@ -23,6 +23,7 @@ from typing import Any
 
 FILE = Path(__file__).parent / "condyle" / "_condyle.pyi"
 WIDTH = 120
+DERIVABLE = 1 << 10  # Py_TPFLAGS_BASETYPE: a class from which others can be derived
 
 ALIASES = {
     "_Array": "NDArray[np.float64]",
@@ -47,6 +48,32 @@ ALIASES = {
     " | Lqr | Unicycle | Action | DifferentialAction | ConstrainedAction",
 }
 
+# The functions of `condyle.pinocchio`.
+SPELLED = [  # the first two have no `data`
+    "_spelled_difference",
+    "_spelled_integrate",
+    "_spelled_crba",
+    "centerOfMass",
+    "computeCentroidalMomentum",
+    "computeCoriolisMatrix",
+    "computeFrameJacobian",
+    "computeGeneralizedGravity",
+    "computeMinverse",
+    "forwardKinematics",
+    "framesForwardKinematics",
+    "getAcceleration",
+    "getClassicalAcceleration",
+    "getFrameAcceleration",
+    "getFrameClassicalAcceleration",
+    "getFrameJacobian",
+    "getFrameVelocity",
+    "getJointJacobian",
+    "getVelocity",
+    "jacobianCenterOfMass",
+    "nonLinearEffects",
+    "updateFramePlacements",
+]
+
 # The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
 ARGUMENTS = {
     "ArrayLike": """
@@ -56,14 +83,23 @@ ARGUMENTS = {
     "ArrayLike | None": "Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
+    "_SpelledModel": " ".join(f"{name}.model" for name in ("_SpelledData", *SPELLED)),
+    "_SpelledData": " ".join(
+        f"{name}.data" for name in SPELLED if name not in ("_spelled_difference", "_spelled_integrate")
+    ),
+    "ReferenceFrame": " ".join(f"{name}.frame" for name in SPELLED if name.startswith("get") or "FrameJ" in name),
+    "_Array": "_SpelledData._leave.com",
+    "Force": "_SpelledData._leave.hg",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "str": "_generate.language contact function joint_name name prefix text FrictionContact.frame Task.frame",
-    "str | int": "body frame Model.with_mimic.follower Model.with_mimic.leader",
+    "str | int": """
+        body frame Model.with_mimic.follower Model.with_mimic.leader getVelocity.joint getAcceleration.joint
+        getClassicalAcceleration.joint getJointJacobian.joint""",
     "str | int | None": "Model.append.frame",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
-        facets grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
+        facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
         Plan.contact""",
     "float": """
         damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
@@ -153,7 +189,16 @@ RESULTS = {
         Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
-        FrictionContact.normal Task.joints""",
+        FrictionContact.normal Task.joints
+        _SpelledData._frame_poses _SpelledData._poses _spelled_crba _spelled_difference _spelled_integrate centerOfMass
+        computeCoriolisMatrix computeFrameJacobian computeGeneralizedGravity computeMinverse getFrameJacobian
+        getJointJacobian jacobianCenterOfMass nonLinearEffects""",
+    "Motion": """
+        getAcceleration getClassicalAcceleration getFrameAcceleration getFrameClassicalAcceleration getFrameVelocity
+        getVelocity""",
+    "Force": "computeCentroidalMomentum _SpelledData.hg",
+    "list[_Array]": "_SpelledData.com",
+    "tuple[_Array, _Array, _Array]": "_SpelledData._state",
     "_Array | None": "Joint.axis FrictionContact.corners",
     "_Array | list[_Array]": "Problem.quasi_static",
     "tuple[_Array, _Array]": """
@@ -165,9 +210,10 @@ RESULTS = {
         FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation Task.weight""",
     "float | None": "FrictionContact.yaw_friction Joint.pitch",
     "tuple[float, float]": "Plan.span",
+    "Data": "_SpelledData._ours",
     "int": """
-        ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame Model.joint
-        Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority""",
+        _SpelledData._given ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame
+        Model.joint Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority""",
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
@@ -183,7 +229,8 @@ RESULTS = {
     "Command": "WholeBodyController.command WholeBodyController.step",
     "Optimality": "WholeBodyController.optimality",
     "None": """
-        _casadi_release AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
+        _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
+        AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
         Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track check""",
     "slice": "ConstraintSet.range",
@@ -193,8 +240,8 @@ RESULTS = {
     "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__",
     "HyperDual": "HyperDual",
     "Model": """
-        Model.__copy__ Model.__deepcopy__ Model.append Model.from_pinocchio Model.lock Model.with_armature
-        Model.with_gravity Model.with_inertias Model.with_limits Model.with_mimic
+        _SpelledModel.ours Model.__copy__ Model.__deepcopy__ Model.append Model.from_pinocchio Model.lock
+        Model.with_armature Model.with_gravity Model.with_inertias Model.with_limits Model.with_mimic
         ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
     "Any": "Model.to_pinocchio",
@@ -333,10 +380,11 @@ class Writer:
     def klass(self, item: type, name: str) -> str:
         """A class with its members: what makes one, properties, methods."""
         members, known = vars(item), self.results.types
-        text = f"@final\nclass {name}:\n{docstring(item, '    ')}\n\n"
+        final = "@disjoint_base\n" if item.__flags__ & DERIVABLE else "@final\n"
+        text = f"{final}class {name}:\n{docstring(item, '    ')}\n\n"
         if item.__text_signature__ is not None:
             text += self.function(item, "__new__", name, "    ") + "\n"
-        for member in sorted(k for k, v in members.items() if inspect.isgetsetdescriptor(v)):
+        for member in sorted(k for k, v in members.items() if inspect.isdatadescriptor(v)):
             head = f"    @property\n    def {member}(self) -> {self.results.find(f'{name}.{member}')}:\n"
             text += head + docstring(members[member], "        ") + "\n\n"
         for member, value in members.items():
@@ -385,6 +433,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
         head = f"from .{part.__name__.split('.')[-1]} import "
         line = head + ", ".join(own)
         imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
+    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")  # others there have names of ours
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\
 """{inspect.getdoc(module)}"""
@@ -397,6 +446,7 @@ from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
 
 {chr(10).join(imports)}
 

@@ -8,8 +8,10 @@ from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
 
 from ._inertia import Inertia
+from ._spelling import Force, Motion, ReferenceFrame
 from ._types import (
     AbaDerivatives,
     AbaHessian,
@@ -89,12 +91,17 @@ __all__ = [
     "Unicycle",
     "WholeBodyController",
     "WrenchCone",
+    "_SpelledData",
+    "_SpelledModel",
     "__version__",
     "_casadi_hold",
     "_casadi_hold_knot",
     "_casadi_release",
     "_generate",
     "_model_from_bytes",
+    "_spelled_crba",
+    "_spelled_difference",
+    "_spelled_integrate",
     "aba",
     "aba_derivatives",
     "aba_hessian",
@@ -107,6 +114,7 @@ __all__ = [
     "body_jacobian_rate",
     "body_velocity",
     "body_velocity_derivative",
+    "centerOfMass",
     "centroidal_derivatives",
     "centroidal_map",
     "centroidal_map_rate",
@@ -117,6 +125,11 @@ __all__ = [
     "com_acceleration",
     "com_jacobian",
     "com_velocity",
+    "computeCentroidalMomentum",
+    "computeCoriolisMatrix",
+    "computeFrameJacobian",
+    "computeGeneralizedGravity",
+    "computeMinverse",
     "compute_all_terms",
     "constrained_dynamics",
     "constrained_dynamics_derivatives",
@@ -128,6 +141,7 @@ __all__ = [
     "difference_jacobian",
     "distance",
     "energy_derivatives",
+    "forwardKinematics",
     "forward_dynamics",
     "forward_kinematics",
     "frame_acceleration",
@@ -139,8 +153,17 @@ __all__ = [
     "frame_placement",
     "frame_velocity",
     "frame_velocity_derivative",
+    "framesForwardKinematics",
     "from_inertia",
     "from_log_cholesky",
+    "getAcceleration",
+    "getClassicalAcceleration",
+    "getFrameAcceleration",
+    "getFrameClassicalAcceleration",
+    "getFrameJacobian",
+    "getFrameVelocity",
+    "getJointJacobian",
+    "getVelocity",
     "gravity",
     "humanoid",
     "impulse_dynamics",
@@ -148,6 +171,7 @@ __all__ = [
     "integrate",
     "integrate_jacobian",
     "interpolate",
+    "jacobianCenterOfMass",
     "joint_torque_regressor",
     "kinetic_energy",
     "kinetic_energy_regressor",
@@ -156,6 +180,7 @@ __all__ = [
     "mechanical_energy",
     "minv",
     "neutral",
+    "nonLinearEffects",
     "nonlinear_effects",
     "normalize",
     "passive_torque",
@@ -174,6 +199,7 @@ __all__ = [
     "static_torque_derivative",
     "to_inertia",
     "transport",
+    "updateFramePlacements",
 ]
 
 _Array: TypeAlias = NDArray[np.float64]
@@ -3270,6 +3296,135 @@ class Simulation:
 
         What a handler of a signal raises, as KeyboardInterrupt, ends the run after a step, whose state is kept.
         """
+
+@disjoint_base
+class _SpelledData:
+    """The scratch of a model under another spelling, and the state that the functions of a joint or a frame are for."""
+
+    def __new__(cls, model: _SpelledModel) -> _SpelledData: ...
+    @property
+    def _frame_poses(self) -> _Array:
+        """The poses of the bodies that frames are seen at: those of the last `updateFramePlacements`, (njoints, 4, 4)."""
+
+    @property
+    def _given(self) -> int:
+        """How many of q, v and a the last `forwardKinematics` was given."""
+
+    @property
+    def _ours(self) -> Data:
+        """The `condyle.Data`."""
+
+    @property
+    def _poses(self) -> _Array:
+        """The poses of the bodies at the last `forwardKinematics`, (njoints, 4, 4)."""
+
+    @property
+    def _state(self) -> tuple[_Array, _Array, _Array]:
+        """q, v and a of the last `forwardKinematics`, with zeros for what it was not given."""
+
+    @property
+    def com(self) -> list[_Array]:
+        """The centre of mass, in a list."""
+
+    @property
+    def hg(self) -> Force:
+        """The centroidal momentum."""
+
+    def _leave(self, com: _Array, hg: Force) -> None:
+        """Leaves a centre of mass and a centroidal momentum here."""
+
+@disjoint_base
+class _SpelledModel:
+    """A `condyle.Model` under another spelling."""
+
+    def __new__(cls, model: Model) -> _SpelledModel: ...
+    @property
+    def ours(self) -> Model:
+        """The `condyle.Model`."""
+
+def centerOfMass(
+    model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
+) -> _Array:
+    """c, also data.com[0]; with v and a also data.vcom[0] and data.acom[0]."""
+
+def computeCentroidalMomentum(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> Force:
+    """hg, also data.hg."""
+
+def computeCoriolisMatrix(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
+    """C with C v + g = h and Ṁ − 2 C skew-symmetric, also data.C."""
+
+def computeFrameJacobian(
+    model: _SpelledModel, data: _SpelledData, q: ArrayLike, frame_id: int, frame: ReferenceFrame | None = None
+) -> _Array:
+    """The Jacobian of a frame, (6, nv)."""
+
+def computeGeneralizedGravity(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
+    """g, also data.g."""
+
+def computeMinverse(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
+    """M⁻¹, also data.Minv."""
+
+def _spelled_crba(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
+    """M, both triangles, also data.M."""
+
+def _spelled_difference(model: _SpelledModel, q0: ArrayLike, q1: ArrayLike) -> _Array:
+    """q₁ ⊖ q₀."""
+
+def forwardKinematics(
+    model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
+) -> None:
+    """data.oMi; with v and a also data.v and data.a, in the bodies' frames."""
+
+def framesForwardKinematics(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> None:
+    """data.oMi and data.oMf."""
+
+def getAcceleration(
+    model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame | None = None
+) -> Motion:
+    """The spatial acceleration of a joint's body at the last forwardKinematics."""
+
+def getClassicalAcceleration(
+    model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame | None = None
+) -> Motion:
+    """r̈ and ω̇ of a joint's body at the last forwardKinematics."""
+
+def getFrameAcceleration(
+    model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame | None = None
+) -> Motion:
+    """The spatial acceleration of a frame at the last forwardKinematics."""
+
+def getFrameClassicalAcceleration(
+    model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame | None = None
+) -> Motion:
+    """r̈ and ω̇ of a frame at the last forwardKinematics."""
+
+def getFrameJacobian(model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame) -> _Array:
+    """The Jacobian of a frame at the last computeJointJacobians, (6, nv)."""
+
+def getFrameVelocity(
+    model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame | None = None
+) -> Motion:
+    """The velocity of a frame at the last forwardKinematics."""
+
+def getJointJacobian(model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame) -> _Array:
+    """The Jacobian of a joint's body at the last computeJointJacobians, (6, nv)."""
+
+def getVelocity(
+    model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame | None = None
+) -> Motion:
+    """The velocity of a joint's body at the last forwardKinematics."""
+
+def _spelled_integrate(model: _SpelledModel, q: ArrayLike, v: ArrayLike) -> _Array:
+    """q ⊕ v."""
+
+def jacobianCenterOfMass(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
+    """∂c/∂q, (3, nv), also data.Jcom."""
+
+def nonLinearEffects(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
+    """C v + g, also data.nle."""
+
+def updateFramePlacements(model: _SpelledModel, data: _SpelledData) -> None:
+    """data.oMf of the last forwardKinematics."""
 
 @final
 class FrictionContact:

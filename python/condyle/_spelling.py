@@ -116,12 +116,11 @@ class JointModelFreeFlyer:
     """The root joint of a robot that moves freely."""
 
 
-class Model:
-    """A `condyle.Model` with Pinocchio's names."""
+class Model(ours._SpelledModel):
+    """A `condyle.Model`, which is `ours`, with Pinocchio's names."""
 
     def __init__(self, model: ours.Model) -> None:
         limits = model.limits
-        self.ours = model
         self.name, self.nq, self.nv, self.njoints = model.name, model.nq, model.nv, model.nbodies
         self.names, self.parents = list(model.names), list(model.parents)
         self.idx_qs, self.idx_vs = list(model.idx_qs), list(model.idx_vs)
@@ -135,7 +134,6 @@ class Model:
         self.referenceConfigurations: dict[str, _Array] = {}
         self._frame_ids = {frame.name: k for k, frame in reversed(list(enumerate(self.frames)))}
         self._moving_mass = sum(inertia.mass for inertia in model.inertias[1:])
-        self._still = np.zeros(self.nv)
         self._lengths = np.zeros(self.nq, bool)  # the coordinates that are no part of a rotation
         turns = {"free_flyer": 4, "spherical": 4, "continuous": 2, "planar": 2}
         for kind, at, n in zip(model.joint_types, model.idx_qs, model.nqs, strict=True):
@@ -162,11 +160,9 @@ class Model:
         return name in self.names
 
 
-class Data:
+class Data(ours._SpelledData):
     """Where results are left: oMi, oMf, v, a, tau, ddq, M, com, hg, …, each from when a function has made it."""
 
-    hg: Force
-    com: list[_Array]
     vcom: list[_Array]
     acom: list[_Array]
     tau: _Array
@@ -186,22 +182,18 @@ class Data:
     potential_energy: float
 
     def __init__(self, model: Model) -> None:
-        self._ours = ours.Data(model.ours)
         self._model = model
-        self._q = self._v = self._a = model._still
-        self._poses: _Array | None = None
-        self._frame_poses: _Array | None = None
 
     @property
     def oMi(self) -> Sequence[SE3]:
         """The poses of the joints' bodies at the last forwardKinematics."""
-        poses = self._made(self._poses)
+        poses = self._poses
         return Lazy(len(poses), lambda joint: SE3._of(poses[joint]))
 
     @property
     def oMf(self) -> Sequence[SE3]:
         """The poses of the frames at the last updateFramePlacements."""
-        poses, frames = self._made(self._frame_poses), self._model.frames
+        poses, frames = self._frame_poses, self._model.frames
 
         def pose(k: int) -> SE3:
             _, body, placement = frames[k]
@@ -212,20 +204,18 @@ class Data:
     @property
     def v(self) -> Sequence[Motion]:
         """The velocities of the joints' bodies, in their frames, at the last forwardKinematics with v."""
-        state = (self._model.ours, self._ours, self._q, self._made(self._v))
-        return Lazy(self._model.njoints, lambda joint: Motion._of(ours.body_velocity(*state, joint)))
+        return self._motions(2, lambda joint: ours.getVelocity(self._model, self, joint))
 
     @property
     def a(self) -> Sequence[Motion]:
         """The spatial accelerations of the joints' bodies, in their frames, at the last forwardKinematics with a."""
-        state = (self._model.ours, self._ours, self._q, self._v, self._made(self._a))
-        return Lazy(self._model.njoints, lambda joint: Motion._of(ours.body_acceleration(*state, joint)))
+        return self._motions(3, lambda joint: ours.getAcceleration(self._model, self, joint))
 
-    def _made(self, numbers: _Array | None) -> _Array:
-        """Numbers that a function has left here."""
-        if numbers is None or numbers is self._model._still:
+    def _motions(self, given: int, motion: Callable[[int], Motion]) -> Sequence[Motion]:
+        """Motions of all joints, where so many of q, v and a have been given."""
+        if self._given < given:
             raise AttributeError
-        return numbers
+        return Lazy(self._model.njoints, motion)
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"data.{name}: no function has made it yet, or it is not part of this layer")

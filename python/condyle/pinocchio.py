@@ -17,13 +17,32 @@ visualisers, and what else is not here, raise an AttributeError that says so. Fo
 """
 
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _condyle as ours
 from . import algebra
+from ._condyle import centerOfMass as centerOfMass
+from ._condyle import computeCentroidalMomentum as computeCentroidalMomentum
+from ._condyle import computeCoriolisMatrix as computeCoriolisMatrix
+from ._condyle import computeFrameJacobian as computeFrameJacobian
+from ._condyle import computeGeneralizedGravity as computeGeneralizedGravity
+from ._condyle import computeMinverse as computeMinverse
+from ._condyle import forwardKinematics as forwardKinematics
+from ._condyle import framesForwardKinematics as framesForwardKinematics
+from ._condyle import getAcceleration as getAcceleration
+from ._condyle import getClassicalAcceleration as getClassicalAcceleration
+from ._condyle import getFrameAcceleration as getFrameAcceleration
+from ._condyle import getFrameClassicalAcceleration as getFrameClassicalAcceleration
+from ._condyle import getFrameJacobian as getFrameJacobian
+from ._condyle import getFrameVelocity as getFrameVelocity
+from ._condyle import getJointJacobian as getJointJacobian
+from ._condyle import getVelocity as getVelocity
+from ._condyle import jacobianCenterOfMass as jacobianCenterOfMass
+from ._condyle import nonLinearEffects as nonLinearEffects
+from ._condyle import updateFramePlacements as updateFramePlacements
 from ._pinocchio_batches import ModelPool as ModelPool
 from ._pinocchio_batches import abaInParallel as abaInParallel
 from ._pinocchio_batches import omp_get_max_threads as omp_get_max_threads
@@ -60,6 +79,7 @@ from ._spelling import skew as skew
 from ._spelling import utils as utils
 
 _Array = NDArray[np.float64]
+crba, integrate, difference = ours._spelled_crba, ours._spelled_integrate, ours._spelled_difference
 WORLD, LOCAL = ReferenceFrame.WORLD, ReferenceFrame.LOCAL
 LOCAL_WORLD_ALIGNED = ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -77,16 +97,6 @@ def randomConfiguration(model: Model, lower: ArrayLike | None = None, upper: Arr
     given = model._lengths & np.isfinite(low) & np.isfinite(high)
     q[given] = low[given] + np.random.random(int(given.sum())) * (high - low)[given]
     return q
-
-
-def integrate(model: Model, q: ArrayLike, v: ArrayLike) -> _Array:
-    """q ⊕ v."""
-    return ours.integrate(model.ours, q, v)
-
-
-def difference(model: Model, q0: ArrayLike, q1: ArrayLike) -> _Array:
-    """q₁ ⊖ q₀."""
-    return ours.difference(model.ours, q0, q1)
 
 
 def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float) -> _Array:
@@ -133,36 +143,6 @@ def aba(
     return out
 
 
-def crba(model: Model, data: Data, q: ArrayLike) -> _Array:
-    """M, both triangles, also data.M."""
-    data.M = M = ours.crba(model.ours, data._ours, q)
-    return M
-
-
-def computeMinverse(model: Model, data: Data, q: ArrayLike) -> _Array:
-    """M⁻¹, also data.Minv."""
-    data.Minv = Minv = ours.minv(model.ours, data._ours, q)
-    return Minv
-
-
-def nonLinearEffects(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
-    """C v + g, also data.nle."""
-    data.nle = nle = ours.nonlinear_effects(model.ours, data._ours, q, v)
-    return nle
-
-
-def computeGeneralizedGravity(model: Model, data: Data, q: ArrayLike) -> _Array:
-    """g, also data.g."""
-    data.g = g = ours.gravity(model.ours, data._ours, q)
-    return g
-
-
-def computeCoriolisMatrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
-    """C with C v + g = h and Ṁ − 2 C skew-symmetric, also data.C."""
-    data.C = C = ours.coriolis_matrix(model.ours, data._ours, q, v)
-    return C
-
-
 def computeRNEADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
@@ -188,65 +168,6 @@ def computeABADerivatives(
     return d[1:]
 
 
-def forwardKinematics(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
-) -> None:
-    """data.oMi; with v and a also data.v and data.a, in the bodies' frames."""
-    data._poses = ours.forward_kinematics(model.ours, data._ours, q)
-    data._q = q.copy() if isinstance(q, np.ndarray) else np.array(q, float)
-    data._v = model._still if v is None else np.array(v, float).ravel()
-    data._a = model._still if a is None else np.array(a, float).ravel()
-
-
-def updateFramePlacements(model: Model, data: Data) -> None:
-    """data.oMf of the last forwardKinematics."""
-    data._frame_poses = data._poses
-
-
-def framesForwardKinematics(model: Model, data: Data, q: ArrayLike) -> None:
-    """data.oMi and data.oMf."""
-    data._poses = data._frame_poses = ours.forward_kinematics(model.ours, data._ours, q)
-    data._q = q.copy() if isinstance(q, np.ndarray) else np.array(q, float)
-    data._v = data._a = model._still
-
-
-def getVelocity(model: Model, data: Data, joint: int, frame: ReferenceFrame = LOCAL) -> Motion:
-    """The velocity of a joint's body at the last forwardKinematics."""
-    return Motion._of(ours.body_velocity(model.ours, data._ours, data._q, data._v, joint, frame._value_))
-
-
-def getAcceleration(model: Model, data: Data, joint: int, frame: ReferenceFrame = LOCAL) -> Motion:
-    """The spatial acceleration of a joint's body at the last forwardKinematics."""
-    return Motion._of(ours.body_acceleration(model.ours, data._ours, data._q, data._v, data._a, joint, frame._value_))
-
-
-def getClassicalAcceleration(model: Model, data: Data, joint: int, frame: ReferenceFrame = LOCAL) -> Motion:
-    """r̈ and ω̇ of a joint's body at the last forwardKinematics."""
-    return Motion._of(
-        ours.body_classical_acceleration(model.ours, data._ours, data._q, data._v, data._a, joint, frame._value_)
-    )
-
-
-def getFrameVelocity(model: Model, data: Data, frame_id: int, frame: ReferenceFrame = LOCAL) -> Motion:
-    """The velocity of a frame at the last forwardKinematics."""
-    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
-    return Motion._of(ours.frame_velocity(model.ours, data._ours, data._q, data._v, at, frame._value_))
-
-
-def getFrameAcceleration(model: Model, data: Data, frame_id: int, frame: ReferenceFrame = LOCAL) -> Motion:
-    """The spatial acceleration of a frame at the last forwardKinematics."""
-    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
-    return Motion._of(ours.frame_acceleration(model.ours, data._ours, data._q, data._v, data._a, at, frame._value_))
-
-
-def getFrameClassicalAcceleration(model: Model, data: Data, frame_id: int, frame: ReferenceFrame = LOCAL) -> Motion:
-    """r̈ and ω̇ of a frame at the last forwardKinematics."""
-    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
-    return Motion._of(
-        ours.frame_classical_acceleration(model.ours, data._ours, data._q, data._v, data._a, at, frame._value_)
-    )
-
-
 def computeForwardKinematicsDerivatives(model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> None:
     """What getJointVelocityDerivatives and its like then read."""
     forwardKinematics(model, data, q, v, a)
@@ -254,8 +175,9 @@ def computeForwardKinematicsDerivatives(model: Model, data: Data, q: ArrayLike, 
 
 def getJointVelocityDerivatives(model: Model, data: Data, joint: int, frame: ReferenceFrame) -> tuple[_Array, _Array]:
     """∂v/∂q and ∂v/∂q̇ of a joint's body, (6, nv); in LOCAL_WORLD_ALIGNED at a place that stays."""
-    dv_dq = ours.body_velocity_derivative(model.ours, data._ours, data._q, data._v, joint, frame._value_)
-    J = ours.body_jacobian(model.ours, data._ours, data._q, joint, frame._value_)
+    q, v, _ = data._state
+    dv_dq = ours.body_velocity_derivative(model.ours, data._ours, q, v, joint, frame._value_)
+    J = getJointJacobian(model, data, joint, frame)
     return _at_rest(dv_dq, getVelocity(model, data, joint, frame), J, frame), J
 
 
@@ -271,8 +193,7 @@ def getJointAccelerationDerivatives(
 ) -> tuple[_Array, _Array, _Array, _Array]:
     """∂v/∂q, and ∂a/∂q, ∂a/∂q̇, ∂a/∂q̈ of a joint's body, (6, nv)."""
     dv_dq, da_da = getJointVelocityDerivatives(model, data, joint, frame)
-    state = (model.ours, data._ours, data._q, data._v, data._a)
-    da_dq, da_dv = ours.body_acceleration_derivatives(*state, joint, frame._value_)
+    da_dq, da_dv = ours.body_acceleration_derivatives(model.ours, data._ours, *data._state, joint, frame._value_)
     return dv_dq, _at_rest(da_dq, getAcceleration(model, data, joint, frame), da_da, frame), da_dv, da_da
 
 
@@ -281,60 +202,17 @@ def computeJointJacobians(model: Model, data: Data, q: ArrayLike) -> None:
     forwardKinematics(model, data, q)
 
 
-def getJointJacobian(model: Model, data: Data, joint: int, frame: ReferenceFrame) -> _Array:
-    """The Jacobian of a joint's body at the last computeJointJacobians, (6, nv)."""
-    return ours.body_jacobian(model.ours, data._ours, data._q, joint, frame._value_)
-
-
-def getFrameJacobian(model: Model, data: Data, frame_id: int, frame: ReferenceFrame) -> _Array:
-    """The Jacobian of a frame at the last computeJointJacobians, (6, nv)."""
-    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
-    return ours.frame_jacobian(model.ours, data._ours, data._q, at, frame._value_)
-
-
 def computeJointJacobian(model: Model, data: Data, q: ArrayLike, joint: int) -> _Array:
     """The Jacobian of a joint's body in its own frame, (6, nv)."""
     return ours.body_jacobian(model.ours, data._ours, q, joint, "local")
 
 
-def computeFrameJacobian(
-    model: Model, data: Data, q: ArrayLike, frame_id: int, frame: ReferenceFrame = LOCAL
-) -> _Array:
-    """The Jacobian of a frame, (6, nv)."""
-    at = frame_id - 1 if 0 < frame_id < model.nframes else _unknown(model, frame_id)
-    return ours.frame_jacobian(model.ours, data._ours, q, at, frame._value_)
-
-
-def centerOfMass(
-    model: Model, data: Data, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
-) -> _Array:
-    """c, also data.com[0]; with v and a also data.vcom[0] and data.acom[0]."""
-    com = ours.com(model.ours, data._ours, q)
-    data.com = [com]
-    if v is not None:
-        data.vcom = [ours.com_velocity(model.ours, data._ours, q, v)]
-        if a is not None:
-            data.acom = [ours.com_acceleration(model.ours, data._ours, q, v, a)]
-    return com
-
-
-def jacobianCenterOfMass(model: Model, data: Data, q: ArrayLike) -> _Array:
-    """∂c/∂q, (3, nv), also data.Jcom."""
-    data.Jcom = Jcom = ours.com_jacobian(model.ours, data._ours, q)
-    return Jcom
-
-
 def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
     """Ag, (6, nv), also data.Ag; data.hg and data.com."""
     Ag, _, com, data.Jcom = ours.centroidal_map(model.ours, data._ours, q)
-    data.Ag, data.hg, data.com = Ag, Force._of(Ag @ np.asarray(v, float)), [com]
+    data.Ag = Ag
+    data._leave(com, Force._of(Ag @ np.asarray(v, float)))
     return Ag
-
-
-def computeCentroidalMomentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> Force:
-    """hg, also data.hg."""
-    data.hg = hg = Force._of(ours.centroidal_momentum(model.ours, data._ours, q, v))
-    return hg
 
 
 def computeKineticEnergy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
@@ -366,10 +244,6 @@ def dDifference(model: Model, q0: ArrayLike, q1: ArrayLike) -> tuple[_Array, _Ar
 
 
 nle = nonLinearEffects
-
-
-def _unknown(model: Model, frame_id: int) -> NoReturn:
-    raise ValueError(f"frame_id: expected 1 to {model.nframes - 1}, found {frame_id}; universe does not move")
 
 
 def __getattr__(name: str) -> Any:

@@ -198,11 +198,11 @@ fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
     Ok(py.import("condyle._types")?.getattr(class)?.cast_into()?)
 }
 
-/// The number of states of a part, at most: the three matrices nv × nv of each are in a processor's own cache, of a megabyte,
-/// when they are written to the caller's arrays; a part takes some hundred microseconds. Each thread has two registers
+/// The number of states of a part, at most: the three matrices nv × nv of each are in half of a processor's own cache, of a
+/// megabyte, when they are written to the caller's arrays; a part takes some fifty microseconds. Each thread has two registers
 /// full at least.
 pub(crate) fn part_size(nv: usize, threads: usize) -> usize {
-    const NUMBERS: usize = 1 << 15;
+    const NUMBERS: usize = 1 << 14;
     (NUMBERS / (nv * nv).max(64)).next_multiple_of(16).max(16) * threads
 }
 

@@ -40,7 +40,7 @@ pub(crate) struct Data {
 impl Data {
     #[new]
     #[pyo3(signature = (model, threads = 1))]
-    fn new(model: &Bound<'_, Model>, threads: usize) -> PyResult<Self> {
+    pub(crate) fn new(model: &Bound<'_, Model>, threads: usize) -> PyResult<Self> {
         within("threads", threads, 1, condyle::Batch::<f64>::MOST_THREADS)?;
         let model = model.get();
         let (inner, made_for) = (condyle::Data::new(&model.inner), MadeFor::new(model));

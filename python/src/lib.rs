@@ -8,6 +8,7 @@
 //! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
 //!   `regressors`, `simulation`: the library's functions and types, one to one;
+//! - `spelling`: Pinocchio's functions, for the module `condyle.pinocchio`;
 //! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
 //! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
 //!
@@ -41,6 +42,7 @@ mod regressors;
 mod robots;
 mod signals;
 mod simulation;
+mod spelling;
 mod tree;
 mod wholebody;
 
@@ -122,6 +124,15 @@ mod _condyle {
     use robots::{arm7, humanoid, quadruped};
     #[pymodule_export]
     use simulation::Simulation;
+    #[pymodule_export]
+    use spelling::{
+        SpelledData, SpelledModel, centerOfMass, computeCentroidalMomentum, computeCoriolisMatrix,
+        computeFrameJacobian, computeGeneralizedGravity, computeMinverse, crba as spelled_crba,
+        difference as spelled_difference, forwardKinematics, framesForwardKinematics, getAcceleration,
+        getClassicalAcceleration, getFrameAcceleration, getFrameClassicalAcceleration, getFrameJacobian,
+        getFrameVelocity, getJointJacobian, getVelocity, integrate as spelled_integrate, jacobianCenterOfMass,
+        nonLinearEffects, updateFramePlacements,
+    };
     #[pymodule_export]
     use wholebody::{FrictionContact, Plan, Task, WholeBodyController};
 

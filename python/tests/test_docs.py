@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import condyle
+import condyle.pinocchio
 from condyle import _condyle
 
 README = Path(__file__).parents[1] / "README.md"
@@ -60,5 +61,5 @@ def test_stubs_are_up_to_date() -> None:
 def test_version_and_names() -> None:
     assert condyle.__version__ == _condyle.__version__
     modules = [getattr(condyle, name) for name in condyle.__all__ if inspect.ismodule(getattr(condyle, name))]
-    public = {name for module in (condyle, *modules) for name in module.__all__}
+    public = {name for module in (condyle, *modules) for name in module.__all__} | vars(condyle.pinocchio).keys()
     assert {name for name in _condyle.__all__ if not name.startswith("_")} <= public

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle import _condyle, _inertia, _types
+from condyle import _condyle, _inertia, _spelling, _types
 from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, FrictionCone, Outcome, Problem, Residual, Solution
 from condyle.simulation import Simulation
 
@@ -37,6 +37,12 @@ ARGUMENTS = {
     "pi": condyle.inertial_parameters.from_inertia(INERTIA),
     "theta": np.zeros(10),
 }
+# An argument of each type of `condyle.pinocchio`.
+SPELLED = {"_SpelledModel": _spelling.Model(ARM), "_SpelledData": _spelling.Model(ARM).createData()}
+SPELLED |= {"ReferenceFrame": _spelling.ReferenceFrame.WORLD, "str | int": "joint3", "int": 1}
+_condyle.framesForwardKinematics(SPELLED["_SpelledModel"], SPELLED["_SpelledData"], Q)
+_condyle.computeCentroidalMomentum(SPELLED["_SpelledModel"], SPELLED["_SpelledData"], Q, V)
+_condyle.centerOfMass(SPELLED["_SpelledModel"], SPELLED["_SpelledData"], Q)
 WORDS = {"integrate_jacobian": "position", "difference_jacobian": "from"}
 
 
@@ -57,12 +63,15 @@ OBJECTS = {
     "HyperDual": condyle.HyperDual(1.0),
     "Simulation": Simulation(ARM),
     "Problem": PROBLEM,
+    "_SpelledModel": SPELLED["_SpelledModel"],
+    "_SpelledData": SPELLED["_SpelledData"],
 }
 
 
 def namespace() -> dict[str, Any]:
     """The names that the types in the stubs are made of."""
     names: dict[str, Any] = {"np": np, "typing": typing} | vars(_types) | vars(_inertia) | vars(_condyle)
+    names |= {name: getattr(_spelling, name) for name in ("Motion", "Force", "ReferenceFrame")}
     for node in STUB.body:
         if isinstance(node, ast.ImportFrom) and node.module in ("typing", "collections.abc", "numpy.typing"):
             exec(ast.unparse(node), names)
@@ -103,7 +112,11 @@ def results() -> Iterator[Any]:
     for node in STUB.body:
         if isinstance(node, ast.FunctionDef) and node.returns and not node.name.startswith("_"):
             wanted = node.args.args[: len(node.args.args) - len(node.args.defaults)]
-            given = [WORDS[node.name] if a.arg == "argument" else ARGUMENTS[a.arg] for a in wanted]
+            kinds = SPELLED if "_SpelledModel" in ast.unparse(node.args) else {}
+            given = [
+                WORDS[node.name] if a.arg == "argument" else kinds.get(ast.unparse(a.annotation), ARGUMENTS.get(a.arg))
+                for a in wanted
+            ]
             yield pytest.param(getattr(_condyle, node.name)(*given), node.returns, id=node.name)
         if not isinstance(node, ast.ClassDef) or node.name not in OBJECTS:
             continue

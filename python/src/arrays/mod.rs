@@ -38,7 +38,7 @@ pub(crate) trait Number: Scalar {
     ) -> PyResult<Self::Input<'py, D>>;
     /// Reads a number.
     fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
-    /// Gives an array in C order, the caller's or a new one, when it is filled.
+    /// Gives an array in C order, the caller's or a new one, when it is filled; `fill` sets all of its numbers.
     fn output<'py>(
         py: Python<'py>,
         out: Option<&Bound<'py, PyAny>>,
@@ -70,7 +70,7 @@ impl Number for f64 {
         shape: &[usize],
         fill: impl FnOnce(&mut [Self]),
     ) -> PyResult<Bound<'py, PyAny>> {
-        output(py, out, shape, fill)
+        output::set(py, out, shape, fill)
     }
     fn new_vector<'py>(py: Python<'py>, numbers: &[Self]) -> Option<Bound<'py, PyAny>> {
         Some(PyArray1::from_slice(py, numbers).into_any())

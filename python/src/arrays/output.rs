@@ -12,7 +12,7 @@ use pyo3::types::{PyFloat, PyTuple, PyType};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Fills an array in C order, the caller's or a new one, and returns it.
+/// Fills an array in C order, the caller's or a new one of zeros, and returns it.
 pub(crate) fn output<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -25,18 +25,42 @@ pub(crate) fn output<'py>(
             fill(writable(&array)?.as_slice_mut()?);
             Ok(out.clone())
         }
-        None => {
-            // SAFETY: nobody else has the array yet, which has as many numbers, one after the other.
-            #[allow(unsafe_code)]
-            let numbers = unsafe { core::slice::from_raw_parts_mut(array.data(), shape.iter().product()) };
-            fill(numbers);
-            Ok(array.into_any())
-        }
+        None => Ok(filled(array, fill)),
     }
+}
+
+/// Fills an array in C order, the caller's or a new one, all of whose numbers `fill` sets, and returns it.
+pub(super) fn set<'py>(
+    py: Python<'py>,
+    out: Option<&Bound<'py, PyAny>>,
+    shape: &[usize],
+    fill: impl FnOnce(&mut [f64]),
+) -> PyResult<Bound<'py, PyAny>> {
+    if out.is_some() || !is_small(shape) {
+        return output(py, out, shape, fill);
+    }
+    // SAFETY: whatever is in the memory that NumPy got is a double, and all are set before anybody sees them.
+    #[allow(unsafe_code)]
+    let array = unsafe { PyArray::<f64, _>::new(py, shape, false) };
+    Ok(filled(array, fill))
+}
+
+/// Fills a new array in C order, and returns it.
+fn filled<'py>(array: Bound<'py, PyArrayDyn<f64>>, fill: impl FnOnce(&mut [f64])) -> Bound<'py, PyAny> {
+    // SAFETY: nobody else has the array yet, which has as many numbers, one after the other.
+    #[allow(unsafe_code)]
+    let numbers = unsafe { core::slice::from_raw_parts_mut(array.data(), array.len()) };
+    fill(numbers);
+    array.into_any()
 }
 
 /// So many numbers and more are asked of NumPy in a way that can fail.
 const LARGE: usize = 1 << 24;
+
+/// Whether an array of this shape is so small that it can be had.
+fn is_small(shape: &[usize]) -> bool {
+    shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE)
+}
 
 /// An array in C order to be filled: the caller's, if it has the shape, or a new one.
 pub(crate) fn place<'py>(
@@ -45,7 +69,7 @@ pub(crate) fn place<'py>(
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let Some(out) = out else {
-        if shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE) {
+        if is_small(shape) {
             return Ok(PyArray::<f64, _>::zeros(py, shape, false));
         }
         return Ok(py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?.cast_into()?); // or a `MemoryError`

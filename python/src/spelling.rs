@@ -1,0 +1,405 @@
+//! What `condyle.pinocchio` calls most: Pinocchio's functions that read what the last one has left in `data`.
+//!
+//! They stand here, and not in Python, because a call of a small robot takes less time than a function written in Python adds.
+//! The classes of that module derive from those here.
+
+use crate::algorithms;
+use crate::arrays::{Computed, Give, Number, at_once, class};
+use crate::centroidal::{centroidal_momentum, com, com_acceleration, com_jacobian, com_velocity};
+use crate::configuration;
+use crate::data::{Data, Holds, take};
+use crate::exceptions::wrong_word;
+use crate::kinematics::{forward_kinematics, frame_jacobian};
+use crate::model::{Model, body_index};
+use condyle::ReferenceFrame;
+use numpy::Ix1;
+use pyo3::exceptions::{PyAttributeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+use pyo3::{ffi, intern};
+
+/// A `condyle.Model` under another spelling.
+#[pyclass(name = "_SpelledModel", module = "condyle.pinocchio", frozen, subclass)]
+pub(crate) struct SpelledModel {
+    /// The `condyle.Model`.
+    #[pyo3(get)]
+    ours: Py<Model>,
+}
+
+#[pymethods]
+impl SpelledModel {
+    #[new]
+    fn new(model: Py<Model>) -> Self {
+        Self { ours: model }
+    }
+}
+
+/// The scratch of a model under another spelling, and the state that the functions of a joint or a frame are for.
+#[pyclass(name = "_SpelledData", module = "condyle.pinocchio", subclass)]
+pub(crate) struct SpelledData {
+    ours: Py<Data>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    a: Vec<f64>,
+    /// How many of q, v and a the last `forwardKinematics` was given.
+    given: usize,
+    poses: Option<Py<PyAny>>,
+    frame_poses: Option<Py<PyAny>>,
+    com: Option<Py<PyAny>>,
+    hg: Option<Py<PyAny>>,
+}
+
+#[pymethods]
+impl SpelledData {
+    #[new]
+    fn new(model: &Bound<'_, SpelledModel>) -> PyResult<Self> {
+        let (py, model) = (model.py(), &model.get().ours);
+        let [nq, nv] = [model.get().inner.nq(), model.get().inner.nv()];
+        let ours = Py::new(py, Data::new(model.bind(py), 1)?)?;
+        let zero = |n| vec![0.0; n];
+        let (q, v, a) = (zero(nq), zero(nv), zero(nv));
+        Ok(Self { ours, q, v, a, given: 0, poses: None, frame_poses: None, com: None, hg: None })
+    }
+
+    /// The `condyle.Data`.
+    #[getter]
+    fn _ours<'py>(&self, py: Python<'py>) -> Bound<'py, Data> {
+        self.ours.bind(py).clone()
+    }
+
+    /// q, v and a of the last `forwardKinematics`, with zeros for what it was not given.
+    #[getter]
+    fn _state<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        Ok((self.q.give(py, None)?, self.v.give(py, None)?, self.a.give(py, None)?))
+    }
+
+    /// How many of q, v and a the last `forwardKinematics` was given.
+    #[getter]
+    fn _given(&self) -> usize {
+        self.given
+    }
+
+    /// The poses of the bodies at the last `forwardKinematics`, (njoints, 4, 4).
+    #[getter]
+    fn _poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        made(py, &self.poses)
+    }
+
+    /// The poses of the bodies that frames are seen at: those of the last `updateFramePlacements`, (njoints, 4, 4).
+    #[getter]
+    fn _frame_poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        made(py, &self.frame_poses)
+    }
+
+    /// The centre of mass, in a list.
+    #[getter]
+    fn com<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 1]> {
+        Ok([made(py, &self.com)?])
+    }
+
+    /// The centroidal momentum.
+    #[getter]
+    fn hg<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        made(py, &self.hg)
+    }
+
+    /// Leaves a centre of mass and a centroidal momentum here.
+    fn _leave(&mut self, com: Py<PyAny>, hg: Py<PyAny>) {
+        (self.com, self.hg) = (Some(com), Some(hg));
+    }
+}
+
+/// What a function has left, or an `AttributeError`.
+fn made<'py>(py: Python<'py>, what: &Option<Py<PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+    what.as_ref().map(|what| what.bind(py).clone()).ok_or_else(|| PyAttributeError::new_err(()))
+}
+
+/// Copies a vector, or a column, of numbers.
+fn copy(name: &str, given: &Bound<'_, PyAny>, to: &mut [f64]) -> PyResult<()> {
+    if let Some(numbers) = at_once::<Ix1>(given, &[to.len()]) {
+        to.copy_from_slice(&numbers);
+        return Ok(());
+    }
+    let flat = given.py().import("numpy")?.call_method1("ravel", (given,))?;
+    to.copy_from_slice(&f64::read::<Ix1>(name, &flat, &[to.len()])?);
+    Ok(())
+}
+
+/// The axes and the origin that a `ReferenceFrame` names.
+fn reference(frame: Option<&Bound<'_, PyAny>>) -> PyResult<ReferenceFrame> {
+    use ReferenceFrame::{Local, LocalWorldAligned, World};
+    static NAMED: PyOnceLock<[(Py<PyAny>, ReferenceFrame); 3]> = PyOnceLock::new();
+    let Some(frame) = frame else { return Ok(Local) };
+    let py = frame.py();
+    let named = NAMED.get_or_try_init(py, || {
+        let class = py.import("condyle._spelling")?.getattr("ReferenceFrame")?;
+        let one = |name, reference| PyResult::Ok((class.getattr(name)?.unbind(), reference));
+        PyResult::Ok([one("LOCAL", Local)?, one("WORLD", World)?, one("LOCAL_WORLD_ALIGNED", LocalWorldAligned)?])
+    })?;
+    match named.iter().find(|(name, _)| frame.is(name)) {
+        Some((_, reference)) => Ok(*reference),
+        None => Err(wrong_word("frame", "LOCAL, WORLD or LOCAL_WORLD_ALIGNED", &frame.repr()?.to_string())),
+    }
+}
+
+/// The number of a frame in a model of ours, which does not count the world.
+fn frame_number(model: &condyle::Model, frame_id: isize) -> PyResult<usize> {
+    let frames = model.frames().len();
+    usize::try_from(frame_id - 1).ok().filter(|frame| *frame < frames).ok_or_else(|| {
+        PyValueError::new_err(format!("frame_id: expected 1 to {frames}, found {frame_id}; universe does not move"))
+    })
+}
+
+/// The number of a joint's body.
+fn joint_number(model: &condyle::Model, joint: &Bound<'_, PyAny>) -> PyResult<usize> {
+    body_index("joint: expected a joint's name", model, joint, 0)
+}
+
+/// Six numbers as a `Motion` or a `Force`, without a call of what is written in Python.
+#[allow(unsafe_code)]
+fn spatial<'py>(class: &Bound<'py, PyType>, numbers: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let (py, none) = (class.py(), std::ptr::null_mut());
+    // SAFETY: the class is one of Python's making that derives from `object`, whose `__new__` this is.
+    let six = unsafe { Bound::from_owned_ptr_or_err(py, ffi::PyType_GenericNew(class.as_type_ptr(), none, none)) }?;
+    six.setattr(intern!(py, "vector"), numbers)?;
+    Ok(six)
+}
+
+/// data.oMi; with v and a also data.v and data.a, in the bodies' frames.
+#[pyfunction]
+#[pyo3(signature = (model, data, q, v=None, a=None))]
+pub(crate) fn forwardKinematics(
+    model: &Bound<'_, SpelledModel>,
+    data: &Bound<'_, SpelledData>,
+    q: &Bound<'_, PyAny>,
+    v: Option<&Bound<'_, PyAny>>,
+    a: Option<&Bound<'_, PyAny>>,
+) -> PyResult<()> {
+    let (py, mut data) = (model.py(), data.try_borrow_mut()?);
+    let poses = forward_kinematics(model.get().ours.bind(py), data.ours.bind(py), q, None)?;
+    let SpelledData { q: kept_q, v: kept_v, a: kept_a, .. } = &mut *data;
+    copy("q", q, kept_q)?;
+    for (name, given, kept) in [("v", v, kept_v), ("a", a, kept_a)] {
+        match given {
+            Some(given) => copy(name, given, kept)?,
+            None => kept.fill(0.0),
+        }
+    }
+    data.given = if a.is_some() { 3 } else { 1 + usize::from(v.is_some()) };
+    data.poses = Some(poses.unbind());
+    Ok(())
+}
+
+/// data.oMf of the last forwardKinematics.
+#[pyfunction]
+pub(crate) fn updateFramePlacements(model: &Bound<'_, SpelledModel>, data: &Bound<'_, SpelledData>) -> PyResult<()> {
+    let mut data = data.try_borrow_mut()?;
+    data.frame_poses = data.poses.as_ref().map(|poses| poses.clone_ref(model.py()));
+    Ok(())
+}
+
+/// data.oMi and data.oMf.
+#[pyfunction]
+pub(crate) fn framesForwardKinematics(
+    model: &Bound<'_, SpelledModel>,
+    data: &Bound<'_, SpelledData>,
+    q: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    forwardKinematics(model, data, q, None, None)?;
+    updateFramePlacements(model, data)
+}
+
+/// Functions that give a motion of a joint's body or of a frame at the last forwardKinematics.
+macro_rules! motions {
+    ($($(#[$doc:meta])* $name:ident($of:ident: $Of:ty, $number:ident): $method:ident of $pass:ident($($kept:ident),*);)*) => {$(
+        $(#[$doc])*
+        #[pyfunction]
+        #[pyo3(signature = (model, data, $of, frame=None))]
+        pub(crate) fn $name<'py>(
+            model: &Bound<'py, SpelledModel>,
+            data: &Bound<'py, SpelledData>,
+            $of: $Of,
+            frame: Option<&Bound<'py, PyAny>>,
+        ) -> PyResult<Bound<'py, PyAny>> {
+            let (py, data, robot) = (model.py(), data.try_borrow()?, model.get().ours.get());
+            let (number, reference) = ($number(&robot.inner, $of)?, reference(frame)?);
+            let mut scratch = take(robot, data.ours.bind(py))?;
+            let scratch = Holds::<f64>::held(&mut *scratch, &robot.inner)?;
+            let motion = condyle::$pass(&robot.inner, scratch, $(&data.$kept),*).$method(number, reference);
+            spatial(class!(py, "condyle._spelling", "Motion")?, &motion.give(py, None)?)
+        }
+    )*};
+}
+motions! {
+    /// The velocity of a joint's body at the last forwardKinematics.
+    getVelocity(joint: &Bound<'py, PyAny>, joint_number): body_velocity of forward_velocities(q, v);
+    /// The spatial acceleration of a joint's body at the last forwardKinematics.
+    getAcceleration(joint: &Bound<'py, PyAny>, joint_number): body_acceleration of forward_accelerations(q, v, a);
+    /// r̈ and ω̇ of a joint's body at the last forwardKinematics.
+    getClassicalAcceleration(joint: &Bound<'py, PyAny>, joint_number):
+        body_classical_acceleration of forward_accelerations(q, v, a);
+    /// The velocity of a frame at the last forwardKinematics.
+    getFrameVelocity(frame_id: isize, frame_number): frame_velocity of forward_velocities(q, v);
+    /// The spatial acceleration of a frame at the last forwardKinematics.
+    getFrameAcceleration(frame_id: isize, frame_number): frame_acceleration of forward_accelerations(q, v, a);
+    /// r̈ and ω̇ of a frame at the last forwardKinematics.
+    getFrameClassicalAcceleration(frame_id: isize, frame_number):
+        frame_classical_acceleration of forward_accelerations(q, v, a);
+}
+
+/// The robot, and what is kept of its state.
+fn of<'a, 'py>(
+    model: &'a Bound<'py, SpelledModel>,
+    data: &'a Bound<'py, SpelledData>,
+) -> PyResult<(PyRef<'py, SpelledData>, &'a condyle::Model)> {
+    let (data, robot) = (data.try_borrow()?, model.get().ours.get());
+    take(robot, data.ours.bind(model.py()))?; // of this robot, or it raises
+    Ok((data, &robot.inner))
+}
+
+/// The Jacobian of a joint's body at the last computeJointJacobians, (6, nv).
+#[pyfunction]
+pub(crate) fn getJointJacobian<'py>(
+    model: &Bound<'py, SpelledModel>,
+    data: &Bound<'py, SpelledData>,
+    joint: &Bound<'py, PyAny>,
+    frame: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (data, robot) = of(model, data)?;
+    let (joint, reference) = (joint_number(robot, joint)?, reference(Some(frame))?);
+    let fill = |J: &mut [f64]| condyle::body_jacobian_strided(robot, &data.q, joint, reference, J, [robot.nv(), 1]);
+    Computed::new([6, robot.nv()], fill).give(model.py(), None)
+}
+
+/// The Jacobian of a frame at the last computeJointJacobians, (6, nv).
+#[pyfunction]
+pub(crate) fn getFrameJacobian<'py>(
+    model: &Bound<'py, SpelledModel>,
+    data: &Bound<'py, SpelledData>,
+    frame_id: isize,
+    frame: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (data, robot) = of(model, data)?;
+    let (number, reference) = (frame_number(robot, frame_id)?, reference(Some(frame))?);
+    let fill = |J: &mut [f64]| condyle::frame_jacobian_strided(robot, &data.q, number, reference, J, [robot.nv(), 1]);
+    Computed::new([6, robot.nv()], fill).give(model.py(), None)
+}
+
+/// The Jacobian of a frame, (6, nv).
+#[pyfunction]
+#[pyo3(signature = (model, data, q, frame_id, frame=None))]
+pub(crate) fn computeFrameJacobian<'py>(
+    model: &Bound<'py, SpelledModel>,
+    data: &Bound<'py, SpelledData>,
+    q: &Bound<'py, PyAny>,
+    frame_id: isize,
+    frame: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, ours) = (model.py(), &model.get().ours);
+    let number = frame_number(&ours.get().inner, frame_id)?.into_pyobject(py)?.into_any();
+    let word = match reference(frame)? {
+        ReferenceFrame::Local => "local",
+        ReferenceFrame::World => "world",
+        ReferenceFrame::LocalWorldAligned => "local_world_aligned",
+    };
+    frame_jacobian(ours.bind(py), data.try_borrow()?.ours.bind(py), q, &number, word, None)
+}
+
+/// c, also data.com[0]; with v and a also data.vcom[0] and data.acom[0].
+#[pyfunction]
+#[pyo3(signature = (model, data, q, v=None, a=None))]
+pub(crate) fn centerOfMass<'py>(
+    model: &Bound<'py, SpelledModel>,
+    data: &Bound<'py, SpelledData>,
+    q: &Bound<'py, PyAny>,
+    v: Option<&Bound<'py, PyAny>>,
+    a: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, ours) = (model.py(), model.get().ours.bind(model.py()));
+    let mut kept = data.try_borrow_mut()?;
+    let center = com(ours, kept.ours.bind(py), q, None)?;
+    kept.com = Some(center.clone().unbind());
+    if let Some(v) = v {
+        data.setattr("vcom", [com_velocity(ours, kept.ours.bind(py), q, v, None)?])?;
+        if let Some(a) = a {
+            data.setattr("acom", [com_acceleration(ours, kept.ours.bind(py), q, v, a, None)?])?;
+        }
+    }
+    Ok(center)
+}
+
+/// hg, also data.hg.
+#[pyfunction]
+pub(crate) fn computeCentroidalMomentum<'py>(
+    model: &Bound<'py, SpelledModel>,
+    data: &Bound<'py, SpelledData>,
+    q: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (py, robot, mut data) = (model.py(), model.get().ours.get(), data.try_borrow_mut()?);
+    let at_once = |x, length| at_once::<Ix1>(x, &[length]);
+    let numbers = match (at_once(q, robot.inner.nq()), at_once(v, robot.inner.nv())) {
+        (Some(q), Some(v)) => {
+            let mut scratch = take(robot, data.ours.bind(py))?;
+            let scratch = Holds::<f64>::held(&mut *scratch, &robot.inner)?;
+            condyle::forward_velocities(&robot.inner, scratch, &q, &v).centroidal_momentum().give(py, None)?
+        }
+        _ => centroidal_momentum(model.get().ours.bind(py), data.ours.bind(py), q, v, None)?,
+    };
+    let hg = spatial(class!(py, "condyle._spelling", "Force")?, &numbers)?;
+    data.hg = Some(hg.clone().unbind());
+    Ok(hg)
+}
+
+/// Functions whose result is also left in `data`, under a name.
+macro_rules! left {
+    ($($(#[$doc:meta])* $name:literal $function:ident($($arg:ident),*) = $call:path => $left:literal;)*) => {$(
+        $(#[$doc])*
+        #[pyfunction(name = $name)]
+        pub(crate) fn $function<'py>(
+            model: &Bound<'py, SpelledModel>,
+            data: &Bound<'py, SpelledData>,
+            $($arg: &Bound<'py, PyAny>),*
+        ) -> PyResult<Bound<'py, PyAny>> {
+            let py = model.py();
+            let result = $call(model.get().ours.bind(py), data.try_borrow()?.ours.bind(py), $($arg,)* None)?;
+            data.setattr(intern!(py, $left), &result)?;
+            Ok(result)
+        }
+    )*};
+}
+left! {
+    /// M, both triangles, also data.M.
+    "_spelled_crba" crba(q) = algorithms::crba => "M";
+    /// M⁻¹, also data.Minv.
+    "computeMinverse" computeMinverse(q) = algorithms::minv => "Minv";
+    /// C v + g, also data.nle.
+    "nonLinearEffects" nonLinearEffects(q, v) = algorithms::nonlinear_effects => "nle";
+    /// g, also data.g.
+    "computeGeneralizedGravity" computeGeneralizedGravity(q) = algorithms::gravity => "g";
+    /// C with C v + g = h and Ṁ − 2 C skew-symmetric, also data.C.
+    "computeCoriolisMatrix" computeCoriolisMatrix(q, v) = algorithms::coriolis_matrix => "C";
+    /// ∂c/∂q, (3, nv), also data.Jcom.
+    "jacobianCenterOfMass" jacobianCenterOfMass(q) = com_jacobian => "Jcom";
+}
+
+/// q ⊕ v.
+#[pyfunction(name = "_spelled_integrate")]
+pub(crate) fn integrate<'py>(
+    model: &Bound<'py, SpelledModel>,
+    q: &Bound<'py, PyAny>,
+    v: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    configuration::integrate(model.get().ours.bind(model.py()), q, v, None)
+}
+
+/// q₁ ⊖ q₀.
+#[pyfunction(name = "_spelled_difference")]
+pub(crate) fn difference<'py>(
+    model: &Bound<'py, SpelledModel>,
+    q0: &Bound<'py, PyAny>,
+    q1: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    configuration::difference(model.get().ours.bind(model.py()), q0, q1, None)
+}
