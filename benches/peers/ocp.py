@@ -7,8 +7,10 @@ Each problem is built in both libraries from the same JSON: problems of a folder
 else those that `ocp_problems.py` makes. Compared are the costs of all iterations (to 1e-6 of each), their step lengths
 and regularisations, and the optimum; the stopping value, which loses its digits near the optimum, is only shown. Both
 are timed in turn, round after round, on one core, each right after the same solve not timed, as in a loop of control
-that solves again and again: figures are medians of milliseconds in an iteration, for the whole
-solve and for its phases. Needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment, which `./test` makes.
+that solves again and again: figures are medians of milliseconds in an iteration, for the whole solve and for its
+phases. With --converted our problem is what `condyle.crocoddyl` makes of Crocoddyl's, and it is timed beside ours as it
+is built from the JSON, in place of Crocoddyl. Needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment, which
+`./test` makes.
 """
 
 import argparse
@@ -22,6 +24,7 @@ from pathlib import Path
 os.environ["OMP_NUM_THREADS"] = "1"  # before Crocoddyl is loaded: several threads wait for each other on one core
 
 import numpy as np
+from ocp_converted import Converted
 from ocp_ours import Ours
 from ocp_problems import PROBLEMS
 from ocp_robots import NotRunError
@@ -111,6 +114,19 @@ def time_both(ours, theirs, start, iterations, trials, rounds):
     }
 
 
+def time_converted(converted, built, start, rounds):
+    """Medians over the rounds of milliseconds in a solve, of what was converted and of what was built here."""
+    rows = []
+    for _ in range(rounds):
+        row = []
+        for ours in (converted, built):
+            ours.solve(*start)
+            row.append(1e3 * ours.solve(*start).phases["total"])
+        rows.append(row)
+    a, b = (statistics.median(column) for column in zip(*rows, strict=True))
+    return {"total": {"ours": a, "theirs": b, "ratio": a / b}}
+
+
 def line(result):
     """A result as a line of text."""
     case = f"{result['name']} {result['solver']}"
@@ -128,11 +144,14 @@ def run(spec, robot, solver, options):
     """Compares both solves of a problem, and their times, and prints it; says whether they are the same."""
     show = json.dumps if options.json else line
     try:
-        result, ours, theirs, a, b, start = compare(spec, robot, solver)
+        make = Converted if options.converted else Ours
+        result, ours, theirs, a, b, start = compare(spec, robot, solver, make)
     except NotRunError as missing:
         print(show({"name": spec["name"], "solver": solver, "not_run": str(missing)}), flush=True)
         return True
-    if options.rounds and len(a.rows) == len(b.rows):
+    if options.converted:
+        result["time"] = time_converted(ours, Ours(spec, robot, solver), start, options.rounds)
+    elif options.rounds and len(a.rows) == len(b.rows):
         trials = int(sum(round(-math.log2(step)) + 1 for step in b.rows[:, 1]))
         result["time"] = time_both(ours, theirs, start, len(b.rows), trials, options.rounds)
     print(show(result), flush=True)
@@ -149,6 +168,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--problems", type=Path, help="a folder of problems")
     parser.add_argument("--solver", help="one of fddp, ddp, boxfddp, boxddp; all that a problem names unless given")
+    parser.add_argument("--converted", action="store_true", help="ours is made of Crocoddyl's, and timed beside ours")
     parser.add_argument("--json", action="store_true", help="a line of JSON for each problem")
     parser.add_argument("--trace", action="store_true", help="show the iterations of both")
     parser.add_argument("--rounds", type=int, default=5, help="how often both are timed; 0 for not at all")

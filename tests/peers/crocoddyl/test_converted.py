@@ -18,23 +18,12 @@ import condyle.crocoddyl
 from condyle.optimal import AugmentedLagrangian, Cost, Fddp, FreeDynamics, Limit, Problem, ProblemError, Residual
 
 # isort: split
-from ocp_ours import Ours
+from ocp_converted import Converted
 from ocp_robots import NotRunError
 from ocp_theirs import Theirs
 
 # The same sums in another order, beside the largest number.
 ROUNDING = 1e-11
-
-
-class Converted(Ours):
-    """Our solver on what Crocoddyl has built."""
-
-    strict = True
-
-    def made(self, robot, solver):
-        self.theirs = Theirs(self.spec, robot, solver)
-        bounded = solver.startswith("box")
-        return condyle.crocoddyl.problem(self.theirs.problem, bounded=bounded, strict=self.strict)
 
 
 class Loose(Converted):
