@@ -9,7 +9,7 @@
 ((18, 18), -9.81)
 
 Functions return what Pinocchio's do in Python, and leave it in `data` under the same name, as arrays that no later call
-changes. `model.ours` is the `condyle.Model`, whose functions cost less than this layer and take batches. What differs:
+changes. `model.ours` is the `condyle.Model`, whose functions take batches too. What differs:
 both triangles of M are filled, as in Pinocchio's Python; armature counts in the kinetic energy of all joints; `frames`
 are `universe` and then ours, so frames go by `getFrameId`, not by numbers from elsewhere. Geometry, collisions,
 visualisers, and what else is not here, raise an AttributeError that says so. For code that is written anew use

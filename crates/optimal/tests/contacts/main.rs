@@ -1,8 +1,10 @@
-//! Robots in contact, at impacts, with other drives and integrators: exact derivatives, and what is refused.
+//! Robots in contact, at impacts, and with other drives: exact derivatives, and what is refused.
 #![allow(non_snake_case)] // the names of the literature
 
 mod files;
+mod groups;
 mod implicit;
+mod integrators;
 mod inverse;
 mod limits;
 
@@ -11,9 +13,8 @@ use condyle_dynamics::{
     forward_velocities, integrate, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, ControlPolynomial, Cost, FrameName,
-    FreeAcceleration, FreeDynamics, FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Limit,
-    Residual, WrenchCone,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FrameName, FreeDynamics, FrictionCone,
+    ImpulseDynamics, Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;
@@ -293,107 +294,6 @@ fn inverse_and_forward_dynamics_have_one_optimum() {
 }
 
 #[test]
-fn derivatives_of_integrators_are_those_of_the_action() {
-    let mut rng = StdRng::seed_from_u64(14);
-    let polynomials = [ControlPolynomial::Constant, ControlPolynomial::Linear, ControlPolynomial::Quadratic];
-    let of = |method: Integrator| polynomials.map(|controls| (method, controls));
-    let methods = [Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4];
-    let methods = [methods.map(of).concat(), of(Integrator::SemiImplicitEuler).into()].concat();
-    for model in [robots::arm7(), robots::quadruped()].map(Arc::new) {
-        for &(method, controls) in &methods {
-            let drives = Actuation::joints(&model);
-            let nu = drives.nu();
-            let frame = model.frames().last().unwrap().into();
-            let costs = vec![
-                Cost::new(
-                    "state",
-                    0.3,
-                    Residual::State { reference: random_state(&model, &mut rng) },
-                    Activation::Quadratic,
-                ),
-                Cost::new("effort", 0.1, Residual::Control { reference: vec![0.0; nu] }, Activation::Quadratic),
-                Cost::new(
-                    "place",
-                    0.9,
-                    Residual::FrameTranslation { frame, target: Vec3::new(0.1, 0.2, 0.3) },
-                    Activation::Quadratic,
-                ),
-                Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
-            ];
-            let inner = FreeAcceleration::new(model.clone(), drives, costs).unwrap();
-            let action = FreeDynamics::new(inner, method, DT).unwrap().with_controls(controls);
-            let what = format!("{method:?} of {}, {controls:?}", model.name());
-            check_derivatives(&what, action, &model, 0.3, &mut rng);
-        }
-    }
-}
-
-/// Controls that are the same at all nodes of a polynomial are constant: the step, its cost and its derivatives by them.
-#[test]
-fn equal_controls_of_a_polynomial_are_constant() {
-    let mut rng = StdRng::seed_from_u64(23);
-    let arm = Arc::new(robots::arm7());
-    let costs = || vec![Cost::new("effort", 0.1, Residual::Control { reference: vec![0.5; 7] }, Activation::Quadratic)];
-    for method in
-        [Integrator::SemiImplicitEuler, Integrator::RungeKutta2, Integrator::RungeKutta3, Integrator::RungeKutta4]
-    {
-        let knot = |controls: ControlPolynomial| {
-            let inner = FreeAcceleration::new(arm.clone(), Actuation::joints(&arm), costs()).unwrap();
-            FreeDynamics::new(inner, method, DT)
-                .unwrap()
-                .with_bounds(vec![-1.0; 7], vec![1.0; 7])
-                .with_controls(controls)
-        };
-        let (x, u) = (random_state(&arm, &mut rng), random(7, 1.0, &mut rng));
-        let (mut constant, mut expected, mut same) =
-            (knot(ControlPolynomial::Constant), [0.0; 14], LqNode::zeros(14, 7));
-        let cost = constant.calc(0, &x, &u, &mut expected);
-        constant.calc_diff(0, &x, &u, &mut same);
-        for controls in [ControlPolynomial::Linear, ControlPolynomial::Quadratic] {
-            let (mut action, n) = (knot(controls), controls.nodes());
-            let (w, mut next, mut node) = (u.repeat(n), [0.0; 14], LqNode::zeros(14, 7 * n));
-            assert_eq!((action.nu(), action.hold(0, &x)), (7 * n, constant.hold(0, &x).repeat(n)));
-            assert_eq!(action.bounds(0), Some((&vec![-1.0; 7 * n][..], &vec![1.0; 7 * n][..])));
-            let same_cost = (action.calc(0, &x, &w, &mut next) - cost).abs() < ROUNDING;
-            assert!(same_cost && largest_difference(&next, &expected) < ROUNDING, "{method:?} {controls:?}");
-            action.calc_diff(0, &x, &w, &mut node);
-            let by_all: DMatrix<f64> = (0..n).map(|k| node.B.columns(7 * k, 7).into_owned()).sum(); // ∂w/∂u = [1; 1; 1]
-            assert!(largest_difference(by_all.as_slice(), same.B.as_slice()) < ROUNDING, "{method:?} {controls:?}");
-            let blocks = (0..n * n).map(|k| node.R.view((7 * (k % n), 7 * (k / n)), (7, 7)).into_owned());
-            let R: DMatrix<f64> = blocks.sum();
-            assert!(largest_difference(R.as_slice(), same.R.as_slice()) < ROUNDING, "{method:?} {controls:?}");
-        }
-    }
-}
-
-/// A step of Δt against many small ones: halving Δt divides the error by 2^(order + 1).
-#[test]
-fn runge_kutta_methods_have_their_order() {
-    let mut rng = StdRng::seed_from_u64(15);
-    let model = Arc::new(robots::arm7());
-    let (x, u) = (random_state(&model, &mut rng), random(7, 1.0, &mut rng));
-    let end = |method, dt: f64, steps: usize| {
-        let inner = FreeAcceleration::new(model.clone(), Actuation::joints(&model), vec![]).unwrap();
-        let mut action = FreeDynamics::new(inner, method, dt).unwrap();
-        let (mut x, mut next) = (x.clone(), x.clone());
-        for _ in 0..steps {
-            action.calc(0, &x, &u, &mut next);
-            x.copy_from_slice(&next);
-        }
-        x
-    };
-    let time = 0.02;
-    let exact = end(Integrator::RungeKutta4, time / 256.0, 256);
-    for (method, order) in
-        [(Integrator::RungeKutta2, 2.0), (Integrator::RungeKutta3, 3.0), (Integrator::RungeKutta4, 4.0)]
-    {
-        let error = |steps: usize| largest_difference(&end(method, time / steps as f64, steps), &exact);
-        let observed = (error(2) / error(4)).log2();
-        assert!((observed - order).abs() < 0.3, "{method:?}: order {observed}");
-    }
-}
-
-#[test]
 fn residuals_are_what_they_say() {
     let mut rng = StdRng::seed_from_u64(16);
     let model = Arc::new(robots::quadruped());
@@ -539,86 +439,6 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
     let solution = solver.solve(&mut problem, &x0.repeat(11), &[0.0; 70]).unwrap();
     assert_eq!(solution.status, Status::Converged);
     assert!(solution.xs.iter().all(|x| x.is_finite()));
-}
-
-/// A group of knots in the lanes of a vector register: the bits of single calls, with knots left over and all.
-#[test]
-fn knots_side_by_side_are_single_knots() {
-    let mut rng = StdRng::seed_from_u64(18);
-    let model = Arc::new(robots::quadruped().with_limbs(false)); // which add up in another order
-    let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
-    let costs = contact_costs(&model, &contacts, 12, &mut rng);
-    let free = costs.iter().filter(|cost| !["force", "cone"].contains(&cost.name.as_str())).cloned().collect();
-    let stance = ContactDynamics::running(model.clone(), &contacts, DT, costs).unwrap();
-    let flight = FreeDynamics::running(model.clone(), DT, free).unwrap();
-    check_group(stance, &model, &mut rng);
-    check_group(flight, &model, &mut rng);
-    let quadratic = |name: &str, residual| Cost::new(name, 0.3, residual, Activation::Quadratic);
-    let given = vec![
-        quadratic("effort", Residual::JointEffort { reference: random(18, 5.0, &mut rng) }),
-        quadratic("acceleration", Residual::JointAcceleration { reference: random(18, 5.0, &mut rng) }),
-        quadratic("gravity", Residual::ControlGravity),
-        quadratic("com", Residual::CenterOfMass { target: Vec3::new(0.1, 0.2, 0.3) }),
-    ];
-    check_group(InverseDynamics::running(model.clone(), DT, given).unwrap(), &model, &mut rng);
-}
-
-/// The same where knots of a group differ in targets, in weights, and in what they look at at all.
-#[test]
-fn knots_with_costs_of_their_own_are_single_knots() {
-    let mut rng = StdRng::seed_from_u64(19);
-    let model = Arc::new(robots::quadruped().with_limbs(false));
-    let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
-    let costs = contact_costs(&model, &contacts, 12, &mut rng);
-    let mut stance = ContactDynamics::running(model.clone(), &contacts, DT, costs.clone()).unwrap();
-    let foot = || FrameName::from("LH_foot");
-    let mut other = |knot: usize, turn: bool| {
-        let mut own = costs.clone();
-        for cost in &mut own {
-            match &mut cost.residual {
-                Residual::CenterOfMass { target } => *target = Vec3::new(rng.random(), rng.random(), 0.3),
-                Residual::FrameRotation { target, .. } => *target = rotation(&mut rng),
-                Residual::FrameVelocity { frame: own, .. } if turn => *own = foot(),
-                Residual::CentroidalMomentum { .. } if knot == 5 => cost.weight = 0.0,
-                _ => {}
-            }
-        }
-        own
-    };
-    for (knot, turn) in [(1, false), (4, true), (5, false), (6, true), (9, true), (13, false)] {
-        stance.set_costs(knot, other(knot, turn)).unwrap();
-    }
-    let lift = vec![Cost::new(
-        "lift",
-        1.0,
-        Residual::FrameTranslation { frame: foot(), target: Vec3::zero() },
-        Activation::Quadratic,
-    )];
-    stance.set_costs(2, lift).unwrap();
-    let height = Residual::FrameTranslation { frame: foot(), target: Vec3::new(0.0, 0.0, 0.1) };
-    stance.set_limits(3, vec![Limit::equality("height", height)]).unwrap();
-    check_group(stance, &model, &mut rng);
-}
-
-fn check_group(mut action: impl ActionModel, model: &Model, rng: &mut StdRng) {
-    for count in [1, 2, 3, 8, 21] {
-        let knots: Vec<usize> = (0..count).collect();
-        let xs = knots.iter().flat_map(|_| random_state(model, rng)).collect::<Vec<_>>();
-        let us = random(count * action.nu(), 5.0, rng);
-        let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
-        let (mut next, mut costs) = (vec![0.0; count * nx], vec![0.0; count]);
-        let mut nodes = vec![LqNode::zeros(ndx, nu); count];
-        action.calc_group(&knots, &xs, &us, &mut next, &mut costs);
-        action.calc_diff_group(&knots, &xs, &us, &mut nodes);
-        for t in knots {
-            let (x, u) = (&xs[t * nx..][..nx], &us[t * nu..][..nu]);
-            let (mut alone, mut node) = (vec![0.0; nx], LqNode::zeros(ndx, nu));
-            assert_eq!(action.calc(t, x, u, &mut alone), costs[t], "{count}");
-            assert_eq!(alone, next[t * nx..][..nx]);
-            action.calc_diff(t, x, u, &mut node);
-            assert!(node == nodes[t], "knot {t} of {count} has other derivatives");
-        }
-    }
 }
 
 /// What knots in contact and impacts say of the form of A and B is true: a sweep finds the same without knowing it.
