@@ -139,6 +139,9 @@ class Model(ours._SpelledModel):
         for kind, at, n in zip(model.joint_types, model.idx_qs, model.nqs, strict=True):
             self._lengths[at : at + n - turns.get(kind, 0)] = n > 0
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.ours,), self.__dict__
+
     def createData(self) -> "Data":
         """Scratch, and the place where results are left."""
         return Data(self)
@@ -204,18 +207,21 @@ class Data(ours._SpelledData):
     @property
     def v(self) -> Sequence[Motion]:
         """The velocities of the joints' bodies, in their frames, at the last forwardKinematics with v."""
-        return self._motions(2, lambda joint: ours.getVelocity(self._model, self, joint))
+        if self._given < 2:
+            raise AttributeError
+        (q, v, _), model, data = self._state, self._model.ours, self._ours
+        return Lazy(model.nbodies, lambda joint: Motion._of(ours.body_velocity(model, data, q, v, joint)))
 
     @property
     def a(self) -> Sequence[Motion]:
         """The spatial accelerations of the joints' bodies, in their frames, at the last forwardKinematics with a."""
-        return self._motions(3, lambda joint: ours.getAcceleration(self._model, self, joint))
-
-    def _motions(self, given: int, motion: Callable[[int], Motion]) -> Sequence[Motion]:
-        """Motions of all joints, where so many of q, v and a have been given."""
-        if self._given < given:
+        if self._given < 3:
             raise AttributeError
-        return Lazy(self._model.njoints, motion)
+        state, model, data = self._state, self._model.ours, self._ours
+        return Lazy(model.nbodies, lambda joint: Motion._of(ours.body_acceleration(model, data, *state, joint)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._model,), self.__dict__
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"data.{name}: no function has made it yet, or it is not part of this layer")

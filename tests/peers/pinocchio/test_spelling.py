@@ -1,6 +1,8 @@
 """`condyle.pinocchio`: the same lines run on it and on Pinocchio, and give the same numbers."""
 
+import copy
 import doctest
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -289,6 +291,73 @@ def test_columns_and_limits_as_scripts_have_them() -> None:
         with pytest.raises(ValueError, match="v: expected shape"):
             function(model, data, q, v[1:], v)
     assert "universe" in [frame.name for frame in model.frames] and pin.omp_get_max_threads() > 0
+
+
+def test_what_was_left_stays() -> None:
+    pin = condyle.pinocchio
+    model = pin.buildSampleModelManipulator()
+    data, q, (v, a) = (
+        model.createData(),
+        np.full(model.nq, 0.3),
+        np.random.default_rng(1).standard_normal((2, model.nv)),
+    )
+    with pytest.raises(AttributeError, match=r"data\.oMi: no function has made it yet"):
+        data.oMi  # noqa: B018
+    pin.forwardKinematics(model, data, q)
+    with pytest.raises(AttributeError, match=r"data\.v: no function has made it yet"):
+        data.v  # noqa: B018
+    pin.forwardKinematics(model, data, q, v, a)
+    pin.updateFramePlacements(model, data)
+    hg, com = pin.computeCentroidalMomentum(model, data, q, v), pin.centerOfMass(model, data, q)
+    made = [data.oMi[3], data.oMf[2], *(lazy for lazy in (data.v, data.a))]
+    numbers = [made[0].homogeneous, made[1].homogeneous, made[2][3].vector, made[3][3].vector, hg.vector, com.copy()]
+    pin.framesForwardKinematics(model, data, q + 1.0)
+    pin.computeCentroidalMomentum(model, data, q + 1.0, a)
+    pin.centerOfMass(model, data, q + 1.0)
+    again = [made[0].homogeneous, made[1].homogeneous, made[2][3].vector, made[3][3].vector, hg.vector, com]
+    assert all(np.array_equal(x, y) for x, y in zip(numbers, again, strict=True))
+    assert not np.array_equal(data.hg.vector, hg.vector) and not np.array_equal(data.com[0], com)
+    with pytest.raises(AttributeError, match=r"data\.v: no function has made it yet"):
+        data.v  # noqa: B018  # the last call was without v
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_copies(copied: Callable[[Any], Any]) -> None:
+    model = condyle.pinocchio.buildSampleModelManipulator()
+    model.referenceConfigurations["half"] = np.full(model.nq, 0.5)
+    data, q = model.createData(), np.full(model.nq, 0.3)
+    M = condyle.pinocchio.crba(model, data, q)
+    others, left = copied(model), copied(data)
+    assert (
+        np.array_equal(others.referenceConfigurations["half"], np.full(model.nq, 0.5)) and others.names == model.names
+    )
+    assert np.array_equal(left.M, M) and np.array_equal(condyle.pinocchio.crba(others, left, q), M)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            lambda pin, m, d: pin.getFrameVelocity(m, d, 0),
+            r"frame_id: expected 1 to \d+, found 0; universe does not move",
+        ),
+        (
+            lambda pin, m, d: pin.getFrameVelocity(m, d, 1, "world"),
+            r"frame: expected LOCAL, WORLD or LOCAL_WORLD_ALIGNED",
+        ),
+        (lambda pin, m, d: pin.getVelocity(m, d, 99), r"joint: expected a joint's name or 0 to \d+, found 99"),
+        (lambda pin, m, d: pin.forwardKinematics(m, d, [0.0]), r"q: expected shape"),
+        (lambda pin, m, d: pin.forwardKinematics(m, d, np.zeros(m.nq), [0.0]), r"v: expected shape"),
+        (
+            lambda pin, m, d: pin.getJointJacobian(pin.buildSampleModelHumanoid(), d, 1, pin.LOCAL),
+            r"data: made for another model",
+        ),
+    ],
+)
+def test_messages(call: Callable[[ModuleType, Any, Any], Any], said: str) -> None:
+    model = condyle.pinocchio.buildSampleModelManipulator()
+    with pytest.raises((ValueError, IndexError), match=said):
+        call(condyle.pinocchio, model, model.createData())
 
 
 def test_tutorial() -> None:
