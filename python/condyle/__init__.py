@@ -68,6 +68,7 @@ Centre of mass, momentum, energy: `com`, `com_velocity`, `com_acceleration`, `co
 Contacts, loops, impacts: `ContactConstraint`, `ConstraintSet`, `constrained_dynamics` (`Constrained`),
     `constrained_dynamics_derivatives` (`ConstrainedDerivatives`), `constrained_dynamics_equations`
     (`ConstrainedEquations`), `impulse_dynamics` (`Impulse`), `impulse_dynamics_derivatives` (`ImpulseDerivatives`)
+Poses, motions, forces: `SE3`, `Motion`, `Force`, `exp3`, `log3`, `exp6`, `log6`, `Jexp6`, `Jlog6`; more in `algebra`
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
@@ -193,9 +194,11 @@ from ._types import (
     RneaHessian,
     RneaSecondDerivatives,
 )
+from .algebra import SE3, Force, Jexp6, Jlog6, Motion, exp3, exp6, log3, log6
 
 __all__ = [
     "LEVEL",
+    "SE3",
     "WORLD",
     "AbaDerivatives",
     "AbaHessian",
@@ -216,11 +219,14 @@ __all__ = [
     "DivideConquer",
     "EnergyDerivatives",
     "Error",
+    "Force",
     "Frame",
     "HyperDual",
     "Impulse",
     "ImpulseDerivatives",
     "Inertia",
+    "Jexp6",
+    "Jlog6",
     "Joint",
     "Limits",
     "Ltdl",
@@ -228,6 +234,7 @@ __all__ = [
     "Model",
     "ModelBuilder",
     "ModelError",
+    "Motion",
     "NotPhysicalError",
     "ParseError",
     "RneaDerivatives",
@@ -268,6 +275,8 @@ __all__ = [
     "difference_jacobian",
     "distance",
     "energy_derivatives",
+    "exp3",
+    "exp6",
     "forward_dynamics",
     "forward_kinematics",
     "frame_acceleration",
@@ -293,6 +302,8 @@ __all__ = [
     "kinetic_energy",
     "kinetic_energy_regressor",
     "load",
+    "log3",
+    "log6",
     "mechanical_energy",
     "minv",
     "neutral",

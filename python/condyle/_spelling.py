@@ -239,7 +239,7 @@ def log6(X: algebra.SE3 | ArrayLike) -> Motion:
 
 def Jlog3(R: ArrayLike) -> _Array:
     """∂ log3(R exp δ)/∂δ."""
-    return algebra.jlog3(log3(R))
+    return algebra.Jlog3(log3(R))
 
 
 utils = SimpleNamespace(zero=np.zeros, eye=np.eye, rand=np.random.random)
@@ -247,4 +247,4 @@ utils = SimpleNamespace(zero=np.zeros, eye=np.eye, rand=np.random.random)
 
 log = log6
 exp3, log3, skew = algebra.exp3, algebra.log3, algebra.skew
-Jexp3, Jexp6, Jlog6 = algebra.jexp3, algebra.jexp6, algebra.jlog6
+Jexp3, Jexp6, Jlog6 = algebra.Jexp3, algebra.Jexp6, algebra.Jlog6

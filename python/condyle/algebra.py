@@ -27,13 +27,13 @@ __all__ = [
     "SE3",
     "Force",
     "Inertia",
+    "Jexp3",
+    "Jexp6",
+    "Jlog3",
+    "Jlog6",
     "Motion",
     "exp3",
     "exp6",
-    "jexp3",
-    "jexp6",
-    "jlog3",
-    "jlog6",
     "log3",
     "log6",
     "quaternion",
@@ -300,17 +300,17 @@ def log3(R: ArrayLike) -> _Array:
 def exp6(m: ArrayLike | Motion) -> SE3:
     """exp of motions: (exp ω̂, V v), V = 1 + (1 − cos θ)/θ² ω̂ + (θ − sin θ)/θ³ ω̂²."""
     x = m.vector if isinstance(m, Motion) else _shaped(m, "m", 6)
-    return SE3(exp3(x[..., 3:]), _times(jexp3(-x[..., 3:]), x[..., :3]))
+    return SE3(exp3(x[..., 3:]), _times(Jexp3(-x[..., 3:]), x[..., :3]))
 
 
 def log6(X: SE3 | ArrayLike) -> Motion:
     """The motion m, |ω| ≤ π, with exp m = X."""
     pose = X if isinstance(X, SE3) else SE3.from_homogeneous(X)
     w = log3(pose.rotation)
-    return Motion(_times(jlog3(-w), pose.translation), w)
+    return Motion(_times(Jlog3(-w), pose.translation), w)
 
 
-def jexp3(w: ArrayLike) -> _Array:
+def Jexp3(w: ArrayLike) -> _Array:
     """The right Jacobian of exp: exp(w + δ) = exp(w) exp(J δ) + O(δ²), (…, 3, 3)."""
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
@@ -322,8 +322,8 @@ def jexp3(w: ArrayLike) -> _Array:
     return J
 
 
-def jlog3(w: ArrayLike) -> _Array:
-    """The inverse of `jexp3`, of the rotation vector w with |w| ≤ π: 1 + ½ ŵ + (1 − ½ θ cot ½ θ)/θ² ŵ²."""
+def Jlog3(w: ArrayLike) -> _Array:
+    """The inverse of `Jexp3`, of the rotation vector w with |w| ≤ π: 1 + ½ ŵ + (1 − ½ θ cot ½ θ)/θ² ŵ²."""
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
     t = theta**2
@@ -334,8 +334,8 @@ def jlog3(w: ArrayLike) -> _Array:
     return J
 
 
-def jexp6(m: ArrayLike | Motion) -> _Array:
-    """The right Jacobian of `exp6`, Σ (−m×)ᵏ / (k + 1)!, (…, 6, 6): [J, C; 0, J] with J of `jexp3`.
+def Jexp6(m: ArrayLike | Motion) -> _Array:
+    """The right Jacobian of `exp6`, Σ (−m×)ᵏ / (k + 1)!, (…, 6, 6): [J, C; 0, J] with J of `Jexp3`.
 
     C, the coupling of the linear part to the angular one, is summed in the closed form of Barfoot and Furgale (2014).
     """
@@ -356,9 +356,9 @@ def jexp6(m: ArrayLike | Motion) -> _Array:
     return out
 
 
-def jlog6(X: SE3 | ArrayLike) -> _Array:
-    """The derivative of log6(X exp δ) by δ at 0, (…, 6, 6): the inverse of `jexp6` at log6(X)."""
-    return np.asarray(np.linalg.inv(jexp6(log6(X))), float)
+def Jlog6(X: SE3 | ArrayLike) -> _Array:
+    """The derivative of log6(X exp δ) by δ at 0, (…, 6, 6): the inverse of `Jexp6` at log6(X)."""
+    return np.asarray(np.linalg.inv(Jexp6(log6(X))), float)
 
 
 def quaternion(R: ArrayLike) -> _Array:

@@ -31,7 +31,7 @@ It needs nothing but condyle; where Pinocchio is installed, the numbers of both 
     integrate, difference, interpolate, neutral         the same
     randomConfiguration(model)                          random_configuration(model, seed)
     dIntegrate, dDifference                             integrate_jacobian, difference_jacobian
-    SE3, Motion, Force, exp6, log6, Jlog6               condyle.algebra: SE3, Motion, Force, exp6, log6, jlog6
+    SE3, Motion, Force, exp6, log6, Jlog6               condyle: SE3, Motion, Force, exp6, log6, Jlog6
     Inertia.FromBox, FromSphere, …                      Inertia.from_box, from_sphere, …
     rneaInParallel(n, pool, q, v, a), columns           rnea with q (N, nq), v and a (N, nv), rows
     MeshcatVisualizer                                   condyle.viz.play(model, q, dt, urdf=path)

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from condyle.algebra import SE3, Force, Inertia, Motion, exp3, exp6, jexp3, jexp6, jlog3, jlog6, log3, log6
+from condyle.algebra import SE3, Force, Inertia, Jexp3, Jexp6, Jlog3, Jlog6, Motion, exp3, exp6, log3, log6
 
 EXACT = 1e-12
 """Some thousand roundings of numbers near 1."""
@@ -31,14 +31,14 @@ def test_exponentials(angle: float) -> None:
         X = pin.exp6(m)
         close(exp3(m[3:]), pin.exp3(m[3:]))
         close(exp6(m).homogeneous, X.homogeneous, 1e-11)
-        close(jexp3(m[3:]), pin.Jexp3(m[3:]), 1e-9)
-        close(jexp6(m), pin.Jexp6(m), 1e-9)
+        close(Jexp3(m[3:]), pin.Jexp3(m[3:]), 1e-9)
+        close(Jexp6(m), pin.Jexp6(m), 1e-9)
         close(log3(X.rotation), m[3:], 1e-10)
         close(log6(X.homogeneous).vector, m, 1e-9)
-        close(jlog3(m[3:]), pin.Jlog3(X.rotation), 1e-8)
-        close(jlog6(SE3(X.rotation, X.translation)), pin.Jlog6(X), 1e-8)
+        close(Jlog3(m[3:]), pin.Jlog3(X.rotation), 1e-8)
+        close(Jlog6(SE3(X.rotation, X.translation)), pin.Jlog6(X), 1e-8)
         close(exp6(many).homogeneous[k], exp6(m).homogeneous)
-        close(jexp6(many)[k], jexp6(m))
+        close(Jexp6(many)[k], Jexp6(m))
 
 
 @pytest.mark.parametrize("angle", [*ANGLES, np.pi - 1e-9, np.pi])
@@ -47,12 +47,12 @@ def test_inverses(angle: float) -> None:
     for m in motions(angle):
         X = exp6(m)
         close(exp6(log6(X)).homogeneous, X.homogeneous)
-        close(jlog3(m[3:]) @ jexp3(m[3:]), np.eye(3), 1e-12)
+        close(Jlog3(m[3:]) @ Jexp3(m[3:]), np.eye(3), 1e-12)
         h = 1e-6
         step = np.array(
             [log6(X.inverse() * exp6(m + h * e)).vector - log6(X.inverse() * exp6(m - h * e)).vector for e in np.eye(6)]
         )
-        close(step.T / (2 * h), jexp6(m), 1e-8)
+        close(step.T / (2 * h), Jexp6(m), 1e-8)
 
 
 def test_actions() -> None:
