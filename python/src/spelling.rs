@@ -178,6 +178,7 @@ pub(crate) fn forwardKinematics(
 ) -> PyResult<()> {
     let (py, mut data) = (model.py(), data.try_borrow_mut()?);
     let poses = forward_kinematics(model.get().ours.bind(py), data.ours.bind(py), q, None)?;
+    (data.given, data.poses) = (0, None); // until all of it is kept
     let SpelledData { q: kept_q, v: kept_v, a: kept_a, .. } = &mut *data;
     copy("q", q, kept_q)?;
     for (name, given, kept) in [("v", v, kept_v), ("a", a, kept_a)] {
@@ -210,6 +211,15 @@ pub(crate) fn framesForwardKinematics(
     updateFramePlacements(model, data)
 }
 
+/// What is kept of the state at the last forwardKinematics.
+fn kept<'py>(data: &Bound<'py, SpelledData>) -> PyResult<PyRef<'py, SpelledData>> {
+    let data = data.try_borrow()?;
+    match data.given {
+        0 => Err(PyValueError::new_err("data: expected a state, found none: call forwardKinematics before")),
+        _ => Ok(data),
+    }
+}
+
 /// Functions that give a motion of a joint's body or of a frame at the last forwardKinematics.
 macro_rules! motions {
     ($($(#[$doc:meta])* $name:ident($of:ident: $Of:ty, $number:ident): $method:ident of $pass:ident($($kept:ident),*);)*) => {$(
@@ -222,7 +232,7 @@ macro_rules! motions {
             $of: $Of,
             frame: Option<&Bound<'py, PyAny>>,
         ) -> PyResult<Bound<'py, PyAny>> {
-            let (py, data, robot) = (model.py(), data.try_borrow()?, model.get().ours.get());
+            let (py, data, robot) = (model.py(), kept(data)?, model.get().ours.get());
             let (number, reference) = ($number(&robot.inner, $of)?, reference(frame)?);
             let mut scratch = take(robot, data.ours.bind(py))?;
             let scratch = Holds::<f64>::held(&mut *scratch, &robot.inner)?;
@@ -248,14 +258,23 @@ motions! {
         frame_classical_acceleration of forward_accelerations(q, v, a);
 }
 
-/// The robot, and what is kept of its state.
-fn of<'a, 'py>(
-    model: &'a Bound<'py, SpelledModel>,
-    data: &'a Bound<'py, SpelledData>,
-) -> PyResult<(PyRef<'py, SpelledData>, &'a condyle::Model)> {
-    let (data, robot) = (data.try_borrow()?, model.get().ours.get());
+/// `condyle::body_jacobian_strided`, or of a frame: model, q, body or frame, reference frame, J and its strides.
+type FillJacobian = fn(&condyle::Model, &[f64], usize, ReferenceFrame, &mut [f64], [usize; 2]);
+
+/// The Jacobian of a joint's body or of a frame at the last computeJointJacobians.
+fn kept_jacobian<'py>(
+    model: &Bound<'py, SpelledModel>,
+    data: &Bound<'py, SpelledData>,
+    number: impl FnOnce(&condyle::Model) -> PyResult<usize>,
+    frame: &Bound<'py, PyAny>,
+    fill: FillJacobian,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (data, robot) = (kept(data)?, model.get().ours.get());
     take(robot, data.ours.bind(model.py()))?; // of this robot, or it raises
-    Ok((data, &robot.inner))
+    let robot = &robot.inner;
+    let (number, reference) = (number(robot)?, reference(Some(frame))?);
+    let fill = |J: &mut [f64]| fill(robot, &data.q, number, reference, J, [robot.nv(), 1]);
+    Computed::new([6, robot.nv()], fill).give(model.py(), None)
 }
 
 /// The Jacobian of a joint's body at the last computeJointJacobians, (6, nv).
@@ -266,10 +285,7 @@ pub(crate) fn getJointJacobian<'py>(
     joint: &Bound<'py, PyAny>,
     frame: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (data, robot) = of(model, data)?;
-    let (joint, reference) = (joint_number(robot, joint)?, reference(Some(frame))?);
-    let fill = |J: &mut [f64]| condyle::body_jacobian_strided(robot, &data.q, joint, reference, J, [robot.nv(), 1]);
-    Computed::new([6, robot.nv()], fill).give(model.py(), None)
+    kept_jacobian(model, data, |robot| joint_number(robot, joint), frame, condyle::body_jacobian_strided)
 }
 
 /// The Jacobian of a frame at the last computeJointJacobians, (6, nv).
@@ -280,10 +296,7 @@ pub(crate) fn getFrameJacobian<'py>(
     frame_id: isize,
     frame: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (data, robot) = of(model, data)?;
-    let (number, reference) = (frame_number(robot, frame_id)?, reference(Some(frame))?);
-    let fill = |J: &mut [f64]| condyle::frame_jacobian_strided(robot, &data.q, number, reference, J, [robot.nv(), 1]);
-    Computed::new([6, robot.nv()], fill).give(model.py(), None)
+    kept_jacobian(model, data, |robot| frame_number(robot, frame_id), frame, condyle::frame_jacobian_strided)
 }
 
 /// The Jacobian of a frame, (6, nv).

@@ -345,6 +345,10 @@ def test_copies(copied: Callable[[Any], Any]) -> None:
             lambda pin, m, d: pin.getFrameVelocity(m, d, 1, "world"),
             r"frame: expected LOCAL, WORLD or LOCAL_WORLD_ALIGNED",
         ),
+        (
+            lambda pin, m, d: pin.getFrameVelocity(m, m.createData(), 1),
+            r"data: expected a state, found none: call forwardKinematics before",
+        ),
         (lambda pin, m, d: pin.getVelocity(m, d, 99), r"joint: expected a joint's name or 0 to \d+, found 99"),
         (lambda pin, m, d: pin.forwardKinematics(m, d, [0.0]), r"q: expected shape"),
         (lambda pin, m, d: pin.forwardKinematics(m, d, np.zeros(m.nq), [0.0]), r"v: expected shape"),
@@ -356,8 +360,23 @@ def test_copies(copied: Callable[[Any], Any]) -> None:
 )
 def test_messages(call: Callable[[ModuleType, Any, Any], Any], said: str) -> None:
     model = condyle.pinocchio.buildSampleModelManipulator()
+    data = model.createData()
+    condyle.pinocchio.forwardKinematics(model, data, np.full(model.nq, 0.3))
     with pytest.raises((ValueError, IndexError), match=said):
-        call(condyle.pinocchio, model, model.createData())
+        call(condyle.pinocchio, model, data)
+
+
+def test_a_call_that_fails_leaves_no_state() -> None:
+    pin = condyle.pinocchio
+    model = pin.buildSampleModelManipulator()
+    data, q = model.createData(), np.full(model.nq, 0.3)
+    pin.forwardKinematics(model, data, q)
+    with pytest.raises(ValueError, match="v: expected shape"):
+        pin.forwardKinematics(model, data, 2.0 * q, [0.0])
+    with pytest.raises(ValueError, match="data: expected a state"):
+        pin.getVelocity(model, data, 1)
+    with pytest.raises(AttributeError, match=r"data\.oMi"):
+        data.oMi  # noqa: B018
 
 
 def test_tutorial() -> None:
