@@ -1,18 +1,20 @@
 //! Many states in one call: arguments with one axis more, for the states, and results likewise.
 //!
 //! An argument without that axis is shared by all states. What the library computes in lanes goes there in parts of some
-//! milliseconds, with the interpreter's lock released, and each part is written to the arrays that the caller gets; what needs
+//! milliseconds, with the interpreter's lock released, and writes its results to the arrays that the caller gets; what needs
 //! no `Data` is computed state after state, likewise, and all else is called for each. Between parts and states signals are
 //! looked at.
 
 use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
 use crate::signals::{self, Signals};
-use condyle::{Batch, Force, Scalar};
+use condyle::{Batch, BatchWriter, Force, Scalar};
 use numpy::{Ix2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
+use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple, PyType};
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyString, PyTuple, PyType};
 use std::iter;
 use std::ops::{Deref, Range};
 
@@ -87,11 +89,12 @@ pub(crate) fn all<'py>(
     states: usize,
     length: usize,
 ) -> PyResult<Input<'py, Ix2>> {
+    let is_of_states = self::states(given, axes)?.is_some();
+    if is_of_states && axes == 1 {
+        return matrix(name, given, [states, length]);
+    }
     let numpy = given.py().import("numpy")?;
-    if self::states(given, axes)?.is_some() {
-        if axes == 1 {
-            return matrix(name, given, [states, length]);
-        }
+    if is_of_states {
         let flat = numpy.call_method1("reshape", (given, (states, -1)))?;
         return matrix(name, &flat, [states, length]);
     }
@@ -185,8 +188,9 @@ impl Kind {
             Self::One => Ok(vec![out.cloned()]),
             Self::Pair => members(out, &["da_dq", "da_dv"]),
             Self::Named(class) if out.is_some() => {
-                let names: Vec<String> = class_of(py, class)?.getattr("_fields")?.extract()?;
-                members(out, &names.iter().map(String::as_str).collect::<Vec<_>>())
+                let names: Vec<Bound<'py, PyString>> =
+                    class_of(py, class)?.getattr(intern!(py, "_fields"))?.extract()?;
+                members(out, &names.iter().map(|name| name.to_str()).collect::<PyResult<Vec<_>>>()?)
             }
             Self::Named(_) | Self::AllTerms => Ok(Vec::new()),
         }
@@ -195,14 +199,15 @@ impl Kind {
 
 /// A class of named tuples.
 fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
-    Ok(py.import("condyle._types")?.getattr(class)?.cast_into()?)
+    static TYPES: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
+    let types = TYPES.get_or_try_init(py, || PyResult::Ok(py.import("condyle._types")?.unbind()))?;
+    Ok(types.bind(py).getattr(class)?.cast_into()?)
 }
 
-/// The number of states of a part, at most: the three matrices nv × nv of each are in half of a processor's own cache, of a
-/// megabyte, when they are written to the caller's arrays; a part takes some fifty microseconds. Each thread has two registers
-/// full at least.
+/// The number of states of a part, at most: it takes a millisecond or less, and its own price, a third of a microsecond, does not
+/// show. Each thread has two registers full at least.
 pub(crate) fn part_size(nv: usize, threads: usize) -> usize {
-    const NUMBERS: usize = 1 << 14;
+    const NUMBERS: usize = 1 << 17;
     (NUMBERS / (nv * nv).max(64)).next_multiple_of(16).max(16) * threads
 }
 
@@ -220,9 +225,9 @@ pub(crate) fn run<'py>(
     kind: Kind,
     states: usize,
     out: Option<&Bound<'py, PyAny>>,
-    mut compute: impl FnMut(&mut Batch, Range<usize>) + Send,
+    mut compute: impl FnMut(&mut BatchWriter<'_, '_, f64>, Range<usize>) + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
-    compute(batch, 0..0); // for the shapes of the results
+    compute(&mut batch.writer(&mut []), 0..0); // for the shapes of the results
     let shapes: Vec<Vec<usize>> = batch.last_shapes().map(<[_]>::to_vec).collect();
     let mut given = kind.places(py, out)?.into_iter().chain(iter::repeat(None));
     let sizes: Vec<usize> = shapes.iter().map(|shape| shape.iter().product()).collect();
@@ -238,10 +243,8 @@ pub(crate) fn run<'py>(
         let step = batch.capacity();
         for from in (0..states).step_by(step) {
             let some = from..states.min(from + step);
-            compute(batch, some.clone());
-            for (k, (to, size)) in numbers.iter_mut().zip(&sizes).enumerate() {
-                batch.write_last(k, &mut to[some.start * size..some.end * size]);
-            }
+            let places = numbers.iter_mut().zip(&sizes).map(|(to, size)| &mut to[some.start * size..some.end * size]);
+            compute(&mut batch.writer(&mut places.collect::<Vec<_>>()), some);
             if signals.go_on().is_break() {
                 return;
             }

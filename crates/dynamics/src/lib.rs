@@ -52,7 +52,7 @@ pub use batch::derivatives::{
 pub use batch::group::StateMatrix;
 pub use batch::kinematics::BatchAccelerationDerivatives;
 pub use batch::results::{Matrices, Poses};
-pub use batch::{Batch, BatchNumber};
+pub use batch::{Batch, BatchNumber, BatchWriter};
 pub use calls::centroidal::{centroidal_map, centroidal_map_rate, compute_all_terms};
 pub use calls::constrained_dynamics::{
     Constrained, ConstrainedDerivatives, ConstrainedEquations, constrained_dynamics, constrained_dynamics_derivatives,

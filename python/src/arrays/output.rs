@@ -415,10 +415,10 @@ pub(crate) fn members<'py>(
 /// The addresses that the results of a batch are written to.
 pub(crate) fn destinations(out: Option<&Bound<'_, PyAny>>) -> Vec<Range<usize>> {
     let Some(out) = out else { return Vec::new() };
-    match out.try_iter() {
-        Ok(members) if !out.is_instance_of::<PyUntypedArray>() => members.flatten().map(|one| memory(&one)).collect(),
-        _ => vec![memory(out)],
+    if out.is_instance_of::<PyUntypedArray>() {
+        return vec![memory(out)];
     }
+    out.try_iter().map_or_else(|_| Vec::new(), |members| members.flatten().map(|one| memory(&one)).collect())
 }
 
 /// The addresses of the numbers of a C-contiguous array of doubles; none of anything else, which is refused later.

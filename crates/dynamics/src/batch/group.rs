@@ -37,7 +37,7 @@ pub(super) const DTAU: [usize; 3] = [2, 3, 4];
 pub(super) const DA: [usize; 2] = [5, 6];
 
 /// The kinds that are symmetric: the two numbers of a pair differ by rounding at most, and either may stand for both.
-const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
+pub(super) const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
 
 pub(super) const KINDS: usize = 7;
 

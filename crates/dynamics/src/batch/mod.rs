@@ -29,7 +29,7 @@ use condyle_spatial::level::{Level, level};
 use constraints::{BatchConstraints, Sets};
 use group::{ARGUMENTS, Arguments, FORCES, Group, Pass, enter};
 use places::{MOST_RESULTS, Places};
-use results::{Last, Shape, Taken};
+use results::{Last, Shape};
 use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 
 /// Scratch and results for up to N states at once, on one or several threads.
@@ -113,22 +113,34 @@ impl<T: Real> Batch<T> {
         }
     }
 
+    /// The same functions, which write their results to places of the caller's instead: as many as the function has results, in
+    /// the order of its struct, each with the numbers of all states one after the other, matrices by rows. What is written as soon
+    /// as it is computed need not go through memory twice. Where nothing else says how many states are meant, the places do.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Batch, robots};
+    /// let arm = robots::arm7();
+    /// let (mut batch, q) = (Batch::new(&arm, 10, 1), vec![0.3; 70]);
+    /// let mut M = vec![0.0; 10 * 7 * 7];
+    /// batch.writer(&mut [&mut M]).crba(&arm, &q);
+    /// assert_eq!(M[9 * 49 + 7 + 2], batch.crba(&arm, &q).at(9)[(1, 2)]);
+    /// ```
+    pub fn writer<'b, 'a>(&'b mut self, to: &'b mut [&'a mut [T]]) -> BatchWriter<'b, 'a, T> {
+        BatchWriter { batch: self, to }
+    }
+
     /// The number of states for which it has room.
     pub fn capacity(&self) -> usize {
         self.states
     }
 
-    /// The number of states that arguments are for: the first that has numbers says it, else the forces, else there are as
-    /// many as there is room for.
+    /// The number of states that arguments are for: the first that has numbers says it, else the forces, else it is `full`.
     #[track_caller]
-    fn count(&self, model: &Model, given: &[Given<'_, T>]) -> usize {
+    fn count(&self, model: &Model, given: &[Given<'_, T>], full: usize) -> usize {
         let length = |at: usize| [model.nq(), model.nv(), model.nv(), model.nv(), 6 * model.nodes().len()][at];
         let first = given.iter().find(|one| one.at != FORCES && length(one.at) > 0);
         let forces = given.iter().find(|one| one.at == FORCES && !one.numbers.is_empty());
-        let states = match first.or(forces) {
-            None => self.states,
-            Some(one) => one.numbers.len() / length(one.at),
-        };
+        let states = first.or(forces).map_or(full, |one| one.numbers.len() / length(one.at));
         for (k, one) in given.iter().enumerate() {
             let (name, each, found) = (one.name, length(one.at), one.numbers.len());
             if one.at == FORCES {
@@ -151,7 +163,8 @@ impl<T: Real> Batch<T> {
         states
     }
 
-    /// Checks the arguments and runs a pass over all states, to results of these shapes.
+    /// Checks the arguments and runs a pass over all states, to results of these shapes, which are `written` to the caller's
+    /// places or stay here.
     #[track_caller]
     fn compute<P: Pass<T>>(
         &mut self,
@@ -160,7 +173,8 @@ impl<T: Real> Batch<T> {
         given: &[Given<'_, T>],
         (shapes, columns): (&[&[usize]], usize),
         constraints: Option<&mut BatchConstraints<T>>,
-    ) -> Taken<'_, T> {
+        written: Option<&mut [&mut [T]]>,
+    ) {
         match &self.lanes {
             InLanes::Single(g) => g.check(model),
             InLanes::Short(g) => g.check(model),
@@ -170,7 +184,6 @@ impl<T: Real> Batch<T> {
             constraints.check(model);
             assert!(constraints.fits(self), "constraints: made for another batch");
         }
-        let states = self.count(model, given);
         let rows = constraints.as_ref().map_or(0, |constraints| constraints.rows());
         let size = |&size: &usize| match size {
             NV => model.nv(),
@@ -180,29 +193,43 @@ impl<T: Real> Batch<T> {
             COLUMNS => columns,
             other => other,
         };
-        let mut last = Last { states, results: shapes.len(), ..Last::default() };
-        let first_kept = shapes.len() - P::KINDS.len();
+        let mut last = Last { results: shapes.len(), ..Last::default() };
+        let kinds = if written.is_some() { &[] } else { P::KINDS };
+        let first_kept = shapes.len() - kinds.len();
         for (k, shape) in shapes.iter().enumerate() {
             last.shapes[k] = Shape::new(shape.iter().map(size));
-            last.kept[k] = k.checked_sub(first_kept).map(|kind| P::KINDS[kind]);
+            last.kept[k] = k.checked_sub(first_kept).map(|kind| kinds[kind]);
         }
+        let full = written.as_ref().map_or(self.states, |places| last.room(places).min(self.states));
+        let states = self.count(model, given, full);
+        last.states = states;
         self.last = last;
         let mut to: [&mut [T]; MOST_RESULTS] = Default::default();
-        for (k, (to, slot)) in to.iter_mut().zip(&mut self.slots).take(first_kept).enumerate() {
-            let size = last.shapes[k].len();
-            if slot.len() < self.states * size {
-                slot.resize(self.states * size, T::zero());
+        if states == 0 {
+            return; // nothing to be written
+        }
+        if let Some(places) = written {
+            self.last.check(places);
+            for (to, place) in to.iter_mut().zip(places) {
+                *to = place;
             }
-            *to = &mut slot[..states * size];
+        } else {
+            for (k, (to, slot)) in to.iter_mut().zip(&mut self.slots).take(first_kept).enumerate() {
+                let size = last.shapes[k].len();
+                if slot.len() < self.states * size {
+                    slot.resize(self.states * size, T::zero());
+                }
+                *to = &mut slot[..states * size];
+            }
         }
         let mut from = Arguments([&[] as &[T]; ARGUMENTS]);
         for one in given {
             from.0[one.at] = one.numbers;
         }
-        let places = (from, Places::new(to, first_kept, states), !P::KINDS.is_empty());
+        let places = (from, Places::new(to, first_kept, states), !kinds.is_empty());
         macro_rules! run {
             ($group:ident, $kind:ident) => {{
-                $group.keep(P::KINDS, model.nv());
+                $group.keep(kinds, model.nv());
                 let sets = match constraints.map(|constraints| &mut constraints.sets) {
                     Some(Sets::$kind(sets)) => &mut sets[..],
                     _ => &mut [],
@@ -210,13 +237,17 @@ impl<T: Real> Batch<T> {
                 $group.run(&|of, to| enter(pass, of, to), model, states, sets, places);
             }};
         }
-        if states > 0 {
-            match &mut self.lanes {
-                InLanes::Single(group) => run!(group, Single),
-                InLanes::Short(group) => run!(group, Short),
-                InLanes::Long(group) => run!(group, Long),
-            }
+        match &mut self.lanes {
+            InLanes::Single(group) => run!(group, Single),
+            InLanes::Short(group) => run!(group, Short),
+            InLanes::Long(group) => run!(group, Long),
         }
-        Taken { batch: self, next: 0 }
     }
+}
+
+/// A batch whose functions write their results to the caller's memory: see [`Batch::writer`].
+#[derive(Debug)]
+pub struct BatchWriter<'b, 'a, T: Real> {
+    batch: &'b mut Batch<T>,
+    to: &'b mut [&'a mut [T]],
 }

@@ -1,5 +1,6 @@
 //! The places to which passes of a batch put their results: of each state, one after the other.
 
+use super::group::SYMMETRIC;
 use condyle_spatial::block::{Block, MOST, Real, Strided, scatter, scatter_matrix};
 use condyle_spatial::{Inertia, Se3};
 use core::mem;
@@ -62,6 +63,13 @@ impl<T: Real> Places<'_, T> {
     pub(super) fn columns<S: Block<Number = T>>(&mut self, x: &[S], columns: usize) {
         self.part(self.next, [0, 1], x, columns);
         self.next += 1;
+    }
+
+    /// Writes a matrix of each state of a kind that could have stayed in lanes, by rows.
+    pub(super) fn kind<S: Block<Number = T>>(&mut self, kind: usize, x: &DMatrix<S>) {
+        // the columns of what is symmetric are its rows, one after the other
+        let columns = if SYMMETRIC.contains(&kind) { x.len() } else { x.ncols() };
+        self.columns(x.as_slice(), columns);
     }
 
     /// Writes matrix k of n, of a result that is so many matrices.

@@ -52,6 +52,29 @@ pub(super) struct Last {
     pub kept: [Option<usize>; MOST_RESULTS],
 }
 
+impl Last {
+    /// The number of states that these places have room for: of the first result that has numbers, else none.
+    pub(super) fn room<T>(&self, places: &[&mut [T]]) -> usize {
+        let first = places.iter().zip(&self.shapes).find(|(_, shape)| shape.len() > 0);
+        first.map_or(0, |(place, shape)| place.len() / shape.len())
+    }
+
+    /// Panics unless these are places for its results.
+    #[track_caller]
+    pub(super) fn check<T>(&self, places: &[&mut [T]]) {
+        assert!(
+            places.len() == self.results,
+            "to: expected a place for each of {} results, found {}",
+            self.results,
+            places.len()
+        );
+        for (k, place) in places.iter().enumerate() {
+            let expected = self.states * self.shapes[k].len();
+            assert!(place.len() == expected, "to[{k}]: expected length {expected}, found {}", place.len());
+        }
+    }
+}
+
 /// Results that are taken one after the other.
 pub(super) struct Taken<'b, T: Real> {
     pub batch: &'b Batch<T>,
@@ -208,18 +231,5 @@ impl<T: Real> Batch<T> {
     #[doc(hidden)]
     pub fn last_shapes(&self) -> impl Iterator<Item = &[usize]> {
         self.last.shapes[..self.last.results].iter().map(Shape::sizes)
-    }
-
-    /// Writes result k of the last call, of all states one after the other, each by rows.
-    ///
-    /// # Panics
-    /// If there is no such result, or `to` has not as many numbers.
-    #[doc(hidden)]
-    pub fn write_last(&self, k: usize, to: &mut [T]) {
-        let mut from = Taken { batch: self, next: k };
-        match self.last.kept[k] {
-            None => to.copy_from_slice(Take::take(&mut from)),
-            Some(_) => Matrices::take(&mut from).write_rows(to),
-        }
     }
 }

@@ -7,10 +7,11 @@
 //! }
 //! ```
 //!
-//! the method of `Batch` of that name: it takes the arguments of all states, checks them, and runs the body on groups of
-//! states, a lane for each, where it puts each result to the places that have the shapes in brackets. After the arguments of
-//! states may stand some that all share, with their types; `with` names more of what a pass has, `columns` says what
-//! `COLUMNS` is in a shape, and `keeps` names the matrices of `Data` that stay in lanes instead, the last ones of the shapes.
+//! the methods of `Batch` and of `BatchWriter` of that name: they take the arguments of all states, check them, and run the
+//! body on groups of states, a lane for each, where it puts each result to the places that have the shapes in brackets. After
+//! the arguments of states may stand some that all share, with their types; `with` names more of what a pass has, `columns`
+//! says what `COLUMNS` is in a shape, and `keeps` names the matrices of `Data` that stay in lanes instead, the last ones of
+//! the shapes; a writer writes them too.
 
 /// Sizes that depend on the robot, in shapes.
 pub(super) const NV: usize = usize::MAX;
@@ -87,6 +88,41 @@ macro_rules! batched {
         $(with $($scratch:ident),+)? $(columns ($columns:expr))? $(keeps [$($($place:ident).+: $kind:expr),+])?
         $body:block
     )*) => {
+        $(mod $name {
+            use super::*;
+            use $crate::batch::group::{Pass, States};
+            use $crate::batch::places::Places;
+            use $crate::batch::table::of_states;
+
+            #[derive(Clone, Copy)]
+            pub(super) struct Work { $($(pub $shared: $Shared),*)? }
+
+            impl<T: condyle_spatial::block::Real> Pass<T> for Work {
+                const KINDS: &'static [usize] = &[$($($kind),+)?];
+
+                #[inline(always)]
+                #[allow(unused_variables)] // by passes that need no `Data`, or leave what they give
+                fn run<S: condyle_spatial::block::Block<Number = T>>(self, s: States<'_, S>, $to: &mut Places<'_, T>) {
+                    let Self { $($($shared),*)? } = self;
+                    let ($model, $data) = (s.model, s.data);
+                    $(let $given = of_states!(s, $given);)*
+                    $($(let $scratch = s.$scratch;)+)?
+                    $(let $set = s.constraints.expect("a pass under constraints has them");)?
+                    $(
+                        let mut kept = s.kept;
+                        if let Some(kept) = &mut kept {
+                            $(core::mem::swap(&mut $data.$($place).+, &mut kept[$kind]);)+
+                        }
+                    )?
+                    $body
+                    $(match kept {
+                        Some(kept) => { $(core::mem::swap(&mut $data.$($place).+, &mut kept[$kind]);)+ }
+                        None => { $($to.kind($kind, &$data.$($place).+);)+ }
+                    })?
+                }
+            }
+        })*
+
         impl<T: condyle_spatial::block::Real> $crate::batch::Batch<T> {$(
             $(#[$doc])*
             pub fn $name(
@@ -96,39 +132,32 @@ macro_rules! batched {
                 $($given: $crate::batch::table::given!($given, T),)*
                 $($($shared: $Shared,)*)?
             ) -> $Out {
-                use $crate::batch::group::{Pass, States};
-                use $crate::batch::places::Places;
-                use $crate::batch::table::{Given, of_states, placed};
-
-                #[derive(Clone, Copy)]
-                struct Work { $($($shared: $Shared),*)? }
-
-                impl<T: condyle_spatial::block::Real> Pass<T> for Work {
-                    const KINDS: &'static [usize] = &[$($($kind),+)?];
-
-                    #[inline(always)]
-                    #[allow(unused_variables)] // by passes that need no `Data`, or leave what they give
-                    fn run<S: condyle_spatial::block::Block<Number = T>>(self, s: States<'_, S>, $to: &mut Places<'_, T>) {
-                        let Self { $($($shared),*)? } = self;
-                        let ($model, $data) = (s.model, s.data);
-                        $(let $given = of_states!(s, $given);)*
-                        $($(let $scratch = s.$scratch;)+)?
-                        $(let $set = s.constraints.expect("a pass under constraints has them");)?
-                        $(
-                            let kept: &mut [_; $crate::batch::group::KINDS] = s.kept.expect("a pass that leaves matrices has them");
-                            $(core::mem::swap(&mut $data.$($place).+, &mut kept[$kind]);)+
-                        )?
-                        $body
-                        $($(core::mem::swap(&mut $data.$($place).+, &mut kept[$kind]);)+)?
-                    }
-                }
-
-                let columns: usize = 0 $(+ $columns)?;
-                let constraints = None $(.or(Some(&mut *$set)))?;
-                let given: &[Given<'_, T>] = &[$(placed!($given, $given)),*];
+                let (columns, constraints) = (0 $(+ $columns)?, None $(.or(Some(&mut *$set)))?);
+                let given: &[_] = &[$($crate::batch::table::placed!($given, $given)),*];
                 let shapes: &[&[usize]] = &[$(&[$($size),*]),*];
-                let work = Work { $($($shared),*)? };
-                $crate::batch::results::Take::take(&mut self.compute(work, $model, given, (shapes, columns), constraints))
+                let work = $name::Work { $($($shared),*)? };
+                self.compute(work, $model, given, (shapes, columns), constraints, None);
+                $crate::batch::results::Take::take(&mut $crate::batch::results::Taken { batch: self, next: 0 })
+            }
+        )*}
+
+        impl<T: condyle_spatial::block::Real> $crate::batch::BatchWriter<'_, '_, T> {$(
+            #[doc = concat!("Writes what [`Batch::", stringify!($name), "`](crate::Batch::", stringify!($name), ") gives.")]
+            ///
+            /// # Panics
+            /// As it does, or if there are not as many places as results, or a place has not the size of its result.
+            pub fn $name(
+                &mut self,
+                $model: &condyle_model::Model,
+                $($set: &mut $crate::batch::constraints::BatchConstraints<T>,)?
+                $($given: $crate::batch::table::given!($given, T),)*
+                $($($shared: $Shared,)*)?
+            ) {
+                let (columns, constraints) = (0 $(+ $columns)?, None $(.or(Some(&mut *$set)))?);
+                let given: &[_] = &[$($crate::batch::table::placed!($given, $given)),*];
+                let shapes: &[&[usize]] = &[$(&[$($size),*]),*];
+                let work = $name::Work { $($($shared),*)? };
+                self.batch.compute(work, $model, given, (shapes, columns), constraints, Some(&mut *self.to));
             }
         )*}
     };

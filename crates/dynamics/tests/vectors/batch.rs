@@ -52,6 +52,80 @@ fn matrices_by_rows() {
     }
 }
 
+/// What a writer writes is what the batch keeps, by rows; on one thread without allocating.
+#[test]
+fn written_to_places() {
+    const COUNT: usize = 19;
+    each_level(|level| {
+        for model in models(2) {
+            let (n, s) = (model.nv(), states(&model, COUNT, 7));
+            let States { q, v, x, f_ext } = &s;
+            for threads in [1, 2] {
+                let mut batch = Batch::new(&model, COUNT, threads);
+                let mut kept = [(); 4].map(|()| vec![0.0; COUNT * n * n]);
+                let mut found = kept.clone().map(|_| vec![f64::NAN; COUNT * n * n]);
+                let check = |kept: &[Vec<f64>], found: &mut [Vec<f64>], what: &str| {
+                    assert!(kept == found, "{what}, {threads} threads, {level}, on\n{model}");
+                    found.iter_mut().for_each(|place| place.fill(f64::NAN));
+                };
+                let quiet = |count: usize| assert!(threads > 1 || count == 0, "{count} allocations on\n{model}");
+
+                let d = batch.rnea_derivatives(&model, q, v, x, f_ext);
+                let matrices = [d.dtau_dq, d.dtau_dv, d.dtau_da];
+                matrices.iter().zip(&mut kept).for_each(|(matrix, kept)| matrix.write_rows(kept));
+                let [a, b, c, _] = &mut found;
+                let to: &mut [&mut [f64]] = &mut [a, b, c];
+                quiet(allocations(|| batch.writer(to).rnea_derivatives(&model, q, v, x, f_ext)));
+                check(&kept[..3], &mut found[..3], "rnea_derivatives");
+
+                let d = batch.aba_derivatives(&model, q, v, x, f_ext);
+                let (accelerations, matrices) = (d.a.to_vec(), [d.da_dq, d.da_dv, d.da_dtau]);
+                matrices.iter().zip(&mut kept[1..]).for_each(|(matrix, kept)| matrix.write_rows(kept));
+                kept[0][..COUNT * n].copy_from_slice(&accelerations);
+                kept[0].truncate(COUNT * n);
+                found[0].truncate(COUNT * n);
+                let [a, b, c, d] = &mut found;
+                let to: &mut [&mut [f64]] = &mut [a, b, c, d];
+                quiet(allocations(|| batch.writer(to).aba_derivatives(&model, q, v, x, f_ext)));
+                check(&kept, &mut found, "aba_derivatives");
+
+                batch.crba(&model, q).write_rows(&mut kept[1]);
+                quiet(allocations(|| batch.writer(&mut [&mut found[1]]).crba(&model, q)));
+                check(&kept[1..2], &mut found[1..2], "crba");
+                batch.minv(&model, q).write_rows(&mut kept[1]);
+                batch.writer(&mut [&mut found[1]]).minv(&model, q);
+                check(&kept[1..2], &mut found[1..2], "minv");
+                batch.coriolis_matrix(&model, q, v).write_rows(&mut kept[1]);
+                batch.writer(&mut [&mut found[1]]).coriolis_matrix(&model, q, v);
+                check(&kept[1..2], &mut found[1..2], "coriolis_matrix");
+                kept[0].copy_from_slice(batch.rnea(&model, q, v, x, f_ext));
+                quiet(allocations(|| batch.writer(&mut [&mut found[0]]).rnea(&model, q, v, x, f_ext)));
+                check(&kept[..1], &mut found[..1], "rnea");
+            }
+        }
+    });
+}
+
+#[test]
+#[should_panic(expected = "to[0]: expected length 98, found 49")]
+fn a_place_that_is_too_small() {
+    let model = robots::arm7();
+    Batch::new(&model, 2, 1).writer(&mut [&mut [0.0; 49]]).crba(&model, &[0.3; 14]);
+}
+
+#[test]
+#[should_panic(expected = "to: expected a place for each of 3 results, found 1")]
+fn a_place_that_is_missing() {
+    let model = robots::arm7();
+    Batch::new(&model, 1, 1).writer(&mut [&mut [0.0; 49]]).rnea_derivatives(
+        &model,
+        &[0.3; 7],
+        &[0.1; 7],
+        &[0.2; 7],
+        &[],
+    );
+}
+
 /// Whatever the number of states, full groups or not, and of threads; and on one thread, once a function has been called,
 /// without allocating.
 #[test]

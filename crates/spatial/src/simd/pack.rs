@@ -138,16 +138,22 @@ impl<S: Block> Kernel for Gather<'_, S> {
 /// There is a place for as many numbers as a vector has.
 #[inline(always)]
 unsafe fn write_tile<S: Block>(block: &mut [S; MOST], negative: bool, to: &mut [&mut [S::Number]], at: usize) {
+    let lanes = to.len();
     if negative {
         for k in 0..S::LANES {
             block[k] = -block[k];
         }
     }
     S::transpose(&mut block[..S::LANES]);
-    for (k, to) in to.iter_mut().enumerate() {
-        debug_assert!(at + S::LANES <= to.len());
+    let mut write = |k: usize| {
+        debug_assert!(at + S::LANES <= to[k].len());
         // SAFETY: by the caller.
-        block[k].store(unsafe { to.get_unchecked_mut(at..at + S::LANES) });
+        block[k].store(unsafe { to[k].get_unchecked_mut(at..at + S::LANES) });
+    };
+    if lanes == S::LANES {
+        (0..S::LANES).for_each(&mut write); // from registers
+    } else {
+        (0..lanes).for_each(&mut write);
     }
 }
 
@@ -176,27 +182,36 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
         let (entry, place) = (last(down, along), last(stride, 1));
         assert!(fits(entry, from.len()), "a matrix ends before its last entry");
         assert!(to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())), "no place for the last entry");
+        let mut offsets = [0; MOST]; // of the vectors of a tile
         if columns < S::LANES && stride == columns && rows * columns >= S::LANES {
-            // narrow rows, one after the other, as if they were one
-            let (n, mut first, mut i, mut j) = (rows * columns, 0, 0, 0);
-            loop {
+            // narrow rows, one after the other, as if they were one: each tile but the last begins with a row
+            let mut walk = |mut i: usize, mut j: usize| {
                 for k in 0..S::LANES {
-                    // SAFETY: row i < rows, and column j < columns; the last entry is there.
-                    block[k] = *unsafe { from.get_unchecked(i * down + j * along) };
+                    offsets[k] = i * down + j * along;
                     j += 1;
                     if j == columns {
                         (i, j) = (i + 1, 0);
                     }
                 }
-                // SAFETY: the last entry has a place, and the tile ends with it or before.
+                offsets
+            };
+            let (n, mut tile) = (rows * columns, walk(0, 0));
+            let (mut i, mut first) = (0, 0);
+            loop {
+                for k in 0..S::LANES {
+                    // SAFETY: the tile ends with the last entry or before, which is there.
+                    block[k] = *unsafe { from.get_unchecked(i * down + tile[k]) };
+                }
+                // SAFETY: as above; the last entry has a place.
                 unsafe { write_tile(&mut block, negative, to, first) };
-                first += S::LANES;
-                if first >= n {
+                if first + S::LANES >= n {
                     return;
                 }
+                i += S::LANES / columns;
+                first = i * columns;
                 if first + S::LANES > n {
                     first = n - S::LANES; // the last tile overlaps the one before
-                    (i, j) = (first / columns, first % columns);
+                    (i, tile) = (0, walk(first / columns, first % columns));
                 }
             }
         }
@@ -214,12 +229,15 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             }
             return;
         }
+        for k in 0..S::LANES {
+            offsets[k] = k * along;
+        }
         for i in 0..rows {
             let mut j = 0;
             loop {
                 for k in 0..S::LANES {
                     // SAFETY: row i < rows, and column j + k < columns; the last entry is there.
-                    block[k] = *unsafe { from.get_unchecked(i * down + (j + k) * along) };
+                    block[k] = *unsafe { from.get_unchecked(i * down + j * along + offsets[k]) };
                 }
                 // SAFETY: as above; there are as many columns as lanes, at least.
                 unsafe { write_tile(&mut block, negative, to, i * stride + j) };
