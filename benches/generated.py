@@ -4,10 +4,10 @@
     python benches/generated.py [--rounds N] [--cpu K] [ROBOT ...]
 
 Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn, as is Pinocchio, which
-benches/peers/dynamics.py builds (some ten minutes the first time). Our passes are timed by `cargo bench -p
-condyle-codegen --bench generated`: limbs one after the other, and side by side. Needs Linux, Rust, compilers of C and
-C++, and the package condyle. Pinocchio's own generated code needs CppADCodeGen, which no wheel brings: it is not
-measured.
+benches/peers/dynamics.py builds (some ten minutes the first time). Pinocchio's own generated code is what CppADCodeGen
+makes of its recursions (benches/peers/cppadcg.cpp, some ten minutes more), compiled by the same compiler with the same
+options. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`: limbs one after the other, and side
+by side. Needs Linux, Rust, compilers of C and C++, and the package condyle.
 """
 
 import argparse
@@ -86,6 +86,18 @@ def measured(model: condyle.Model, function: str, states: Path, rounds: int, cpu
     return {"ns": ns, "operations": operations, "kb": kb, "compile_s": took}
 
 
+def of_cppadcg(program: Path, model: Path, states: Path, cpu: int) -> dict[str, list[float]]:
+    """Pinocchio's generated code, by function: ns of a call, and s to generate and compile it."""
+    with TemporaryDirectory() as folder:
+        command = ("taskset", "-c", str(cpu), program, model, states, folder, shutil.which(compiler()), *FLAGS, "-fPIC")
+        told = dynamics.run(*command)
+    return {name: [float(x) for x in numbers] for name, *numbers in map(str.split, told.splitlines())}
+
+
+def beside(ns: float, other: "list[float] | None") -> str:
+    return "– | –" if other is None else f"{other[0]:.0f} | {ns / other[0]:.2f}"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("robots", nargs="*", default=["panda", "anymal", "talos"], metavar="ROBOT")
@@ -95,9 +107,12 @@ def main() -> None:
     dynamics.PEERS.mkdir(parents=True, exist_ok=True)
     python = dynamics.environment("venv", "pin==4.1.0", "example-robot-data-loaders==5.0.0")
     theirs = dynamics.build_pinocchio(python)
+    cppadcg = dynamics.build_pinocchio(python, "cppadcg", "-O1", "cmeel-cppad==20250000.2", "cmeel-cppadcodegen==2.4.3")
     print(f"{compiler()} {' '.join(FLAGS)}, {options.rounds} rounds\n")
-    print("| robot | function | operations | generated ns | Pinocchio ns | ratio | KB | compiled in s |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print(
+        "| robot | function | operations | ours ns | Pinocchio ns | ratio | CppADCodeGen ns | ratio | KB | compiled s |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     files = []
     for robot in options.robots:
         source, locked = dynamics.ROBOTS[robot]
@@ -108,11 +123,13 @@ def main() -> None:
         if locked:
             model = model.lock(locked, condyle.neutral(model))
         peer = dynamics.times(dynamics.run("taskset", "-c", str(options.cpu), theirs, paths[0], paths[2]))
+        recorded = of_cppadcg(cppadcg, paths[0], paths[2], options.cpu)
         for function in FUNCTIONS:
             ours = measured(model, function, paths[2], options.rounds, options.cpu)
             print(
                 f"| {robot} | {function} | {ours['operations']} | {ours['ns']:.0f} | {peer[function]:.0f} | "
-                f"{ours['ns'] / peer[function]:.2f} | {ours['kb']:.0f} | {ours['compile_s']:.1f} |",
+                f"{ours['ns'] / peer[function]:.2f} | {beside(ours['ns'], recorded.get(function))} | "
+                f"{ours['kb']:.0f} | {ours['compile_s']:.1f} |",
                 flush=True,
             )
         files.append(path + ("" if root == "fixed" else ":free"))

@@ -61,26 +61,31 @@ def environment(name: str, *packages: str) -> Path:
     return python
 
 
-def build_pinocchio(python: Path) -> Path:
-    """Compiles pinocchio.cpp, one part at a time; its path."""
-    headers = environment("headers", "cmeel-eigen==3.4.1", "cmeel-urdfdom-headers==3.0.0")
+def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *packages: str) -> Path:
+    """Compiles pinocchio.cpp, or another program of its parts that needs headers of some packages more; its path."""
     purelib = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
     prefix = Path(run(python, "-c", purelib).strip()) / "cmeel.prefix"
-    include = Path(run(headers, "-c", purelib).strip()) / "cmeel.prefix" / "include"
+    folders = [prefix / "include", prefix / "include/urdfdom"]
+    headers = [environment("headers", "cmeel-eigen==3.4.1", "cmeel-urdfdom-headers==3.0.0")]
+    headers += [environment(f"headers-{name}", *packages)] if packages else []
+    for one in headers:
+        include = Path(run(one, "-c", purelib).strip()) / "cmeel.prefix" / "include"
+        folders += [include, include / "urdfdom_headers", include / "eigen3"]
     compiler = next(c for c in ("clang++-19", "clang++", "g++") if shutil.which(c))
     flags = ["-std=c++17", "-march=native", "-DNDEBUG", "-w", "-DBOOST_MPL_LIMIT_LIST_SIZE=30"]
     flags += ["-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30"]
     flags += ["-DBOOST_FUSION_INVOKE_MAX_ARITY=12"]
-    for folder in (prefix / "include", prefix / "include/urdfdom", include / "urdfdom_headers", include / "eigen3"):
+    for folder in folders:
         flags += ["-isystem", str(folder)]
-    source, program = Path(__file__).with_name("pinocchio.cpp"), PEERS / "pinocchio"
-    objects = [PEERS / f"part{part}.o" for part in PARTS]
+    source, program = Path(__file__).with_name(f"{name}.cpp"), PEERS / name
+    objects = [PEERS / f"{name}{part}.o" for part in PARTS]
     for part, target in zip(PARTS, objects, strict=True):
         if not target.exists() or target.stat().st_mtime < source.stat().st_mtime:
-            print(f"compiling pinocchio.cpp, part {part} of {PARTS[-1]}, with {compiler} …", file=sys.stderr)
-            level = "-O3" if part else "-O1"  # part 0 only reads the model
-            run(compiler, *flags, level, f"-DPART={part}", "-c", source, "-o", target)
-    run(compiler, *objects, "-o", program, f"-L{prefix}/lib", f"-Wl,-rpath,{prefix}/lib", "-lboost_serialization")
+            print(f"compiling {source.name}, part {part} of {PARTS[-1]}, with {compiler} …", file=sys.stderr)
+            optimised = level if part else "-O1"  # part 0 only reads the model
+            run(compiler, *flags, optimised, f"-DPART={part}", "-c", source, "-o", target)
+    libraries = [f"-L{prefix}/lib", f"-Wl,-rpath,{prefix}/lib", "-lboost_serialization", "-ldl"]
+    run(compiler, *objects, "-o", program, *libraries)
     return program
 
 

@@ -102,7 +102,7 @@ for (const name of ["reach", "trot"]) {
     await page.screenshot({ path: join(folder, `${name}_dark.png`) });
     await page.setViewport({ width: 360, height: 640 });
     await page.waitForFunction((wide) => document.querySelector("#view canvas").clientWidth !== wide, {}, wide);
-    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "nothing sticks out");
+    await page.waitForFunction(() => document.documentElement.scrollWidth <= innerWidth); // nothing sticks out, once all have their sizes
     await page.screenshot({ path: join(folder, `${name}_narrow.png`) });
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
     assert.notEqual(await colour(page), dark);
