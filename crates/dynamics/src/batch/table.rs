@@ -95,7 +95,7 @@ macro_rules! batched {
             use $crate::batch::table::of_states;
 
             #[derive(Clone, Copy)]
-            pub(super) struct Work { $($(pub $shared: $Shared),*)? }
+            struct Work { $($($shared: $Shared),*)? }
 
             impl<T: condyle_spatial::block::Real> Pass<T> for Work {
                 const KINDS: &'static [usize] = &[$($($kind),+)?];
@@ -121,6 +121,23 @@ macro_rules! batched {
                     })?
                 }
             }
+
+            /// For all states, to where the results are `written` or to where they stay.
+            #[allow(clippy::too_many_arguments)] // those of the function
+            pub(super) fn compute<T: condyle_spatial::block::Real>(
+                batch: &mut $crate::batch::Batch<T>,
+                $model: &condyle_model::Model,
+                $($set: &mut $crate::batch::constraints::BatchConstraints<T>,)?
+                $($given: $crate::batch::table::given!($given, T),)*
+                $($($shared: $Shared,)*)?
+                written: Option<&mut [&mut [T]]>,
+            ) {
+                let (columns, constraints) = (0 $(+ $columns)?, None $(.or(Some($set)))?);
+                let given: &[_] = &[$($crate::batch::table::placed!($given, $given)),*];
+                let shapes: &[&[usize]] = &[$(&[$($size),*]),*];
+                let work = Work { $($($shared),*)? };
+                batch.compute(work, $model, given, (shapes, columns), constraints, written);
+            }
         })*
 
         impl<T: condyle_spatial::block::Real> $crate::batch::Batch<T> {$(
@@ -132,11 +149,7 @@ macro_rules! batched {
                 $($given: $crate::batch::table::given!($given, T),)*
                 $($($shared: $Shared,)*)?
             ) -> $Out {
-                let (columns, constraints) = (0 $(+ $columns)?, None $(.or(Some(&mut *$set)))?);
-                let given: &[_] = &[$($crate::batch::table::placed!($given, $given)),*];
-                let shapes: &[&[usize]] = &[$(&[$($size),*]),*];
-                let work = $name::Work { $($($shared),*)? };
-                self.compute(work, $model, given, (shapes, columns), constraints, None);
+                $name::compute(self, $model, $($set,)? $($given,)* $($($shared,)*)? None);
                 $crate::batch::results::Take::take(&mut $crate::batch::results::Taken { batch: self, next: 0 })
             }
         )*}
@@ -153,11 +166,7 @@ macro_rules! batched {
                 $($given: $crate::batch::table::given!($given, T),)*
                 $($($shared: $Shared,)*)?
             ) {
-                let (columns, constraints) = (0 $(+ $columns)?, None $(.or(Some(&mut *$set)))?);
-                let given: &[_] = &[$($crate::batch::table::placed!($given, $given)),*];
-                let shapes: &[&[usize]] = &[$(&[$($size),*]),*];
-                let work = $name::Work { $($($shared),*)? };
-                self.batch.compute(work, $model, given, (shapes, columns), constraints, Some(&mut *self.to));
+                $name::compute(self.batch, $model, $($set,)? $($given,)* $($($shared,)*)? Some(&mut *self.to));
             }
         )*}
     };
