@@ -92,6 +92,12 @@ static void measure(const Task &task, const char *name, int outputs, bool takes_
   std::fflush(stdout);
 }
 
+// Three square matrices one after the other; of the last, symmetric one the upper triangle is known.
+static void put(Vector &y, const Matrix &dq, const Matrix &dv, Matrix &last) {
+  last.template triangularView<Eigen::StrictlyLower>() = last.transpose();
+  y << dq.reshaped(), dv.reshaped(), last.reshaped();
+}
+
 #if PART == 0
 int main(int argc, char **argv) {
   if (argc < 6)
@@ -129,9 +135,7 @@ void part2(const Task &task) {
   measure(task, "rnea_derivatives", 3 * nv * nv, false, [nv](auto &model, auto &data, auto &q, auto &v, auto &a, auto &y) {
     Matrix dq = Matrix::Zero(nv, nv), dv = Matrix::Zero(nv, nv), da = Matrix::Zero(nv, nv);
     pinocchio::computeRNEADerivatives(model, data, q, v, a, dq, dv, da);
-    da.template triangularView<Eigen::StrictlyLower>() = da.transpose();
-    for (int k = 0; k < 3; ++k)
-      y.segment(k * nv * nv, nv * nv) = Eigen::Map<Vector>((k == 0 ? dq : k == 1 ? dv : da).data(), nv * nv);
+    put(y, dq, dv, da);
   });
 }
 #elif PART == 3
@@ -140,9 +144,7 @@ void part3(const Task &task) {
   measure(task, "aba_derivatives", 3 * nv * nv, true, [nv](auto &model, auto &data, auto &q, auto &v, auto &tau, auto &y) {
     Matrix dq = Matrix::Zero(nv, nv), dv = Matrix::Zero(nv, nv), dtau = Matrix::Zero(nv, nv);
     pinocchio::computeABADerivatives(model, data, q, v, tau, dq, dv, dtau);
-    dtau.template triangularView<Eigen::StrictlyLower>() = dtau.transpose();
-    for (int k = 0; k < 3; ++k)
-      y.segment(k * nv * nv, nv * nv) = Eigen::Map<Vector>((k == 0 ? dq : k == 1 ? dv : dtau).data(), nv * nv);
+    put(y, dq, dv, dtau);
   });
 }
 #endif
