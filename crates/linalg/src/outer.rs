@@ -24,71 +24,57 @@ impl SparseRows {
     }
 
     /// Notes which blocks are not zero.
-    #[inline(always)]
     pub fn mark(&mut self, stride: usize) {
-        for (to, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
-            *to = mask(row);
-        }
+        mark_rows(&mut self.masks, &self.numbers, stride);
     }
 }
 
 /// The blocks of a row that are not zero: bit k stands for the columns from k times [`block`] on.
-#[inline(always)]
 pub fn mask(row: &[f64]) -> u64 {
-    let (eights, rest) = row.as_chunks::<8>();
-    let (wide, mut last, mut mask) = (block(row.len()) / 8, [0.0; 8], 0);
-    let (mut bit, mut left) = (1, wide);
-    for x in eights {
-        mask |= if any(x) { bit } else { 0 };
-        left -= 1;
-        if left == 0 {
-            (bit, left) = (bit << 1, wide);
+    let mut masks = [0];
+    mark_rows(&mut masks, row, row.len());
+    masks[0]
+}
+
+compiled! {
+    /// The [`mask`] of each row of `stride` numbers.
+    fn mark_rows<V, COLUMNS>(masks: &mut [u64], numbers: &[f64], stride: usize) {
+        let wide = block(stride) / 8;
+        for (to, row) in masks.iter_mut().zip(numbers.chunks_exact(stride)) {
+            let (eights, rest) = row.as_chunks::<8>();
+            let (mut last, mut mask, mut bit, mut left) = ([0.0; 8], 0, 1, wide);
+            for x in eights {
+                mask |= if V::any(x) { bit } else { 0 };
+                left -= 1;
+                if left == 0 {
+                    (bit, left) = (bit << 1, wide);
+                }
+            }
+            last[..rest.len()].copy_from_slice(rest);
+            *to = if V::any(&last) { mask | bit } else { mask };
         }
     }
-    last[..rest.len()].copy_from_slice(rest);
-    if any(&last) { mask | bit } else { mask }
 }
 
-/// Whether one of eight numbers is not zero, in registers; a NaN is not.
-#[inline(always)]
-fn any(x: &[f64; 8]) -> bool {
-    let mut any = false;
-    for i in 0..8 {
-        any |= x[i] != 0.0;
-    }
-    any
-}
-
-/// y −= Σ aᵢ xᵢ on the blocks of a [`mask`], in whole registers.
+/// y −= Σ aᵢ xᵢ in whole registers: less than one at the end, if there is less, stays.
 ///
 /// # Panics
 /// If an x has not as many numbers as y.
 #[inline(always)]
-pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N], mut mask: u64) {
-    let (n, wide) = (y.len(), block(y.len()));
+pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N]) {
+    let n = y.len();
     let mut factors = [V::splat(0.0); N];
     for k in 0..N {
         assert!(x[k].len() == n, "rows of different lengths");
         factors[k] = V::splat(-a[k]);
     }
-    while mask != 0 {
-        let first = mask.trailing_zeros();
-        let after = first + (mask >> first).trailing_ones(); // blocks side by side are one run
-        let mut i = first as usize * wide;
-        let end = n.min(after as usize * wide);
-        while i + V::N <= end {
-            // SAFETY: end ≤ n, and all rows have n numbers.
-            unsafe {
-                let y = y.get_unchecked_mut(i..i + V::N);
-                let mut sum = V::load(y);
-                for k in 0..N {
-                    sum = V::load(x[k].get_unchecked(i..i + V::N)).mul_add(factors[k], sum);
-                }
-                sum.store(y);
-            }
-            i += V::N;
+    for (i, y) in y.chunks_exact_mut(V::N).enumerate() {
+        let mut sum = V::load(y);
+        for k in 0..N {
+            // SAFETY: all rows have n numbers, as y has.
+            sum = V::load(unsafe { x[k].get_unchecked(i * V::N..(i + 1) * V::N) }).mul_add(factors[k], sum);
         }
-        mask &= u64::MAX.checked_shl(after).unwrap_or(0);
+        sum.store(y);
     }
 }
 

@@ -39,6 +39,8 @@ pub trait Vector: Copy {
     fn mul(self, b: Self) -> Self;
     /// The transpose of N registers: number i of register k becomes number k of register i.
     fn transpose(rows: &mut [Self]);
+    /// Whether one of eight numbers is not zero; a NaN is not.
+    fn any(x: &[f64; 8]) -> bool;
 }
 
 /// Two numbers, which the compiler keeps in a register of the kind that every processor has.
@@ -82,6 +84,14 @@ impl Vector for Pair {
         let (a, b) = (rows[0].0, rows[1].0);
         (rows[0], rows[1]) = (Self([a[0], b[0]]), Self([a[1], b[1]]));
     }
+    #[inline(always)]
+    fn any(x: &[f64; 8]) -> bool {
+        let mut any = false;
+        for i in 0..8 {
+            any |= x[i] != 0.0;
+        }
+        any
+    }
 }
 
 impl<S: Block<Number = f64>> Vector for S {
@@ -118,6 +128,16 @@ impl<S: Block<Number = f64>> Vector for S {
     #[inline(always)]
     fn transpose(rows: &mut [Self]) {
         Block::transpose(rows);
+    }
+    #[inline(always)]
+    fn any(x: &[f64; 8]) -> bool {
+        let (zero, one) = (<S as Scalar>::zero(), S::one());
+        let least = <S as Scalar>::splat(f64::from_bits(1)); // only zeros are smaller
+        let mut any = zero;
+        for x in x.chunks_exact(S::LANES) {
+            any = S::select(<S as Block>::load(x).abs().lt(least), any, one);
+        }
+        S::any(zero.lt(any))
     }
 }
 

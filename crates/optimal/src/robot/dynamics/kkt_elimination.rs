@@ -20,7 +20,7 @@ use crate::lq::InverseDynamicsForm;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
 use crate::robot::residuals::rows::Row;
-use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, mask, max_abs, subtract_rows};
+use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
 pub(super) const PREFERENCE: f64 = 1e-2;
@@ -60,8 +60,8 @@ pub(crate) struct KktElimination {
     limbs: Vec<(usize, usize)>,
     /// The column that each row was solved for.
     pivots: Vec<usize>,
-    /// The rows that are solved here, and which of their blocks are not zero.
-    late: Vec<(usize, u64)>,
+    /// The rows that are solved here.
+    late: Vec<usize>,
     /// The place of each column of δa and δf: its unknown, if it is one, or else the row that was solved for it.
     place: Vec<Place>,
     /// Runs of columns that are unknowns: the first column, the first unknown, how many.
@@ -186,8 +186,7 @@ impl Vectorized for Run<'_> {
             if e.pivots[r] != usize::MAX {
                 continue;
             }
-            let (before, rest) = T.split_at_mut(r * stride);
-            let (row, after) = rest.split_at_mut(stride);
+            let row = &mut T[r * stride..][..stride];
             // what the entries of a row that depends on others are compared with: a contact's are of order one
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = e.choose(r, row, scale) else { return };
@@ -198,35 +197,33 @@ impl Vectorized for Run<'_> {
                 *x *= inverse;
             }
             row[k] = 1.0;
-            let mask = mask(row);
-            for other in before.chunks_exact_mut(stride).chain(after.chunks_exact_mut(stride)) {
-                let factor = other[k];
-                if factor != 0.0 {
-                    subtract_rows::<V, 1>(other, [row], [factor], mask);
-                    other[k] = 0.0;
+            for i in 0..solved {
+                let factor = T[i * stride + k];
+                if factor != 0.0 && i != r {
+                    let rows = [i, r].map(|i| i * stride..(i + 1) * stride);
+                    let Ok([other, row]) = T.get_disjoint_mut(rows) else { unreachable!("two rows") };
+                    subtract_rows::<V, 1>(other, [row], [factor]);
                 }
             }
-            e.late.push((r, 0));
+            e.late.push(r);
         }
         // what the rows were solved for goes out of the joints' rows, several at once
-        e.late.iter_mut().for_each(|(r, blocks)| *blocks = mask(&T[*r * stride..][..stride]));
         for other in motion.chunks_exact_mut(stride).take(if e.late.is_empty() { 0 } else { nv }) {
-            let (mut x, mut a, mut blocks, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0, 0);
-            for &(r, mask) in &e.late {
+            let (mut x, mut a, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0);
+            for &r in &e.late {
                 let factor = other[e.pivots[r]];
                 if factor == 0.0 {
                     continue;
                 }
-                (x[count], a[count], blocks, count) = (&T[r * stride..][..stride], factor, blocks | mask, count + 1);
+                (x[count], a[count], count) = (&T[r * stride..][..stride], factor, count + 1);
                 if count == TOGETHER {
-                    subtract_rows::<V, TOGETHER>(other, x, a, blocks);
-                    (a, blocks, count) = ([0.0; TOGETHER], 0, 0);
+                    subtract_rows::<V, TOGETHER>(other, x, a);
+                    (a, count) = ([0.0; TOGETHER], 0);
                 }
             }
             if count > 0 {
-                subtract_rows::<V, TOGETHER>(other, x, a, blocks);
+                subtract_rows::<V, TOGETHER>(other, x, a);
             }
-            e.late.iter().for_each(|&(r, _)| other[e.pivots[r]] = 0.0);
         }
 
         // the columns that are left are the unknowns
@@ -287,11 +284,17 @@ struct Gather<'a> {
 }
 
 impl Gather<'_> {
+    /// Writes a row's unknowns, whole registers at a time: each run goes over what the one before it wrote too much.
     #[inline(always)]
     fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
         for &[from, unknown, length] in self.runs {
-            let by = if from < self.nv { by_a } else { by_f };
-            copy_scaled::<V>(&mut to[unknown..], &row[from..][..length], by);
+            let by = V::splat(if from < self.nv { by_a } else { by_f });
+            let (row, to) = (&row[from..][..length + SLACK], &mut to[unknown..][..length + SLACK]);
+            let mut i = 0;
+            while i < length {
+                V::load(&row[i..]).mul(by).store(&mut to[i..]);
+                i += V::N;
+            }
         }
         copy_scaled::<V>(&mut to[self.m..], &row[self.x..][..2 * self.nv], by_x);
     }
