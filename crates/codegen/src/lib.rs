@@ -17,6 +17,8 @@
 //! time, and the code has neither loops nor branches nor memory of its own.
 #![allow(non_snake_case)]
 
+#[cfg(feature = "cuda")]
+pub mod cuda;
 mod derivative;
 mod error;
 mod expression;

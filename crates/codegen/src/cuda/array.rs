@@ -1,0 +1,133 @@
+//! Arrays in a device's memory.
+
+use super::device::{Device, Stream};
+use super::driver::{Address, call};
+use super::error::Error;
+use super::kernels::Real;
+use core::fmt;
+use core::marker::PhantomData;
+
+/// Numbers in a device's memory: number k of state i of n stands at `[k * n + i]`.
+///
+/// The memory is given back when this is dropped, after what all streams do with it.
+pub struct DeviceArray<T: Real> {
+    pub(super) device: Device,
+    pub(super) address: Address,
+    len: usize,
+    is_owned: bool,
+    number: PhantomData<T>,
+}
+
+impl<T: Real> fmt::Debug for DeviceArray<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DeviceArray").field("device", &self.device).field("len", &self.len).finish_non_exhaustive()
+    }
+}
+
+impl<T: Real> Drop for DeviceArray<T> {
+    fn drop(&mut self) {
+        if let (true, Ok(_current)) = (self.is_owned, self.device.0.current()) {
+            let _ = call!(self.device.0.driver, cuMemFree_v2(self.address)); // waits for all streams
+        }
+    }
+}
+
+impl<T: Real> DeviceArray<T> {
+    /// Memory for some numbers, which are whatever stood there before.
+    ///
+    /// # Errors
+    /// [`Error::Call`], as where there is too little memory.
+    pub fn new(device: &Device, len: usize) -> Result<Self, Error> {
+        let mut address = 0;
+        if len > 0 {
+            let _current = device.0.current()?;
+            call!(device.0.driver, cuMemAlloc_v2(&raw mut address, len.saturating_mul(size_of::<T>())))?;
+        }
+        Ok(Self { device: device.clone(), address, len, is_owned: len > 0, number: PhantomData })
+    }
+
+    /// A copy of some numbers.
+    ///
+    /// # Errors
+    /// [`Error::Call`].
+    pub fn from_slice(stream: &Stream, numbers: &[T]) -> Result<Self, Error> {
+        let mut array = Self::new(&stream.device, numbers.len())?;
+        array.write(stream, numbers)?;
+        Ok(array)
+    }
+
+    /// Memory of another library's, which is not copied, and not given back.
+    ///
+    /// # Safety
+    /// `len` numbers of type `T` stand at this address of the device, which is there longer than this; and what uses it on streams that
+    /// are not ordered with those that this is given to does not write to it, nor read what is written here.
+    pub unsafe fn from_raw(device: &Device, address: u64, len: usize) -> Self {
+        Self { device: device.clone(), address, len, is_owned: false, number: PhantomData }
+    }
+
+    /// The address in the device's memory, for other libraries.
+    pub fn as_raw(&self) -> u64 {
+        self.address
+    }
+
+    /// How many numbers there are.
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Copies numbers to the device, after what is in the stream, and waits for it.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are not as many; [`Error::OtherDevice`]; [`Error::Call`].
+    pub fn write(&mut self, stream: &Stream, numbers: &[T]) -> Result<(), Error> {
+        self.check(stream, "numbers", numbers.len())?;
+        if self.len == 0 {
+            return Ok(());
+        }
+        let _current = self.device.0.current()?;
+        let (driver, from) = (&self.device.0.driver, numbers.as_ptr().cast());
+        call!(driver, cuMemcpyHtoDAsync_v2(self.address, from, size_of_val(numbers), stream.handle))?;
+        call!(driver, cuStreamSynchronize(stream.handle))
+    }
+
+    /// Copies the numbers from the device, after what is in the stream, and waits for it.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are not as many; [`Error::OtherDevice`]; [`Error::Call`], also what a kernel before did wrong.
+    pub fn read(&self, stream: &Stream, numbers: &mut [T]) -> Result<(), Error> {
+        self.check(stream, "numbers", numbers.len())?;
+        if self.len == 0 {
+            return Ok(());
+        }
+        let _current = self.device.0.current()?;
+        let (driver, to) = (&self.device.0.driver, numbers.as_mut_ptr().cast());
+        let copied = call!(driver, cuMemcpyDtoHAsync_v2(to, self.address, size_of_val(numbers), stream.handle));
+        call!(driver, cuStreamSynchronize(stream.handle)).and(copied)
+    }
+
+    /// The numbers, copied from the device: [`read`](Self::read) into a new vector.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read).
+    pub fn to_vec(&self, stream: &Stream) -> Result<Vec<T>, Error> {
+        let mut numbers = vec![T::default(); self.len];
+        self.read(stream, &mut numbers)?;
+        Ok(numbers)
+    }
+
+    fn check(&self, stream: &Stream, name: &str, len: usize) -> Result<(), Error> {
+        if len != self.len {
+            return Err(Error::Length { array: name.to_owned(), expected: self.len, found: len });
+        }
+        on_device("stream", &self.device, &stream.device)
+    }
+}
+
+/// That something is on the device where it is used.
+pub(super) fn on_device(name: &str, expected: &Device, found: &Device) -> Result<(), Error> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(Error::OtherDevice { name: name.to_owned(), expected: expected.ordinal(), found: found.ordinal() })
+}

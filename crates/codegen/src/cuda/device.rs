@@ -1,0 +1,242 @@
+//! Devices and their streams.
+
+use super::driver::{Driver, Handle, call};
+use super::error::Error;
+use super::kernels::{Kernels, Real};
+use crate::cuda::Compiler;
+use crate::function::Function;
+use core::ffi::{CStr, c_char, c_int};
+use core::fmt;
+use core::ptr::null_mut;
+use std::sync::Arc;
+
+/// Attributes of a device, by their numbers in CUDA's header.
+const MULTIPROCESSORS: c_int = 16;
+const CAPABILITY_MAJOR: c_int = 75;
+const CAPABILITY_MINOR: c_int = 76;
+
+/// A stream that does not wait for the legacy default stream.
+const NON_BLOCKING: u32 = 1;
+
+/// An event without a time.
+const DISABLE_TIMING: u32 = 2;
+
+/// A GPU, with its primary context, which is held as long as this or something of it is there.
+///
+/// Clones are the same device. It may be used by several threads at a time.
+#[derive(Clone)]
+pub struct Device(pub(super) Arc<Inner>);
+
+pub(super) struct Inner {
+    pub(super) driver: Driver,
+    pub(super) ordinal: usize,
+    device: c_int,
+    context: Handle,
+    pub(super) multiprocessors: usize,
+    capability: (u32, u32),
+}
+
+// SAFETY: a context may be made the current one by any thread, also by several at a time.
+unsafe impl Send for Inner {}
+// SAFETY: as above.
+unsafe impl Sync for Inner {}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        let _ = call!(self.driver, cuDevicePrimaryCtxRelease_v2(self.device));
+    }
+}
+
+/// A device's context is the thread's current one as long as this is there.
+pub(super) struct Current<'a>(&'a Inner);
+
+impl Drop for Current<'_> {
+    fn drop(&mut self) {
+        let _ = call!(self.0.driver, cuCtxPopCurrent_v2(null_mut()));
+    }
+}
+
+impl Inner {
+    pub(super) fn current(&self) -> Result<Current<'_>, Error> {
+        call!(self.driver, cuCtxPushCurrent_v2(self.context))?;
+        Ok(Current(self))
+    }
+}
+
+impl fmt::Debug for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Device").field(&self.0.ordinal).finish()
+    }
+}
+
+impl PartialEq for Device {
+    /// Whether both are the same GPU.
+    fn eq(&self, other: &Self) -> bool {
+        self.0.context == other.0.context
+    }
+}
+
+impl Device {
+    /// The device of that number, by the driver that [`Driver::new`] finds.
+    ///
+    /// # Errors
+    /// Those of [`Driver::new`] and [`Driver::device`].
+    pub fn new(ordinal: usize) -> Result<Self, Error> {
+        Driver::new()?.device(ordinal)
+    }
+
+    pub(super) fn open(driver: Driver, ordinal: usize) -> Result<Self, Error> {
+        let count = driver.devices()?;
+        if ordinal >= count {
+            return Err(Error::Device { ordinal, count });
+        }
+        let (mut device, mut context) = (0, null_mut());
+        call!(driver, cuDeviceGet(&raw mut device, ordinal as c_int))?;
+        let attribute = |attribute| {
+            let mut value = 0;
+            call!(driver, cuDeviceGetAttribute(&raw mut value, attribute, device))?;
+            Ok::<_, Error>(value.unsigned_abs())
+        };
+        let multiprocessors = attribute(MULTIPROCESSORS)?.max(1) as usize;
+        let capability = (attribute(CAPABILITY_MAJOR)?, attribute(CAPABILITY_MINOR)?);
+        call!(driver, cuDevicePrimaryCtxRetain(&raw mut context, device))?;
+        Ok(Self(Arc::new(Inner { driver, ordinal, device, context, multiprocessors, capability })))
+    }
+
+    /// The number by which it was asked for.
+    pub fn ordinal(&self) -> usize {
+        self.0.ordinal
+    }
+
+    /// The compute capability: (9, 0) of Hopper.
+    pub fn capability(&self) -> (u32, u32) {
+        self.0.capability
+    }
+
+    /// The name that its maker gave it.
+    ///
+    /// # Errors
+    /// [`Error::Call`].
+    pub fn name(&self) -> Result<String, Error> {
+        let mut name: [c_char; 256] = [0; 256];
+        call!(self.0.driver, cuDeviceGetName(name.as_mut_ptr(), 255, self.0.device))?;
+        // SAFETY: the last character stays 0.
+        Ok(unsafe { CStr::from_ptr(name.as_ptr()) }.to_string_lossy().into_owned())
+    }
+
+    /// A new stream, which is ordered with no other one but by [`Stream::wait_for`].
+    ///
+    /// # Errors
+    /// [`Error::Call`].
+    pub fn stream(&self) -> Result<Stream, Error> {
+        let (mut handle, _current) = (null_mut(), self.0.current()?);
+        call!(self.0.driver, cuStreamCreate(&raw mut handle, NON_BLOCKING))?;
+        Ok(Stream { device: self.clone(), handle, is_owned: true })
+    }
+
+    /// The legacy default stream, with which all streams of other libraries are ordered that were not made as non-blocking ones.
+    pub fn default_stream(&self) -> Stream {
+        Stream { device: self.clone(), handle: null_mut(), is_owned: false }
+    }
+
+    /// The kernels of some functions, compiled for this device, on numbers of type `T`.
+    ///
+    /// Where the compiler does not know the device yet, it makes PTX for the newest one that it knows, which the driver goes on with.
+    ///
+    /// # Errors
+    /// [`Error::Compile`] with what the compiler says; [`Error::Load`]; [`Error::Call`].
+    ///
+    /// # Panics
+    /// If `name` is no identifier (ASCII letters, digits and `_`).
+    pub fn compile<T: Real>(
+        &self,
+        compiler: &Compiler,
+        name: &str,
+        functions: &[Function],
+    ) -> Result<Kernels<T>, Error> {
+        let image = compiler.image::<T>(name, functions, self.0.capability)?;
+        Kernels::load(self, name, functions, &image)
+    }
+
+    /// The kernels of some functions from what a compiler has made of them, PTX or CUBIN: NVRTC is not needed.
+    ///
+    /// # Safety
+    /// `image` is what [`Compiler::ptx`] (or another compiler) made of the same functions, under the same name and for the same `T`,
+    /// and whole.
+    ///
+    /// # Errors
+    /// [`Error::Load`] with what the driver says, as where the image is for newer devices; [`Error::Call`].
+    pub unsafe fn load<T: Real>(&self, name: &str, functions: &[Function], image: &[u8]) -> Result<Kernels<T>, Error> {
+        Kernels::load(self, name, functions, image)
+    }
+}
+
+/// An order of work: what goes to the same stream is done one after the other.
+///
+/// Copies and calls name the stream on which they are done. It may be used by several threads at a time.
+pub struct Stream {
+    pub(super) device: Device,
+    pub(super) handle: Handle,
+    is_owned: bool,
+}
+
+// SAFETY: work may be put into a stream by any thread, also by several at a time.
+unsafe impl Send for Stream {}
+// SAFETY: as above.
+unsafe impl Sync for Stream {}
+
+impl fmt::Debug for Stream {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Stream").field("device", &self.device).field("handle", &self.handle).finish()
+    }
+}
+
+impl Drop for Stream {
+    fn drop(&mut self) {
+        if let (true, Ok(_current)) = (self.is_owned, self.device.0.current()) {
+            let _ = call!(self.device.0.driver, cuStreamDestroy_v2(self.handle)); // what is under way goes on
+        }
+    }
+}
+
+impl Stream {
+    /// A stream of another library's: its `CUstream` or `cudaStream_t`. It is not destroyed.
+    ///
+    /// # Safety
+    /// It is one of the device's primary context, and is there longer than this.
+    pub unsafe fn from_raw(device: &Device, handle: u64) -> Self {
+        Self { device: device.clone(), handle: handle as Handle, is_owned: false }
+    }
+
+    /// The `CUstream`, for other libraries.
+    pub fn as_raw(&self) -> u64 {
+        self.handle as u64
+    }
+
+    /// Lets what goes into this stream from now on wait for what is in the other one already.
+    ///
+    /// # Errors
+    /// [`Error::Call`].
+    pub fn wait_for(&self, other: &Self) -> Result<(), Error> {
+        let driver = &self.device.0.driver;
+        let mut event = null_mut();
+        let made = {
+            let _current = other.device.0.current()?;
+            call!(driver, cuEventCreate(&raw mut event, DISABLE_TIMING))?;
+            call!(driver, cuEventRecord(event, other.handle))
+        };
+        let _current = self.device.0.current()?;
+        let waits = made.and_then(|()| call!(driver, cuStreamWaitEvent(self.handle, event, 0)));
+        call!(driver, cuEventDestroy_v2(event))?; // when it has happened
+        waits
+    }
+
+    /// Waits until all that has been put into the stream is done.
+    ///
+    /// # Errors
+    /// [`Error::Call`], also what a kernel before did wrong.
+    pub fn synchronize(&self) -> Result<(), Error> {
+        let _current = self.device.0.current()?;
+        call!(self.device.0.driver, cuStreamSynchronize(self.handle))
+    }
+}

@@ -1,0 +1,151 @@
+//! The driver's library.
+
+use super::device::Device;
+use super::error::Error;
+use super::library::{Named, library_functions};
+use core::ffi::{CStr, c_char, c_int, c_uint, c_void};
+use core::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What CUDA made: a context, a stream, an event, a module or a kernel.
+pub(super) type Handle = *mut c_void;
+
+/// An address in the device's memory.
+pub(super) type Address = u64;
+
+library_functions! { DriverTable:
+    cuInit(c_uint);
+    cuGetErrorName(c_int, *mut *const c_char);
+    cuGetErrorString(c_int, *mut *const c_char);
+    cuDeviceGetCount(*mut c_int);
+    cuDeviceGet(*mut c_int, c_int);
+    cuDeviceGetName(*mut c_char, c_int, c_int);
+    cuDeviceGetAttribute(*mut c_int, c_int, c_int);
+    cuDevicePrimaryCtxRetain(*mut Handle, c_int);
+    cuDevicePrimaryCtxRelease_v2(c_int);
+    cuCtxPushCurrent_v2(Handle);
+    cuCtxPopCurrent_v2(*mut Handle);
+    cuCtxSynchronize();
+    cuMemAlloc_v2(*mut Address, usize);
+    cuMemFree_v2(Address);
+    cuMemcpyHtoDAsync_v2(Address, *const c_void, usize, Handle);
+    cuMemcpyDtoHAsync_v2(*mut c_void, Address, usize, Handle);
+    cuStreamCreate(*mut Handle, c_uint);
+    cuStreamDestroy_v2(Handle);
+    cuStreamSynchronize(Handle);
+    cuStreamWaitEvent(Handle, Handle, c_uint);
+    cuEventCreate(*mut Handle, c_uint);
+    cuEventDestroy_v2(Handle);
+    cuEventRecord(Handle, Handle);
+    cuModuleLoadDataEx(*mut Handle, *const c_void, c_uint, *const c_int, *const *mut c_void);
+    cuModuleUnload(Handle);
+    cuModuleGetFunction(*mut Handle, Handle, *const c_char);
+    cuFuncGetAttribute(*mut c_int, c_int, Handle);
+    cuOccupancyMaxPotentialBlockSize(*mut c_int, *mut c_int, Handle, *const c_void, usize, c_int);
+    cuLaunchKernel(Handle, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, Handle, *const *mut c_void, *const *mut c_void);
+}
+
+/// Calls a function of the driver's: `Ok(())`, or its name with CUDA's words. The arguments are the caller's to vouch for.
+macro_rules! call {
+    ($driver:expr, $function:ident($($argument:expr),* $(,)?)) => {{
+        let driver: &$crate::cuda::Driver = &$driver;
+        // SAFETY: handles are alive as long as what owns them; pointers to results and their sizes are said where they are made.
+        let status = unsafe { (driver.table.$function)($($argument),*) };
+        driver.check(stringify!($function), status)
+    }};
+}
+pub(super) use call;
+
+const LIBRARY: Named = Named {
+    library: "CUDA's driver",
+    variable: "CONDYLE_CUDA_LIBRARY",
+    files: if cfg!(windows) { &["nvcuda.dll"] } else { &["libcuda.so.1", "libcuda.so"] },
+};
+
+/// NVIDIA's driver, which has been loaded.
+#[derive(Clone)]
+pub struct Driver {
+    pub(super) table: Arc<DriverTable>,
+}
+
+impl fmt::Debug for Driver {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Driver")
+    }
+}
+
+impl Driver {
+    /// The driver from where the system finds it, or from the file that the environment variable `CONDYLE_CUDA_LIBRARY` names.
+    ///
+    /// ```
+    /// use condyle_codegen::cuda::{Driver, Error};
+    /// match Driver::new() {
+    ///     Ok(driver) => println!("{} devices", driver.devices()?),
+    ///     Err(Error::Library { reason, .. }) => println!("no driver: {reason}"),
+    ///     Err(other) => println!("{other}"), // a driver, but no device, or no right to use it
+    /// }
+    /// # Ok::<(), Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Library`] if there is none; [`Error::Call`] if it cannot be used, as where there is no device.
+    pub fn new() -> Result<Self, Error> {
+        Self::load(None)
+    }
+
+    /// The driver from a file.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn open(library: &Path) -> Result<Self, Error> {
+        Self::load(Some(library))
+    }
+
+    fn load(library: Option<&Path>) -> Result<Self, Error> {
+        let driver = Self { table: Arc::new(DriverTable::load(&LIBRARY, library)?) };
+        call!(driver, cuInit(0))?;
+        Ok(driver)
+    }
+
+    /// The number of devices.
+    ///
+    /// # Errors
+    /// [`Error::Call`].
+    pub fn devices(&self) -> Result<usize, Error> {
+        let mut count = 0;
+        call!(self, cuDeviceGetCount(&raw mut count))?;
+        Ok(usize::try_from(count).unwrap_or(0))
+    }
+
+    /// The device of that number.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if there are not so many; [`Error::Call`].
+    pub fn device(&self, ordinal: usize) -> Result<Device, Error> {
+        Device::open(self.clone(), ordinal)
+    }
+
+    /// What a function returned, as a result.
+    pub(super) fn check(&self, function: &'static str, status: c_int) -> Result<(), Error> {
+        if status == 0 {
+            return Ok(());
+        }
+        Err(Error::Call { function, status, text: self.text(status) })
+    }
+
+    /// A status by its name and in CUDA's words.
+    fn text(&self, status: c_int) -> String {
+        let say = |function: unsafe extern "system" fn(c_int, *mut *const c_char) -> c_int| {
+            let mut text = core::ptr::null();
+            // SAFETY: the function writes a pointer to a constant, or null.
+            unsafe {
+                if function(status, &raw mut text) != 0 || text.is_null() {
+                    return "unknown".to_owned();
+                }
+                CStr::from_ptr(text).to_string_lossy().into_owned()
+            }
+        };
+        format!("{}, {}", say(self.table.cuGetErrorName), say(self.table.cuGetErrorString))
+    }
+}

@@ -1,0 +1,43 @@
+//! Generated kernels on a GPU: compiled while the program runs, and called with arrays of the device.
+//!
+//! ```no_run
+//! use condyle_codegen::cuda::{Compiler, Device, DeviceArray};
+//! use condyle_codegen::{Settings, functions};
+//! let arm = condyle_dynamics::robots::arm7();
+//! let device = Device::new(0)?;
+//! let kernels = device.compile::<f64>(&Compiler::new()?, "arm7", &functions(&arm, &["aba"], &Settings::default()).unwrap())?;
+//!
+//! let n = 100_000;                                      // states: number k of state i stands at [k * n + i]
+//! let stream = device.stream()?;
+//! let q = DeviceArray::from_slice(&stream, &vec![0.3; 7 * n])?;
+//! let v = DeviceArray::from_slice(&stream, &vec![0.1; 7 * n])?;
+//! let tau = DeviceArray::from_slice(&stream, &vec![1.0; 7 * n])?;
+//! let mut a = DeviceArray::new(&device, 7 * n)?;
+//! kernels.kernel("aba")?.call(&stream, n, &[&q, &v, &tau], &mut [&mut a])?; // returns at once
+//! println!("{}", a.to_vec(&stream)?[0]);
+//! # Ok::<(), condyle_codegen::cuda::Error>(())
+//! ```
+//!
+//! Nothing of CUDA is needed when the program is built: the driver's library is loaded by [`Driver::new`], that of NVIDIA's run-time
+//! compiler (NVRTC) by [`Compiler::new`], each from where the system finds it or from the file that the environment variables
+//! `CONDYLE_CUDA_LIBRARY` and `CONDYLE_NVRTC_LIBRARY` name. Where there is no NVRTC, [`Device::load`] takes what [`Compiler::ptx`] made
+//! elsewhere; that needs no GPU.
+//!
+//! All is done in the device's primary context, which other libraries of the process use too. Arrays and streams of theirs are
+//! taken as they are: [`DeviceArray::from_raw`], [`Stream::from_raw`].
+#![allow(unsafe_code)] // two libraries in C
+
+mod array;
+mod compiler;
+mod device;
+mod driver;
+mod error;
+mod kernels;
+mod library;
+
+pub use array::DeviceArray;
+pub use compiler::Compiler;
+pub use device::{Device, Stream};
+pub use driver::Driver;
+pub use error::Error;
+pub use kernels::{Kernel, Kernels, Real};

@@ -1,0 +1,392 @@
+//! Kernels called through a driver without a GPU (`tests/cuda_driver`), against the library that they were recorded from.
+#![allow(non_snake_case, unsafe_code)]
+
+mod common;
+
+use common::{compile, folder, is_there};
+use condyle_codegen::cuda::{Compiler, Device, DeviceArray, Driver, Error, Kernels, Real, Stream};
+use condyle_codegen::{Array, Function, Settings, functions};
+use condyle_dynamics::{Data, Model, aba, aba_derivatives, crba, random_configuration, rnea, robots};
+use condyle_spatial::Scalar;
+use libloading::Library;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::ffi::{CStr, CString, c_char, c_int, c_long, c_uint};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, MutexGuard, OnceLock};
+
+/// Sums in another order, amplified by M⁻¹; relative to the largest number.
+const ROUNDING: f64 = 1e-11;
+
+/// How much further from `f64` a kernel on `f32` may be than the library on `f32` with the same states.
+const FURTHER: f64 = 4.0;
+
+/// The driver, the compiler, and what the driver says that a real one would not.
+struct Fake {
+    driver: Driver,
+    compiler: Compiler,
+    library: Library,
+    _alone: MutexGuard<'static, ()>,
+}
+
+impl Fake {
+    /// The libraries, built once and for one test at a time; `None` where there are no compilers.
+    fn new() -> Option<Self> {
+        static FILES: OnceLock<Option<[PathBuf; 2]>> = OnceLock::new();
+        static ALONE: Mutex<()> = Mutex::new(());
+        let files = FILES.get_or_init(|| {
+            let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/cuda_driver");
+            let build = |from: &str, to: &str| {
+                let to = folder(&format!("cuda_{from}")).join(to);
+                let flags = ["-Wall", "-Wextra", "-shared", "-fPIC", "-pthread", "-ldl", "-o"];
+                compile(Command::new("cc").arg(source.join(from)).args(flags).arg(&to));
+                to
+            };
+            let can = cfg!(target_os = "linux") && is_there("cc") && is_there("g++");
+            can.then(|| [build("driver.c", "libcuda.so.1"), build("nvrtc.c", "libnvrtc.so.12")])
+        });
+        let [driver, nvrtc] = files.as_ref()?;
+        let alone = ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        Some(Self {
+            driver: Driver::open(driver).unwrap(),
+            compiler: Compiler::open(nvrtc).unwrap(),
+            // SAFETY: it is ours.
+            library: unsafe { Library::new(driver) }.unwrap(),
+            _alone: alone,
+        })
+    }
+
+    /// How much memory, and how many streams, events, modules and contexts have been made and not been destroyed.
+    fn live(&self) -> [c_long; 5] {
+        // SAFETY: this is its type.
+        let live = unsafe { self.library.get::<unsafe extern "C" fn(c_int) -> c_long>(b"fake_live\0") }.unwrap();
+        // SAFETY: there are five kinds.
+        core::array::from_fn(|kind| unsafe { live(kind as c_int) })
+    }
+
+    fn complaint(&self) -> String {
+        // SAFETY: this is its type, and it returns a string.
+        unsafe {
+            let complaint = self.library.get::<unsafe extern "C" fn() -> *const c_char>(b"fake_complaint\0").unwrap();
+            CStr::from_ptr(complaint()).to_string_lossy().into_owned()
+        }
+    }
+
+    /// Lets the next call of a function fail.
+    fn fail(&self, function: &str, status: c_int) {
+        let name = CString::new(function).unwrap();
+        // SAFETY: this is its type.
+        unsafe {
+            let fail = self.library.get::<unsafe extern "C" fn(*const c_char, c_int)>(b"fake_fail\0").unwrap();
+            fail(name.as_ptr(), status);
+        }
+    }
+
+    /// The blocks and threads of the last launch, and how many there have been.
+    fn launches(&self) -> ([c_uint; 2], c_long) {
+        let mut last = [0; 2];
+        // SAFETY: this is its type.
+        unsafe {
+            let launches = self.library.get::<unsafe extern "C" fn(*mut c_uint) -> c_long>(b"fake_launches\0").unwrap();
+            let count = launches(last.as_mut_ptr());
+            (last, count)
+        }
+    }
+
+    /// Everything is gone, and nothing was wrong.
+    fn end(self) {
+        assert_eq!(self.complaint(), "");
+        assert_eq!(self.live(), [0; 5]);
+    }
+}
+
+/// What the library computes.
+fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec<Vec<S>> {
+    let data = &mut Data::new(model);
+    match name {
+        "rnea" => vec![rnea(model, data, q, v, x, &[]).to_vec()],
+        "aba" => vec![aba(model, data, q, v, x, &[]).to_vec()],
+        "crba" => vec![crba(model, data, q).as_slice().to_vec()],
+        "aba_derivatives" => {
+            let a = aba(model, data, q, v, x, &[]).to_vec();
+            let d = aba_derivatives(model, data, q, v, x, &[]);
+            [vec![a], [d.da_dq, d.da_dv, d.da_dtau].map(|m| m.as_slice().to_vec()).into()].concat()
+        }
+        other => panic!("{other}"),
+    }
+}
+
+/// The arrays of all states as kernels want them: all states' first numbers first.
+fn side_by_side<T: Copy>(states: &[Vec<Vec<T>>]) -> Vec<Vec<T>> {
+    let of = |a: usize, k: usize| states.iter().map(move |state| state[a][k]);
+    (0..states[0].len()).map(|a| (0..states[0][a].len()).flat_map(|k| of(a, k)).collect()).collect()
+}
+
+trait Number: Real + Scalar + Into<f64> {
+    fn nearest(x: f64) -> Self;
+}
+
+impl Number for f64 {
+    fn nearest(x: f64) -> Self {
+        x
+    }
+}
+
+impl Number for f32 {
+    fn nearest(x: f64) -> Self {
+        x as f32
+    }
+}
+
+/// Calls a kernel for some numbers of states and compares each number.
+fn check<T: Number>(device: &Device, kernels: &Kernels<T>, model: &Model, name: &str, counts: &[usize]) {
+    let (stream, kernel) = (device.stream().unwrap(), kernels.kernel(name).unwrap());
+    for &n in counts {
+        let rng = &mut StdRng::seed_from_u64(n as u64);
+        let (mut inputs, mut expected, mut alike) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..n {
+            let q = random_configuration(model, rng);
+            let [v, x] = [(); 2].map(|()| (0..model.nv()).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>());
+            let state = [q, v, x].map(|numbers| numbers.into_iter().map(T::nearest).collect::<Vec<T>>());
+            expected.push(library(model, name, &state.clone().map(|x| x.into_iter().map(Into::into).collect())));
+            alike.push(library(model, name, &state));
+            inputs.push(state[..kernel.inputs().len()].to_vec());
+        }
+        let inputs: Vec<_> =
+            side_by_side(&inputs).iter().map(|x| DeviceArray::from_slice(&stream, x).unwrap()).collect();
+        let new = |array: &Array| DeviceArray::<T>::new(device, array.len() * n).unwrap();
+        let mut outputs: Vec<_> = kernel.outputs().iter().map(new).collect();
+        let given: Vec<_> = inputs.iter().collect();
+        kernel.call(&stream, n, &given, &mut outputs.iter_mut().collect::<Vec<_>>()).unwrap();
+        let (expected, alike): (Vec<Vec<f64>>, Vec<Vec<T>>) = (side_by_side(&expected), side_by_side(&alike));
+        assert_eq!(outputs.len(), expected.len());
+        for ((output, expected), alike) in outputs.iter().zip(&expected).zip(&alike) {
+            let error = |found: &[T]| {
+                assert_eq!(found.len(), expected.len());
+                let apart = found.iter().zip(expected).map(|(&x, y)| (x.into() - y).abs());
+                apart.fold(0.0, |max, x| if max.is_nan() || x <= max { max } else { x }) // NaN stays
+            };
+            let scale = expected.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
+            let (found, bound) = (error(&output.to_vec(&stream).unwrap()), ROUNDING * scale + FURTHER * error(alike));
+            assert!(found <= bound, "{kernel:?}, {n} states: {found:e} where {bound:e} are allowed");
+        }
+    }
+}
+
+fn of(model: &Model, names: &[&str]) -> Vec<Function> {
+    functions(model, names, &Settings::default()).unwrap()
+}
+
+#[test]
+fn kernels_compute_what_the_library_computes() {
+    let Some(fake) = Fake::new() else { return };
+    let device = fake.driver.device(0).unwrap();
+    let robots: [(Model, &[&str]); 3] = [
+        (robots::arm7(), &["rnea", "aba", "crba", "aba_derivatives"]),
+        (robots::quadruped(), &["rnea", "aba_derivatives"]),
+        (robots::humanoid(), &["rnea", "aba"]),
+    ];
+    for (model, names) in &robots {
+        let all = of(model, names);
+        let double = device.compile::<f64>(&fake.compiler, "robot", &all).unwrap();
+        let single = device.compile::<f32>(&fake.compiler, "robot", &all).unwrap();
+        for name in *names {
+            check(&device, &double, model, name, &[1, 31, 129, 1000]);
+            check(&device, &single, model, name, &[1, 129]);
+        }
+    }
+    drop(device);
+    fake.end();
+}
+
+#[test]
+fn blocks_keep_every_multiprocessor_busy() {
+    let Some(fake) = Fake::new() else { return };
+    let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
+    let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["rnea"])).unwrap();
+    // four multiprocessors, and at most 256 threads in a block
+    for (n, expected) in [(1, [1, 32]), (100, [4, 32]), (129, [3, 64]), (1024, [4, 256]), (3000, [12, 256])] {
+        check(&device, &kernels, &arm, "rnea", &[n]);
+        assert_eq!(fake.launches().0, expected, "{n} states");
+    }
+    let kernel = kernels.kernel("rnea").unwrap();
+    assert_eq!((kernel.registers(), kernel.local_bytes()), (96, 64));
+    assert_eq!(kernel.most_states(), i32::MAX as usize / 7);
+    assert_eq!(format!("{kernel:?}"), "rnea(q, v, a) -> tau");
+    let before = fake.launches().1;
+    let none = || DeviceArray::<f64>::new(&device, 0).unwrap();
+    let stream = device.default_stream();
+    kernel.call(&stream, 0, &[&none(), &none(), &none()], &mut [&mut none()]).unwrap();
+    assert_eq!(none().to_vec(&stream).unwrap(), []);
+    assert_eq!(fake.launches().1, before, "nothing is launched for no states");
+}
+
+#[test]
+fn streams_are_ordered_by_what_is_said() {
+    let Some(fake) = Fake::new() else { return };
+    let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
+    let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["crba"])).unwrap();
+    let kernel = kernels.kernel("crba").unwrap();
+    let (first, second) = (device.stream().unwrap(), device.stream().unwrap());
+    let q = DeviceArray::from_slice(&first, &[0.3; 7]).unwrap();
+    let mut M = DeviceArray::new(&device, 49).unwrap();
+    kernel.call(&first, 1, &[&q], &mut [&mut M]).unwrap();
+    assert!(M.to_vec(&second).unwrap().iter().all(|x| x.is_nan()), "the other stream does not wait");
+    second.wait_for(&first).unwrap();
+    let expected = crba(&arm, &mut Data::new(&arm), &[0.3; 7]).as_slice().to_vec();
+    let found = M.to_vec(&second).unwrap();
+    assert!(found.iter().zip(&expected).all(|(x, y)| (x - y).abs() < ROUNDING));
+    // what is dropped while a kernel waits for its turn is there until it has run
+    let mut again = DeviceArray::new(&device, 49).unwrap();
+    kernel.call(&second, 1, &[&q], &mut [&mut again]).unwrap();
+    drop(q);
+    drop(second);
+    drop(kernels);
+    assert_eq!(again.to_vec(&first).unwrap(), found);
+    drop((M, again, first, device));
+    fake.end();
+}
+
+#[test]
+fn memory_and_streams_of_others_are_used_where_they_are() {
+    let Some(fake) = Fake::new() else { return };
+    let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
+    let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["gravity"])).unwrap();
+    let theirs = device.stream().unwrap();
+    let (q, mut g) = (DeviceArray::from_slice(&theirs, &[0.3; 14]).unwrap(), DeviceArray::new(&device, 14).unwrap());
+    // SAFETY: they are there until the end of the test.
+    let (stream, [from, mut to]) = unsafe {
+        let array = |a: &DeviceArray<f64>| DeviceArray::from_raw(&device, a.as_raw(), a.len());
+        (Stream::from_raw(&device, theirs.as_raw()), [array(&q), array(&g)])
+    };
+    kernels.kernel("gravity").unwrap().call(&stream, 2, &[&from], &mut [&mut to]).unwrap();
+    drop((from, to, stream));
+    let found = g.to_vec(&theirs).unwrap();
+    assert!(found.iter().all(|x| x.is_finite()));
+    assert_eq!(found[2], found[3]);
+    g.write(&theirs, &[1.0; 14]).unwrap();
+    assert_eq!(g.to_vec(&theirs).unwrap(), [1.0; 14]);
+    drop((q, g, theirs, kernels, device));
+    fake.end();
+}
+
+#[test]
+fn a_newer_device_gets_ptx_and_so_does_a_machine_without_a_compiler() {
+    let Some(fake) = Fake::new() else { return };
+    let (old, new, arm) = (fake.driver.device(0).unwrap(), fake.driver.device(1).unwrap(), robots::arm7());
+    assert_eq!((old.capability(), new.capability()), ((9, 0), (9, 9)));
+    assert_eq!((new.name().unwrap(), fake.driver.devices().unwrap()), ("No GPU 1".to_owned(), 2));
+    let all = of(&arm, &["aba"]);
+    let kernels = new.compile::<f64>(&fake.compiler, "arm7", &all).unwrap();
+    check(&new, &kernels, &arm, "aba", &[33]);
+    let ptx = fake.compiler.ptx::<f32>("arm7", &all, (7, 0)).unwrap();
+    // SAFETY: this was made of them.
+    let loaded = unsafe { old.load::<f32>("arm7", &all, &ptx) }.unwrap();
+    check(&old, &loaded, &arm, "aba", &[33]);
+    // what is elsewhere is refused
+    let (stream, other) = (new.default_stream(), old.default_stream());
+    let on = |device| DeviceArray::<f64>::new(device, 7).unwrap();
+    let [q, v, tau, mut a] = [&new, &new, &old, &new].map(on);
+    let kernel = kernels.kernel("aba").unwrap();
+    let said = kernel.call(&stream, 1, &[&q, &v, &tau], &mut [&mut a]).unwrap_err();
+    assert_eq!(said.to_string(), "tau: expected one of device 1, found one of device 0");
+    let said = kernel.call(&other, 1, &[&q, &v, &q], &mut [&mut a]).unwrap_err();
+    assert_eq!(said.to_string(), "stream: expected one of device 1, found one of device 0");
+    assert!(matches!(a.to_vec(&other), Err(Error::OtherDevice { .. })));
+    drop((kernels, loaded, q, v, tau, a, stream, other, old, new));
+    fake.end();
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let Some(fake) = Fake::new() else { return };
+    let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
+    let said = |error: Error| error.to_string();
+    assert_eq!(said(fake.driver.device(2).unwrap_err()), "device 2: there are 2");
+    let all = of(&arm, &["crba"]);
+    let kernels = device.compile::<f64>(&fake.compiler, "arm7", &all).unwrap();
+    let kernel = kernels.kernel("crba").unwrap();
+    assert_eq!(said(kernels.kernel("aba").unwrap_err()), "no kernel `aba`; there are crba");
+    let stream = device.stream().unwrap();
+    let (q, mut M) = (DeviceArray::from_slice(&stream, &[0.1; 14]).unwrap(), DeviceArray::new(&device, 98).unwrap());
+    let mut call = |n, q: &[&DeviceArray<f64>]| said(kernel.call(&stream, n, q, &mut [&mut M]).unwrap_err());
+    assert_eq!(call(3, &[&q]), "q: expected 21 numbers, found 14");
+    assert_eq!(call(2, &[&q, &q]), "crba: expected 1 inputs, found 2");
+    assert_eq!(call(100_000_000, &[&q]), "crba: expected at most 43826196 states, found 100000000");
+    fake.fail("cuLaunchKernel", 2);
+    assert_eq!(call(2, &[&q]), "cuLaunchKernel: CUDA_ERROR_OUT_OF_MEMORY, out of memory (status 2)");
+    assert_eq!(said(kernel.call(&stream, 2, &[&q], &mut []).unwrap_err()), "crba: expected 1 outputs, found 0");
+    assert_eq!(said(M.write(&stream, &[0.0; 3]).unwrap_err()), "numbers: expected 98 numbers, found 3");
+    fake.fail("cuStreamSynchronize", 700);
+    let failed = said(M.to_vec(&stream).unwrap_err());
+    assert!(failed.contains("CUDA_ERROR_ILLEGAL_ADDRESS, an illegal memory access was encountered"), "{failed}");
+    fake.fail("cuMemAlloc_v2", 999);
+    assert!(said(DeviceArray::<f64>::new(&device, 5).unwrap_err()).contains("unknown (status 999)"));
+
+    let failed = fake.compiler.ptx::<f64>("arm7", &all, (1, 0)).unwrap_err();
+    assert!(said(failed).starts_with("arm7: not compiled for compute_10: status 5: "));
+    // SAFETY: the driver without a GPU reads no further than to the zero.
+    let failed = said(unsafe { device.load::<f64>("arm7", &all, b"no code") }.unwrap_err());
+    assert_eq!(
+        failed,
+        "arm7: not loaded: CUDA_ERROR_INVALID_PTX, a PTX JIT compilation failed: ptxas: this is no code"
+    );
+    fake.fail("cuModuleGetFunction", 500);
+    let failed = device.compile::<f64>(&fake.compiler, "arm7", &all).unwrap_err();
+    assert!(said(failed).contains("named symbol not found"));
+    drop((kernels, q, M, stream, device));
+    fake.end();
+}
+
+#[test]
+fn without_a_driver_that_is_said() {
+    let missing = Path::new("no-such-file.so");
+    let said = Driver::open(missing).unwrap_err().to_string();
+    assert!(said.starts_with("CUDA's driver: cannot be loaded: no-such-file.so: "), "{said}");
+    assert!(said.ends_with("; the environment variable CONDYLE_CUDA_LIBRARY may name its file"), "{said}");
+    let said = Compiler::open(missing).unwrap_err().to_string();
+    assert!(said.starts_with("NVIDIA's run-time compiler: cannot be loaded: no-such-file.so: "), "{said}");
+    // a library that is another one
+    if let Some(fake) = Fake::new() {
+        let other = folder("cuda_other").join("libother.so");
+        let source = other.with_extension("c");
+        std::fs::write(&source, "int other;\n").unwrap();
+        compile(Command::new("cc").args(["-shared", "-o"]).arg(&other).arg(&source));
+        assert!(Driver::open(&other).unwrap_err().to_string().contains("cuInit"));
+        drop(fake);
+    }
+    match Device::new(0) {
+        Ok(device) => println!("there is a GPU: {}", device.name().unwrap()),
+        Err(error) => println!("{error}"),
+    }
+}
+
+#[test]
+fn several_threads_may_call_at_a_time() {
+    let Some(fake) = Fake::new() else { return };
+    let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
+    let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["rnea", "aba"])).unwrap();
+    std::thread::scope(|scope| {
+        for name in ["rnea", "aba", "rnea", "aba"] {
+            let (device, kernels, arm) = (&device, &kernels, &arm);
+            scope.spawn(move || check(device, kernels, arm, name, &[50, 77, 3]));
+        }
+    });
+    drop((kernels, device));
+    fake.end();
+}
+
+/// NVIDIA's own compiler where it is installed; it needs no GPU.
+#[test]
+fn nvidias_compiler_takes_the_code() {
+    let Ok(compiler) = Compiler::new() else {
+        println!("NOT RUN: NVIDIA's run-time compiler is not installed");
+        return;
+    };
+    let all = of(&robots::arm7(), &["aba_derivatives"]);
+    let ptx = String::from_utf8(compiler.ptx::<f32>("arm7", &all, (7, 5)).unwrap()).unwrap();
+    assert!(ptx.contains(".visible .entry arm7_aba_derivatives(") && ptx.contains(".target sm_75"));
+    let failed = compiler.ptx::<f32>("arm7", &all, (1, 0)).unwrap_err();
+    assert!(matches!(&failed, Error::Compile { log, .. } if log.contains("gpu-architecture")), "{failed}");
+}
