@@ -100,7 +100,7 @@ ARGUMENTS = {
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
-        Plan.contact""",
+        Plan.contact _lend.address _lend.bits _lend.device""",
     "float": """
         damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
@@ -108,7 +108,8 @@ ARGUMENTS = {
         fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt",
     "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
-        Unicycle.terminal""",
+        Unicycle.terminal _lend.versioned""",
+    "list[int]": "_lend.shape _lend.strides",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -172,7 +173,7 @@ ARGUMENTS = {
     "Settings": "WholeBodyController.settings",
     "Plan": "plan",
     "References": "references",
-    "Any": "_casadi_hold_knot.of Model.from_pinocchio.model",
+    "Any": "_borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model",
     "int | None": "_casadi_hold_knot.t",
     "list[str]": "names _generate.frames inputs",
     "list[ContactConstraint]": "_generate.constraints",
@@ -183,6 +184,7 @@ ARGUMENTS = {
 RESULTS = {
     "tuple[str, list[tuple[str, str]], "
     "list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]": "_generate",
+    "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
@@ -244,7 +246,7 @@ RESULTS = {
         Model.with_armature Model.with_gravity Model.with_inertias Model.with_limits Model.with_mimic
         ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
-    "Any": "Model.to_pinocchio",
+    "Any": "Model.to_pinocchio _lend",
     "dict[str, _Array]": "Model.reference_configurations Model.reference_configurations_str",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",

@@ -94,10 +94,12 @@ __all__ = [
     "_SpelledData",
     "_SpelledModel",
     "__version__",
+    "_borrowed",
     "_casadi_hold",
     "_casadi_hold_knot",
     "_casadi_release",
     "_generate",
+    "_lend",
     "_model_from_bytes",
     "_spelled_crba",
     "_spelled_difference",
@@ -1219,6 +1221,14 @@ def static_torque_derivative(
 
     q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
     """
+
+def _borrowed(capsule: Any) -> tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]:
+    """The array that a capsule of DLPack lends, for as long as the capsule is there: it is not taken over."""
+
+def _lend(
+    owner: Any, address: int, bits: int, shape: list[int], strides: list[int], device: int, versioned: bool
+) -> Any:
+    """A capsule of DLPack that lends floating-point numbers on a CUDA device, whose owner stays until they are given back."""
 
 @final
 class Cholesky:

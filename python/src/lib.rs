@@ -10,6 +10,7 @@
 //!   `regressors`, `simulation`: the library's functions and types, one to one;
 //! - `spelling`: Pinocchio's functions, for the module `condyle.pinocchio`;
 //! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
+//! - `dlpack`: arrays on devices, for the module `condyle.cuda`;
 //! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
 //!
 //! The doc comments here are the docstrings that Python sees; `stubs.py` writes them into `condyle/_condyle.pyi`.
@@ -28,6 +29,7 @@ mod configuration;
 mod constrained;
 mod data;
 mod derivatives;
+mod dlpack;
 mod exceptions;
 mod factorisation;
 mod functions;
@@ -89,6 +91,8 @@ mod _condyle {
         frame_classical_acceleration_derivatives, frame_velocity_derivative, rnea_hessian, rnea_input_derivative,
         rnea_second_derivatives, static_torque_derivative,
     };
+    #[pymodule_export]
+    use dlpack::{borrowed, lend};
     #[pymodule_export]
     use exceptions::{ControllerError, Error, ModelError, NotPhysicalError, ParseError, ProblemError};
     #[pymodule_export]

@@ -164,8 +164,8 @@ fn check<T: Number>(device: &Device, kernels: &Kernels<T>, model: &Model, name: 
         for ((output, expected), alike) in outputs.iter().zip(&expected).zip(&alike) {
             let error = |found: &[T]| {
                 assert_eq!(found.len(), expected.len());
-                let apart = found.iter().zip(expected).map(|(&x, y)| (x.into() - y).abs());
-                apart.fold(0.0, |max, x| if max.is_nan() || x <= max { max } else { x }) // NaN stays
+                let apart = found.iter().zip(expected).map(|(&x, y)| -> f64 { (x.into() - y).abs() });
+                apart.fold(0.0, |max: f64, x| if max.is_nan() || x <= max { max } else { x }) // NaN stays
             };
             let scale = expected.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
             let (found, bound) = (error(&output.to_vec(&stream).unwrap()), ROUNDING * scale + FURTHER * error(alike));

@@ -1,0 +1,229 @@
+"""Arrays in a GPU's memory: our own, and those that other libraries lend by DLPack or `__cuda_array_interface__`."""
+
+import sys
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _condyle
+from ._cuda_driver import Device, Event, Memory
+
+LEGACY = 1
+"""The legacy default stream, by the number that it has in DLPack and in the driver."""
+_FLOAT, _READ_ONLY = 2, 1
+_CUDA, _CUDA_MANAGED = 2, 13
+_VERSION = (1, 0)
+
+
+class DeviceArray:
+    """Numbers in a GPU's memory, as `condyle.cuda` makes them.
+
+    Other libraries take it without a copy, after what is under way: `torch.from_dlpack(x)`, `cupy.from_dlpack(x)`,
+    `jax.numpy.from_dlpack(x)`, and what knows `__cuda_array_interface__`, as Numba. `x.numpy()` copies it to the host.
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        dtype: "np.dtype[Any]",
+        shape: tuple[int, ...],
+        strides: tuple[int, ...],
+        written: "list[tuple[int, Event]]",
+    ) -> None:
+        self._memory = memory
+        self.dtype: np.dtype[Any] = dtype
+        self.shape: tuple[int, ...] = shape
+        self.strides: tuple[int, ...] = strides
+        """How far numbers are apart along each axis, counted in numbers."""
+        self._written = written
+        """The stream that has written last, and the moment when it has; one for all views."""
+
+    @property
+    def device(self) -> int:
+        """The number of the device."""
+        return self._memory.device.ordinal
+
+    @property
+    def ndim(self) -> int:
+        """The number of axes."""
+        return len(self.shape)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __repr__(self) -> str:
+        return f"DeviceArray({self.shape}, {self.dtype}, device={self.device})"
+
+    def swapaxes(self, a: int, b: int) -> "DeviceArray":
+        """The same numbers with two axes exchanged: a view."""
+        order = list(range(self.ndim))
+        order[a], order[b] = order[b], order[a]
+        shape, strides = (tuple(x[k] for k in order) for x in (self.shape, self.strides))
+        return DeviceArray(self._memory, self.dtype, shape, strides, self._written)
+
+    def numpy(self) -> NDArray[Any]:
+        """A copy in the host's memory, after what is under way."""
+        host = np.empty(self.shape, self.dtype)
+        order = sorted(range(self.ndim), key=lambda k: (-self.strides[k], k))
+        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # as it lies in memory
+        if dense.nbytes > 0:
+            self._before(LEGACY)
+            with self._memory.device.current() as driver:
+                driver.call("cuMemcpyDtoHAsync_v2", dense.ctypes.data, self._memory.address, dense.nbytes, LEGACY)
+                driver.call("cuStreamSynchronize", LEGACY)
+        host[...] = dense.transpose(np.argsort(order))
+        return host
+
+    def _before(self, stream: int) -> None:
+        """Lets a stream wait until the numbers are there."""
+        for writer, event in self._written:
+            if writer != stream:
+                event.before(stream)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return (_CUDA, self.device)
+
+    def __dlpack__(
+        self,
+        *,
+        stream: int | None = None,
+        max_version: tuple[int, int] | None = None,
+        dl_device: tuple[int, int] | None = None,
+        copy: bool | None = None,
+    ) -> Any:
+        """A capsule for another library, which says on which stream it is going to use the numbers."""
+        if dl_device is not None and tuple(dl_device) != self.__dlpack_device__():
+            raise BufferError(f"dl_device: expected {self.__dlpack_device__()}, found {tuple(dl_device)}")
+        if copy:
+            raise BufferError("copy: a DeviceArray lends its own memory; let your library copy it")
+        if stream == 0 or (stream is not None and stream < -1):
+            raise ValueError(f"stream: expected −1, or 1, 2 or the address of a stream, found {stream}")
+        if stream != -1:
+            self._before(LEGACY if stream is None else stream)
+        is_versioned = max_version is not None and tuple(max_version) >= _VERSION
+        bits = 8 * self.dtype.itemsize
+        return _condyle._lend(
+            self, self._memory.address, bits, list(self.shape), list(self.strides), self.device, is_versioned
+        )
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        """What Numba and others read: with the stream after which the numbers are there."""
+        size = self.dtype.itemsize
+        return {
+            "shape": self.shape,
+            "typestr": self.dtype.str,
+            "data": (self._memory.address, False),
+            "strides": tuple(size * stride for stride in self.strides),
+            "stream": self._written[0][0] if self._written else None,
+            "version": 3,
+        }
+
+
+def new(device: Device, dtype: "np.dtype[Any]", shape: tuple[int, ...]) -> DeviceArray:
+    """An array in row order whose numbers are not there yet."""
+    return DeviceArray(Memory(device, int(np.prod(shape)) * dtype.itemsize), dtype, shape, row_order(shape), [])
+
+
+def row_order(shape: Sequence[int]) -> tuple[int, ...]:
+    """The strides of an array in row order, in numbers."""
+    return tuple(int(np.prod(shape[k + 1 :])) for k in range(len(shape)))
+
+
+class View(NamedTuple):
+    """Where the numbers of an array are, as long as `owner` is there."""
+
+    owner: Any
+    address: int
+    dtype: str
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    is_read_only: bool
+
+
+def view(name: str, array: Any, device: Device, stream: int) -> View:
+    """An array of any library's on this device, which the stream may use after what its library has under way."""
+    if isinstance(array, DeviceArray):
+        _on_device(name, device, *array.__dlpack_device__())
+        array._before(stream)
+        return View(array, array._memory.address, str(array.dtype), array.shape, array.strides, False)
+    if hasattr(array, "__dlpack_device__"):
+        kind, ordinal = array.__dlpack_device__()
+        _on_device(name, device, int(kind), int(ordinal))
+        try:
+            capsule = array.__dlpack__(stream=stream, max_version=_VERSION)
+        except TypeError:  # libraries that do not know of versions
+            capsule = array.__dlpack__(stream=stream)
+        address, (code, bits, lanes), shape, strides, _, flags = _condyle._borrowed(capsule)
+        dtype = f"float{bits}" if (code, lanes) == (_FLOAT, 1) else f"type {code} of {lanes} x {bits} bits"
+        is_read_only = bool(flags & _READ_ONLY)
+        return View(
+            capsule, address, dtype, tuple(shape), row_order(shape) if strides is None else tuple(strides), is_read_only
+        )
+    if hasattr(array, "__cuda_array_interface__"):
+        return _interface(name, array, device, stream)
+    raise TypeError(
+        f"{name}: expected an array on device {device.ordinal}, as of CuPy, PyTorch or JAX, found "
+        f"{type(array).__name__}; condyle.cuda.array copies one to the device"
+    )
+
+
+def _on_device(name: str, device: Device, kind: int, ordinal: int) -> None:
+    if kind not in (_CUDA, _CUDA_MANAGED):
+        raise TypeError(
+            f"{name}: expected an array on device {device.ordinal}, found one that is not on a CUDA device (DLPack's "
+            f"device type {kind}); condyle.cuda.array copies one to the device"
+        )
+    if kind == _CUDA and ordinal != device.ordinal:
+        raise ValueError(f"{name}: expected an array on device {device.ordinal}, found one on device {ordinal}")
+
+
+def _interface(name: str, array: Any, device: Device, stream: int) -> View:
+    """An array by its `__cuda_array_interface__`, which does not say on which device it is."""
+    said = array.__cuda_array_interface__
+    address, is_read_only = said["data"]
+    shape, dtype, their = tuple(said["shape"]), np.dtype(said["typestr"]), said.get("stream")
+    size = dtype.itemsize
+    strides = said.get("strides")
+    steps = row_order(shape) if strides is None else tuple(stride // size for stride in strides)
+    if strides is not None and any(stride % size for stride in strides):
+        raise ValueError(f"{name}: expected strides of whole numbers, found {strides} bytes")
+    if 0 not in shape and not device.owns(address):
+        raise ValueError(f"{name}: expected an array on device {device.ordinal}, found an address elsewhere")
+    if their is not None and their != stream:
+        Event(device, their).before(stream)
+    return View(array, address or 0, str(dtype), shape, steps, is_read_only)
+
+
+def current_stream(array: Any, device: Device) -> int | None:
+    """The stream on which the library of an array works at present, where it says so: PyTorch and CuPy do."""
+    library = type(array).__module__.partition(".")[0]
+    module: Any = sys.modules.get(library)
+    if library == "torch":
+        return int(module.cuda.current_stream(device.ordinal).cuda_stream) or LEGACY
+    if library == "cupy":
+        with module.cuda.Device(device.ordinal):
+            return int(module.cuda.get_current_stream().ptr) or LEGACY
+    return None
+
+
+def stream_number(stream: Any) -> int:
+    """A stream by its number: an address, or an object of PyTorch's, CuPy's or another library's."""
+    if hasattr(stream, "__cuda_stream__"):
+        _, number = stream.__cuda_stream__()
+    else:
+        number = getattr(stream, "cuda_stream", getattr(stream, "ptr", stream))
+    if not isinstance(number, int) or number < 0:
+        raise TypeError(f"stream: expected a stream of CUDA or its address, found {stream!r}")
+    return number or LEGACY
+
+
+def importer(array: Any) -> Any:
+    """`from_dlpack` of an array's library, or None where there is none."""
+    if isinstance(array, DeviceArray):
+        return None
+    namespace = getattr(array, "__array_namespace__", None)
+    library = namespace() if callable(namespace) else sys.modules.get(type(array).__module__.partition(".")[0])
+    return getattr(library, "from_dlpack", None)

@@ -1,0 +1,309 @@
+"""Robots as kernels on an NVIDIA GPU: compiled while the program runs, and called with arrays of CuPy, PyTorch or JAX.
+
+    import condyle.cuda, torch
+
+    arm = condyle.robots.arm7()
+    aba = condyle.cuda.compile(arm, "aba_derivatives", dtype="float32")
+    q, v, tau = torch.zeros(3, 7, 100_000, device="cuda")
+    d = aba(q, v, tau)           # a named tuple of tensors; d.da_dq has the shape (7, 7, 100_000)
+    aba(q, v, tau, out=d)        # into the same memory
+
+A thread computes one state. Numbers of one kind stand side by side: an argument of k numbers for n states is an array
+of shape (k, n) in row order. Its transpose, of shape (n, k) and with strides (1, n), is taken as well, and where the
+first argument is such a one the results have the states along the first axis too. Nothing is copied: other layouts
+are refused, and so are other dtypes. Results are arrays of the library of the first argument.
+
+Nothing of CUDA is needed but where this is used: the driver, which comes with the GPU, and NVIDIA's run-time compiler
+(`pip install nvidia-cuda-nvrtc-cu12`, or the system's). The environment variables `CONDYLE_CUDA_LIBRARY` and
+`CONDYLE_NVRTC_LIBRARY` name other files. All is done in the device's primary context, which other libraries use too.
+"""
+
+import os
+from collections import namedtuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _condyle, _cuda_driver
+from ._condyle import Model
+from ._cuda_driver import Device, Event, Function
+from ._device_array import LEGACY, DeviceArray, View, current_stream, importer, new, stream_number, view
+from ._types import ContactConstraint
+
+__all__ = ["DeviceArray", "Kernel", "array", "compile", "devices", "ptx"]
+
+Real = Literal["float64", "float32"]
+_LANGUAGES = {"float64": "cuda", "float32": "cuda-float"}
+_PLACES = 2**31 - 1
+"""Places in arrays are numbers of 32 bits."""
+
+
+def devices() -> list[str]:
+    """The names of the devices that there are.
+
+    Raises `RuntimeError` if there is no driver, or it finds no device.
+    """
+    return _cuda_driver.names()
+
+
+def array(numbers: ArrayLike, dtype: Real | None = None, *, device: int = 0) -> DeviceArray:
+    """A copy of an array in the memory of a device, in row order: of NumPy's or what NumPy understands.
+
+    Raises `RuntimeError` if there is no driver, or too little memory.
+    """
+    host: np.ndarray[Any, Any] = np.ascontiguousarray(numbers, dtype=dtype)
+    if host.dtype.name not in _LANGUAGES:
+        host = host.astype(np.float64)
+    made = new(_cuda_driver.device(device), host.dtype, np.shape(numbers))
+    if host.nbytes > 0:
+        with made._memory.device.current() as driver:
+            driver.call("cuMemcpyHtoDAsync_v2", made._memory.address, host.ctypes.data, host.nbytes, LEGACY)
+            driver.call("cuStreamSynchronize", LEGACY)
+    return made
+
+
+class _Array:
+    """An argument or a result: its name, and how many numbers of a state it has."""
+
+    def __init__(self, name: str, rows: int, columns: int) -> None:
+        self.name, self.rows, self.columns = name, rows, columns
+        self.size = rows * columns
+        self.shape: tuple[int, ...] = (rows,) if columns == 1 else (rows, columns)
+
+    def in_memory(self, n: int) -> tuple[int, ...]:
+        """The shape in row order as it lies in memory: matrices stand column by column."""
+        return (*reversed(self.shape), n)
+
+    def turned(self, made: Any, states_first: bool) -> Any:
+        """A view in which matrices have rows first, and states stand on the side where they stand in arguments."""
+        if self.columns == 1:
+            return made.swapaxes(0, 1) if states_first else made
+        return made.swapaxes(0, 2) if states_first else made.swapaxes(0, 1)
+
+    def states(self, given: View, dtype: str, n: int | None) -> tuple[int, bool]:
+        """The number of states of an array, and whether they stand along its first axis."""
+        if given.dtype != dtype:
+            raise ValueError(f"{self.name}: expected {dtype}, found {given.dtype}")
+        for shape in dict.fromkeys(((self.size,), self.shape)):
+            for states_first in (False, True):
+                found = given.shape[1:] if states_first else given.shape[:-1]
+                if len(given.shape) != len(shape) + 1 or found != shape:
+                    continue
+                many = given.shape[0 if states_first else -1]
+                if n is not None and many != n:
+                    continue
+                steps = tuple(many * int(np.prod(shape[:k])) for k in range(len(shape)))
+                wanted = (1, *steps) if states_first else (*steps, 1)
+                pairs = zip(given.shape, wanted, given.strides, strict=True)
+                if 0 in given.shape or all(a == b for size, a, b in pairs if size != 1):
+                    return many, states_first
+        states = "n" if n is None else str(n)
+        matrix = f", or {(*self.shape, states)} column by column".replace("'", "") if self.columns > 1 else ""
+        raise ValueError(
+            f"{self.name}: expected ({self.size}, {states}) in row order, or its transpose{matrix}: number k of state "
+            f"i at [k * n + i], found {given.shape} with strides {given.strides}; copy it into that order"
+        )
+
+
+class Kernel:
+    """A function of a robot on a GPU. `inputs` and `outputs` are the names of its arrays and their shapes for a state.
+
+    It may be called from several threads at a time.
+    """
+
+    def __init__(self, name: str, dtype: Real, function: Function, inputs: list[Any], outputs: list[Any]) -> None:
+        self.name: str = name
+        self.dtype: np.dtype[Any] = np.dtype(dtype)
+        self._inputs = [_Array(*about) for about in inputs]
+        self._outputs = [_Array(*about) for about in outputs]
+        self.inputs: dict[str, int] = {a.name: a.size for a in self._inputs}
+        self.outputs: dict[str, tuple[int, ...]] = {a.name: a.shape for a in self._outputs}
+        self._function = function
+        self._most = _PLACES // max(a.size for a in (*self._inputs, *self._outputs))
+        fields = [f"{output}_" if output == "lambda" else output for output in self.outputs]
+        self._result: Any = namedtuple(name, fields) if len(outputs) > 1 else None
+
+    @property
+    def device(self) -> int:
+        """The number of the device."""
+        return self._function.device.ordinal
+
+    @property
+    def registers(self) -> int:
+        """The registers of a thread."""
+        return self._function.registers
+
+    @property
+    def local_bytes(self) -> int:
+        """The memory of a thread, in bytes, for what does not fit into registers."""
+        return self._function.local_bytes
+
+    def __repr__(self) -> str:
+        return f"{self.name}({', '.join(self.inputs)}) -> {', '.join(self.outputs)}"
+
+    def __call__(self, *arguments: Any, out: Any = None, stream: Any = None) -> Any:
+        """The results for n states; returns at once, and what uses them waits where that is needed.
+
+        arguments: arrays on the device, of any library that speaks DLPack or has `__cuda_array_interface__`. One result
+        is an array, several are a named tuple, of shape (k, n) or, for matrices, (rows, columns, n); with n in front if
+        that is so in the first argument. They are new memory, which takes time: in a loop give `out`, an array, or a
+        sequence of arrays, of the same shapes, which is filled and returned. Matrices in it may also be
+        (rows × columns, n), column by column.
+
+        stream: where the work is put: a stream of PyTorch's or CuPy's, or its address. By default the one on which
+        PyTorch or CuPy works if the first argument is theirs, else the legacy default stream. `out` is to be read on
+        that stream, or on one that waits for it.
+        """
+        if len(arguments) != len(self._inputs):
+            raise TypeError(f"{self!r}: expected {len(self._inputs)} arguments, found {len(arguments)}")
+        device = self._function.device
+        number = stream_number(stream) if stream is not None else current_stream(arguments[0], device) or LEGACY
+        n: int | None = None
+        states_first, views = False, []
+        for about, given in zip(self._inputs, arguments, strict=True):
+            views.append(view(about.name, given, device, number))
+            n, is_first = about.states(views[-1], self.dtype.name, n)
+            states_first = is_first if len(views) == 1 else states_first
+        if n is None or n > self._most:
+            raise ValueError(f"{self.name}: expected at most {self._most} states, found {n}")
+        if out is None:
+            made: list[Any] = [new(device, self.dtype, about.in_memory(n)) for about in self._outputs]
+            views += [view("out", x, device, number) for x in made]
+        else:
+            made = [out] if self._result is None else list(out)
+            views += self._room(made, n, number, views)
+        if n > 0:
+            self._function.launch(number, n, [v.address for v in views])
+            self._after(number, [*arguments, *made], views)
+        if out is not None:
+            return out
+        take = importer(arguments[0]) or (lambda x: x)
+        results = [about.turned(take(x), states_first) for about, x in zip(self._outputs, made, strict=True)]
+        return results[0] if self._result is None else self._result(*results)
+
+    def _room(self, out: list[Any], n: int, stream: int, inputs: list[View]) -> list[View]:
+        """Where results go: arrays that may be written to, and that share no memory with others."""
+        if len(out) != len(self._outputs):
+            raise TypeError(f"{self!r}: out: expected {len(self._outputs)} arrays, found {len(out)}")
+        size = self.dtype.itemsize * n
+        taken = [(a.name, v.address, size * a.size) for a, v in zip(self._inputs, inputs, strict=True)]
+        views = []
+        for about, given in zip(self._outputs, out, strict=True):
+            found = view(about.name, given, self._function.device, stream)
+            about.states(found, self.dtype.name, n)
+            if found.is_read_only or type(given).__module__.partition(".")[0] in ("jax", "jaxlib"):
+                raise ValueError(f"{about.name}: out may not be written to")
+            start, end = found.address, found.address + size * about.size
+            for name, address, length in taken:
+                if start < address + length and address < end:
+                    raise ValueError(f"{about.name}: out shares memory with {name}")
+            taken.append((about.name, start, size * about.size))
+            views.append(found)
+        return views
+
+    def _after(self, stream: int, arrays: Sequence[Any], views: list[View]) -> None:
+        """Notes when results are there, and keeps what their libraries might use for something else until then."""
+        device = self._function.device
+        event = Event(device, stream)
+        for result in arrays[len(self._inputs) :]:
+            if isinstance(result, DeviceArray):
+                result._written[:] = [(stream, event)]
+        lent = [
+            v.owner
+            for v, x in zip(views, arrays, strict=True)
+            if not isinstance(x, DeviceArray) and current_stream(x, device) != stream
+        ]
+        device.hold(event, lent)
+
+
+def _generated(model: Model, name: str, dtype: Real, options: dict[str, Any]) -> tuple[str, str, Any]:
+    """The symbol of a kernel, its text, and what it takes and gives."""
+    if dtype not in _LANGUAGES:
+        raise ValueError(f"dtype: expected 'float64' or 'float32', found {dtype!r}")
+    code, files, described = _condyle._generate(model, [name], _LANGUAGES[dtype], **options)
+    return f"{code}_{name}", files[0][1], described[0]
+
+
+def ptx(
+    model: Model,
+    name: str,
+    *,
+    dtype: Real = "float64",
+    capability: tuple[int, int] = (7, 5),
+    frames: Sequence[str] = (),
+    constraints: Sequence[ContactConstraint] = (),
+    external_forces: bool = False,
+    inputs: Sequence[str] = (),
+) -> bytes:
+    """A kernel in NVIDIA's intermediate language, for `compile` on a machine without NVIDIA's run-time compiler.
+
+    capability: that of the oldest device that shall take it. The rest is as of `compile`. It needs no GPU.
+
+    Raises `RuntimeError` if there is no compiler or it fails.
+    """
+    options = _options(frames, constraints, external_forces, inputs)
+    symbol, text, _ = _generated(model, name, dtype, options)
+    return _cuda_driver.compiler().compile(symbol, text, f"compute_{capability[0]}{capability[1]}")
+
+
+def _options(
+    frames: Sequence[str], constraints: Sequence[ContactConstraint], external_forces: bool, inputs: Sequence[str]
+) -> dict[str, Any]:
+    return {
+        "frames": list(frames),
+        "constraints": list(constraints),
+        "external_forces": external_forces,
+        "inputs": list(inputs),
+    }
+
+
+def compile(  # noqa: A001
+    model: Model,
+    name: str,
+    *,
+    dtype: Real = "float64",
+    device: int = 0,
+    frames: Sequence[str] = (),
+    constraints: Sequence[ContactConstraint] = (),
+    external_forces: bool = False,
+    inputs: Sequence[str] = (),
+    ptx: bytes | None = None,
+    cache: "str | os.PathLike[str] | None" = None,
+) -> Kernel:
+    """A function of a robot as a kernel, made by NVIDIA's run-time compiler, or read from the cache if it is there.
+
+    name: one of `condyle.codegen.functions`, and frames, constraints, external_forces, inputs as there. dtype: the kind
+    of numbers that it computes with. ptx: what `ptx` made for the same model, name, dtype and options: the compiler is
+    not needed then. cache: a folder; by default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`.
+
+    Raises `RuntimeError` if there is no driver, no device or no compiler, or if it fails; `ValueError` if there is no
+    such device; what `condyle.codegen.source` raises.
+    """
+    options = _options(frames, constraints, external_forces, inputs)
+    symbol, text, (_, given, made, _) = _generated(model, name, dtype, options)
+    on = _cuda_driver.device(device)
+    image = ptx if ptx is not None else _image(symbol, text, on, cache)
+    return Kernel(name, dtype, Function(on, symbol, image), given, made)
+
+
+def _image(symbol: str, text: str, device: Device, cache: "str | os.PathLike[str] | None") -> bytes:
+    """What the compiler makes of a text, kept by the text, the compiler's version and the device's kind."""
+    import hashlib
+    import tempfile
+
+    compiler = _cuda_driver.compiler()
+    architecture = compiler.architecture(device.capability)
+    key = hashlib.sha256(repr((text, compiler.version, architecture)).encode()).hexdigest()[:32]
+    root = Path(cache or os.environ.get("CONDYLE_CACHE") or Path.home() / ".cache" / "condyle")
+    kept = root / f"{key}.{'cubin' if architecture.startswith('sm_') else 'ptx'}"
+    if kept.is_file():
+        return kept.read_bytes()
+    image = compiler.compile(symbol, text, architecture)
+    root.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=root) as folder:
+        (Path(folder) / "made").write_bytes(image)
+        os.replace(Path(folder) / "made", kept)
+    return image

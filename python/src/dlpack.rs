@@ -1,0 +1,161 @@
+//! DLPack, by which libraries lend each other arrays on devices: capsules are read and made, for the module `condyle.cuda`.
+//!
+//! What is lent may be given back by any thread, and after the interpreter has ended.
+#![allow(unsafe_code)]
+
+use core::ffi::{CStr, c_void};
+use core::ptr::null_mut;
+use pyo3::exceptions::{PyBufferError, PyTypeError};
+use pyo3::ffi;
+use pyo3::prelude::*;
+
+/// The structures and constants of DLPack's header.
+#[repr(C)]
+struct Tensor {
+    data: *mut c_void,
+    device: (i32, i32),
+    ndim: i32,
+    dtype: (u8, u8, u16),
+    shape: *mut i64,
+    strides: *mut i64,
+    byte_offset: u64,
+}
+
+#[repr(C)]
+struct Managed {
+    tensor: Tensor,
+    context: *mut c_void,
+    deleter: Option<unsafe extern "C" fn(*mut Managed)>,
+}
+
+#[repr(C)]
+struct Versioned {
+    version: (u32, u32),
+    context: *mut c_void,
+    deleter: Option<unsafe extern "C" fn(*mut Versioned)>,
+    flags: u64,
+    tensor: Tensor,
+}
+
+const CUDA: i32 = 2;
+const FLOAT: u8 = 2;
+const VERSION: (u32, u32) = (1, 0);
+const PLAIN: &CStr = c"dltensor";
+const VERSIONED: &CStr = c"dltensor_versioned";
+
+/// What a capsule says: address, (kind of number, bits, lanes), shape, strides in numbers unless in row order, (kind of device,
+/// its number), flags.
+type Description = (usize, (u8, u8, u16), Vec<i64>, Option<Vec<i64>>, (i32, i32), u64);
+
+/// The array that a capsule of DLPack lends, for as long as the capsule is there: it is not taken over.
+#[pyfunction]
+#[pyo3(name = "_borrowed")]
+pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
+    // SAFETY: a capsule of that name has that structure; the later version may have another one behind its flags.
+    let (tensor, flags) = unsafe {
+        if ffi::PyCapsule_IsValid(capsule.as_ptr(), VERSIONED.as_ptr()) != 0 {
+            let managed = ffi::PyCapsule_GetPointer(capsule.as_ptr(), VERSIONED.as_ptr()).cast::<Versioned>();
+            let (major, _) = (*managed).version;
+            if major != VERSION.0 {
+                return Err(PyBufferError::new_err(format!("DLPack: expected version {}, found {major}", VERSION.0)));
+            }
+            (&raw const (*managed).tensor, (*managed).flags)
+        } else if ffi::PyCapsule_IsValid(capsule.as_ptr(), PLAIN.as_ptr()) != 0 {
+            let managed = ffi::PyCapsule_GetPointer(capsule.as_ptr(), PLAIN.as_ptr()).cast::<Managed>();
+            (&raw const (*managed).tensor, 0)
+        } else {
+            return Err(PyTypeError::new_err("DLPack: expected a capsule that nobody has taken over"));
+        }
+    };
+    // SAFETY: as above; there are `ndim` sizes and strides, or the strides are null.
+    unsafe {
+        let tensor = &*tensor;
+        let numbers = |from: *mut i64| match usize::try_from(tensor.ndim) {
+            Ok(ndim) if ndim > 0 && !from.is_null() => core::slice::from_raw_parts(from, ndim).to_vec(),
+            _ => Vec::new(),
+        };
+        let strides = (!tensor.strides.is_null()).then(|| numbers(tensor.strides));
+        let address = tensor.data as usize + tensor.byte_offset as usize;
+        Ok((address, tensor.dtype, numbers(tensor.shape), strides, tensor.device, flags))
+    }
+}
+
+/// What is lent, as `M` describes it, with all that the description points to.
+struct Lent<M> {
+    managed: M,
+    _numbers: [Vec<i64>; 2],
+    owner: Option<Py<PyAny>>,
+}
+
+/// Takes back what was lent.
+///
+/// # Safety
+/// `context` is a `Lent<M>` that was boxed, and nobody uses it from now on.
+unsafe fn take_back<M>(context: *mut c_void) {
+    // SAFETY: the caller's.
+    let mut lent = unsafe { Box::from_raw(context.cast::<Lent<M>>()) };
+    let mut owner = lent.owner.take();
+    if Python::try_attach(|_| drop(owner.take())).is_none() {
+        core::mem::forget(owner); // there is no interpreter any more
+    }
+}
+
+unsafe extern "C" fn delete_plain(managed: *mut Managed) {
+    // SAFETY: this is called once, by whom it was lent to.
+    unsafe { take_back::<Managed>((*managed).context) }
+}
+
+unsafe extern "C" fn delete_versioned(managed: *mut Versioned) {
+    // SAFETY: as above.
+    unsafe { take_back::<Versioned>((*managed).context) }
+}
+
+/// What happens at the end of a capsule: if nobody has taken over what it lends, and thereby renamed it, it is taken back.
+unsafe extern "C" fn end(capsule: *mut ffi::PyObject) {
+    // SAFETY: a capsule of that name is one of ours.
+    unsafe {
+        if ffi::PyCapsule_IsValid(capsule, VERSIONED.as_ptr()) != 0 {
+            delete_versioned(ffi::PyCapsule_GetPointer(capsule, VERSIONED.as_ptr()).cast());
+        } else if ffi::PyCapsule_IsValid(capsule, PLAIN.as_ptr()) != 0 {
+            delete_plain(ffi::PyCapsule_GetPointer(capsule, PLAIN.as_ptr()).cast());
+        }
+    }
+}
+
+/// A capsule of DLPack that lends floating-point numbers on a CUDA device, whose owner stays until they are given back.
+#[pyfunction]
+#[pyo3(name = "_lend")]
+pub(crate) fn lend(
+    py: Python<'_>,
+    owner: Py<PyAny>,
+    address: usize,
+    bits: u8,
+    shape: Vec<i64>,
+    strides: Vec<i64>,
+    device: i32,
+    versioned: bool,
+) -> PyResult<Py<PyAny>> {
+    let (ndim, owner) = (shape.len() as i32, Some(owner));
+    let mut _numbers = [shape, strides]; // they stay where they are when the vectors move
+    let [shape, strides] = _numbers.each_mut().map(Vec::as_mut_ptr);
+    let (data, dtype, context) = (address as *mut c_void, (FLOAT, bits, 1), null_mut());
+    let tensor = Tensor { data, device: (CUDA, device), ndim, dtype, shape, strides, byte_offset: 0 };
+    let (managed, name): (*mut c_void, _) = if versioned {
+        let managed = Versioned { version: VERSION, context, deleter: Some(delete_versioned), flags: 0, tensor };
+        let lent = Box::into_raw(Box::new(Lent { managed, _numbers, owner }));
+        // SAFETY: it was made just now.
+        unsafe { (*lent).managed.context = lent.cast() };
+        // SAFETY: as above.
+        (unsafe { &raw mut (*lent).managed }.cast(), VERSIONED)
+    } else {
+        let managed = Managed { tensor, context, deleter: Some(delete_plain) };
+        let lent = Box::into_raw(Box::new(Lent { managed, _numbers, owner }));
+        // SAFETY: as above.
+        unsafe { (*lent).managed.context = lent.cast() };
+        // SAFETY: as above.
+        (unsafe { &raw mut (*lent).managed }.cast(), PLAIN)
+    };
+    // SAFETY: the name is a constant; the capsule's end takes back what it lends.
+    unsafe { Bound::from_owned_ptr_or_err(py, ffi::PyCapsule_New(managed, name.as_ptr(), Some(end))) }
+        .map(Bound::unbind)
+}

@@ -1,0 +1,388 @@
+"""Kernels called through a driver without a GPU, against the library; skipped where there are no C compilers."""
+
+import gc
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from foreign_arrays import Array, Gpu, Imported, Interface, build
+from sample import Robot
+
+import condyle
+import condyle.cuda
+from condyle import _cuda_driver
+
+ROUNDING = 1e-11
+"""Of numbers that M⁻¹ may have amplified, relative to the largest one."""
+SINGLE = 1e-5
+"""Of RNEA of an arm in single precision: a hundred roundings of 6e-8."""
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or not (shutil.which("cc") and shutil.which("g++")),
+    reason="there are no compilers of C and C++ for the driver without a GPU",
+)
+ARM = condyle.robots.arm7()
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Path]]:
+    """The driver without a GPU in place of NVIDIA's."""
+    driver, compiler = build(tmp_path_factory.mktemp("driver"))
+    patch = pytest.MonkeyPatch()
+    patch.setenv("CONDYLE_CUDA_LIBRARY", str(driver))
+    patch.setenv("CONDYLE_NVRTC_LIBRARY", str(compiler))
+    patch.setenv("CONDYLE_CACHE", str(tmp_path_factory.mktemp("cache")))
+    caches = (_cuda_driver.driver, _cuda_driver.device, _cuda_driver.compiler)
+    for made in caches:
+        made.cache_clear()
+    yield driver, compiler
+    for made in caches:
+        made.cache_clear()
+    patch.undo()
+
+
+@pytest.fixture(scope="module")
+def shared_gpu(libraries: tuple[Path, Path]) -> Gpu:
+    return Gpu(libraries[0])
+
+
+@pytest.fixture
+def gpu(shared_gpu: Gpu) -> Iterator[Gpu]:
+    """Another library's view of the GPU; at the end nothing is left, and the driver has nothing to complain of."""
+    yield shared_gpu
+    gc.collect()
+    held = _cuda_driver.device(0)
+    with held.current() as driver:
+        driver.call("cuCtxSynchronize")
+    held.hold(_cuda_driver.Event(held, 1), [])
+    gc.collect()
+    assert shared_gpu.library.fake_complaint() == b""
+    assert shared_gpu.live() == {"memory": 0, "streams": 1, "events": 0, "modules": 0}
+
+
+def states(model: condyle.Model, n: int) -> tuple[Any, Any, Any]:
+    """q, v and numbers for a or τ of n states, with the states along the last axis."""
+    rng = np.random.default_rng(n)
+    q = np.array([condyle.random_configuration(model, seed=k) for k in range(n)]).reshape(n, model.nq)
+    v, x = rng.standard_normal((2, n, model.nv))
+    return q.T.copy(), v.T.copy(), x.T.copy()
+
+
+def expected(model: condyle.Model, name: str, *given: Any) -> list[Any]:
+    """What the library computes, with the states along the last axis."""
+    found = getattr(condyle, name)(model, condyle.Data(model), *(np.ascontiguousarray(x.T) for x in given))
+    return [np.moveaxis(x, 0, -1) for x in (found if isinstance(found, tuple) else (found,))]
+
+
+def near(found: Any, wanted: Any, bound: float = ROUNDING) -> None:
+    assert found.shape == wanted.shape
+    assert np.abs(found - wanted).max() <= bound * (1.0 + np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("name", ["rnea", "aba", "aba_derivatives"])
+def test_kernels_compute_what_the_library_computes(gpu: Gpu, robot: Robot, name: str) -> None:
+    if name == "aba_derivatives" and robot.model.nv > 20:
+        pytest.skip("what the system's compiler takes for it is not worth it")
+    kernel = condyle.cuda.compile(robot.model, name)
+    for n in (1, 33, 300):
+        given = states(robot.model, n)
+        found = kernel(*(condyle.cuda.array(x) for x in given))
+        wanted = expected(robot.model, name, *given)
+        assert all(isinstance(x, condyle.cuda.DeviceArray) for x in (found if len(wanted) > 1 else [found]))
+        for one, other in zip(found if len(wanted) > 1 else [found], wanted, strict=True):
+            near(one.numpy(), other)
+    assert list(kernel.inputs) == ["q", "v", "a" if name == "rnea" else "tau"]
+    assert (kernel.registers, kernel.local_bytes, kernel.device) == (96, 64, 0)
+
+
+def test_single_precision(gpu: Gpu) -> None:
+    kernel = condyle.cuda.compile(ARM, "rnea", dtype="float32")
+    given = [x.astype(np.float32) for x in states(ARM, 100)]
+    found = kernel(*(condyle.cuda.array(x) for x in given)).numpy()
+    assert found.dtype == np.float32
+    near(found, expected(ARM, "rnea", *(x.astype(np.float64) for x in given))[0], SINGLE)
+
+
+@pytest.mark.parametrize("is_versioned", [False, True])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: bool) -> None:
+    """They are used where they are, after their library's work, and results are seen by it: nothing waits otherwise."""
+    kernel = condyle.cuda.compile(ARM, "rnea_derivatives")
+    given = states(ARM, 50)
+    options = {"transposed": transposed, "is_versioned": is_versioned}
+    arrays = [Array(gpu, x.T if transposed else x, **options) for x in given]
+    before = gpu.live()["memory"]
+    found = kernel(*arrays)
+    assert gpu.live()["memory"] == before + 3, "of three results, and of nothing else"
+    assert found._fields == ("dtau_dq", "dtau_dv", "dtau_da")
+    for one, other in zip(found, expected(ARM, "rnea_derivatives", *given), strict=True):
+        assert isinstance(one, Imported)
+        near(one.numpy(), np.moveaxis(other, -1, 0) if transposed else other)
+
+
+def test_a_consumer_that_does_not_wait_sees_nothing(gpu: Gpu) -> None:
+    """That is how it is seen in these tests that others wait."""
+    kernel = condyle.cuda.compile(ARM, "gravity")
+    q = condyle.cuda.array(states(ARM, 3)[0])  # it stays: whose memory is given back is waited for
+    found = kernel(q)
+    assert np.isnan(Imported(gpu, found, stream=-1).numpy()).all()
+    near(Imported(gpu, found).numpy(), expected(ARM, "gravity", states(ARM, 3)[0])[0])
+
+
+def test_results_go_where_out_says(gpu: Gpu) -> None:
+    kernel = condyle.cuda.compile(ARM, "aba_derivatives")
+    given = states(ARM, 20)
+    arrays = [Array(gpu, x) for x in given]
+    vector, matrix = np.zeros((7, 20)), np.zeros((49, 20))
+    first = condyle.cuda.array(vector)
+    # in memory matrices stand column by column: a library's (7, 7, n) that it has turned, or a flat one
+    turned = Array(gpu, np.zeros((7, 7, 20)))
+    turned.strides = (20, 140, 1)
+    out = [first, turned, Array(gpu, matrix), condyle.cuda.array(np.zeros((7, 7, 20))).swapaxes(0, 1)]
+    before = gpu.live()["memory"]
+    assert kernel(*arrays, out=out, stream=gpu.stream) is out
+    assert gpu.live()["memory"] == before
+    a, da_dq, da_dv, da_dtau = expected(ARM, "aba_derivatives", *given)
+    near(out[0].numpy(), a)
+    near(out[1].numpy(), da_dq)
+    near(out[2].numpy().reshape(7, 7, 20).swapaxes(0, 1), da_dv)
+    near(out[3].numpy(), da_dtau)
+    result = kernel(*arrays)
+    assert kernel(*arrays, out=result._replace(a=first), stream=gpu.stream).da_dq is result.da_dq
+    gravity = condyle.cuda.compile(ARM, "gravity")
+    assert gravity(first, out=condyle.cuda.array(vector)).shape == (7, 20)
+
+    def refused(message: str, *out: Any) -> None:
+        with pytest.raises(ValueError, match=message):
+            kernel(*arrays, out=out)
+
+    refused("a: out shares memory with q", arrays[0], *out[1:])
+    refused("da_dv: out shares memory with da_dq", first, out[2], out[2], out[3])
+    refused(r"da_dq: expected \(49, 20\) in row order, or its transpose, or \(7, 7, 20\) column by column",
+            first, condyle.cuda.array(np.zeros((7, 7, 20))), *out[2:])  # fmt: skip
+    locked = Array(gpu, vector, is_versioned=True)
+    locked.flags = 1
+    refused("a: out may not be written to", locked, *out[1:])
+    immutable = type("ArrayImpl", (Array,), {"__module__": "jaxlib._jax"})(gpu, vector)
+    refused("a: out may not be written to", immutable, *out[1:])
+    with pytest.raises(TypeError, match="out: expected 4 arrays, found 1"):
+        kernel(*arrays, out=[first])
+
+
+def test_what_is_lent_is_kept_until_it_was_read(gpu: Gpu) -> None:
+    kernel = condyle.cuda.compile(ARM, "gravity")
+    q = Array(gpu, states(ARM, 5)[0])
+    found = kernel(q)
+    assert q.given_back == 0, "the kernel has not run yet, and the library might use the memory for something else"
+    found.numpy()
+    kernel(condyle.cuda.array(states(ARM, 1)[0]))
+    assert q.given_back == 1
+    kernel(q, stream=gpu.stream).numpy()
+    # a library that says on which stream it works, which the kernel uses, takes care of that itself
+    torch: Any = ModuleType("torch")
+    torch.cuda = SimpleNamespace(current_stream=lambda device: SimpleNamespace(cuda_stream=gpu.stream))
+    torch.from_dlpack = lambda x: Imported(gpu, x)
+    tensor = type("Tensor", (Array,), {"__module__": "torch", "__array_namespace__": None})(gpu, states(ARM, 5)[0])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "torch", torch)
+        found = kernel(tensor)
+        assert tensor.given_back == 1
+        assert isinstance(found, Imported)
+        near(found.numpy(), expected(ARM, "gravity", states(ARM, 5)[0])[0])
+
+
+def test_streams_may_be_objects(gpu: Gpu) -> None:
+    kernel = condyle.cuda.compile(ARM, "gravity")
+    q = condyle.cuda.array(states(ARM, 2)[0])
+    wanted = expected(ARM, "gravity", states(ARM, 2)[0])[0]
+    for stream in (
+        0,
+        2,
+        SimpleNamespace(cuda_stream=gpu.stream),
+        SimpleNamespace(ptr=gpu.stream),
+        SimpleNamespace(__cuda_stream__=lambda: (0, gpu.stream)),
+    ):
+        near(kernel(q, stream=stream).numpy(), wanted)
+    with pytest.raises(TypeError, match="stream: expected a stream of CUDA or its address, found 'main'"):
+        kernel(q, stream="main")
+
+
+def test_cuda_array_interface(gpu: Gpu) -> None:
+    kernel = condyle.cuda.compile(ARM, "gravity")
+    array = Array(gpu, states(ARM, 9)[0].T, transposed=True)
+    found = kernel(Interface(array))
+    wanted = expected(ARM, "gravity", states(ARM, 9)[0])[0].T
+    assert isinstance(found, condyle.cuda.DeviceArray)
+    said = found.__cuda_array_interface__
+    assert (said["shape"], said["strides"], said["typestr"], said["stream"]) == ((9, 7), (8, 72), "<f8", 1)
+    near(found.numpy(), wanted)
+    near(kernel(Interface(array, strides=None, shape=(7, 9))).numpy(), wanted.T)
+    with pytest.raises(ValueError, match="q: expected an array on device 0, found an address elsewhere"):
+        kernel(Interface(array, data=(array.host.ctypes.data, False)))
+    with pytest.raises(ValueError, match="q: expected strides of whole numbers, found .* bytes"):
+        kernel(Interface(array, strides=(4, 60)))
+
+
+def test_capsules_as_the_header_says(gpu: Gpu) -> None:
+    array = condyle.cuda.array(np.arange(12.0, dtype=np.float32).reshape(3, 4))
+    for max_version in (None, (0, 8), (1, 0), (2, 1)):
+        imported = Imported(gpu, array.swapaxes(0, 1), max_version=max_version)
+        is_versioned = max_version is not None and max_version >= (1, 0)
+        assert hasattr(imported.managed, "major") == is_versioned
+        if is_versioned:
+            assert (imported.managed.major, imported.managed.minor, imported.managed.flags) == (1, 0, 0)
+        assert (imported.shape, imported.strides, imported.dtype.name) == ((4, 3), (1, 4), "float32")
+        assert np.array_equal(imported.numpy(), np.arange(12.0).reshape(3, 4).T)
+    array.__dlpack__()  # nobody takes it over
+    del array
+    gc.collect()
+    assert gpu.live()["memory"] == 1, "what was imported last is still there"
+    assert np.array_equal(imported.numpy(), np.arange(12.0).reshape(3, 4).T)
+    del imported
+    one = condyle.cuda.array([[1.0]])
+    assert repr(one) == "DeviceArray((1, 1), float64, device=0)"
+    with pytest.raises((BufferError, RuntimeError, ValueError)):
+        np.from_dlpack(one)
+    for wrong in ({"copy": True}, {"dl_device": (1, 0)}):
+        with pytest.raises(BufferError):
+            one.__dlpack__(**wrong)
+    with pytest.raises(ValueError, match="stream: expected −1, or 1, 2 or the address of a stream, found 0"):
+        one.__dlpack__(stream=0)
+
+
+def test_wrong_arguments(gpu: Gpu) -> None:
+    kernel = condyle.cuda.compile(ARM, "rnea")
+    q, v, a = (condyle.cuda.array(x) for x in states(ARM, 10))
+
+    def refused(kind: type[Exception], message: str, *given: Any) -> None:
+        with pytest.raises(kind, match=message):
+            kernel(*given)
+
+    refused(TypeError, r"rnea\(q, v, a\) -> tau: expected 3 arguments, found 2", q, v)
+    refused(
+        TypeError, "q: expected an array on device 0, found one that is not on a CUDA device", np.zeros((7, 1)), v, a
+    )
+    refused(TypeError, "v: expected an array on device 0, as of CuPy, PyTorch or JAX, found list", q, [1.0], a)
+    refused(ValueError, r"v: expected \(7, 10\) in row order, .*, found \(7, 9\) with strides \(9, 1\)",
+            q, condyle.cuda.array(np.zeros((7, 9))), a)  # fmt: skip
+    refused(ValueError, r"q: expected \(7, n\) in row order, .*, found \(10, 7\) with strides \(7, 1\); copy it",
+            condyle.cuda.array(np.zeros((10, 7))), v, a)  # fmt: skip
+    refused(ValueError, "v: expected float64, found float32", q, condyle.cuda.array(np.zeros((7, 10)), "float32"), a)
+    elsewhere = Array(gpu, np.zeros((7, 10)))
+    elsewhere.device = (2, 1)
+    refused(ValueError, "a: expected an array on device 0, found one on device 1", q, v, elsewhere)
+    refused(ValueError, "v: expected float64, found type 0 of 1 x 64 bits", q, Array(gpu, np.zeros((7, 10), int)), a)
+    gpu.fail("cuLaunchKernel", 2)
+    refused(RuntimeError, r"cuLaunchKernel: CUDA_ERROR_OUT_OF_MEMORY, out of memory \(status 2\)", q, v, a)
+    assert kernel(*(condyle.cuda.array(np.zeros((7, 0))) for _ in range(3))).numpy().shape == (7, 0)
+
+
+def test_what_cannot_be_made_is_said(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="device: expected a number from 0 to 1, found 2"):
+        condyle.cuda.compile(ARM, "rnea", device=2)
+    with pytest.raises(ValueError, match="dtype: expected 'float64' or 'float32', found 'float16'"):
+        condyle.cuda.compile(ARM, "rnea", dtype="float16")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="functions: expected 'rnea', .*, found 'abba'"):
+        condyle.cuda.compile(ARM, "abba")
+    with pytest.raises(RuntimeError, match="arm7_rnea: not loaded: CUDA_ERROR_INVALID_PTX, .*: ptxas: this is no code"):
+        condyle.cuda.compile(ARM, "rnea", ptx=b"no code")
+    monkeypatch.setenv("CXX", "sh -c 'echo no such option; exit 1'")
+    with pytest.raises(RuntimeError, match="arm7_crba: not compiled for sm_90: status 6: no such option"):
+        condyle.cuda.compile(ARM, "crba", cache=tmp_path)
+    assert not list(tmp_path.iterdir())
+    gpu.fail("cuMemAlloc_v2", 2)
+    with pytest.raises(RuntimeError, match="cuMemAlloc_v2: CUDA_ERROR_OUT_OF_MEMORY"):
+        condyle.cuda.array([1.0])
+
+
+def test_ptx_the_cache_and_a_newer_device(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert condyle.cuda.devices() == ["No GPU 0", "No GPU 1"]
+    ptx = condyle.cuda.ptx(ARM, "gravity", capability=(7, 0))
+    q = states(ARM, 4)[0]
+    condyle.cuda.compile(ARM, "gravity", device=1, cache=tmp_path)
+    assert [path.suffix for path in tmp_path.iterdir()] == [".ptx"], "the compiler does not know that device"
+    first = condyle.cuda.compile(ARM, "gravity", cache=tmp_path)
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".cubin", ".ptx"]
+    monkeypatch.setenv("CXX", "false")  # what is there is not made again
+    for kernel in (
+        first,
+        condyle.cuda.compile(ARM, "gravity", cache=tmp_path),
+        condyle.cuda.compile(ARM, "gravity", ptx=ptx),
+    ):
+        near(kernel(condyle.cuda.array(q)).numpy(), expected(ARM, "gravity", q)[0])
+
+
+def test_several_threads_may_call_at_a_time(gpu: Gpu) -> None:
+    kernel, failures = condyle.cuda.compile(ARM, "rnea"), []
+
+    def run(n: int) -> None:
+        try:
+            given = states(ARM, n)
+            for _ in range(5):
+                near(kernel(*(Array(gpu, x) for x in given)).numpy(), expected(ARM, "rnea", *given)[0])
+        except BaseException as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=run, args=(n,)) for n in (3, 40, 77)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failures
+
+
+PROGRAM = """
+import condyle, condyle.cuda, numpy as np
+kernel = condyle.cuda.compile(condyle.robots.arm7(), "gravity")
+found = kernel(condyle.cuda.array(np.zeros((7, 3))))
+capsule = found.__dlpack__()
+"""
+
+
+def run(program: str, **environment: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-c", program], env=os.environ | environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_arrays_that_are_there_at_the_end(gpu: Gpu) -> None:
+    ended = run(PROGRAM)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_without_a_driver_or_a_device(libraries: tuple[Path, Path]) -> None:
+    said = run(PROGRAM, CONDYLE_CUDA_LIBRARY="no-such-file.so")
+    assert said.returncode == 1
+    assert "RuntimeError: CUDA's driver: cannot be loaded: no-such-file.so: cannot open" in said.stderr
+    assert "; the environment variable CONDYLE_CUDA_LIBRARY may name its file" in said.stderr
+    said = run(PROGRAM, CONDYLE_CUDA_LIBRARY=str(libraries[1]))
+    assert "undefined symbol: cuInit" in said.stderr
+    said = run(PROGRAM, CONDYLE_NVRTC_LIBRARY="no-such-file.so")
+    assert "RuntimeError: NVIDIA's run-time compiler: cannot be loaded: no-such-file.so" in said.stderr
+    count = "import ctypes, os; ctypes.CDLL(os.environ['CONDYLE_CUDA_LIBRARY']).fake_devices(0)\n"
+    said = run(count + PROGRAM)
+    assert "RuntimeError: cuInit: CUDA_ERROR_NO_DEVICE, no CUDA-capable device is detected (status 100)" in said.stderr
+
+
+def test_nvidias_compiler_takes_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it is installed; it needs no GPU."""
+    monkeypatch.delenv("CONDYLE_NVRTC_LIBRARY", raising=False)
+    try:
+        compiler = _cuda_driver.Compiler()
+    except RuntimeError as error:
+        pytest.skip(f"NOT RUN: {error}")
+    monkeypatch.setattr(_cuda_driver, "compiler", lambda: compiler)
+    ptx = condyle.cuda.ptx(ARM, "aba", dtype="float32", capability=(7, 5))
+    assert b".visible .entry arm7_aba(" in ptx
+    assert compiler.architecture((9, 0)) == "sm_90"
+    assert compiler.compile("arm7_aba", "__global__ void f() {}", "sm_90").startswith(b"\x7fELF")
+    with pytest.raises(RuntimeError, match="arm7_aba: not compiled for compute_10: .*gpu-architecture"):
+        condyle.cuda.ptx(ARM, "aba", capability=(1, 0))
