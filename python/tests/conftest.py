@@ -1,9 +1,17 @@
-"""Robots for all tests."""
+"""Robots for all tests, and a GPU that is none."""
+
+import gc
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+from foreign_arrays import Gpu, build
 from sample import Robot, make
 
 import condyle
+from condyle import _cuda_driver
 
 
 @pytest.fixture(params=["arm7", "quadruped", "humanoid"])
@@ -16,3 +24,41 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 def quadruped() -> Robot:
     """The quadruped alone."""
     return make(condyle.robots.quadruped())
+
+
+@pytest.fixture(scope="module")
+def cuda_libraries(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Path]]:
+    """The driver and the compiler without a GPU in place of NVIDIA's."""
+    if sys.platform != "linux" or not (shutil.which("cc") and shutil.which("g++")):
+        pytest.skip("there are no compilers of C and C++ for the driver without a GPU")
+    driver, compiler = build(tmp_path_factory.mktemp("driver"))
+    patch = pytest.MonkeyPatch()
+    patch.setenv("CONDYLE_CUDA_LIBRARY", str(driver))
+    patch.setenv("CONDYLE_NVRTC_LIBRARY", str(compiler))
+    patch.setenv("CONDYLE_CACHE", str(tmp_path_factory.mktemp("cache")))
+    caches = (_cuda_driver.driver, _cuda_driver.device, _cuda_driver.compiler)
+    for made in caches:
+        made.cache_clear()
+    yield driver, compiler
+    for made in caches:
+        made.cache_clear()
+    patch.undo()
+
+
+@pytest.fixture(scope="module")
+def shared_gpu(cuda_libraries: tuple[Path, Path]) -> Gpu:
+    return Gpu(cuda_libraries[0])
+
+
+@pytest.fixture
+def gpu(shared_gpu: Gpu) -> Iterator[Gpu]:
+    """Another library's view of the GPU; at the end nothing is left, and the driver has nothing to complain of."""
+    yield shared_gpu
+    gc.collect()
+    held = _cuda_driver.device(0)
+    with held.current() as driver:
+        driver.call("cuCtxSynchronize")
+    held.hold(_cuda_driver.Event(held, 1), [])
+    gc.collect()
+    assert shared_gpu.library.fake_complaint() == b""
+    assert shared_gpu.live() == {"memory": 0, "streams": 2, "events": 0, "modules": 0}

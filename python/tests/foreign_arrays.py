@@ -72,19 +72,20 @@ def build(folder: Path) -> tuple[Path, Path]:
 
 
 class Gpu:
-    """The driver as another library uses it, on device 0, with a stream of its own that is ordered with no other."""
+    """The driver as another library uses it, on device 0, with two streams that are ordered with no other one."""
 
     def __init__(self, library: Path) -> None:
         self.library = ctypes.CDLL(str(library))
         self.library.fake_complaint.restype = ctypes.c_char_p
         self.library.fake_live.restype = ctypes.c_long
         self.library.fake_launches.restype = ctypes.c_long
-        context, self.stream_handle = c_void_p(), c_void_p()
+        context, streams = c_void_p(), [c_void_p(), c_void_p()]
         self.call("cuInit", 0)
         self.call("cuDevicePrimaryCtxRetain", byref(context), 0)
         self.call("cuCtxPushCurrent_v2", context)
-        self.call("cuStreamCreate", byref(self.stream_handle), 1)
-        self.stream: int = self.stream_handle.value or 0
+        for stream in streams:
+            self.call("cuStreamCreate", byref(stream), 1)
+        self.stream, self.other_stream = (stream.value or 0 for stream in streams)
         self.call("cuCtxPopCurrent_v2", None)
         self.context = context
 
@@ -126,6 +127,7 @@ class Speaker:
     flags = 0
     device = (2, 0)
     given_back = 0
+    asked = 0
 
     def __array_namespace__(self) -> Any:
         return SimpleNamespace(from_dlpack=lambda x: Imported(self.gpu, x))
@@ -138,6 +140,7 @@ class Speaker:
             raise TypeError(f"unexpected arguments {options}")
         assert isinstance(stream, int)
         assert stream > 0
+        self.asked = stream
         self.gpu.order(self.gpu.stream, stream)
         sizes, steps = ((c_int64 * len(x))(*x) for x in (self.shape, self.strides))
         bits = 8 * self.dtype.itemsize

@@ -1,71 +1,27 @@
 """Kernels called through a driver without a GPU, against the library; skipped where there are no C compilers."""
 
 import gc
-import os
-import shutil
-import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from foreign_arrays import Array, Gpu, Imported, Interface, build
+from foreign_arrays import Array, Gpu, Imported, Interface
 from sample import Robot
 
 import condyle
+import condyle.codegen
 import condyle.cuda
-from condyle import _cuda_driver
 
 ROUNDING = 1e-11
 """Of numbers that M⁻¹ may have amplified, relative to the largest one."""
 SINGLE = 1e-5
 """Of RNEA of an arm in single precision: a hundred roundings of 6e-8."""
 
-pytestmark = pytest.mark.skipif(
-    sys.platform != "linux" or not (shutil.which("cc") and shutil.which("g++")),
-    reason="there are no compilers of C and C++ for the driver without a GPU",
-)
 ARM = condyle.robots.arm7()
-
-
-@pytest.fixture(scope="module")
-def libraries(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Path]]:
-    """The driver without a GPU in place of NVIDIA's."""
-    driver, compiler = build(tmp_path_factory.mktemp("driver"))
-    patch = pytest.MonkeyPatch()
-    patch.setenv("CONDYLE_CUDA_LIBRARY", str(driver))
-    patch.setenv("CONDYLE_NVRTC_LIBRARY", str(compiler))
-    patch.setenv("CONDYLE_CACHE", str(tmp_path_factory.mktemp("cache")))
-    caches = (_cuda_driver.driver, _cuda_driver.device, _cuda_driver.compiler)
-    for made in caches:
-        made.cache_clear()
-    yield driver, compiler
-    for made in caches:
-        made.cache_clear()
-    patch.undo()
-
-
-@pytest.fixture(scope="module")
-def shared_gpu(libraries: tuple[Path, Path]) -> Gpu:
-    return Gpu(libraries[0])
-
-
-@pytest.fixture
-def gpu(shared_gpu: Gpu) -> Iterator[Gpu]:
-    """Another library's view of the GPU; at the end nothing is left, and the driver has nothing to complain of."""
-    yield shared_gpu
-    gc.collect()
-    held = _cuda_driver.device(0)
-    with held.current() as driver:
-        driver.call("cuCtxSynchronize")
-    held.hold(_cuda_driver.Event(held, 1), [])
-    gc.collect()
-    assert shared_gpu.library.fake_complaint() == b""
-    assert shared_gpu.live() == {"memory": 0, "streams": 1, "events": 0, "modules": 0}
 
 
 def states(model: condyle.Model, n: int) -> tuple[Any, Any, Any]:
@@ -119,8 +75,13 @@ def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: boo
     given = states(ARM, 50)
     options = {"transposed": transposed, "is_versioned": is_versioned}
     arrays = [Array(gpu, x.T if transposed else x, **options) for x in given]
+    ours = [condyle.cuda.array(np.zeros((7, 7, 50))).swapaxes(0, 1) for _ in range(3)]
+    kernel(*arrays, out=ours, stream=gpu.other_stream)
+    assert {x.asked for x in arrays} == {gpu.other_stream}
+    for one, other in zip(ours, expected(ARM, "rnea_derivatives", *given), strict=True):
+        near(one.numpy(), other)
     before = gpu.live()["memory"]
-    found = kernel(*arrays)
+    found = kernel(*arrays, stream=gpu.other_stream)
     assert gpu.live()["memory"] == before + 3, "of three results, and of nothing else"
     assert found._fields == ("dtau_dq", "dtau_dv", "dtau_da")
     for one, other in zip(found, expected(ARM, "rnea_derivatives", *given), strict=True):
@@ -175,6 +136,22 @@ def test_results_go_where_out_says(gpu: Gpu) -> None:
     refused("a: out may not be written to", immutable, *out[1:])
     with pytest.raises(TypeError, match="out: expected 4 arrays, found 1"):
         kernel(*arrays, out=[first])
+
+
+@pytest.mark.parametrize("states_first", [False, True])
+def test_matrices_that_are_not_square(gpu: Gpu, states_first: bool) -> None:
+    kernel = condyle.cuda.compile(ARM, "frames", frames=["tool"])
+    q, v, _ = states(ARM, 20)
+    arrays = [condyle.cuda.array(x) for x in (q, v)]
+    found = kernel(*(x.swapaxes(0, 1) for x in arrays) if states_first else arrays)
+    wanted = condyle.codegen.compile(ARM, "frames", frames=["tool"])(q.T, v.T)
+    out = [condyle.cuda.array(np.zeros((*reversed(shape), 20))) for shape in kernel.outputs.values()]
+    out = [x.swapaxes(0, 2 if states_first else 1) if x.ndim == 3 else x for x in out]
+    kernel(*arrays, out=out)
+    for one, again, other in zip(found, out, wanted, strict=True):
+        near(one.numpy() if states_first else np.moveaxis(one.numpy(), -1, 0), other)
+        near(again.numpy() if states_first and again.ndim == 3 else np.moveaxis(again.numpy(), -1, 0), other)
+    assert found.tool_J.shape == ((20, 6, 7) if states_first else (6, 7, 20))
 
 
 def test_what_is_lent_is_kept_until_it_was_read(gpu: Gpu) -> None:
@@ -258,51 +235,6 @@ def test_capsules_as_the_header_says(gpu: Gpu) -> None:
         one.__dlpack__(stream=0)
 
 
-def test_wrong_arguments(gpu: Gpu) -> None:
-    kernel = condyle.cuda.compile(ARM, "rnea")
-    q, v, a = (condyle.cuda.array(x) for x in states(ARM, 10))
-
-    def refused(kind: type[Exception], message: str, *given: Any) -> None:
-        with pytest.raises(kind, match=message):
-            kernel(*given)
-
-    refused(TypeError, r"rnea\(q, v, a\) -> tau: expected 3 arguments, found 2", q, v)
-    refused(
-        TypeError, "q: expected an array on device 0, found one that is not on a CUDA device", np.zeros((7, 1)), v, a
-    )
-    refused(TypeError, "v: expected an array on device 0, as of CuPy, PyTorch or JAX, found list", q, [1.0], a)
-    refused(ValueError, r"v: expected \(7, 10\) in row order, .*, found \(7, 9\) with strides \(9, 1\)",
-            q, condyle.cuda.array(np.zeros((7, 9))), a)  # fmt: skip
-    refused(ValueError, r"q: expected \(7, n\) in row order, .*, found \(10, 7\) with strides \(7, 1\); copy it",
-            condyle.cuda.array(np.zeros((10, 7))), v, a)  # fmt: skip
-    refused(ValueError, "v: expected float64, found float32", q, condyle.cuda.array(np.zeros((7, 10)), "float32"), a)
-    elsewhere = Array(gpu, np.zeros((7, 10)))
-    elsewhere.device = (2, 1)
-    refused(ValueError, "a: expected an array on device 0, found one on device 1", q, v, elsewhere)
-    refused(ValueError, "v: expected float64, found type 0 of 1 x 64 bits", q, Array(gpu, np.zeros((7, 10), int)), a)
-    gpu.fail("cuLaunchKernel", 2)
-    refused(RuntimeError, r"cuLaunchKernel: CUDA_ERROR_OUT_OF_MEMORY, out of memory \(status 2\)", q, v, a)
-    assert kernel(*(condyle.cuda.array(np.zeros((7, 0))) for _ in range(3))).numpy().shape == (7, 0)
-
-
-def test_what_cannot_be_made_is_said(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match="device: expected a number from 0 to 1, found 2"):
-        condyle.cuda.compile(ARM, "rnea", device=2)
-    with pytest.raises(ValueError, match="dtype: expected 'float64' or 'float32', found 'float16'"):
-        condyle.cuda.compile(ARM, "rnea", dtype="float16")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="functions: expected 'rnea', .*, found 'abba'"):
-        condyle.cuda.compile(ARM, "abba")
-    with pytest.raises(RuntimeError, match="arm7_rnea: not loaded: CUDA_ERROR_INVALID_PTX, .*: ptxas: this is no code"):
-        condyle.cuda.compile(ARM, "rnea", ptx=b"no code")
-    monkeypatch.setenv("CXX", "sh -c 'echo no such option; exit 1'")
-    with pytest.raises(RuntimeError, match="arm7_crba: not compiled for sm_90: status 6: no such option"):
-        condyle.cuda.compile(ARM, "crba", cache=tmp_path)
-    assert not list(tmp_path.iterdir())
-    gpu.fail("cuMemAlloc_v2", 2)
-    with pytest.raises(RuntimeError, match="cuMemAlloc_v2: CUDA_ERROR_OUT_OF_MEMORY"):
-        condyle.cuda.array([1.0])
-
-
 def test_ptx_the_cache_and_a_newer_device(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert condyle.cuda.devices() == ["No GPU 0", "No GPU 1"]
     ptx = condyle.cuda.ptx(ARM, "gravity", capability=(7, 0))
@@ -337,52 +269,3 @@ def test_several_threads_may_call_at_a_time(gpu: Gpu) -> None:
     for thread in threads:
         thread.join()
     assert not failures
-
-
-PROGRAM = """
-import condyle, condyle.cuda, numpy as np
-kernel = condyle.cuda.compile(condyle.robots.arm7(), "gravity")
-found = kernel(condyle.cuda.array(np.zeros((7, 3))))
-capsule = found.__dlpack__()
-"""
-
-
-def run(program: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-c", program], env=os.environ | environment, capture_output=True, text=True, check=False
-    )
-
-
-def test_arrays_that_are_there_at_the_end(gpu: Gpu) -> None:
-    ended = run(PROGRAM)
-    assert (ended.returncode, ended.stderr) == (0, "")
-
-
-def test_without_a_driver_or_a_device(libraries: tuple[Path, Path]) -> None:
-    said = run(PROGRAM, CONDYLE_CUDA_LIBRARY="no-such-file.so")
-    assert said.returncode == 1
-    assert "RuntimeError: CUDA's driver: cannot be loaded: no-such-file.so: cannot open" in said.stderr
-    assert "; the environment variable CONDYLE_CUDA_LIBRARY may name its file" in said.stderr
-    said = run(PROGRAM, CONDYLE_CUDA_LIBRARY=str(libraries[1]))
-    assert "undefined symbol: cuInit" in said.stderr
-    said = run(PROGRAM, CONDYLE_NVRTC_LIBRARY="no-such-file.so")
-    assert "RuntimeError: NVIDIA's run-time compiler: cannot be loaded: no-such-file.so" in said.stderr
-    count = "import ctypes, os; ctypes.CDLL(os.environ['CONDYLE_CUDA_LIBRARY']).fake_devices(0)\n"
-    said = run(count + PROGRAM)
-    assert "RuntimeError: cuInit: CUDA_ERROR_NO_DEVICE, no CUDA-capable device is detected (status 100)" in said.stderr
-
-
-def test_nvidias_compiler_takes_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where it is installed; it needs no GPU."""
-    monkeypatch.delenv("CONDYLE_NVRTC_LIBRARY", raising=False)
-    try:
-        compiler = _cuda_driver.Compiler()
-    except RuntimeError as error:
-        pytest.skip(f"NOT RUN: {error}")
-    monkeypatch.setattr(_cuda_driver, "compiler", lambda: compiler)
-    ptx = condyle.cuda.ptx(ARM, "aba", dtype="float32", capability=(7, 5))
-    assert b".visible .entry arm7_aba(" in ptx
-    assert compiler.architecture((9, 0)) == "sm_90"
-    assert compiler.compile("arm7_aba", "__global__ void f() {}", "sm_90").startswith(b"\x7fELF")
-    with pytest.raises(RuntimeError, match="arm7_aba: not compiled for compute_10: .*gpu-architecture"):
-        condyle.cuda.ptx(ARM, "aba", capability=(1, 0))
