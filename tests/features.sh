@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Checks that each feature of each crate can be left out: none is on, one is, all but one are. Then it runs the unit tests of what
-# needs no standard library without it (dynamics runs without it in tests/embedded.sh).
+# needs no standard library without it (dynamics runs without it in tests/embedded.sh), and kernels with a driver that has no GPU.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -25,9 +25,13 @@ check condyle-model libm loaders serde std threads
 check condyle-dynamics libm loaders serde std threads
 check condyle-optimal "" loaders serde threads
 check condyle-wholebody "" loaders threads
+check condyle-codegen "" cuda
 check condyle "" loaders serde threads
 
 for crate in spatial linalg model; do
     cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
 done
 cargo test --locked --package condyle-linalg --no-default-features --features std
+cargo clippy --locked --package condyle-codegen --features cuda --all-targets -- -D warnings
+cargo test --locked --package condyle-codegen --features cuda --test cuda
+cargo test --locked --package condyle-codegen --features cuda --doc cuda

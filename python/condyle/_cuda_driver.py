@@ -4,8 +4,8 @@ import ctypes
 import os
 import sys
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Sequence
 from ctypes import POINTER, byref, c_char_p, c_int, c_size_t, c_uint, c_uint64, c_void_p
 from functools import cache
 from pathlib import Path
@@ -131,6 +131,20 @@ def names() -> list[str]:
     return found
 
 
+class Current:
+    """A context that is the thread's current one in a block."""
+
+    def __init__(self, driver: Driver, context: c_void_p) -> None:
+        self._driver, self._context = driver, context
+
+    def __enter__(self) -> Driver:
+        self._driver.call("cuCtxPushCurrent_v2", self._context)
+        return self._driver
+
+    def __exit__(self, *_: object) -> None:
+        self._driver.call("cuCtxPopCurrent_v2", None)
+
+
 class Device:
     """A device with its primary context, which other libraries of the process use too; it is held until the end."""
 
@@ -146,7 +160,7 @@ class Device:
         self.multiprocessors = max(1, self._attribute(device, _MULTIPROCESSORS))
         major, minor = (self._attribute(device, attribute) for attribute in _CAPABILITY)
         self.capability = (major, minor)
-        self._held: list[tuple[Event, list[Any]]] = []
+        self._held: deque[tuple[Event, list[Any]]] = deque()
         self._lock = threading.Lock()
 
     def _attribute(self, device: c_int, attribute: int) -> int:
@@ -154,14 +168,9 @@ class Device:
         self.driver.call("cuDeviceGetAttribute", byref(value), attribute, device)
         return value.value
 
-    @contextmanager
-    def current(self) -> Iterator[Driver]:
+    def current(self) -> "Current":
         """The driver, with this device's context as the thread's current one."""
-        self.driver.call("cuCtxPushCurrent_v2", self._context)
-        try:
-            yield self.driver
-        finally:
-            self.driver.call("cuCtxPopCurrent_v2", byref(c_void_p()))
+        return Current(self.driver, self._context)
 
     def owns(self, address: int) -> bool:
         """Whether this is an address in the device's memory."""
@@ -171,11 +180,14 @@ class Device:
         return status == 0 and found.value == self.ordinal
 
     def hold(self, until: "Event", things: list[Any]) -> None:
-        """Keeps things until an event has happened, and lets go of those whose event has."""
+        """Keeps things until an event has happened, and lets go of the oldest ones whose event has."""
+        dropped = []
         with self._lock:
-            kept = [(event, held) for event, held in self._held if not event.has_happened()]
-            dropped, self._held = self._held, [*kept, (until, things)] if things else kept
-        del dropped  # without the lock: what is let go of may run anything
+            while self._held and self._held[0][0].has_happened():
+                dropped.append(self._held.popleft())
+            if things:
+                self._held.append((until, things))
+        dropped.clear()  # without the lock: what is let go of may run anything
 
 
 @cache

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,12 +125,12 @@ class DeviceArray:
 
 def new(device: Device, dtype: "np.dtype[Any]", shape: tuple[int, ...]) -> DeviceArray:
     """An array in row order whose numbers are not there yet."""
-    return DeviceArray(Memory(device, int(np.prod(shape)) * dtype.itemsize), dtype, shape, row_order(shape), [])
+    return DeviceArray(Memory(device, prod(shape) * dtype.itemsize), dtype, shape, row_order(shape), [])
 
 
 def row_order(shape: Sequence[int]) -> tuple[int, ...]:
     """The strides of an array in row order, in numbers."""
-    return tuple(int(np.prod(shape[k + 1 :])) for k in range(len(shape)))
+    return tuple(prod(shape[k + 1 :]) for k in range(len(shape)))
 
 
 class View(NamedTuple):
@@ -148,7 +149,7 @@ def view(name: str, array: Any, device: Device, stream: int) -> View:
     if isinstance(array, DeviceArray):
         _on_device(name, device, *array.__dlpack_device__())
         array._before(stream)
-        return View(array, array._memory.address, str(array.dtype), array.shape, array.strides, False)
+        return View(array, array._memory.address, f"float{8 * array.dtype.itemsize}", array.shape, array.strides, False)
     if hasattr(array, "__dlpack_device__"):
         kind, ordinal = array.__dlpack_device__()
         _on_device(name, device, int(kind), int(ordinal))
@@ -194,7 +195,7 @@ def _interface(name: str, array: Any, device: Device, stream: int) -> View:
         raise ValueError(f"{name}: expected an array on device {device.ordinal}, found an address elsewhere")
     if their is not None and their != stream:
         Event(device, their).before(stream)
-    return View(array, address or 0, str(dtype), shape, steps, is_read_only)
+    return View(array, address or 0, dtype.name, shape, steps, is_read_only)
 
 
 def current_stream(array: Any, device: Device) -> int | None:

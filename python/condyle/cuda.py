@@ -14,13 +14,14 @@ first argument is such a one the results have the states along the first axis to
 are refused, and so are other dtypes. Results are arrays of the library of the first argument.
 
 Nothing of CUDA is needed but where this is used: the driver, which comes with the GPU, and NVIDIA's run-time compiler
-(`pip install nvidia-cuda-nvrtc-cu12`, or the system's). The environment variables `CONDYLE_CUDA_LIBRARY` and
+(`pip install 'condyle[cuda]'`, or the system's). The environment variables `CONDYLE_CUDA_LIBRARY` and
 `CONDYLE_NVRTC_LIBRARY` name other files. All is done in the device's primary context, which other libraries use too.
 """
 
 import os
 from collections import namedtuple
 from collections.abc import Sequence
+from math import prod
 from pathlib import Path
 from typing import Any, Literal
 
@@ -95,7 +96,7 @@ class _Array:
                 many = given.shape[0 if states_first else -1]
                 if n is not None and many != n:
                     continue
-                steps = tuple(many * int(np.prod(shape[:k])) for k in range(len(shape)))
+                steps = tuple(many * prod(shape[:k]) for k in range(len(shape)))
                 wanted = (1, *steps) if states_first else (*steps, 1)
                 pairs = zip(given.shape, wanted, given.strides, strict=True)
                 if 0 in given.shape or all(a == b for size, a, b in pairs if size != 1):
@@ -117,6 +118,7 @@ class Kernel:
     def __init__(self, name: str, dtype: Real, function: Function, inputs: list[Any], outputs: list[Any]) -> None:
         self.name: str = name
         self.dtype: np.dtype[Any] = np.dtype(dtype)
+        self._real: str = dtype
         self._inputs = [_Array(*about) for about in inputs]
         self._outputs = [_Array(*about) for about in outputs]
         self.inputs: dict[str, int] = {a.name: a.size for a in self._inputs}
@@ -165,7 +167,7 @@ class Kernel:
         states_first, views = False, []
         for about, given in zip(self._inputs, arguments, strict=True):
             views.append(view(about.name, given, device, number))
-            n, is_first = about.states(views[-1], self.dtype.name, n)
+            n, is_first = about.states(views[-1], self._real, n)
             states_first = is_first if len(views) == 1 else states_first
         if n is None or n > self._most:
             raise ValueError(f"{self.name}: expected at most {self._most} states, found {n}")
@@ -193,7 +195,7 @@ class Kernel:
         views = []
         for about, given in zip(self._outputs, out, strict=True):
             found = view(about.name, given, self._function.device, stream)
-            about.states(found, self.dtype.name, n)
+            about.states(found, self._real, n)
             if found.is_read_only or type(given).__module__.partition(".")[0] in ("jax", "jaxlib"):
                 raise ValueError(f"{about.name}: out may not be written to")
             start, end = found.address, found.address + size * about.size

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -71,9 +72,10 @@ capsule = found.__dlpack__()
 
 
 def run(program: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-c", program], env=os.environ | environment, capture_output=True, text=True, check=False
-    )
+    """Runs a program with a cache of its own: what the compiler without a GPU makes is gone with its process."""
+    with TemporaryDirectory() as cache:
+        changed = os.environ | {"CONDYLE_CACHE": cache} | environment
+        return subprocess.run([sys.executable, "-c", program], env=changed, capture_output=True, text=True, check=False)
 
 
 def test_arrays_that_are_there_at_the_end(gpu: Gpu) -> None:

@@ -1,0 +1,194 @@
+#!/usr/bin/env python3
+"""States a second of generated kernels on a GPU, for batches of many sizes, beside MJX and MuJoCo Warp.
+
+    python benches/cuda.py [--robots panda anymal talos] [--functions rnea aba ...] [--batches 10 12 14 16 18 20]
+
+Batches are powers of two. "Resident" is with all arrays on the device; "copied" also brings arguments there and results
+back. Each kernel is compared with the CPU first. MJX and MuJoCo Warp compute `forward`, which is forward dynamics and
+kinematics, in single precision, of the same robot without shapes; they are left out where they are not installed.
+Needs a GPU, NVIDIA's run-time compiler, the packages condyle and example-robot-data-loaders, and mujoco for the peers.
+Without a device it prints NOT RUN.
+"""
+
+import argparse
+import sys
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import condyle
+import condyle.cuda
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests/peers/mujoco"))
+
+SECONDS = 0.3
+"""How long is measured, at least."""
+ROUNDING = 1e-11
+"""Of double precision, amplified by M⁻¹; relative to the largest number."""
+CHECKED = 64
+"""States that are compared with the CPU."""
+
+
+def rate(n: int, call: Callable[[], object], wait: Callable[[], object]) -> float:
+    """Millions of states a second: of the fastest of five runs of many calls each."""
+    call(), wait()
+    count, best = 1, 0.0
+    while True:
+        start = time.perf_counter()
+        for _ in range(count):
+            call()
+        wait()
+        took = time.perf_counter() - start
+        if took > SECONDS / 5:
+            break
+        count *= 2
+    for _ in range(5):
+        start = time.perf_counter()
+        for _ in range(count):
+            call()
+        wait()
+        best = max(best, count * n / (time.perf_counter() - start))
+    return best / 1e6
+
+
+def states(model: condyle.Model, names: "list[str]", n: int, dtype: str) -> list[Any]:
+    """Arguments of n states, along the last axis; at most 1024 of them differ."""
+    rng = np.random.default_rng(0)
+    q = np.array([condyle.random_configuration(model, seed=k) for k in range(min(n, 1024))])
+    given = {"q": q, **{name: rng.standard_normal((len(q), model.nv)) for name in names if name != "q"}}
+    return [np.ascontiguousarray(np.resize(given[name], (n, given[name].shape[1])).T.astype(dtype)) for name in names]
+
+
+def error(model: condyle.Model, kernel: condyle.cuda.Kernel) -> float:
+    """How far results are from the CPU's, relative to the largest number."""
+    given = states(model, list(kernel.inputs), CHECKED, kernel.dtype.name)
+    found = kernel(*map(condyle.cuda.array, given))
+    wanted = getattr(condyle, kernel.name)(model, condyle.Data(model), *(x.T.astype(float).copy() for x in given))
+    pairs = zip(found, wanted, strict=True) if isinstance(wanted, tuple) else [(found, wanted)]
+    return max(np.abs(np.moveaxis(x.numpy(), -1, 0) - y).max() / (1.0 + np.abs(y).max()) for x, y in pairs)
+
+
+def ours(model: condyle.Model, kernel: condyle.cuda.Kernel, n: int) -> tuple[float, float]:
+    """Resident and copied."""
+    from condyle import _cuda_driver
+
+    def wait() -> None:
+        with _cuda_driver.device(0).current() as driver:
+            driver.call("cuCtxSynchronize")
+
+    host = states(model, list(kernel.inputs), n, kernel.dtype.name)
+    given = [condyle.cuda.array(x) for x in host]
+    out = kernel(*given)
+
+    def copied() -> None:
+        made = kernel(*map(condyle.cuda.array, host), out=out)
+        for result in made if isinstance(made, tuple) else (made,):
+            result.numpy()
+
+    return rate(n, lambda: kernel(*given, out=out), wait), rate(n, copied, wait)
+
+
+def table(model: condyle.Model, robot: str, functions: "list[str]", batches: "list[int]") -> None:
+    for name in functions:
+        for dtype in ("float32", "float64"):
+            kernel = condyle.cuda.compile(model, name, dtype=dtype)
+            apart = error(model, kernel)
+            if dtype == "float64" and not apart <= ROUNDING:
+                sys.exit(f"{robot}, {name}: {apart:.1e} from the CPU, {ROUNDING} are allowed")
+            for n in batches:
+                try:
+                    resident, copied = (f"{x:.3g}" for x in ours(model, kernel, n))
+                except (RuntimeError, ValueError) as refused:  # too little memory, or too many states for a call
+                    resident, copied = str(refused).split(",")[0], "–"
+                print(
+                    f"| {robot} | {name} | {dtype} | {kernel.registers} | {kernel.local_bytes} | {apart:.0e} | "
+                    f"{n} | {resident} | {copied} |",
+                    flush=True,
+                )
+
+
+def mujoco_model(path: Path, is_free: bool) -> Any:
+    """The robot in MuJoCo, without shapes and contacts."""
+    import mujoco
+    from world import bare
+
+    robot = bare(path.read_text(encoding="utf-8"))
+    if not is_free:
+        [joint] = (joint for joint in robot.iter("joint") if joint.attrib.get("name") == "root_joint")
+        joint.attrib["type"] = "fixed"
+    model = mujoco.MjModel.from_xml_string(ET.tostring(robot).decode())
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    return model
+
+
+def by_mjx(model: Any, n: int) -> float:
+    import jax
+    from mujoco import mjx
+
+    on_device = mjx.put_model(model)
+    data = jax.vmap(lambda v: mjx.make_data(model).replace(qvel=v))(jax.numpy.ones((n, model.nv)))
+    forward = jax.jit(jax.vmap(mjx.forward, in_axes=(None, 0)))
+    last: list[Any] = []
+
+    def call() -> None:
+        last[:] = [forward(on_device, data).qacc]
+
+    return rate(n, call, lambda: last[0].block_until_ready())
+
+
+def by_warp(model: Any, n: int) -> float:
+    import mujoco_warp
+    import warp
+
+    on_device, data = mujoco_warp.put_model(model), mujoco_warp.make_data(model, nworld=n)
+    mujoco_warp.forward(on_device, data)
+    if not warp.get_device().is_cuda:
+        return rate(n, lambda: mujoco_warp.forward(on_device, data), warp.synchronize)
+    with warp.ScopedCapture() as capture:
+        mujoco_warp.forward(on_device, data)
+    return rate(n, lambda: warp.capture_launch(capture.graph), warp.synchronize)
+
+
+def peers(robot: str, path: Path, is_free: bool, batches: "list[int]") -> None:
+    for name, measured in (("MJX", by_mjx), ("MuJoCo Warp", by_warp)):
+        for n in batches:
+            try:
+                found = measured(mujoco_model(path, is_free), n)
+                print(f"| {robot} | {name} forward | float32 | | | | {n} | {found:.3g} | |", flush=True)
+            except Exception as failed:
+                print(f"NOT RUN: {name}, {robot}, {n} states: {type(failed).__name__}: {failed}")
+                break
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--robots", nargs="+", default=["panda", "anymal", "talos"], metavar="ROBOT")
+    parser.add_argument("--functions", nargs="+", default=["rnea", "aba", "aba_derivatives"], metavar="FUNCTION")
+    parser.add_argument("--batches", nargs="+", type=int, default=[10, 12, 14, 16, 18, 20], metavar="POWER")
+    options = parser.parse_args()
+    try:
+        found = condyle.cuda.devices()
+    except RuntimeError as none:
+        print(f"NOT RUN: {none}")
+        return
+    from example_robot_data.robots_loader import ROBOTS, getModelPath
+
+    print(f"{found[0]}; millions of states a second\n")
+    columns = ["robot", "function", "type", "registers", "bytes of stack", "error", "states", "resident", "copied"]
+    print(f"| {' | '.join(columns)} |\n|{' --- |' * len(columns)}")
+    for robot in options.robots:
+        loader = ROBOTS[robot]
+        file = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
+        path = Path(getModelPath(file)) / file
+        model = condyle.Model.from_urdf(path, root_joint="free_flyer" if loader.free_flyer else None)
+        batches = [1 << power for power in options.batches]
+        table(model, robot, options.functions, batches)
+        peers(robot, path, loader.free_flyer, batches)
+
+
+if __name__ == "__main__":
+    main()
