@@ -6,8 +6,8 @@ use crate::function::{Function, Recorder, record};
 use crate::identifiers::identifiers;
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, ReferenceFrame, aba, aba_derivatives, aba_hessian, centroidal_map_rate,
-    constrained_dynamics, constrained_dynamics_derivatives, crba, forward_velocities, gravity, impulse_dynamics, minv,
-    nonlinear_effects, rnea, rnea_derivatives, rnea_hessian,
+    constrained_dynamics, constrained_dynamics_derivatives, crba, forward_kinematics, forward_velocities, gravity,
+    impulse_dynamics, minv, neutral, nonlinear_effects, rnea, rnea_derivatives, rnea_hessian,
 };
 use condyle_model::inertial_parameters::to_inertia;
 use condyle_model::{Model, Vec3};
@@ -107,7 +107,11 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
             match name {
                 _ if is_constrained => return robot.constrained(r, name),
                 "frames" => robot.frames(r, &frames),
-                _ => robot.unconstrained(r, name),
+                "centroidal" => robot.unconstrained(r, name),
+                _ => {
+                    robot.in_frame_of_first_body()?;
+                    robot.unconstrained(r, name);
+                }
             }
             Ok(())
         });
@@ -177,6 +181,25 @@ impl<'s> Robot<'s> {
             model = model.with_gravity(Vec3::new(g[0], g[1], g[2]))?;
         }
         Ok(Self { data: Data::new(&model), model, settings, q })
+    }
+
+    /// Takes the frame in which the first body would be at rest in its neutral position for the world's: what the joints feel is
+    /// the same there, under a gravity that is turned with it, and the position of the first joint falls out of all else.
+    ///
+    /// Where the world carries several bodies, or the first joint leads another one, it stays as it is.
+    fn in_frame_of_first_body(&mut self) -> Result<(), Error> {
+        let Self { model, data, q, .. } = self;
+        let [_, first, others @ ..] = model.nodes() else { return Ok(()) };
+        if others.iter().any(|node| node.parent == 0 || node.idx_v == first.idx_v) {
+            return Ok(());
+        }
+        let neutral: Vec<Expression> = neutral(model).into_iter().map(Expression::splat).collect();
+        let oR = forward_kinematics(model, data, q).body(1).rotation;
+        q[first.idx_q..][..first.joint.nq()].copy_from_slice(&neutral[first.idx_q..][..first.joint.nq()]);
+        let aR = forward_kinematics(model, data, q).body(1).rotation;
+        let gravity = aR * oR.transpose_mul(*model.gravity()); // aR₁ oR₁ᵀ g
+        self.model = self.model.clone().with_gravity(gravity)?;
+        Ok(())
     }
 
     fn input(&self, r: &mut Recorder, name: &str, about: &str) -> Vec<Expression> {
