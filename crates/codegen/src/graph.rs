@@ -161,6 +161,9 @@ impl Graph {
         if let (Some(x), Some(y)) = (self.value(a), self.value(b)) {
             return self.constant(x + y);
         }
+        if let Some(rest) = self.rest_of_sum(a, b).or_else(|| self.rest_of_sum(b, a)) {
+            return rest;
+        }
         match (self.negated(a), self.negated(b)) {
             _ if a == ZERO => b,
             _ if b == ZERO => a,
@@ -178,9 +181,29 @@ impl Graph {
         }
     }
 
+    /// a + (b − a) = b.
+    fn rest_of_sum(&self, a: Id, difference: Id) -> Option<Id> {
+        match self.nodes[difference as usize] {
+            Node::Sub(b, c) if c == a => Some(b),
+            _ => None,
+        }
+    }
+
+    /// a − (a − b) = b, (a + b) − a = b.
+    fn rest_of_difference(&self, a: Id, b: Id) -> Option<Id> {
+        match (self.nodes[a as usize], self.nodes[b as usize]) {
+            (_, Node::Sub(c, rest)) if c == a => Some(rest),
+            (Node::Add(c, rest), _) | (Node::Add(rest, c), _) if c == b => Some(rest),
+            _ => None,
+        }
+    }
+
     pub(crate) fn sub(&mut self, a: Id, b: Id) -> Id {
         if let (Some(x), Some(y)) = (self.value(a), self.value(b)) {
             return self.constant(x - y);
+        }
+        if let Some(rest) = self.rest_of_difference(a, b) {
+            return rest;
         }
         match (self.negated(a), self.negated(b)) {
             _ if a == b => ZERO,
@@ -209,9 +232,23 @@ impl Graph {
             (Some(x), Some(y)) => self.constant(x * y),
             (Some(x), None) => self.scale(x, a, b),
             (None, Some(y)) => self.scale(y, b, a),
-            (None, None) => self.find(Node::Mul(a.min(b), a.max(b))),
+            (None, None) => match self.dividend(a, b).or_else(|| self.dividend(b, a)) {
+                Some(x) => x,
+                None => self.find(Node::Mul(a.min(b), a.max(b))),
+            },
         };
         self.signed(product, minus_a != minus_b)
+    }
+
+    /// (x / b) b = x and (1 / b) x b = x.
+    fn dividend(&self, a: Id, b: Id) -> Option<Id> {
+        let inverse = Node::Div(ONE, b);
+        match self.nodes[a as usize] {
+            Node::Div(x, c) if c == b => Some(x),
+            Node::Mul(x, y) if self.nodes[y as usize] == inverse => Some(x),
+            Node::Mul(x, y) if self.nodes[x as usize] == inverse => Some(y),
+            _ => None,
+        }
     }
 
     /// The constant x, which has the number c, times another value.

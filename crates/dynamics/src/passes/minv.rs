@@ -62,6 +62,24 @@ impl<S> Workspace<S> {
     }
 }
 
+impl<S: Scalar> Workspace<S> {
+    /// Whether solving by the factor, which there is then, takes fewer operations than a product with M⁻¹.
+    pub(crate) fn has_short_factor(&self) -> bool {
+        let nv = self.Minv.nrows();
+        !self.by_gauss_jordan && 2 * self.factor.nonzeros() < nv * nv
+    }
+
+    /// x = M⁻¹ b in place of b, after `from_matrix`.
+    pub(crate) fn solve(&self, b: &mut [S]) {
+        if !self.by_gauss_jordan {
+            return self.factor.solve(b);
+        }
+        let Minv = self.Minv.as_slice().chunks_exact(b.len().max(1));
+        let x: Vec<S> = Minv.map(|row| (0..row.len()).fold(S::zero(), |sum, j| row[j].mul_add(b[j], sum))).collect();
+        b.copy_from_slice(&x);
+    }
+}
+
 /// X = M⁻¹ for at most `SHORT_CHAIN` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
 ///
 /// ```text

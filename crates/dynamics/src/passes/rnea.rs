@@ -69,7 +69,7 @@ impl<S> Workspace<S> {
 
 /// K = ω̇× + ω× ω×.
 #[inline(always)]
-fn centripetal<S: Scalar>(w: Vec3<S>, dw: Vec3<S>) -> Mat3<S> {
+pub(crate) fn centripetal<S: Scalar>(w: Vec3<S>, dw: Vec3<S>) -> Mat3<S> {
     let minus = -w;
     let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
     let (xx, yy) = (minus.x * w.x, minus.y * w.y);

@@ -137,11 +137,11 @@ impl Joint {
 }
 
 #[inline(always)]
-fn quaternion<L: Layout>(l: &L, i: usize, q: &[L::S], at: usize) -> Quaternion<L::S> {
+pub(super) fn quaternion<L: Layout>(l: &L, i: usize, q: &[L::S], at: usize) -> Quaternion<L::S> {
     Quaternion::new(l.position(q, i, at), l.position(q, i, at + 1), l.position(q, i, at + 2), l.position(q, i, at + 3))
 }
 
 #[inline(always)]
-fn point<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Vec3<L::S> {
+pub(super) fn point<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Vec3<L::S> {
     Vec3::new(l.position(q, i, 0), l.position(q, i, 1), l.position(q, i, 2))
 }

@@ -115,3 +115,39 @@ impl<S: Scalar> ArticulatedInertia<S> {
         }
     }
 }
+
+impl<S: Scalar> Act<ArticulatedInertia<S>> for Se3<S> {
+    /// The linear motion of the body's origin, at p, is that of the frame's origin plus ω × p, and a force f at p has the moment
+    /// p × f about it: with M, B, C the turned linear part, coupling and rotational part,
+    ///
+    /// ```text
+    /// M' = M,   B' = B − M [p]ₓ,   C' = C + [p]ₓ B' + ([p]ₓ B)ᵀ
+    /// ```
+    #[inline(always)]
+    fn act(&self, I: ArticulatedInertia<S>) -> ArticulatedInertia<S> {
+        let (R, p) = (self.rotation, self.translation);
+        let (linear, rotational) = (I.linear.rotate(R), I.rotational.rotate(R));
+        let B = R * I.coupling * R.transpose();
+        let Mat3 { x, y, z } = linear.full();
+        // M [p]ₓ by its columns: [p]ₓ has the columns (0, p_z, −p_y), (−p_z, 0, p_x), (p_y, −p_x, 0)
+        let Mp = Mat3 {
+            x: y.scale_add(p.z, -z.scale(p.y)),
+            y: z.scale_add(p.x, -x.scale(p.z)),
+            z: x.scale_add(p.y, -y.scale(p.x)),
+        };
+        let coupling = B - Mp;
+        let (K, k) = (coupling.columns().map(|b| p.cross(b)), B.columns().map(|b| p.cross(b)));
+        let shift = Sym3 {
+            xx: K[0].x + k[0].x,
+            xy: K[1].x + k[0].y,
+            yy: K[1].y + k[1].y,
+            xz: K[2].x + k[0].z,
+            yz: K[2].y + k[1].z,
+            zz: K[2].z + k[2].z,
+        };
+        ArticulatedInertia { linear, coupling, rotational: rotational + shift }
+    }
+    fn act_inv(&self, I: ArticulatedInertia<S>) -> ArticulatedInertia<S> {
+        self.inverse().act(I)
+    }
+}

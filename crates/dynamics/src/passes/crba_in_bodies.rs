@@ -1,0 +1,63 @@
+//! The joint-space inertia matrix by the composite-rigid-body algorithm, in the bodies' own frames.
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2, line by line. It is the form for code that is
+//! recorded for one robot: constant turns and zeros of placements and inertias fold, and S_eᵀ F is a number of F, while in the
+//! world's frame of `crba.rs` every number depends on every joint before. Generated code is tested against `crba.rs`.
+
+use crate::passes::kinematics::{PlacementCache, World};
+use alloc::vec;
+use alloc::vec::Vec;
+use condyle_model::Model;
+use condyle_model::joint::{Carried, Joint, JointPlacement};
+use condyle_model::layout::{Columns, Single};
+use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3};
+use nalgebra::DMatrix;
+
+/// The whole algorithm. Its memory is its own: of numbers that are recorded each takes some anyway.
+fn pass<L: Columns>(l: &L, world: &mut World<L::S>, q: &[L::S], M: &mut [L::Number]) {
+    let n = l.bodies().end;
+    Joint::sin_cos(l, q, &mut world.sin_cos);
+    let (sin, cos) = (&world.sin_cos.sin[..], &world.sin_cos.cos[..]);
+    let identity = Se3::<L::S>::identity();
+    let numbers: Vec<usize> = (0..n).collect();
+    let mut IC = vec![Inertia::zero(); n];
+    let mut X = vec![(identity, JointPlacement::General(identity)); n]; // X_T, X_J
+    for i in l.bodies() {
+        IC[i] = l.inertia(i);
+        X[i] = (l.placement(i), Joint::own_placement(l, i, q, sin[i], cos[i])); // λXi = X_T X_J
+    }
+    l.clear(M);
+    for i in l.bodies().rev() {
+        let support = l.support(i);
+        for k in 0..l.joint(i).nv() {
+            let column = l.own_column(i, k);
+            let mut F = IC[i] * l.joint(i).column(&identity, k); // F = Iᶜ S
+            let mut j = i;
+            while j != 0 {
+                // M_ej = S_eᵀ F for every column e from the root to its own
+                let (first, own) = (l.support(j).len() - l.joint(j).nv(), if j == i { k } else { l.joint(j).nv() });
+                for e in 0..own {
+                    let x = l.joint(j).column(&identity, e).dot(F);
+                    l.set_column(M, column, support[first + e], x);
+                    l.set_row(M, column, support[first + e], x);
+                }
+                if j == i {
+                    l.set_row(M, column, support[first + k], l.joint(i).column(&identity, k).dot(F));
+                }
+                let (X_T, X_J) = &X[j];
+                F = X_T.act(F.carried_by(X_J)); // F = λX*_j F
+                j = l.parent(&numbers, j);
+            }
+        }
+        let (X_T, X_J) = &X[i];
+        let carried = X_T.act(IC[i].carried_by(X_J));
+        l.add_to_parent(&mut IC, i, carried); // Iᶜ_λ += λX*_i Iᶜ_i iXλ
+    }
+    l.add_armature(M);
+}
+
+/// Body by body, for numbers that are recorded.
+pub(crate) fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, world: &mut World<S>, q: &[S], M: &mut DMatrix<S>) {
+    world.placed = PlacementCache::Nowhere;
+    pass(&Single::new(model), world, q, M.as_mut_slice());
+}
