@@ -30,6 +30,7 @@ mod order;
 mod program;
 mod robot;
 mod steps;
+mod sums;
 mod text;
 
 pub use derivative::{DualExpression, jacobian};

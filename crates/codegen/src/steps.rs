@@ -3,6 +3,8 @@
 
 use crate::function::{Function, Operations};
 use crate::graph::{Id, Node};
+use crate::sums::Sums;
+use std::collections::HashMap;
 
 /// A step.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,61 +94,26 @@ impl<'f> Steps<'f> {
     /// The steps of a function, in the order in which they were recorded.
     pub(crate) fn new(function: &'f Function) -> Self {
         let nodes = &function.nodes[..];
-        let mut uses = vec![0_u32; nodes.len()];
-        nodes.iter().flat_map(|node| node.operands()).for_each(|id| uses[id as usize] += 1);
-        function.results.iter().for_each(|&id| uses[id as usize] += 1);
-        let product = |id: Id| match nodes[id as usize] {
-            Node::Mul(a, b) if uses[id as usize] == 1 => Some((a, b)),
-            _ => None,
-        };
-        let mut fused = vec![false; nodes.len()];
-        let mut other_half = vec![None; nodes.len()];
-        let mut angle_seen = vec![usize::MAX; nodes.len()];
-        let mut all: Vec<Step> = Vec::new();
-        for (k, &node) in nodes.iter().enumerate() {
-            let id = k as Id;
-            let step = match node {
-                Node::Constant(_) | Node::Input(_) => continue,
-                // of two products the later one: the other has been computed by then
-                Node::Add(a, b) => match (product(a), product(b)) {
-                    (_, Some((x, y))) if product(a).is_none() || b > a => {
-                        fuse(&mut fused, b, Step::MulAdd(id, [x, y, a]))
-                    }
-                    (Some((x, y)), _) => fuse(&mut fused, a, Step::MulAdd(id, [x, y, b])),
-                    _ => Step::Plain(id, node),
-                },
-                Node::Sub(a, b) => match (product(a), product(b)) {
-                    (_, Some((x, y))) if product(a).is_none() || b > a => {
-                        fuse(&mut fused, b, Step::SubMul(id, [x, y, a]))
-                    }
-                    (Some((x, y)), _) => fuse(&mut fused, a, Step::MulSub(id, [x, y, b])),
-                    _ => Step::Plain(id, node),
-                },
-                Node::Sin(angle) | Node::Cos(angle) => {
-                    let before: usize = angle_seen[angle as usize];
-                    if before != usize::MAX {
-                        other_half[before] = Some(id);
-                        continue;
-                    }
-                    angle_seen[angle as usize] = k;
-                    Step::Plain(id, node)
-                }
-                _ => Step::Plain(id, node),
-            };
-            all.push(step);
-        }
-        all.retain(|step| !matches!(*step, Step::Plain(id, Node::Mul(..)) if fused[id as usize]));
-        for step in &mut all {
-            match *step {
-                Step::Plain(id, Node::Sin(angle)) => {
-                    *step = Step::SinCos(Angle { angle, sin: Some(id), cos: other_half[id as usize] });
-                }
-                Step::Plain(id, Node::Cos(angle)) => {
-                    *step = Step::SinCos(Angle { angle, sin: other_half[id as usize], cos: Some(id) });
-                }
-                _ => {}
+        let mut all = Sums::new(nodes, &function.results).steps();
+        let mut halves: HashMap<Id, Angle> = HashMap::new();
+        for node in nodes.iter().enumerate() {
+            if let (id, &(Node::Sin(angle) | Node::Cos(angle))) = node {
+                let both = halves.entry(angle).or_insert(Angle { angle, sin: None, cos: None });
+                let half = if matches!(nodes[id], Node::Sin(_)) { &mut both.sin } else { &mut both.cos };
+                *half = Some(id as Id);
             }
         }
+        // both halves of an angle where the first one stands
+        all.retain_mut(|step| match *step {
+            Step::Plain(_, Node::Sin(angle) | Node::Cos(angle)) => match halves.remove(&angle) {
+                Some(both) => {
+                    *step = Step::SinCos(both);
+                    true
+                }
+                None => false,
+            },
+            _ => true,
+        });
         let mut angles = Vec::new();
         all.retain(|step| match *step {
             Step::SinCos(angle) if operations_from_inputs(nodes, angle.angle).is_some() => {
@@ -190,12 +157,6 @@ impl<'f> Steps<'f> {
         }
         n
     }
-}
-
-/// Marks a product as part of a step.
-fn fuse(fused: &mut [bool], product: Id, step: Step) -> Step {
-    fused[product as usize] = true;
-    step
 }
 
 impl Function {

@@ -1,0 +1,137 @@
+//! Sums of products: in how many steps a sum of any length is computed, and which products go into it.
+//!
+//! A sum that only another sum needs is part of it, so that a sum is a list of terms, each a value or a product of two. As products
+//! are fused with the sum behind them, a sum that begins with a value takes a step for each other term, wherever brackets stood;
+//! x − (a b + c d) is two steps. Terms are added in the order in which they were recorded, as soon as they are there.
+
+use crate::graph::{Id, Node};
+use crate::steps::Step;
+
+/// A term: a value, and whether it is subtracted.
+#[derive(Clone, Copy, Debug)]
+struct Term {
+    id: Id,
+    minus: bool,
+}
+
+/// The sums among the values of a function.
+pub(crate) struct Sums<'f> {
+    nodes: &'f [Node],
+    /// How often each value is needed.
+    uses: Vec<u32>,
+    /// How often each value is needed by sums.
+    by_sums: Vec<u32>,
+    /// The products that have a step of their own.
+    has_step: Vec<bool>,
+}
+
+impl<'f> Sums<'f> {
+    pub(crate) fn new(nodes: &'f [Node], results: &[Id]) -> Self {
+        let (mut uses, mut by_sums) = (vec![0; nodes.len()], vec![0; nodes.len()]);
+        for node in nodes {
+            node.operands().for_each(|id| uses[id as usize] += 1);
+            if is_sum(*node) {
+                node.operands().for_each(|id| by_sums[id as usize] += 1);
+            }
+        }
+        results.iter().for_each(|&id| uses[id as usize] += 1);
+        let has_step = (0..nodes.len()).map(|id| uses[id] > by_sums[id]).collect();
+        Self { nodes, uses, by_sums, has_step }
+    }
+
+    /// Whether a value is part of the one sum that needs it.
+    fn is_part(&self, id: Id) -> bool {
+        let id = id as usize;
+        is_sum(self.nodes[id]) && self.uses[id] == 1 && self.by_sums[id] == 1
+    }
+
+    /// Whether a value is a product that goes into sums and nowhere else.
+    fn is_fused(&self, id: Id) -> bool {
+        matches!(self.nodes[id as usize], Node::Mul(..)) && !self.has_step[id as usize]
+    }
+
+    /// All steps, with the places among the recorded values at which they can be taken.
+    pub(crate) fn steps(mut self) -> Vec<Step> {
+        let mut of_sums = Vec::new();
+        for (k, &node) in self.nodes.iter().enumerate() {
+            let id = k as Id;
+            if is_sum(node) && !self.is_part(id) {
+                self.sum(id, &mut of_sums);
+            }
+        }
+        let mut steps: Vec<(Id, Step)> = Vec::new();
+        for (k, &node) in self.nodes.iter().enumerate() {
+            let id = k as Id;
+            match node {
+                Node::Constant(_) | Node::Input(_) | Node::Add(..) | Node::Sub(..) => {}
+                Node::Mul(..) if self.is_fused(id) => {}
+                _ => steps.push((id, Step::Plain(id, node))),
+            }
+        }
+        steps.extend(of_sums);
+        steps.sort_by_key(|&(place, _)| place); // stable: a value, then the sums that it goes into, step by step
+        steps.into_iter().map(|(_, step)| step).collect()
+    }
+
+    /// The terms of a sum, and the sums that are parts of it.
+    fn terms(&self, root: Id) -> (Vec<Term>, Vec<Id>) {
+        let (mut terms, mut parts) = (Vec::new(), Vec::new());
+        let mut stack = vec![Term { id: root, minus: false }];
+        while let Some(Term { id, minus }) = stack.pop() {
+            if id != root && !self.is_part(id) {
+                terms.push(Term { id, minus });
+                continue;
+            }
+            if id != root {
+                parts.push(id);
+            }
+            match self.nodes[id as usize] {
+                Node::Sub(a, b) => stack.extend([Term { id: a, minus }, Term { id: b, minus: !minus }]),
+                node => stack.extend(node.operands().map(|id| Term { id, minus })),
+            }
+        }
+        terms.sort_by_key(|term| term.id);
+        parts.sort_unstable();
+        (terms, parts)
+    }
+
+    /// The steps of a sum. What it has added up so far goes by the names of its parts.
+    fn sum(&mut self, root: Id, steps: &mut Vec<(Id, Step)>) {
+        let (mut terms, parts) = self.terms(root);
+        // a value first, else a product that goes nowhere else, else any
+        let is_single = |term: &Term| self.uses[term.id as usize] == 1;
+        let first = terms.iter().position(|term| !self.is_fused(term.id));
+        let first = first.or_else(|| terms.iter().position(is_single)).unwrap_or(0);
+        let Term { id: mut sum, minus: mut is_negative } = terms.remove(first);
+        self.has_step[sum as usize] = true;
+        let mut place = sum;
+        let mut names = parts.into_iter().chain([root]);
+        for Term { id, minus } in terms {
+            let Some(name) = names.next() else { break }; // there is one for each term but the first
+            place = place.max(id);
+            let step = match self.nodes[id as usize] {
+                Node::Mul(a, b) if self.is_fused(id) => match (is_negative, minus) {
+                    (false, true) => Step::SubMul(name, [a, b, sum]),
+                    (true, false) => Step::MulSub(name, [a, b, sum]),
+                    _ => Step::MulAdd(name, [a, b, sum]),
+                },
+                _ => Step::Plain(
+                    name,
+                    match (is_negative, minus) {
+                        (false, true) => Node::Sub(sum, id),
+                        (true, false) => Node::Sub(id, sum),
+                        _ => Node::Add(sum, id),
+                    },
+                ),
+            };
+            is_negative &= minus;
+            steps.push((place, step));
+            sum = name;
+        }
+        debug_assert!(!is_negative, "signs are taken out of sums when they are recorded");
+    }
+}
+
+fn is_sum(node: Node) -> bool {
+    matches!(node, Node::Add(..) | Node::Sub(..))
+}
