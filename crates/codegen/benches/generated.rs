@@ -1,11 +1,12 @@
-//! Generated C beside the library: operations, size, time to generate and to compile, and a call.
+//! Generated C beside the library: operations, size, time to generate and to compile, and a call; then of vectors of eight states
+//! beside a batch, a state.
 //!
 //! `cargo bench -p condyle-codegen --bench generated -- panda.urdf anymal.urdf:free` ; without files the robots that come along.
 //! `CC` names the compiler, `CFLAGS` its flags.
 
-use condyle_codegen::{Language, Settings, functions};
+use condyle_codegen::{Function, Language, Settings, functions};
 use condyle_dynamics::{
-    Data, Joint, Model, UrdfOptions, aba, aba_derivatives, crba, minv, neutral, rnea, rnea_derivatives, robots,
+    Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, crba, minv, neutral, rnea, rnea_derivatives, robots,
 };
 use std::path::Path;
 use std::process::Command;
@@ -61,6 +62,25 @@ fn library(model: &Model, name: &str) -> f64 {
     }
 }
 
+/// A state of a batch on one core, by the library.
+fn batch(model: &Model, name: &str) -> f64 {
+    let n = 8 * STATES;
+    let (b, q, v) = (&mut Batch::new(model, n, 1), neutral(model).repeat(n), vec![0.1; n * model.nv()]);
+    let (q, v) = (std::hint::black_box(q), std::hint::black_box(v));
+    let all = match name {
+        "rnea" => time(|| _ = std::hint::black_box(b.rnea(model, &q, &v, &v, &[]))),
+        "aba" => time(|| _ = std::hint::black_box(b.aba(model, &q, &v, &v, &[]))),
+        "crba" => time(|| _ = std::hint::black_box(b.crba(model, &q))),
+        "minv" => time(|| _ = std::hint::black_box(b.minv(model, &q))),
+        "rnea_derivatives" => time(|| _ = std::hint::black_box(b.rnea_derivatives(model, &q, &v, &v, &[]))),
+        _ => time(|| _ = std::hint::black_box(b.aba_derivatives(model, &q, &v, &v, &[]))),
+    };
+    all / n as f64
+}
+
+/// How many times eight states a batch has.
+const STATES: usize = 8;
+
 /// A program that prints the nanoseconds of a call.
 const TIMER: &str = r#"
 #include <stdio.h>
@@ -80,54 +100,77 @@ int main(void) {
 }
 "#;
 
-fn measure(model: &Model, folder: &Path) {
-    println!("{}: nq = {}, nv = {}", model.name(), model.nq(), model.nv());
-    println!(
-        "| function | operations | generate ms | parts and text KB | compile s | code KB | library ns | in turn ns | generated ns | ratio |"
-    );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+/// What compiling a function took.
+struct Compiled {
+    text_kb: usize,
+    seconds: f64,
+    object_kb: u64,
+    /// Of a call.
+    ns: f64,
+}
+
+/// Writes a function's code to a folder, compiles it, and times it on arrays that have each number `lanes` times.
+fn compiled(model: &Model, f: &Function, language: Language, lanes: usize, folder: &Path) -> Compiled {
+    let files = language.text("robot", std::slice::from_ref(f));
+    for file in &files {
+        std::fs::write(folder.join(&file.name), &file.text).unwrap();
+    }
+    let (header, source) = (&files[0].name, &files[1].name);
+    let (mut main, mut arrays) = (format!("#include \"{header}\"\n"), Vec::new());
+    for (k, array) in f.inputs.iter().chain(&f.outputs).enumerate() {
+        let numbers = match ["q", "v", "x"].get(k).filter(|_| k < f.inputs.len()) {
+            Some(&"q") => neutral(model),
+            Some(_) => vec![0.1; array.len()],
+            None => vec![0.0; array.len()],
+        };
+        let numbers: Vec<String> = numbers.iter().flat_map(|x| vec![format!("{x:?}"); lanes]).collect();
+        main += &format!("static double {}[] __attribute__((aligned(64))) = {{{}}};\n", array.name, numbers.join(", "));
+        arrays.push(array.name.clone());
+    }
+    let stem = header.trim_end_matches(".h");
+    main += &TIMER.replace("CALL", &format!("{stem}_{}({})", f.name, arrays.join(", ")));
+    std::fs::write(folder.join("main.c"), main).unwrap();
     let cc = std::env::var("CC").unwrap_or("cc".to_owned());
     let flags = std::env::var("CFLAGS").unwrap_or("-O3 -march=native -ffp-contract=fast".to_owned());
     let flags: Vec<&str> = flags.split_whitespace().collect();
+    let run =
+        |program: &str, arguments: &[&str]| Command::new(program).current_dir(folder).args(arguments).output().unwrap();
+    let start = Instant::now();
+    let output = run(&cc, &[&flags[..], &["-c", source, "-o", "robot.o"]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let seconds = start.elapsed().as_secs_f64();
+    run(&cc, &["-O1", "main.c", "robot.o", "-o", "main", "-lm"]);
+    Compiled {
+        text_kb: files[1].text.len() / 1024,
+        seconds,
+        object_kb: std::fs::metadata(folder.join("robot.o")).unwrap().len() / 1024,
+        ns: String::from_utf8(run("./main", &[]).stdout).unwrap().trim().parse().unwrap(),
+    }
+}
+
+fn measure(model: &Model, folder: &Path) {
+    println!("{}: nq = {}, nv = {}", model.name(), model.nq(), model.nv());
+    println!(
+        "| function | operations | generate ms | text KB | compile s | code KB | library ns | in turn ns | generated ns | ratio \
+         | batch ns | vectors ns | ratio |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for name in NAMES {
         let start = Instant::now();
         let Ok(all) = functions(model, &[name], &Settings::default()) else { continue };
-        let files = Language::C.text("robot", &all);
+        Language::C.text("robot", &all);
         let generated = start.elapsed().as_secs_f64() * 1e3;
-        for file in &files {
-            std::fs::write(folder.join(&file.name), &file.text).unwrap();
-        }
         let f = &all[0];
-        let mut main = "#include \"robot.h\"\n".to_owned();
-        let mut arrays = Vec::new();
-        for (k, array) in f.inputs.iter().chain(&f.outputs).enumerate() {
-            let (k, n) = (["q", "v", "x"].get(k).filter(|_| k < f.inputs.len()), array.len());
-            let numbers = match k {
-                Some(&"q") => neutral(model),
-                Some(_) => vec![0.1; n],
-                None => vec![0.0; n],
-            };
-            let numbers: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
-            main += &format!("static double {}[] = {{{}}};\n", array.name, numbers.join(", "));
-            arrays.push(array.name.clone());
-        }
-        main += &TIMER.replace("CALL", &format!("robot_{name}({})", arrays.join(", ")));
-        std::fs::write(folder.join("main.c"), main).unwrap();
-        let run = |program: &str, arguments: &[&str]| {
-            Command::new(program).current_dir(folder).args(arguments).output().unwrap()
-        };
-        let start = Instant::now();
-        let output = run(&cc, &[&flags[..], &["-c", "robot.c"]].concat());
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let compiled = start.elapsed().as_secs_f64();
-        run(&cc, &["-O1", "main.c", "robot.o", "-o", "main", "-lm"]);
-        let ns: f64 = String::from_utf8(run("./main", &[]).stdout).unwrap().trim().parse().unwrap();
-        let code = std::fs::metadata(folder.join("robot.o")).unwrap().len() / 1024;
+        let Compiled { text_kb, seconds, object_kb, ns } = compiled(model, f, Language::C, 1, folder);
         let (own, in_turn) = (library(model, name), library(&model.clone().with_limbs(false), name));
-        let (total, text) = (f.operations().total(), files[1].text.len() / 1024);
+        let vectors = compiled(model, f, Language::CEight, 8, folder).ns / 8.0;
+        let batch = batch(model, name);
         println!(
-            "| {name} | {total} | {generated:.0} | {text} | {compiled:.1} | {code} | {own:.0} | {in_turn:.0} | {ns:.0} | {:.2} |",
-            ns / in_turn
+            "| {name} | {} | {generated:.0} | {text_kb} | {seconds:.1} | {object_kb} | {own:.0} | {in_turn:.0} | {ns:.0} | {:.2} \
+             | {batch:.0} | {vectors:.0} | {:.2} |",
+            f.operations().total(),
+            ns / in_turn,
+            vectors / batch
         );
     }
 }

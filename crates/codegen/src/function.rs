@@ -1,7 +1,8 @@
 //! A function out of a recording: what it takes, what it gives, and how the one is computed from the other.
 
 use crate::expression::{Expression, Open};
-use crate::graph::{Graph, Id, Node};
+use crate::graph::{Id, Node};
+use crate::sums::with_constants_gathered;
 use condyle_spatial::Scalar;
 use core::fmt;
 use nalgebra::DMatrix;
@@ -175,21 +176,23 @@ pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Functio
     f(&mut recorder);
     let Recorder { inputs, outputs, results, .. } = recorder;
     let results: Vec<Id> = results.into_iter().map(Expression::id).collect();
-    let (nodes, results) = needed(&open.finish(), &results);
+    let (nodes, results) = needed(&open.finish().nodes, &results);
+    let (nodes, results) = with_constants_gathered(&nodes, &results);
+    let (nodes, results) = needed(&nodes, &results);
     Function { name: name.to_owned(), about: about.to_owned(), inputs, outputs, nodes, results }
 }
 
 /// The values that some results need, in the order in which they were recorded, and the results among them.
-fn needed(graph: &Graph, results: &[Id]) -> (Vec<Node>, Vec<Id>) {
-    let mut is_needed = vec![false; graph.nodes.len()];
+fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
+    let mut is_needed = vec![false; all.len()];
     results.iter().for_each(|&id| is_needed[id as usize] = true);
-    for (id, node) in graph.nodes.iter().enumerate().rev() {
+    for (id, node) in all.iter().enumerate().rev() {
         if is_needed[id] {
             node.operands().for_each(|id| is_needed[id as usize] = true);
         }
     }
-    let (mut nodes, mut new) = (Vec::new(), vec![Id::MAX; graph.nodes.len()]);
-    for (id, node) in graph.nodes.iter().enumerate() {
+    let (mut nodes, mut new) = (Vec::new(), vec![Id::MAX; all.len()]);
+    for (id, node) in all.iter().enumerate() {
         if is_needed[id] {
             new[id] = nodes.len() as Id;
             nodes.push(node.renamed(|id| new[id as usize]));

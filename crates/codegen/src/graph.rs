@@ -112,6 +112,27 @@ impl Graph {
         }
     }
 
+    /// The value that is computed in this way, simplified.
+    pub(crate) fn simplified(&mut self, node: Node) -> Id {
+        match node {
+            Node::Constant(_) | Node::Input(_) => self.find(node),
+            Node::Add(a, b) => self.add(a, b),
+            Node::Sub(a, b) => self.sub(a, b),
+            Node::Mul(a, b) => self.mul(a, b),
+            Node::Div(a, b) => self.div(a, b),
+            Node::Neg(a) => self.neg(a),
+            Node::Sqrt(a) => self.sqrt(a),
+            Node::Sin(a) => self.sin_cos(a).0,
+            Node::Cos(a) => self.sin_cos(a).1,
+            Node::Atan2(y, x) => self.atan2(y, x),
+            Node::Abs(a) => self.abs(a),
+            Node::Less(a, b) => self.less(a, b),
+            Node::And(a, b) => self.and(a, b),
+            Node::Or(a, b) => self.or(a, b),
+            Node::Select(mask, a, b) => self.select(mask, a, b),
+        }
+    }
+
     pub(crate) fn constant(&mut self, x: f64) -> Id {
         self.find(Node::constant(if x == 0.0 { 0.0 } else { x })) // −0 is 0
     }

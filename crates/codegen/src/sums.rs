@@ -4,7 +4,7 @@
 //! are fused with the sum behind them, a sum that begins with a value takes a step for each other term, wherever brackets stood;
 //! x − (a b + c d) is two steps. Terms are added in the order in which they were recorded, as soon as they are there.
 
-use crate::graph::{Id, Node};
+use crate::graph::{Graph, Id, Node};
 use crate::steps::Step;
 
 /// A term: a value, and whether it is subtracted.
@@ -12,6 +12,34 @@ use crate::steps::Step;
 struct Term {
     id: Id,
     minus: bool,
+}
+
+/// The same values with all constants of a sum in one; what is no longer needed is among them.
+pub(crate) fn with_constants_gathered(nodes: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
+    let sums = Sums::new(nodes, results);
+    let mut graph = Graph::new();
+    let mut new: Vec<Id> = Vec::with_capacity(nodes.len());
+    for (k, &node) in nodes.iter().enumerate() {
+        let id = k as Id;
+        let (terms, _) = if is_sum(node) && !sums.is_part(id) { sums.terms(id) } else { (Vec::new(), Vec::new()) };
+        let constants = terms.iter().filter_map(|term| match nodes[term.id as usize] {
+            Node::Constant(bits) if term.minus => Some(-f64::from_bits(bits)),
+            Node::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        });
+        let renamed = if constants.clone().count() > 1 {
+            let start = graph.constant(constants.sum());
+            let others = terms.iter().filter(|term| !matches!(nodes[term.id as usize], Node::Constant(_)));
+            others.fold(start, |sum, term| {
+                let id = new[term.id as usize];
+                if term.minus { graph.sub(sum, id) } else { graph.add(sum, id) }
+            })
+        } else {
+            graph.simplified(node.renamed(|id| new[id as usize]))
+        };
+        new.push(renamed);
+    }
+    (graph.nodes, results.iter().map(|&id| new[id as usize]).collect())
 }
 
 /// The sums among the values of a function.

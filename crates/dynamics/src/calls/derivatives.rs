@@ -228,7 +228,9 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S, R> {
     check_forward(model, data, q, v, tau, f_ext);
-    if data.minv.by_factor()
+    if S::RECORDED && data.minv.by_factor() {
+        over_matrix(model, data, q, v, tau, f_ext);
+    } else if data.minv.by_factor()
         && !data.aba_derivatives.solve.pays()
         && run_limbs(Task::AbaDerivatives, model, data, q, v, tau, f_ext)
     {
@@ -251,9 +253,6 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) {
-    if S::RECORDED && data.minv.by_factor() {
-        return over_matrix(model, data, q, v, tau, f_ext);
-    }
     accelerate(model, data, q, v, tau, f_ext);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(&data.aba.qdd);
@@ -272,7 +271,7 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// The same of numbers that are recorded: M and its factor serve the acceleration too, which takes fewer operations than
+/// `aba_derivatives` of numbers that are recorded: M and its factor serve the acceleration too, which takes fewer operations than
 /// articulated bodies, and ∂q̈ where the factor has fewer entries than M⁻¹.
 fn over_matrix<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
