@@ -17,6 +17,7 @@ extern crate alloc;
 
 #[doc(hidden)]
 pub mod axpy;
+pub mod branches;
 mod cast;
 mod cholesky;
 mod compiled;

@@ -12,6 +12,7 @@ use crate::lanes::limbs::LaneView;
 use crate::passes::energy::{self, EnergyDerivatives};
 use crate::passes::kinematics::{PlacementCache, positions};
 use crate::passes::{crba, minv, statics};
+use condyle_linalg::branches::Branches;
 use condyle_linalg::check;
 use condyle_linalg::tree_product::minus_products;
 use condyle_model::Model;
@@ -296,11 +297,12 @@ fn over_matrix<S: Scalar, R: Constant<S>>(
     data.aba_derivatives.a = a;
     if data.minv.has_short_factor() {
         let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+        let mut branches = Branches::new(&data.minv.factor);
         for (dtau, da) in [(&d.dtau_dq, &mut out.da_dq), (&d.dtau_dv, &mut out.da_dv)] {
-            for (b, x) in dtau.as_slice().iter().zip(da.as_mut_slice()) {
-                *x = -*b;
+            for (b, x) in dtau.column_iter().zip(da.as_mut_slice().chunks_exact_mut(model.nv())) {
+                x.iter_mut().zip(b.iter()).for_each(|(x, &b)| *x = -b);
+                branches.solve(x); // ∂q̈ = −M⁻¹ ∂τ
             }
-            data.minv.factor.solve_matrix(da); // ∂q̈ = −M⁻¹ ∂τ
         }
     } else {
         multiply(model, data);

@@ -13,6 +13,7 @@ use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
+use condyle_linalg::branches::Branches;
 use condyle_model::Model;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
@@ -182,6 +183,9 @@ kernel! {
             return gauss_jordan(M, &mut d.Minv);
         }
         d.factor.factorize(M);
+        if S::RECORDED {
+            return Branches::new(&d.factor).inverse(&mut d.Minv);
+        }
         d.factor.inverse(&mut d.Minv);
     }
 }
