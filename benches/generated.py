@@ -6,7 +6,8 @@
 Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn, as is Pinocchio, which
 benches/peers/dynamics.py builds (some ten minutes the first time). Pinocchio's own generated code is what CppADCodeGen
 makes of its recursions (benches/peers/cppadcg.cpp, some ten minutes more), compiled by the same compiler with the same
-options. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`: limbs one after the other, and side
+options, and called in turn with ours by the same program: the ratio is the median over the rounds. A time is the shortest
+of the rounds, as the rest is what else the machine does. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`: limbs one after the other, and side
 by side. Needs Linux, Rust, compilers of C and C++, and the package condyle.
 """
 
@@ -29,27 +30,49 @@ FUNCTIONS = ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives
 FLAGS = ["-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno"]
 ROUND_NS = 2e7
 """How long a round takes, in ns."""
+RUNS = 3
+"""How often Pinocchio is timed."""
 TIMER = """
+#include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 static double now(void) { struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return 1e9 * t.tv_sec + t.tv_nsec; }
 static double in[STATES][SIZE], out[OUT];
 CODE
+/* CppADCodeGen's: q, v and a or tau behind each other, all results behind each other */
+struct atomics { void *model, *forward, *reverse; };
+typedef void recorded(const double *const *in, double *const *out, struct atomics);
+static double packed[STATES][SIZE], results[OUT];
+static recorded *theirs;
+static void call_theirs(const double *x) {
+    double *y = results;
+    theirs(&x, &y, (struct atomics){0, 0, 0});
+}
+static double round_of(void (*f)(const double *), double x[][SIZE], long calls) {
+    double t = now();
+    for (long k = 0; k < calls; k++) f(x[k % STATES]);
+    return (now() - t) / calls;
+}
 int main(int count, char **arguments) {
-    int rounds = atoi(arguments[count - 1]);
     FILE *file = fopen(arguments[1], "rb");
     if (fread(in, sizeof in, 1, file) != 1) return 1;
-    long calls = STATES;
-    for (double took = 0; took < TIME; calls *= 2) {
-        double t = now();
-        for (long k = 0; k < calls; k++) call(in[k % STATES]);
-        took = now() - t;
+    int rounds = atoi(arguments[2]);
+    for (int k = 0; k < STATES; k++) {
+        memcpy(packed[k], in[k], THIRD * sizeof(double));
+        memcpy(packed[k] + NQ + NV, in[k] + THIRD, NV * sizeof(double));
     }
+    if (count > 4) {
+        void *library = dlopen(arguments[3], RTLD_NOW);
+        theirs = library ? (recorded *)dlsym(library, arguments[4]) : 0;
+        if (!theirs) return 2;
+    }
+    long calls = STATES;
+    while (round_of(call, in, calls) * calls < TIME) calls *= 2;
     for (int r = 0; r < rounds; r++) {
-        double t = now();
-        for (long k = 0; k < calls; k++) call(in[k % STATES]);
-        printf("%f\\n", (now() - t) / calls);
+        double ours = round_of(call, in, calls);
+        printf("%f %f\\n", ours, theirs ? round_of(call_theirs, packed, calls) : 0);
     }
     return 0;
 }
@@ -60,8 +83,12 @@ def compiler() -> str:
     return os.environ.get("CC") or next(c for c in ("clang", "gcc", "cc") if shutil.which(c))
 
 
-def measured(model: condyle.Model, function: str, states: Path, rounds: int, cpu: int) -> dict[str, float]:
-    """A function as generated C: ns of a call (median of rounds), operations, KB of the program, s of the compiler."""
+def measured(
+    model: condyle.Model, function: str, states: Path, rounds: int, cpu: int, theirs: Path
+) -> "dict[str, float | None]":
+    """A function as generated C: ns of a call, operations, KB of the program, s of the compiler; CppADCodeGen's ns if
+    it has that function, and the ratio.
+    """
     stem, files, [(_, inputs, outputs, operations)] = condyle._condyle._generate(model, [function], "c")
     width = model.nq + 3 * model.nv
     starts = {"q": 0, "v": model.nq, "a": model.nq + model.nv, "tau": model.nq + 2 * model.nv}
@@ -71,31 +98,41 @@ def measured(model: condyle.Model, function: str, states: Path, rounds: int, cpu
         size += rows * columns
     call = f"{stem}_{function}({', '.join(arguments)});"
     text = TIMER.replace("CODE", f'#include "{stem}.c"\nstatic void call(const double *x) {{ {call} }}')
-    for word, value in (("STATES", dynamics.STATES), ("SIZE", width), ("OUT", size), ("TIME", ROUND_NS)):
+    third = starts["tau" if any(name == "tau" for name, _, _ in inputs) else "a"]
+    sizes = {"STATES": dynamics.STATES, "SIZE": width, "OUT": 4 * model.nv**2, "NQ": model.nq, "NV": model.nv}
+    for word, value in {**sizes, "THIRD": third, "TIME": ROUND_NS}.items():
         text = text.replace(word, str(value))
     with TemporaryDirectory() as folder:
         for file, code in [*files, ("timer.c", text)]:
             (Path(folder) / file).write_text(code, encoding="utf-8")
         start = time.perf_counter()
-        subprocess.run([compiler(), *FLAGS, "timer.c", "-o", "timer", "-lm"], cwd=folder, check=True)
+        subprocess.run([compiler(), *FLAGS, "timer.c", "-o", "timer", "-lm", "-ldl"], cwd=folder, check=True)
         took = time.perf_counter() - start
         call_timer = ["taskset", "-c", str(cpu), "./timer", str(states), str(rounds)]
+        library = theirs / f"{function}.so"
+        if library.exists():
+            call_timer += [str(library), f"{function}_forward_zero"]
         told = subprocess.run(call_timer, cwd=folder, check=True, capture_output=True, text=True).stdout
         kb = (Path(folder) / "timer").stat().st_size / 1024
-    ns = statistics.median(float(line) for line in told.split())
-    return {"ns": ns, "operations": operations, "kb": kb, "compile_s": took}
+    times = [[float(x) for x in line.split()] for line in told.splitlines()]
+    numbers = {"ns": min(ours for ours, _ in times), "operations": operations, "kb": kb, "compile_s": took}
+    if not library.exists():
+        return numbers | {"theirs": None, "ratio": None}
+    ratio = statistics.median(ours / other for ours, other in times)
+    return numbers | {"theirs": min(other for _, other in times), "ratio": ratio}
 
 
-def of_cppadcg(program: Path, model: Path, states: Path, cpu: int) -> dict[str, list[float]]:
-    """Pinocchio's generated code, by function: ns of a call, and s to generate and compile it."""
-    with TemporaryDirectory() as folder:
-        command = ("taskset", "-c", str(cpu), program, model, states, folder, shutil.which(compiler()), *FLAGS, "-fPIC")
-        told = dynamics.run(*command)
-    return {name: [float(x) for x in numbers] for name, *numbers in map(str.split, told.splitlines())}
+def record_theirs(program: Path, model: Path, states: Path) -> Path:
+    """The folder of Pinocchio's generated code for a model: a library for each function."""
+    folder = dynamics.PEERS / f"cppadcg-{model.stem}-{Path(compiler()).name}"
+    if not (folder / "aba_derivatives.so").exists():
+        folder.mkdir(exist_ok=True)
+        dynamics.run(program, model, states, folder, shutil.which(compiler()), *FLAGS, "-fPIC")
+    return folder
 
 
-def beside(ns: float, other: "list[float] | None") -> str:
-    return "– | –" if other is None else f"{other[0]:.0f} | {ns / other[0]:.2f}"
+def beside(ours: "dict[str, float | None]") -> str:
+    return "– | –" if ours["theirs"] is None else f"{ours['theirs']:.0f} | {ours['ratio']:.2f}"
 
 
 def main() -> None:
@@ -122,13 +159,15 @@ def main() -> None:
         model = condyle.Model.from_urdf(path, root_joint=None if root == "fixed" else root)
         if locked:
             model = model.lock(locked, condyle.neutral(model))
-        peer = dynamics.times(dynamics.run("taskset", "-c", str(options.cpu), theirs, paths[0], paths[2]))
-        recorded = of_cppadcg(cppadcg, paths[0], paths[2], options.cpu)
+        runs = [dynamics.run("taskset", "-c", str(options.cpu), theirs, paths[0], paths[2]) for _ in range(RUNS)]
+        runs = [dynamics.times(told) for told in runs]
+        peer = {function: min(times[function] for times in runs) for function in FUNCTIONS}
+        recorded = record_theirs(cppadcg, paths[0], paths[2])
         for function in FUNCTIONS:
-            ours = measured(model, function, paths[2], options.rounds, options.cpu)
+            ours = measured(model, function, paths[2], options.rounds, options.cpu, recorded)
             print(
                 f"| {robot} | {function} | {ours['operations']} | {ours['ns']:.0f} | {peer[function]:.0f} | "
-                f"{ours['ns'] / peer[function]:.2f} | {beside(ours['ns'], recorded.get(function))} | "
+                f"{ours['ns'] / peer[function]:.2f} | {beside(ours)} | "
                 f"{ours['kb']:.0f} | {ours['compile_s']:.1f} |",
                 flush=True,
             )

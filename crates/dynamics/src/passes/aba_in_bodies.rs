@@ -34,7 +34,7 @@ fn pass<L: Layout>(
     let (mut w, mut K) = (vec![Vec3::zero(); n], vec![Mat3::zero(); n]); // ω, ω× ω×
     let (mut c, mut a) = (vec![Motion::zero(); n], vec![Motion::zero(); n]);
     let (mut IA, mut pA) = (vec![ArticulatedInertia::zero(); n], vec![Force::zero(); n]);
-    let mut U: Vec<Vec<(Force<L::S>, L::S, L::S)>> = vec![Vec::new(); n]; // U, D⁻¹, u of each column, the last one first
+    let mut U = vec![Vec::new(); n]; // U, D⁻¹, u of each column, the last one first
     for i in l.bodies() {
         let (X_T, X_J) = (l.placement(i), Joint::own_placement(l, i, q, sin[i], cos[i])); // λXi = X_T X_J
         let turn_inv = |x| X_J.turn_inv(X_T.rotation.transpose_mul(x));
