@@ -6,9 +6,10 @@
 Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn, as is Pinocchio, which
 benches/peers/dynamics.py builds (some ten minutes the first time). Pinocchio's own generated code is what CppADCodeGen
 makes of its recursions (benches/peers/cppadcg.cpp, some ten minutes more), compiled by the same compiler with the same
-options, and called in turn with ours by the same program: the ratio is the median over the rounds. A time is the shortest
-of the rounds, as the rest is what else the machine does. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`: limbs one after the other, and side
-by side. Needs Linux, Rust, compilers of C and C++, and the package condyle.
+options. One program calls it and ours in turn: their ratio is the median over the rounds. A time is the shortest, as
+the rest is what else the machine does. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`:
+limbs one after the other, and side by side; then batches beside vectors of eight states. Needs Linux, Rust, compilers
+of C and C++, and the package condyle.
 """
 
 import argparse
