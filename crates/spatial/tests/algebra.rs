@@ -118,6 +118,17 @@ proptest! {
     }
 
     #[test]
+    fn articulated_inertia_in_another_frame(I in inertia(), X in pose(), s in motion(), v in motion()) {
+        let IA = ArticulatedInertia::from(I);
+        let U = IA * s;
+        let Ia = IA.minus_outer(U, 1.0 / s.dot(U));
+        let there = X.act(Ia);
+        // X (Iᴬ v) = (X Iᴬ X⁻¹) (X v), and back again
+        prop_assert!(distance((there * X.act(v)).to_array(), X.act(Ia * v).to_array()) < 1000.0 * ROUNDING);
+        prop_assert!(distance((X.act_inv(there) * v).to_array(), (Ia * v).to_array()) < 1000.0 * ROUNDING);
+    }
+
+    #[test]
     fn matrices(R in rotation(), a in vec3(), b in vec3(), I in inertia()) {
         prop_assert!(distance((a.skew() * b).to_array(), a.cross(b).to_array()) < ROUNDING);
         prop_assert!(distance(R.transpose_mul(a).to_array(), (R.transpose() * a).to_array()) < ROUNDING);

@@ -144,3 +144,39 @@ impl<S: Scalar> Carried<S> for ArticulatedInertia<S> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few roundings of numbers about 1.
+    const ROUNDING: f64 = 1e-14;
+
+    fn is_equal(a: Force<f64>, b: Force<f64>) -> bool {
+        a.to_array().iter().zip(b.to_array()).all(|(a, b)| (a - b).abs() < ROUNDING)
+    }
+
+    /// What turns about z in few products is what any pose makes of it.
+    #[test]
+    fn about_z_is_a_pose() {
+        let (sin, cos) = 0.7_f64.sin_cos();
+        let o = Vec3::zero();
+        let rotation = Mat3 { x: Vec3::new(cos, sin, 0.0), y: Vec3::new(-sin, cos, 0.0), ..Mat3::identity() };
+        let (short, long) = (JointPlacement::AboutZ { sin, cos }, JointPlacement::General(Se3::new(rotation, o)));
+        let f = Force::new(Vec3::new(0.3, -0.2, 0.5), Vec3::new(0.7, 0.1, -0.4));
+        let m = Motion::new(Vec3::new(-0.6, 0.8, 0.2), Vec3::new(0.4, 0.9, -0.3));
+        let I = Inertia::from_com(
+            1.5,
+            Vec3::new(0.1, 0.2, -0.3),
+            Sym3 { xx: 0.4, xy: 0.03, yy: 0.5, xz: -0.02, yz: 0.05, zz: 0.6 },
+        );
+        let IA = ArticulatedInertia::from(I).minus_outer(f, 0.2);
+        assert!(is_equal(f.carried_by(&short), f.carried_by(&long)));
+        assert!(is_equal(I.carried_by(&short) * m, I.carried_by(&long) * m));
+        assert!(is_equal(IA.carried_by(&short) * m, IA.carried_by(&long) * m));
+        let [a, b] = [short, long].map(|X| Force::from(X.act_inv(m).to_array()));
+        assert!(is_equal(a, b));
+        let [a, b] = [short, long].map(|X| Force::new(X.turn_inv(m.linear), X.translation()));
+        assert!(is_equal(a, b));
+    }
+}
