@@ -3,9 +3,29 @@
 use super::device::{Device, Stream};
 use super::driver::{Address, call};
 use super::error::Error;
-use super::kernels::Real;
+use crate::text::Language;
 use core::fmt;
 use core::marker::PhantomData;
+
+/// A number that kernels compute with: `f64` or `f32`.
+pub trait Real: Copy + Default + sealed::Sealed + 'static {
+    /// The language of kernels on such numbers.
+    const LANGUAGE: Language;
+}
+
+impl Real for f64 {
+    const LANGUAGE: Language = Language::Cuda;
+}
+
+impl Real for f32 {
+    const LANGUAGE: Language = Language::CudaFloat;
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f64 {}
+    impl Sealed for f32 {}
+}
 
 /// Numbers in a device's memory: number k of state i of n stands at `[k * n + i]`.
 ///

@@ -1,7 +1,7 @@
 //! NVIDIA's run-time compiler (NVRTC).
 
+use super::array::Real;
 use super::error::Error;
-use super::kernels::Real;
 use super::library::{Named, library_functions};
 use crate::function::Function;
 use core::ffi::{CStr, c_char, c_int};

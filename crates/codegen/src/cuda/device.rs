@@ -2,9 +2,6 @@
 
 use super::driver::{Driver, Handle, call};
 use super::error::Error;
-use super::kernels::{Kernels, Real};
-use crate::cuda::Compiler;
-use crate::function::Function;
 use core::ffi::{CStr, c_char, c_int};
 use core::fmt;
 use core::ptr::null_mut;
@@ -63,6 +60,16 @@ impl Inner {
     }
 }
 
+impl Driver {
+    /// The device of that number.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if there are not so many; [`Error::Call`].
+    pub fn device(&self, ordinal: usize) -> Result<Device, Error> {
+        Device::open(self.clone(), ordinal)
+    }
+}
+
 impl fmt::Debug for Device {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Device").field(&self.0.ordinal).finish()
@@ -85,7 +92,7 @@ impl Device {
         Driver::new()?.device(ordinal)
     }
 
-    pub(super) fn open(driver: Driver, ordinal: usize) -> Result<Self, Error> {
+    fn open(driver: Driver, ordinal: usize) -> Result<Self, Error> {
         let count = driver.devices()?;
         if ordinal >= count {
             return Err(Error::Device { ordinal, count });
@@ -137,37 +144,6 @@ impl Device {
     /// The legacy default stream, with which all streams of other libraries are ordered that were not made as non-blocking ones.
     pub fn default_stream(&self) -> Stream {
         Stream { device: self.clone(), handle: null_mut(), is_owned: false }
-    }
-
-    /// The kernels of some functions, compiled for this device, on numbers of type `T`.
-    ///
-    /// Where the compiler does not know the device yet, it makes PTX for the newest one that it knows, which the driver goes on with.
-    ///
-    /// # Errors
-    /// [`Error::Compile`] with what the compiler says; [`Error::Load`]; [`Error::Call`].
-    ///
-    /// # Panics
-    /// If `name` is no identifier (ASCII letters, digits and `_`).
-    pub fn compile<T: Real>(
-        &self,
-        compiler: &Compiler,
-        name: &str,
-        functions: &[Function],
-    ) -> Result<Kernels<T>, Error> {
-        let image = compiler.image::<T>(name, functions, self.0.capability)?;
-        Kernels::load(self, name, functions, &image)
-    }
-
-    /// The kernels of some functions from what a compiler has made of them, PTX or CUBIN: NVRTC is not needed.
-    ///
-    /// # Safety
-    /// `image` is what [`Compiler::ptx`] (or another compiler) made of the same functions, under the same name and for the same `T`,
-    /// and whole.
-    ///
-    /// # Errors
-    /// [`Error::Load`] with what the driver says, as where the image is for newer devices; [`Error::Call`].
-    pub unsafe fn load<T: Real>(&self, name: &str, functions: &[Function], image: &[u8]) -> Result<Kernels<T>, Error> {
-        Kernels::load(self, name, functions, image)
     }
 }
 

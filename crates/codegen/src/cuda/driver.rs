@@ -1,6 +1,5 @@
 //! The driver's library.
 
-use super::device::Device;
 use super::error::Error;
 use super::library::{Named, library_functions};
 use core::ffi::{CStr, c_char, c_int, c_uint, c_void};
@@ -116,14 +115,6 @@ impl Driver {
         let mut count = 0;
         call!(self, cuDeviceGetCount(&raw mut count))?;
         Ok(usize::try_from(count).unwrap_or(0))
-    }
-
-    /// The device of that number.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if there are not so many; [`Error::Call`].
-    pub fn device(&self, ordinal: usize) -> Result<Device, Error> {
-        Device::open(self.clone(), ordinal)
     }
 
     /// What a function returned, as a result.

@@ -1,11 +1,11 @@
 //! Kernels, and how they are called.
 
-use super::array::{DeviceArray, on_device};
+use super::array::{DeviceArray, Real, on_device};
+use super::compiler::Compiler;
 use super::device::{Device, Stream};
 use super::driver::{Handle, call};
 use super::error::Error;
 use crate::function::{Array, Function};
-use crate::text::Language;
 use core::ffi::{c_int, c_uint, c_void};
 use core::fmt;
 use core::marker::PhantomData;
@@ -22,26 +22,6 @@ const REGISTERS: c_int = 4;
 const ERROR_LOG: c_int = 5;
 const ERROR_LOG_BYTES: c_int = 6;
 const LOG: usize = 16 * 1024;
-
-/// A number that kernels compute with: `f64` or `f32`.
-pub trait Real: Copy + Default + sealed::Sealed + 'static {
-    /// The language of kernels on such numbers.
-    const LANGUAGE: Language;
-}
-
-impl Real for f64 {
-    const LANGUAGE: Language = Language::Cuda;
-}
-
-impl Real for f32 {
-    const LANGUAGE: Language = Language::CudaFloat;
-}
-
-mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f64 {}
-    impl Sealed for f32 {}
-}
 
 /// What has been compiled and loaded; it stays until all of its kernels are gone.
 struct Module {
@@ -60,6 +40,39 @@ impl Drop for Module {
             let _ = call!(self.device.0.driver, cuCtxSynchronize()); // a kernel of it may be running
             let _ = call!(self.device.0.driver, cuModuleUnload(self.handle));
         }
+    }
+}
+
+impl Device {
+    /// The kernels of some functions, compiled for this device, on numbers of type `T`.
+    ///
+    /// Where the compiler does not know the device yet, it makes PTX for the newest one that it knows, which the driver goes on with.
+    ///
+    /// # Errors
+    /// [`Error::Compile`] with what the compiler says; [`Error::Load`]; [`Error::Call`].
+    ///
+    /// # Panics
+    /// If `name` is no identifier (ASCII letters, digits and `_`).
+    pub fn compile<T: Real>(
+        &self,
+        compiler: &Compiler,
+        name: &str,
+        functions: &[Function],
+    ) -> Result<Kernels<T>, Error> {
+        let image = compiler.image::<T>(name, functions, self.capability())?;
+        Kernels::load(self, name, functions, &image)
+    }
+
+    /// The kernels of some functions from what a compiler has made of them, PTX or CUBIN: NVRTC is not needed.
+    ///
+    /// # Safety
+    /// `image` is what [`Compiler::ptx`] (or another compiler) made of the same functions, under the same name and for the same `T`,
+    /// and whole.
+    ///
+    /// # Errors
+    /// [`Error::Load`] with what the driver says, as where the image is for newer devices; [`Error::Call`].
+    pub unsafe fn load<T: Real>(&self, name: &str, functions: &[Function], image: &[u8]) -> Result<Kernels<T>, Error> {
+        Kernels::load(self, name, functions, image)
     }
 }
 

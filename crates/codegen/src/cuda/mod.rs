@@ -35,9 +35,9 @@ mod error;
 mod kernels;
 mod library;
 
-pub use array::DeviceArray;
+pub use array::{DeviceArray, Real};
 pub use compiler::Compiler;
 pub use device::{Device, Stream};
 pub use driver::Driver;
 pub use error::Error;
-pub use kernels::{Kernel, Kernels, Real};
+pub use kernels::{Kernel, Kernels};
