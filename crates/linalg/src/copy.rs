@@ -30,6 +30,21 @@ compiled! {
         lower::<V>(out, ldo, a, size);
     }
 
+    /// OUT = the symmetric matrix whose lower triangle is that of A, of `size` rows, turned: row i of A is row i + `turn` of OUT,
+    /// counted around, and so are its columns. Both have slack rows; those of OUT change.
+    pub fn copy_symmetric_turned<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize, turn: usize) {
+        turned::<V>(out, ldo, a, [size - turn, turn]);
+    }
+
+    /// OUT = A on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², where some entries may count two
+    /// or three times: enough to see whether one has diverged.
+    pub fn copy_with_squares<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) -> f64 {
+        match out.is_empty() {
+            true => squares::<V, false>(out, 0, a, shape),
+            false => squares::<V, true>(out, ldo, a, shape),
+        }
+    }
+
     /// OUT = Aᵀ, for an A of `rows` rows and `columns` columns.
     pub fn transpose<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
         transposed::<V, false>(out, ldo, a, shape);
@@ -49,12 +64,184 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
         return;
     }
     assert!(holds(a.data, a.stride, shape) && holds(out, ldo, shape), "a matrix ends before the last of its entries");
-    for j in 0..columns {
-        let (at, from) = (j * ldo, j * a.stride);
-        // SAFETY: column j of those that were found to be inside.
-        let (to, x) = unsafe { (out.get_unchecked_mut(at..at + rows), a.data.get_unchecked(from..from + rows)) };
-        copy::<V>(to, x);
+    if rows < V::N {
+        for j in 0..columns {
+            copy::<V>(&mut out[j * ldo..][..rows], &a.data[j * a.stride..][..rows]);
+        }
+        return;
     }
+    // Two registers of rows of all columns, then the next two; the last ones may overlap those before.
+    let (last, mut i) = (rows - V::N, 0);
+    loop {
+        let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
+        for _ in 0..columns {
+            // SAFETY: registers of a column of those that were found to be inside.
+            unsafe {
+                move_register::<V>(out, at + i, a.data, from + i);
+                move_register::<V>(out, at + k, a.data, from + k);
+            }
+            (at, from) = (at + ldo, from + a.stride);
+        }
+        if k == last {
+            return;
+        }
+        i = (k + V::N).min(last);
+    }
+}
+
+/// Copies a register, from a place in `x` to a place in `to`.
+///
+/// # Safety
+/// Both have N numbers there.
+#[inline(always)]
+unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: usize) {
+    debug_assert!(at + V::N <= to.len() && from + V::N <= x.len());
+    // SAFETY: by the caller.
+    unsafe { V::load(x.get_unchecked(from..from + V::N)).store(to.get_unchecked_mut(at..at + V::N)) };
+}
+
+/// Copies some numbers in whole registers, of which the last one may reach N − 1 numbers further.
+///
+/// # Safety
+/// Both have so many numbers there.
+#[inline(always)]
+unsafe fn move_rows<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: usize, count: usize) {
+    let mut i = 0;
+    while i < count {
+        // SAFETY: by the caller.
+        unsafe { move_register::<V>(to, at + i, x, from + i) };
+        i += V::N;
+    }
+}
+
+/// Copies a block of N rows and columns, or minus the block, from a place in `x` to its transpose's place in `to`.
+///
+/// # Safety
+/// Both have a register of numbers there in each of N columns.
+#[inline(always)]
+unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
+    to: &mut [f64],
+    at: usize,
+    ldo: usize,
+    x: &[f64],
+    from: usize,
+    ldx: usize,
+) {
+    let mut block = [V::splat(0.0); SLACK];
+    for k in 0..V::N {
+        let from = from + k * ldx;
+        debug_assert!(from + V::N <= x.len());
+        // SAFETY: by the caller.
+        let x = V::load(unsafe { x.get_unchecked(from..from + V::N) });
+        block[k] = if NEGATED { x.mul(V::splat(-1.0)) } else { x };
+    }
+    V::transpose(&mut block[..V::N]);
+    for k in 0..V::N {
+        let at = at + k * ldo;
+        debug_assert!(at + V::N <= to.len());
+        // SAFETY: by the caller.
+        block[k].store(unsafe { to.get_unchecked_mut(at..at + V::N) });
+    }
+}
+
+/// See [`copy_symmetric_turned`]: A = [VV ·; QV QQ] with `split` and `turn` rows becomes [QQ QV; VQ VV].
+#[inline(always)]
+fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [usize; 2]) {
+    let (size, View { data: x, stride }) = (split + turn, a);
+    if size == 0 {
+        return;
+    }
+    let reached = [size + V::N - 1, size];
+    assert!(holds(x, stride, reached) && holds(out, ldo, reached), "a matrix ends before the last of its entries");
+    if split < V::N || (1..V::N).contains(&turn) {
+        let place = |i: usize| if i < split { i + turn } else { i - split };
+        for j in 0..size {
+            for i in j..size {
+                let (row, column, entry) = (place(i), place(j), x[j * stride + i]);
+                (out[column * ldo + row], out[row * ldo + column]) = (entry, entry);
+            }
+        }
+        return;
+    }
+    // What a register writes behind the rows that are meant is slack, or is written later.
+    // SAFETY: both matrices have `size` columns of `size` rows and N − 1 more.
+    unsafe {
+        for j in 0..if turn > 0 { split } else { 0 } {
+            move_rows::<V>(out, (turn + j) * ldo, x, j * stride + split, turn); // QV
+        }
+        for (to, from, size) in [(turn, 0, split), (0, split, turn)] {
+            if size == 0 {
+                continue;
+            }
+            let (to, from) = (to * (ldo + 1), from * (stride + 1));
+            // the upper triangle, in blocks of which the last ones overlap those before; then the lower one
+            let mut j = 0;
+            loop {
+                let mut i = j;
+                loop {
+                    move_transposed::<V, false>(out, to + i * ldo + j, ldo, x, from + j * stride + i, stride);
+                    if i + V::N >= size {
+                        break;
+                    }
+                    i = (i + V::N).min(size - V::N);
+                }
+                if j + V::N >= size {
+                    break;
+                }
+                j = (j + V::N).min(size - V::N);
+            }
+            for j in 0..size {
+                move_rows::<V>(out, to + j * (ldo + 1), x, from + j * (stride + 1), size - j);
+            }
+        }
+        if turn > 0 {
+            transposed::<V, false>(&mut out[turn..], ldo, a.at(split, 0), [turn, split]); // VQ
+        }
+    }
+}
+
+/// See [`copy_with_squares`].
+#[inline(always)]
+fn squares<V: Vector, const COPY: bool>(out: &mut [f64], ldo: usize, a: View<'_>, [rows, columns]: [usize; 2]) -> f64 {
+    if rows == 0 || columns == 0 {
+        return 0.0;
+    }
+    let inside = holds(a.data, a.stride, [rows, columns]) && (!COPY || holds(out, ldo, [rows, columns]));
+    assert!(inside, "a matrix ends before the last of its entries");
+    let mut sums = [V::splat(0.0); 2];
+    for j in 0..if rows < V::N { columns } else { 0 } {
+        for i in 0..rows {
+            let x = a.data[j * a.stride + i];
+            sums[0] = V::splat(x).mul_add(V::splat(x), sums[0]);
+            if COPY {
+                out[j * ldo + i] = x;
+            }
+        }
+    }
+    let (last, mut i) = (rows.saturating_sub(V::N), 0);
+    while rows >= V::N {
+        let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
+        for _ in 0..columns {
+            for (sum, i) in sums.iter_mut().zip([i, k]) {
+                // SAFETY: a register of a column of those that were found to be inside.
+                unsafe {
+                    let x = V::load(a.data.get_unchecked(from + i..from + i + V::N));
+                    *sum = x.mul_add(x, *sum);
+                    if COPY {
+                        x.store(out.get_unchecked_mut(at + i..at + i + V::N));
+                    }
+                }
+            }
+            (at, from) = (at + ldo, from + a.stride);
+        }
+        if k == last {
+            break;
+        }
+        i = (k + V::N).min(last);
+    }
+    let mut numbers = [0.0; SLACK];
+    sums[0].add(sums[1]).store(&mut numbers);
+    numbers.iter().sum()
 }
 
 #[inline(always)]
@@ -70,6 +257,12 @@ fn lower<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
         let (to, x) = unsafe { (out.get_unchecked_mut(at..at + rows), a.data.get_unchecked(from..from + rows)) };
         copy::<V>(to, x);
     }
+}
+
+/// OUT = Aᵀ, for an A of `rows` rows and `columns` columns, without a function call.
+#[inline(always)]
+pub fn transpose_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
+    transposed::<V, false>(out, ldo, a, shape);
 }
 
 /// OUT = Aᵀ, or −Aᵀ.
@@ -94,21 +287,8 @@ fn transposed<V: Vector, const NEGATED: bool>(out: &mut [f64], ldo: usize, a: Vi
     loop {
         let mut i = 0;
         loop {
-            let mut block = [V::splat(0.0); SLACK];
-            for k in 0..V::N {
-                let at = (j + k) * a.stride + i;
-                debug_assert!(at + V::N <= a.data.len());
-                // SAFETY: a block's rows and columns are among those of the matrix, which is inside.
-                let x = V::load(unsafe { a.data.get_unchecked(at..at + V::N) });
-                block[k] = if NEGATED { x.mul(V::splat(-1.0)) } else { x };
-            }
-            V::transpose(&mut block[..V::N]);
-            for k in 0..V::N {
-                let at = (i + k) * ldo + j;
-                debug_assert!(at + V::N <= out.len());
-                // SAFETY: as above.
-                block[k].store(unsafe { out.get_unchecked_mut(at..at + V::N) });
-            }
+            // SAFETY: a block's rows and columns are among those of the matrix, which is inside.
+            unsafe { move_transposed::<V, NEGATED>(out, i * ldo + j, ldo, a.data, j * a.stride + i, a.stride) };
             if i + V::N >= rows {
                 break;
             }
@@ -139,7 +319,23 @@ mod tests {
                 for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
                     assert!(out[j * ld + i] == a[(i, j)] && out[i * ld + j] == a[(i, j)]);
                 }
+                for turn in 0..=n {
+                    let (mut lower, mut out) = (vec![f64::NAN; ld * n], vec![0.0; ld * n]);
+                    copy_lower(&mut lower, ld, view, n);
+                    copy_symmetric_turned(&mut out, ld, View::new(&lower, ld), n, turn);
+                    for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                        let (row, column) = ((i + turn) % n, (j + turn) % n);
+                        assert!(out[column * ld + row] == a[(i, j)] && out[row * ld + column] == a[(i, j)]);
+                    }
+                }
                 for m in 1..=n {
+                    let squares: f64 = a.rows(0, m).iter().map(|x| x * x).sum();
+                    let mut out = vec![0.0; n * n];
+                    let found = [&mut [], out.as_mut_slice()].map(|out| copy_with_squares(out, n, view, [m, n]));
+                    assert!(found[0] == found[1] && (0.999 * squares..8.001 * squares).contains(&found[0]));
+                    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                        assert_eq!(out[j * n + i], if i < m { a[(i, j)] } else { 0.0 });
+                    }
                     let mut out = vec![0.0; ld * n];
                     let from_second_row = View { data: &view.data[1..], ..view };
                     transpose(&mut out[2..], ld, from_second_row, [n - 1, m]);

@@ -38,25 +38,6 @@ compiled! {
         Ok(())
     }
 
-    /// X ← X L⁻ᵀ for the L of an H of which m columns were eliminated; X has m columns, `rows` rows and slack rows, as H
-    /// has.
-    pub fn solve_transposed<V, COLUMNS>(x: &mut [f64], ldx: usize, rows: usize, h: View<'_>, m: usize) {
-        let mut j0 = 0;
-        while j0 < m {
-            let width = COLUMNS.min(m - j0);
-            let (done, columns) = x.split_at_mut(j0 * ldx);
-            let (a, b) = (View { data: done, stride: ldx }, View { data: &h.data[j0..], ..h });
-            let mut block = DiagonalBlock::<COLUMNS>::new(width);
-            for j in 0..width {
-                let column = &h.data[(j0 + j) * h.stride + j0..][..COLUMNS];
-                block.L[j].copy_from_slice(column);
-                block.inverse[j] = column[j].recip();
-            }
-            block.solve_rows::<V>(columns, ldx, 0..rows, a, b, j0);
-            j0 += COLUMNS;
-        }
-    }
-
     /// x ← L⁻¹ x for the L of an H of which columns were eliminated, with the inverse of L's diagonal; x has slack.
     pub fn forward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
         let (m, mut j) = (inverse_diagonal.len(), 0);
@@ -235,19 +216,7 @@ mod tests {
                     for j in 0..size {
                         h[j * stride..][..rows].copy_from_slice(full.column(j).as_slice());
                     }
-                    let before = h.clone();
                     eliminate(&mut h, stride, [rows, size, m]).unwrap();
-
-                    // X L⁻ᵀ of the rows below is what `eliminate` leaves
-                    let (below, ldx) = (n + 1, n + 1 + SLACK);
-                    let mut x = vec![0.0; ldx * m];
-                    for (to, from) in x.chunks_exact_mut(ldx).zip(before.chunks_exact(stride)) {
-                        to[..below].copy_from_slice(&from[m..rows]);
-                    }
-                    solve_transposed(&mut x, ldx, below, View::new(&h, stride), m);
-                    for (x, h) in x.chunks_exact(ldx).zip(h.chunks_exact(stride)) {
-                        assert!(x[..below].iter().zip(&h[m..rows]).all(|(x, h)| (x - h).abs() < TOLERANCE));
-                    }
 
                     let (mut y, factor) = (vec![0.0; m + SLACK], View::new(&h, stride));
                     (0..m).for_each(|i| y[i] = entry(i, 3));

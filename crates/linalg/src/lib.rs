@@ -40,14 +40,17 @@ pub mod tree_product;
 mod vectors;
 
 pub use cholesky::Cholesky;
-pub use copy::{copy_block, copy_lower, copy_matrix, copy_symmetric, transpose, transpose_negated};
+pub use copy::{
+    copy_block, copy_lower, copy_matrix, copy_symmetric, copy_symmetric_turned, copy_with_squares, transpose,
+    transpose_block, transpose_negated,
+};
 pub use elimination_tree::ColumnTree;
-pub use factor::{backward_solve, eliminate, forward_solve, solve_right, solve_transposed};
+pub use factor::{backward_solve, eliminate, forward_solve, solve_right};
 pub use ltdl::Ltdl;
 pub use outer::{OuterProducts, SparseRows, block, mask, subtract_rows};
 pub use product::{
-    add_matrix, add_product, add_product_lower, add_transposed_product_lower, product, product_of_upper_lower,
-    product_with_upper, product_without_slack, subtract_product, sum_of_squares,
+    add_blocks, add_in_turn, add_matrix, add_product, add_product_lower, add_transposed_product_lower, product,
+    product_of_upper_lower, product_with_upper, product_without_slack,
 };
 pub use registers::{Vector, Vectorized, at_level};
 pub use tile::{SLACK, View};

@@ -84,20 +84,24 @@ pub fn block(stride: usize) -> usize {
     8 * stride.div_ceil(8 * 64).next_power_of_two()
 }
 
-/// The outer product of a row on the left with one on the right.
+/// A run of outer products, of some rows on the left, one after the other, each with one of as many on the right.
 #[derive(Debug, Clone, Copy)]
-struct Product {
+struct Run {
+    /// The first row on the left, and on the right.
     rows: [usize; 2],
-    /// The masks of both.
+    count: usize,
+    /// The masks of all rows on the left, and on the right.
     masks: [u64; 2],
 }
 
-/// A product that some columns of the sum have a part in.
+/// A run that some columns of the sum have a part in.
 #[derive(Debug, Clone, Copy, Default)]
 struct Active {
-    /// The places of both rows.
+    /// The places of its first rows.
     at: [usize; 2],
-    /// The mask of the left row.
+    /// The numbers from its first row on the left to behind its last.
+    length: usize,
+    /// The mask of its rows on the left.
     mask: u64,
 }
 
@@ -113,8 +117,8 @@ pub struct OuterProducts {
     size: usize,
     /// The number of rows.
     count: usize,
-    products: Vec<Product>,
-    /// Scratch for the products of a block of columns. Shape: products.
+    runs: Vec<Run>,
+    /// Scratch for the runs of a block of columns. Shape: runs.
     active: Vec<Active>,
 }
 
@@ -122,13 +126,13 @@ impl OuterProducts {
     /// Room for `numbers` numbers of all rows together, and for `products` products.
     pub fn with_capacity(numbers: usize, products: usize) -> Self {
         let active = Vec::with_capacity(products);
-        Self { rows: vec![0.0; numbers], products: Vec::with_capacity(products), active, ..Self::default() }
+        Self { rows: vec![0.0; numbers], runs: Vec::with_capacity(products), active, ..Self::default() }
     }
 
     /// An empty sum with `size` columns, of rows that are `stride` apart.
     pub fn clear(&mut self, size: usize, stride: usize) {
         (self.size, self.stride, self.count) = (size, stride, 0);
-        self.products.clear();
+        self.runs.clear();
     }
 
     /// The number of rows.
@@ -148,11 +152,11 @@ impl OuterProducts {
         first
     }
 
-    /// Adds a row, a x; returns its numbers.
+    /// Adds a row, a x; returns all of its numbers, of which those behind x keep a value that does not matter.
     #[inline(always)]
     pub fn push<V: Vector>(&mut self, x: &[f64], a: f64) -> &mut [f64] {
         let at = self.add_rows(1) * self.stride;
-        let row = &mut self.rows[at..at + x.len()];
+        let row = &mut self.rows[at..at + self.stride];
         copy_scaled::<V>(row, x, a);
         row
     }
@@ -160,14 +164,21 @@ impl OuterProducts {
     /// Adds the product of the row `rows[0]` on the left with `rows[1]` on the right, with such masks, to the sum.
     #[inline(always)]
     pub fn multiply(&mut self, rows: [usize; 2], masks: [u64; 2]) {
-        self.products.push(Product { rows, masks });
+        match self.runs.last_mut() {
+            Some(Run { rows: [left, right], count, masks: own })
+                if *own == masks && [*left + *count, *right + *count] == rows =>
+            {
+                *count += 1;
+            }
+            _ => self.runs.push(Run { rows, count: 1, masks }),
+        }
     }
 
     /// Adds d₂ x xᵀ to the sum and d₁ x to the gradient, for a row x with such a mask.
     #[inline(always)]
     pub fn square<V: Vector>(&mut self, x: &[f64], mask: u64, [d, dd]: [f64; 2]) {
         let (k, size) = (self.count, self.size);
-        let gradient = 1 << (size / block(x.len()));
+        let (gradient, x) = (1 << (size / block(x.len())), &x[..size]);
         if dd > 0.0 {
             let root = condyle_spatial::Scalar::sqrt(dd);
             self.push::<V>(x, root)[size] = d / root;
@@ -182,9 +193,9 @@ impl OuterProducts {
     /// Adds the lower triangle of the sum, and the gradient below it, to H (with some of what is above the diagonal). H has
     /// slack rows.
     pub fn add_to(&mut self, h: &mut [f64], ldh: usize) {
-        let Self { rows, stride, size, products, active, .. } = self;
-        active.resize(products.len(), Active::default());
-        add_products(h, ldh, Sum { rows, stride: *stride, size: *size, products }, active);
+        let Self { rows, stride, size, runs, active, .. } = self;
+        active.resize(runs.len(), Active::default());
+        add_products(h, ldh, Sum { rows, stride: *stride, size: *size, runs }, active);
     }
 }
 
@@ -194,31 +205,32 @@ struct Sum<'a> {
     rows: &'a [f64],
     stride: usize,
     size: usize,
-    products: &'a [Product],
+    runs: &'a [Run],
 }
 
 compiled! {
     /// See [`OuterProducts::add_to`].
     fn add_products<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: Sum<'_>, active: &mut [Active]) {
-        let Sum { rows, stride, size, products } = sum;
+        let Sum { rows, stride, size, runs } = sum;
         assert!(size + SLACK <= stride, "rows without slack");
-        let (wide, count) = (block(stride).trailing_zeros(), rows.len() / stride);
-        for Product { rows: [left, right], .. } in products {
-            assert!(*left < count && *right < count, "a product of rows that there are not");
+        let (wide, most) = (block(stride).trailing_zeros(), rows.len() / stride);
+        for Run { rows: [left, right], count, .. } in runs {
+            assert!(left.max(right) + count <= most, "a product of rows that there are not");
         }
-        assert!(active.len() >= products.len(), "too little scratch");
+        assert!(active.len() >= runs.len(), "too little scratch");
         let (mut j, mut many, mut listed) = (0, 0, 0);
         while j < size {
             let columns = bits(wide, j, COLUMNS.min(size - j));
             if columns != listed {
                 (many, listed) = (0, columns);
-                for product in products {
-                    let [left, right] = product.rows;
+                for run in runs {
+                    let [left, right] = run.rows;
                     debug_assert!(many < active.len());
-                    // SAFETY: there are as many places as products, and each takes one at most.
+                    // SAFETY: there are as many places as runs, and each takes one at most.
                     let place = unsafe { active.get_unchecked_mut(many) };
-                    *place = Active { at: [left * stride, right * stride], mask: product.masks[0] };
-                    many += usize::from(product.masks[1] & columns != 0);
+                    let (at, length) = ([left * stride, right * stride], run.count * stride);
+                    *place = Active { at, length, mask: run.masks[0] };
+                    many += usize::from(run.masks[1] & columns != 0);
                 }
             }
             let (active, mut i) = (&active[..many], j);
@@ -248,10 +260,10 @@ fn bits(wide: u32, from: usize, length: usize) -> u64 {
     (2_u64 << (last - first)).wrapping_sub(1) << first
 }
 
-/// H[i.., j..] += the products of which a strip of S registers of rows has a part.
+/// H[i.., j..] += the runs of which a strip of S registers of rows has a part.
 ///
 /// # Safety
-/// Each product's left row has S registers of numbers from i on, and its right row COLUMNS numbers from j on.
+/// Each row on the left has S registers of numbers from i on, and each on the right COLUMNS numbers from j on.
 #[inline(always)]
 unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
     h: &mut [f64],
@@ -262,18 +274,19 @@ unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
     [i, j]: [usize; 2],
 ) {
     let mut tile = [[V::splat(0.0); S]; COLUMNS];
-    for product in active {
-        if product.mask & mask == 0 {
+    for run in active {
+        if run.mask & mask == 0 {
             continue;
         }
-        let [left, right] = product.at;
-        debug_assert!((left + i + S * V::N).max(right + j + COLUMNS) <= sum.rows.len());
-        // SAFETY: by the caller.
-        let (strip, row) = unsafe {
-            let from = |at: usize, count| core::slice::from_raw_parts(sum.rows.as_ptr().add(at), count);
-            (from(left + i, S * V::N), from(right + j, COLUMNS))
-        };
-        add_outer(&mut tile, strip, row);
+        let [left, right] = run.at;
+        debug_assert!((left + i + S * V::N).max(right + j + COLUMNS) + run.length <= sum.rows.len() + sum.stride);
+        // SAFETY: by the caller, of the first row; the others are `stride` apart.
+        let from = |at: usize, count| unsafe { core::slice::from_raw_parts(sum.rows.as_ptr().add(at), count) };
+        let mut row = 0;
+        while row < run.length {
+            add_outer(&mut tile, from(left + i + row, S * V::N), from(right + j + row, COLUMNS));
+            row += sum.stride;
+        }
     }
     let (at, columns) = (j * ldh + i, COLUMNS.min(sum.size - j));
     assert!(has_strip::<V, S>(h, ldh, at, columns), "a matrix ends before its tile");

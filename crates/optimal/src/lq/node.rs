@@ -100,16 +100,18 @@ impl LqNode {
             let inside = |block: &EulerBlock| block.range().end <= ndx / 2 && block.range().len() <= LARGEST_BLOCK;
             assert!(blocks.iter().all(inside), "a block of `structure` has more than 6 rows or leaves those of q");
         }
-        for (name, matrix, shape) in [
-            ("A", &self.A, (ndx, ndx)),
-            ("B", &self.B, (ndx, nu)),
-            ("Q", &self.Q, (ndx, ndx)),
-            ("S", &self.S, (ndx, nu)),
-            ("R", &self.R, (nu, nu)),
-        ] {
-            assert!(matrix.shape() == shape, "`{name}` has shape {:?}, expected {shape:?}", matrix.shape());
-        }
+        assert_shape("A", &self.A, (ndx, ndx));
+        assert_shape("B", &self.B, (ndx, nu));
+        assert_shape("Q", &self.Q, (ndx, ndx));
+        assert_shape("S", &self.S, (ndx, nu));
+        assert_shape("R", &self.R, (nu, nu));
     }
+}
+
+#[inline]
+#[track_caller]
+fn assert_shape(name: &str, matrix: &DMatrix<f64>, shape: (usize, usize)) {
+    assert!(matrix.shape() == shape, "`{name}` has shape {:?}, expected {shape:?}", matrix.shape());
 }
 
 /// The result of a sweep at one knot: the feedback δu = k + K δx, and the value function

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // the names of the literature: P, F, W, H
 
 use super::node::{DIVERGED, LqKnot, LqNode};
-use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetric, sum_of_squares, transpose};
+use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetric_turned, copy_with_squares};
 
 /// The value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step makes of it. Matrices are
 /// column-major with slack rows; P has the stride n + SLACK, the others that of [`stride`](Self::stride).
@@ -16,15 +16,17 @@ pub(crate) struct Workspace {
     pub(crate) F: Vec<f64>,
     /// The product of P with [B A], transposed, and others of its kind.
     pub(crate) W: Vec<f64>,
-    /// The quadratic form: [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ], its lower triangle, with rows below it that a segment makes use of.
+    /// The quadratic form: [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ], its lower triangle, with rows below it that a segment makes use of, or
+    /// the map from the unknowns and δx to the controls.
     pub(crate) H: Vec<f64>,
     /// The number of rows below the quadratic form.
     below: usize,
 }
 
 impl Workspace {
-    /// Room for knots with n states and at most m controls, and in H for `below` more rows.
+    /// Room for knots with n states and at most m controls, and in H for `below` more rows, or as many as controls.
     pub(crate) fn new(n: usize, m: usize, below: usize) -> Self {
+        let below = below.max(m);
         let stride = m + n + 1 + below + SLACK;
         Self {
             P: vec![0.0; (n + SLACK) * n],
@@ -60,19 +62,14 @@ impl Workspace {
     pub(crate) fn take_value(&mut self, ld: usize, eliminated: usize, turn: usize) {
         let Self { P, p, H, .. } = self;
         let n = p.len();
-        let (split, stride) = (n - turn, n + SLACK); // states in H before and after the turn
-        let first = &H[eliminated * (ld + 1)..];
-        copy_symmetric(&mut P[turn * stride + turn..], stride, View::new(first, ld), split);
-        for j in 0..split {
-            p[turn + j] = first[j * ld + n];
-        }
-        if turn > 0 {
-            let (mixed, second) = (View::new(&first[split..], ld), &first[split * (ld + 1)..]);
-            copy_symmetric(P, stride, View::new(second, ld), turn);
-            transpose(&mut P[turn..], stride, mixed, [turn, split]);
-            copy_matrix(&mut P[turn * stride..], stride, mixed, [turn, split]);
-            for j in 0..turn {
-                p[j] = second[j * ld + turn];
+        let states = &H[eliminated * (ld + 1)..];
+        copy_symmetric_turned(P, n + SLACK, View::new(states, ld), n, turn);
+        let (after, before) = p.split_at_mut(turn); // the states in H before and after the turn
+        let mut at = n;
+        for part in [before, after] {
+            for p in part {
+                *p = states[at];
+                at += ld;
             }
         }
     }
@@ -84,12 +81,9 @@ impl Workspace {
         for j in 0..n {
             P[j * stride + j] += regularisation;
         }
-        let matrix = View::new(P, stride);
-        knot.Vx.as_mut_slice().copy_from_slice(p);
-        if keep {
-            copy_matrix(knot.Vxx.as_mut_slice(), n, matrix, [n, n]);
-        }
-        let squares = sum_of_squares(matrix, [n, n]) + sum_of_squares(View::new(p, n), [n, 1]);
+        let (Vx, Vxx) = (knot.Vx.as_mut_slice(), if keep { knot.Vxx.as_mut_slice() } else { &mut [] });
+        let squares = copy_with_squares(Vxx, n, View::new(P, stride), [n, n]);
+        let squares = squares + copy_with_squares(Vx, n, View::new(p, n), [n, 1]);
         squares < DIVERGED * DIVERGED // false for a NaN
     }
 }

@@ -7,8 +7,8 @@ use super::super::workspace::Workspace;
 use super::dense::{add_to_diagonal, write_cost};
 use super::{Curvature, Form};
 use condyle_linalg::{
-    SLACK, Vector, Vectorized, View, add_matrix, add_product_lower, add_transposed_product_lower, at_level, product,
-    transpose,
+    SLACK, Vector, Vectorized, View, add_in_turn, add_matrix, add_product_lower, add_transposed_product_lower,
+    at_level, product, transpose,
 };
 
 /// The form of Euler steps with the controls as unknowns, and with the states in the order (v, q).
@@ -51,14 +51,16 @@ impl Form for Euler {
         transpose(&mut F[m..], ld, A.at(nv, nv), [nv, nv]);
         transpose(&mut F[m + nv..], ld, A.at(nv, 0), [nv, nv]);
         let (all, F_q) = (View::new(F, ld), View::new(&F[m + nv..], ld));
-        product(W, ld, [rows, nv, nv], all, View::new(&steps.Pi, ldn));
-        add_matrix(&mut W[m + nv..], ld, View::new(&steps.N, ldn), [nv, nv]);
+        let (N, Pi) = steps.N_and_Pi();
+        let (N, Pi) = (View::new(N, ldn), View::new(Pi, ldn));
+        product(W, ld, [rows, nv, nv], all, Pi);
+        add_matrix(&mut W[m + nv..], ld, N, [nv, nv]);
         for k in 0..nv {
             W[k * ld + rows] = steps.py[k];
         }
         add_product_lower(H, ld, [rows + 1, rows, nv], View::new(W, ld), all);
         let H_qq = &mut H[(m + nv) * (ld + 1)..];
-        add_transposed_product_lower(H_qq, ld, nv, View::new(&steps.N, ldn), F_q, M, ldn);
+        add_transposed_product_lower(H_qq, ld, nv, N, F_q, M, ldn);
         steps.add_positions(work, node);
         add_to_diagonal(&mut work.H, ld, m, regularisation);
     }
@@ -78,10 +80,8 @@ impl Form for Euler {
 /// column-major with slack rows and the stride nv + SLACK.
 #[derive(Debug, Clone)]
 pub(super) struct Steps {
-    /// Nᵀ.
-    pub(super) N: Vec<f64>,
-    /// Π.
-    pub(super) Pi: Vec<f64>,
+    /// Nᵀ, and behind it Π.
+    both: Vec<f64>,
     /// Δt Eᵀp_q + p_v.
     pub(super) py: Vec<f64>,
     /// The columns of P E or P T that are not those of P; their stride is that of P.
@@ -92,7 +92,13 @@ impl Steps {
     /// Room for n states.
     pub(super) fn new(n: usize) -> Self {
         let matrix = |rows: usize| vec![0.0; (rows + SLACK) * (n / 2)];
-        Self { N: matrix(n / 2), Pi: matrix(n / 2), py: vec![0.0; n / 2], PB: matrix(n) }
+        Self { both: matrix(n / 2).repeat(2), py: vec![0.0; n / 2], PB: matrix(n) }
+    }
+
+    /// Nᵀ and Π.
+    #[inline(always)]
+    pub(super) fn N_and_Pi(&self) -> (&[f64], &[f64]) {
+        self.both.split_at(self.both.len() / 2)
     }
 
     /// Writes Π, N and Δt Eᵀp_q + p_v: how the value of the next state depends on its velocity.
@@ -159,41 +165,35 @@ struct WriteSteps<'a> {
 impl Vectorized for WriteSteps<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { steps: Steps { N, Pi, py, PB }, P, p, dt, blocks } = self;
+        let Self { steps: Steps { both, py, PB }, P, p, dt, blocks } = self;
         let (nv, ldp, ldn) = (p.len() / 2, p.len() + SLACK, p.len() / 2 + SLACK);
-        let whole = nv.next_multiple_of(V::N);
 
         // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  as if T and E were 1 from the left
-        let step = V::splat(dt);
-        for k in 0..nv {
-            let (PE, P) = (column(k, blocks, P, PB, ldp), &P[(nv + k) * ldp..]);
-            let columns =
-                N[k * ldn..][..whole].chunks_exact_mut(V::N).zip(Pi[k * ldn..][..whole].chunks_exact_mut(V::N));
-            let above = registers::<V>(PE, 0, whole).zip(registers::<V>(P, 0, whole));
-            let below = registers::<V>(PE, nv, whole).zip(registers::<V>(P, nv, whole));
-            for ((N, Pi), ((PE, P), (PE_below, P_below))) in columns.zip(above.zip(below)) {
-                let sum = V::load(PE).mul_add(step, V::load(P));
-                sum.store(N);
-                sum.add(V::load(PE_below)).mul_add(step, V::load(P_below)).store(Pi);
-            }
-            py[k] = dt * p[k] + p[nv + k];
+        let by_velocity = |k: usize| View::new(&P[(nv + k) * ldp..], ldp);
+        add_in_turn::<V, 1, 1>(both, ldn, ([0], [nv * ldn]), by_velocity(0), View::new(P, ldp), dt, [nv, nv]);
+        for block in blocks {
+            let (k, PE) = (block.start, View::new(&PB[block.start * ldp..], ldp));
+            let (out, shape) = (&mut both[k * ldn..], [nv, block.T.nrows()]);
+            add_in_turn::<V, 1, 1>(out, ldn, ([0], [nv * ldn]), by_velocity(k), PE, dt, shape);
+        }
+        let (N, Pi) = both.split_at_mut(nv * ldn);
+        let (p_q, p_v) = p.split_at(nv);
+        for ((y, q), v) in py.iter_mut().zip(p_q).zip(p_v) {
+            *y = dt * q + v;
         }
         // and their blocks from the left
         for block in blocks {
-            let (T, E, size) = (rows_of(&block.T), rows_of(&block.E), block.T.nrows());
+            let (T, E) = (beyond_identity(&block.T, 1.0), beyond_identity(&block.E, dt));
             for k in 0..nv {
                 let at = k * ldn + block.start;
-                let (N, Pi) = (&mut N[at..][..size], &mut Pi[at..][..size]);
-                let (TN, EN) = (combine(&T, N), combine(&E, N));
-                for i in 0..size {
-                    Pi[i] += dt * (EN[i] - N[i]);
-                }
-                N.copy_from_slice(&TN[..size]);
+                let x = &N[at..][..block.T.nrows()];
+                let (TN, EN) = (combine::<V>(&T, x), combine::<V>(&E, x));
+                add::<V>(&mut N[at..], TN);
+                add::<V>(&mut Pi[at..], EN);
             }
-            let Ep = combine(&E, &p[block.range()]);
-            for (i, k) in block.range().enumerate() {
-                py[k] = dt * Ep[i] + p[nv + k];
-            }
+            let mut Ep = [0.0; 8];
+            add::<V>(&mut Ep, combine::<V>(&E, &p[block.range()]));
+            py[block.range()].iter_mut().zip(Ep).for_each(|(y, Ep)| *y += Ep);
         }
     }
 }
@@ -213,32 +213,27 @@ impl Vectorized for AddPositions<'_> {
     fn run<V: Vector>(self) {
         let Self { steps: Steps { PB, .. }, P, p, H, ld, blocks } = self;
         let (nv, ldp) = (p.len() / 2, p.len() + SLACK);
+        let whole = nv.next_multiple_of(V::N);
         for j in 0..nv {
-            let (PT, H) = (column(j, blocks, P, PB, ldp), &mut H[j * ld..]);
+            let (PT, H) = (&column(j, blocks, P, PB, ldp)[..whole], &mut H[j * ld..][..whole.max(nv + 1)]);
             let gradient = H[nv];
-            let whole = nv.next_multiple_of(V::N);
-            for (H, PT) in H[..whole].chunks_exact_mut(V::N).zip(registers::<V>(PT, 0, whole)) {
+            for (H, PT) in H.chunks_exact_mut(V::N).zip(PT.chunks_exact(V::N)) {
                 V::load(H).add(V::load(PT)).store(H); // what lies above the diagonal is not read
             }
-            H[nv] = gradient;
+            H[nv] = gradient + p[j];
         }
         for block in blocks {
-            let (T, size) = (rows_of(&block.T), block.T.nrows());
+            let T = beyond_identity(&block.T, 1.0);
             for j in 0..nv {
                 let PT = &column(j, blocks, P, PB, ldp)[block.range()];
-                let (TPT, H) = (combine(&T, PT), &mut H[j * ld + block.start..][..size]);
-                for i in 0..size {
-                    H[i] += TPT[i] - PT[i];
-                }
+                add::<V>(&mut H[j * ld + block.start..], combine::<V>(&T, PT));
             }
-        }
-        for block in blocks {
-            let rows = &mut p[block.range()];
-            let product = combine(&rows_of(&block.T), rows);
-            rows.copy_from_slice(&product[..rows.len()]);
-        }
-        for j in 0..nv {
-            H[j * ld + nv] += p[j];
+            let mut Tp = [0.0; 8];
+            add::<V>(&mut Tp, combine::<V>(&T, &p[block.range()]));
+            for (j, Tp) in block.range().zip(Tp) {
+                p[j] += Tp;
+                H[j * ld + nv] += Tp;
+            }
         }
     }
 }
@@ -266,12 +261,6 @@ fn column<'a>(k: usize, blocks: &[EulerBlock], P: &'a [f64], PB: &'a [f64], ldp:
     &(if in_block { PB } else { P })[k * ldp..]
 }
 
-/// Some numbers of a column from a place on, a register of them at a time.
-#[inline(always)]
-fn registers<V: Vector>(column: &[f64], from: usize, count: usize) -> core::slice::ChunksExact<'_, f64> {
-    column[from..][..count].chunks_exact(V::N)
-}
-
 /// The rows of a block, with zeros up to a whole register.
 #[inline(always)]
 fn rows_of(B: &nalgebra::DMatrix<f64>) -> [[f64; 8]; LARGEST_BLOCK] {
@@ -284,14 +273,36 @@ fn rows_of(B: &nalgebra::DMatrix<f64>) -> [[f64; 8]; LARGEST_BLOCK] {
     rows
 }
 
-/// Bᵀx from the rows of B.
+/// The rows of s (B − 1), for a block B.
 #[inline(always)]
-fn combine(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [f64; 8] {
-    let mut sum = [0.0; 8];
-    for i in 0..LARGEST_BLOCK.min(x.len()) {
+fn beyond_identity(B: &nalgebra::DMatrix<f64>, s: f64) -> [[f64; 8]; LARGEST_BLOCK] {
+    let mut rows = rows_of(B);
+    for i in 0..LARGEST_BLOCK {
         for j in 0..8 {
-            sum[j] += rows[i][j] * x[i];
+            rows[i][j] *= s;
+        }
+        rows[i][i] -= if i < B.nrows() { s } else { 0.0 };
+    }
+    rows
+}
+
+/// Bᵀx from the rows of B: eight numbers.
+#[inline(always)]
+fn combine<V: Vector>(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [V; 4] {
+    let mut sums = [V::splat(0.0); 4];
+    for (row, x) in rows.iter().zip(x) {
+        for s in 0..8 / V::N {
+            sums[s] = V::load(&row[s * V::N..]).mul_add(V::splat(*x), sums[s]);
         }
     }
-    sum
+    sums
+}
+
+/// The first eight numbers of y += those of x.
+#[inline(always)]
+fn add<V: Vector>(y: &mut [f64], x: [V; 4]) {
+    let y = &mut y[..8];
+    for s in 0..8 / V::N {
+        V::load(&y[s * V::N..]).add(x[s]).store(&mut y[s * V::N..]);
+    }
 }

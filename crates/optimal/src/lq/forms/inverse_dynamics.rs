@@ -27,8 +27,8 @@ use super::super::workspace::Workspace;
 use super::euler::Steps;
 use super::{Controls, Curvature, Form};
 use condyle_linalg::{
-    OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_level, copy, copy_block, copy_matrix, eliminate,
-    solve_transposed, subtract_product, transpose,
+    OuterProducts, SLACK, Vector, Vectorized, View, add_product, add_product_vector, at_level, copy, copy_block,
+    copy_matrix, eliminate, transpose,
 };
 
 /// The form, with its scratch.
@@ -39,10 +39,8 @@ pub(crate) struct InverseDynamics {
     products: OuterProducts,
     /// ½ Π_dd. Shape: dependent × dependent, with slack rows.
     half: Vec<f64>,
-    /// U_w. Shape: nu × nu, with slack rows.
-    U: Vec<f64>,
-    /// [K k], the states in the order (v, q). Shape: nu × n + 1, with slack rows.
-    gains: Vec<f64>,
+    /// Scratch for k, with slack, and for −y.
+    y: Vec<f64>,
     /// Columns of dependent coordinates. Shape: n × dependent, with slack rows.
     below: Vec<f64>,
 }
@@ -63,8 +61,7 @@ impl InverseDynamics {
             steps: Steps::new(n),
             products: OuterProducts::with_capacity(numbers, products),
             half: Vec::with_capacity((dependent + SLACK) * dependent),
-            U: vec![0.0; (m + SLACK) * m],
-            gains: vec![0.0; (m + SLACK) * (n + 1)],
+            y: vec![0.0; 2 * m + SLACK],
             below: Vec::with_capacity((n + SLACK) * dependent),
         }
     }
@@ -129,6 +126,7 @@ impl Form for InverseDynamics {
         steps.add_positions_below(work, node, Theta);
     }
 
+    /// With the rows U below H: [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K] for Y = U_w L⁻ᵀ and K = U_x − Y Xᵀ, the gains.
     fn eliminate(
         &self,
         work: &mut Workspace,
@@ -136,34 +134,35 @@ impl Form for InverseDynamics {
         node: &LqNode,
         _: &mut LqKnot,
     ) -> Result<usize, (usize, f64)> {
-        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
-        eliminate(&mut work.H, ld, [m + n + 1, m + n, m])?;
+        let (n, m, ld, form) = (node.ndx(), node.nu(), work.stride(node.nu()), &node.inverse_dynamics);
+        transpose(&mut work.H[m + n + 1..], ld, View::new(&form.efforts.numbers, form.stride), [m + n, m]);
+        eliminate(&mut work.H, ld, [m + n + 1 + m, m + n, m])?;
         Ok(m)
     }
 
-    /// From H after the elimination of w, [L ·; X ·; yᵀ ·]:
-    ///
-    /// K = U_x − U_w L⁻ᵀ Xᵀ,   k = −U_w L⁻ᵀ y,   Quᵀk = −yᵀy = −kᵀQuu k
     fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
-        let (n, m) = (node.ndx(), node.nu());
-        let (nv, ld, ldu) = (n / 2, work.stride(m), m + SLACK);
-        let (Self { U, gains, .. }, H) = (self, &work.H);
-        let (efforts, size) = (&node.inverse_dynamics.efforts.numbers, node.inverse_dynamics.stride);
-        transpose(U, ldu, View::new(efforts, size), [m, m]);
-        solve_transposed(U, ldu, m, View::new(H, ld), m);
-        transpose(gains, ldu, View::new(&efforts[m..], size), [n, m]);
-        gains[n * ldu..][..m].fill(0.0);
-        subtract_product(gains, ldu, [m, n + 1, m], View::new(U, ldu), View::new(&H[m..], ld));
-        let K = knot.K.as_mut_slice();
-        copy_matrix(K, m, View::new(&gains[nv * ldu..], ldu), [m, nv]);
-        copy_matrix(&mut K[nv * m..], m, View::new(gains, ldu), [m, nv]);
-        knot.k.as_mut_slice().copy_from_slice(&gains[n * ldu..][..m]);
-        let mut square = 0.0;
-        for j in 0..m {
-            square += H[j * ld + m + n] * H[j * ld + m + n];
-        }
-        knot.expected = [-square, square];
+        recover_gains(work, node, knot, &mut self.y);
     }
+}
+
+/// Writes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k,   from H after the elimination; y is
+/// scratch for twice the controls and slack.
+pub(super) fn recover_gains(work: &Workspace, node: &LqNode, knot: &mut LqKnot, y: &mut [f64]) {
+    let (n, m) = (node.ndx(), node.nu());
+    let (nv, ld, all, H) = (n / 2, work.stride(m), m + n, &work.H);
+    let [Y, by_v, by_q] = [0, m, m + nv].map(|column| View::new(&H[column * ld + all + 1..], ld));
+    let K = knot.K.as_mut_slice();
+    copy_matrix(K, m, by_q, [m, nv]);
+    copy_matrix(&mut K[nv * m..], m, by_v, [m, nv]);
+    let ((k, y), mut square) = (y.split_at_mut(m + SLACK), 0.0);
+    k.fill(0.0);
+    for j in 0..m {
+        y[j] = -H[j * ld + all];
+        square += y[j] * y[j];
+    }
+    add_product_vector(k, m, Y, &y[..m]);
+    knot.k.as_mut_slice().copy_from_slice(&k[..m]);
+    knot.expected = [-square, square];
 }
 
 /// The part of H that is Π and N, and the rows of the outer products: those of Uᵀ (R + ϱ 1) U + Gᵀ a″ G, then D and
@@ -181,7 +180,8 @@ struct WriteRows<'a> {
 impl Vectorized for WriteRows<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { steps: Steps { N, Pi, py, .. }, products, half, node, regularisation, H, ld } = self;
+        let Self { steps, products, half, node, regularisation, H, ld } = self;
+        let ((N, Pi), py) = (steps.N_and_Pi(), steps.py.as_slice());
         let (n, m, imp) = (node.ndx(), node.nu(), &node.inverse_dynamics);
         let (nv, all, size) = (n / 2, m + n, imp.stride);
         let ldn = nv + SLACK;
@@ -197,7 +197,9 @@ impl Vectorized for WriteRows<'_> {
             copy_block::<V>(&mut H[k * ld + m + nv..], ld, N, [nv, length]);
             for (j, p) in py[c..c + length].iter().enumerate() {
                 let column = &mut H[(k + j) * ld..][..=all];
-                column[forces..m].fill(0.0);
+                if forces < m {
+                    column[forces..m].fill(0.0);
+                }
                 column[all] = *p;
             }
         }
@@ -225,10 +227,9 @@ impl Vectorized for WriteRows<'_> {
             products.square::<V>(row, mask, slopes);
         }
         // D and (Π y + N δq)_d
-        for row in imp.steps.numbers.chunks_exact(size) {
-            products.push::<V>(row, 1.0);
-        }
         let count = imp.dependent.len();
+        let first = products.add_rows(count) * size;
+        copy_block::<V>(&mut products.rows[first..], size, View::new(&imp.steps.numbers, size), [size, count]);
         let first = products.add_rows(count);
         for (j, &d) in imp.dependent.iter().enumerate() {
             let (Pi, N) = (&Pi[d * ldn..][..nv], &N[d * ldn..][..nv]);
