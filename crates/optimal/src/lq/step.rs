@@ -118,7 +118,7 @@ impl Step {
         ask: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
         let Self { work, forms, controls, hessians, .. } = self;
-        let form = forms.of(node);
+        let form = forms.of_step(node, regularisation);
         work.move_by(node.f.as_slice());
         form.write(work, node, regularisation, &mut Curvature { knot: t, ask, hessians });
         let eliminated =

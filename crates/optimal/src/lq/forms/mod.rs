@@ -7,6 +7,7 @@
 
 mod controls;
 mod dense;
+mod driven;
 mod euler;
 mod inverse_dynamics;
 
@@ -14,6 +15,7 @@ use super::node::{Hessian, LqKnot, LqNode};
 use super::workspace::Workspace;
 pub(super) use controls::Controls;
 use dense::Dense;
+use driven::Driven;
 use euler::Euler;
 pub(super) use inverse_dynamics::InverseDynamics;
 
@@ -59,15 +61,25 @@ pub(super) struct Forms {
     dense: Dense,
     euler: Euler,
     inverse_dynamics: InverseDynamics,
+    driven: Driven,
 }
 
 impl Forms {
     /// Room for n states, at most m controls, and for inverse dynamics as of [`InverseDynamics::room`].
     pub(super) fn new(n: usize, m: usize, room: [usize; 3]) -> Self {
-        Self { dense: Dense, euler: Euler::new(n), inverse_dynamics: InverseDynamics::new(room, n, m) }
+        let (euler, inverse_dynamics) = (Euler::new(n), InverseDynamics::new(room, n, m));
+        Self { dense: Dense, euler, inverse_dynamics, driven: Driven::new(n) }
     }
 
-    /// The form of a node.
+    /// The form for a step at a node.
+    pub(super) fn of_step(&mut self, node: &LqNode, regularisation: f64) -> &mut dyn Form {
+        match node.inverse_dynamics.active && Driven::takes(node, regularisation) {
+            true => &mut self.driven,
+            false => self.of(node),
+        }
+    }
+
+    /// The form of a node, of those that can have rows below.
     pub(super) fn of(&mut self, node: &LqNode) -> &mut dyn Form {
         if node.inverse_dynamics.active {
             &mut self.inverse_dynamics

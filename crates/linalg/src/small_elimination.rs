@@ -1,0 +1,253 @@
+//! The elimination of a few columns of a small matrix, with a sum of squares that comes into its tiles as they are computed.
+#![allow(unsafe_code, non_snake_case)] // H, X
+
+use crate::compiled::compiled;
+use crate::registers::Vector;
+use crate::tile::{View, add_outer, has_strip, holds};
+
+/// Columns of a tile.
+const COLUMNS: usize = 4;
+
+compiled! {
+    /// As [`eliminate`](crate::eliminate), of H + Σ xₖ xₖᵀ for columns x of X. `shape` = [rows, columns, m], and `length` = [numbers
+    /// in a column of X, columns]; behind these numbers, up to four registers behind H's last row, X has zeros. H has slack rows.
+    ///
+    /// # Errors
+    /// The first column whose pivot is not positive, or not finite, and the pivot.
+    pub fn eliminate_sum<V, WIDE>(
+        h: &mut [f64],
+        stride: usize,
+        shape: [usize; 3],
+        x: View<'_>,
+        length: [usize; 2],
+    ) -> Result<(), (usize, f64)> {
+        let ([rows, size, m], [reach, count]) = (shape, length);
+        if size == 0 {
+            return Ok(());
+        }
+        let slack = rows + V::N.max(COLUMNS) - 1;
+        assert!(m <= size && size <= rows && reach <= rows, "a triangle with more columns than rows");
+        assert!(holds(h, stride, [slack, size]), "a matrix ends before the last of its entries");
+        assert!(count == 0 || holds(x.data, x.stride, [rows + 4 * V::N, count]), "a row without slack");
+        let sum = Sum { x, count, reach };
+        for j in 0..m {
+            let mut i = j;
+            let mut factor = 0.0;
+            while i < rows {
+                // SAFETY: as was found.
+                unsafe {
+                    match (rows - i).div_ceil(V::N) {
+                        1 => eliminate_strip::<V, 1>(h, stride, [i, j], sum, &mut factor)?,
+                        2 => eliminate_strip::<V, 2>(h, stride, [i, j], sum, &mut factor)?,
+                        3 => eliminate_strip::<V, 3>(h, stride, [i, j], sum, &mut factor)?,
+                        _ => eliminate_strip::<V, 4>(h, stride, [i, j], sum, &mut factor)?,
+                    }
+                }
+                i += 4 * V::N;
+            }
+        }
+        let mut j = m;
+        while j < size {
+            // SAFETY: as was found.
+            unsafe { add_tiles::<V>(h, stride, [rows, j], COLUMNS.min(size - j), sum, m) };
+            j += COLUMNS;
+        }
+        Ok(())
+    }
+}
+
+/// The squares that are added.
+#[derive(Clone, Copy)]
+struct Sum<'a> {
+    x: View<'a>,
+    count: usize,
+    reach: usize,
+}
+
+/// H ← H + Σ x xᵀ − Σ of the first m columns of H, on some columns from j on, and on the rows from j to `rows`.
+///
+/// # Safety
+/// H has slack rows behind the rows, and X four registers of them.
+#[inline(always)]
+unsafe fn add_tiles<V: Vector>(
+    h: &mut [f64],
+    stride: usize,
+    [rows, j]: [usize; 2],
+    columns: usize,
+    sum: Sum<'_>,
+    m: usize,
+) {
+    let mut i = j;
+    while i < rows {
+        // SAFETY: by the caller.
+        unsafe {
+            match rows - i <= V::N {
+                true => add_tile::<V, 1>(h, stride, [i, j], columns, sum, m),
+                false => add_tile::<V, 2>(h, stride, [i, j], columns, sum, m),
+            }
+        }
+        i += 2 * V::N;
+    }
+}
+
+/// See [`add_tiles`], on S registers of rows from i on.
+///
+/// # Safety
+/// As of [`add_tiles`].
+#[inline(always)]
+unsafe fn add_tile<V: Vector, const S: usize>(
+    h: &mut [f64],
+    stride: usize,
+    [i, j]: [usize; 2],
+    columns: usize,
+    sum: Sum<'_>,
+    m: usize,
+) {
+    debug_assert!(has_strip::<V, S>(h, stride, j * stride + i, columns));
+    // SAFETY: by the caller.
+    let rows = |x: &[f64], at: usize, count: usize| unsafe { core::slice::from_raw_parts(x.as_ptr().add(at), count) };
+    let mut tile = [[V::splat(0.0); S]; COLUMNS];
+    if i < sum.reach {
+        let mut at = 0;
+        for _ in 0..sum.count {
+            add_outer(&mut tile, rows(sum.x.data, at + i, S * V::N), rows(sum.x.data, at + j, COLUMNS));
+            at += sum.x.stride;
+        }
+    }
+    for jj in 0..COLUMNS {
+        if jj < columns {
+            let column = rows(h, (j + jj) * stride + i, S * V::N);
+            for s in 0..S {
+                tile[jj][s] = V::load(&column[s * V::N..]).add(tile[jj][s]);
+            }
+        }
+    }
+    let mut at = 0;
+    for _ in 0..m {
+        subtract_outer(&mut tile, rows(h, at + i, S * V::N), rows(h, at + j, COLUMNS));
+        at += stride;
+    }
+    for jj in 0..COLUMNS {
+        if jj < columns {
+            let at = (j + jj) * stride + i;
+            // SAFETY: by the caller.
+            let column = unsafe { h.get_unchecked_mut(at..at + S * V::N) };
+            for s in 0..S {
+                tile[jj][s].store(&mut column[s * V::N..]);
+            }
+        }
+    }
+}
+
+/// tile −= strip · rowᵀ, with S registers of rows.
+#[inline(always)]
+fn subtract_outer<V: Vector, const S: usize>(tile: &mut [[V; S]; COLUMNS], strip: &[f64], row: &[f64]) {
+    for jj in 0..COLUMNS {
+        let x = V::splat(-row[jj]);
+        for s in 0..S {
+            tile[jj][s] = V::load(&strip[s * V::N..]).mul_add(x, tile[jj][s]);
+        }
+    }
+}
+
+/// Column j of L and X, from what is added to it and the columns before it, on S registers of rows from i on: first those that
+/// begin on the diagonal, which give `factor`, the inverse of its entry there.
+///
+/// # Errors
+/// The column, if its pivot is not positive or not finite, and the pivot.
+///
+/// # Safety
+/// The first j columns and column j have S registers of numbers from row i on, and so has X if i is within its reach.
+#[inline(always)]
+unsafe fn eliminate_strip<V: Vector, const S: usize>(
+    h: &mut [f64],
+    stride: usize,
+    [i, j]: [usize; 2],
+    sum: Sum<'_>,
+    factor: &mut f64,
+) -> Result<(), (usize, f64)> {
+    debug_assert!(has_strip::<V, S>(h, stride, j * stride + i, 1));
+    // SAFETY: by the caller.
+    let rows = |x: &[f64], at: usize, count: usize| unsafe { core::slice::from_raw_parts(x.as_ptr().add(at), count) };
+    let mut sums = [V::splat(0.0); S];
+    if i < sum.reach {
+        let mut at = 0;
+        for _ in 0..sum.count {
+            let (x, column) = (V::splat(rows(sum.x.data, at + j, 1)[0]), rows(sum.x.data, at + i, S * V::N));
+            for s in 0..S {
+                sums[s] = V::load(&column[s * V::N..]).mul_add(x, sums[s]);
+            }
+            at += sum.x.stride;
+        }
+    }
+    let column = rows(h, j * stride + i, S * V::N);
+    for s in 0..S {
+        sums[s] = V::load(&column[s * V::N..]).add(sums[s]);
+    }
+    let mut at = 0;
+    for _ in 0..j {
+        let (x, column) = (V::splat(-rows(h, at + j, 1)[0]), rows(h, at + i, S * V::N));
+        for s in 0..S {
+            sums[s] = V::load(&column[s * V::N..]).mul_add(x, sums[s]);
+        }
+        at += stride;
+    }
+    let at = at + i;
+    // SAFETY: by the caller; column j begins where j columns end.
+    let column = unsafe { h.get_unchecked_mut(at..at + S * V::N) };
+    if i == j {
+        sums[0].store(column);
+        let pivot = column[0];
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return Err((j, pivot));
+        }
+        *factor = condyle_spatial::Scalar::sqrt(pivot).recip();
+    }
+    for s in 0..S {
+        sums[s].mul(V::splat(*factor)).store(&mut column[s * V::N..]);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registers::tests::at_each_level;
+    use crate::tile::SLACK;
+    use crate::{add_product_lower, eliminate};
+
+    /// Entries of size one, sums of 40 of them: 1e-12 leaves room for rounding and nothing else.
+    const TOLERANCE: f64 = 1e-12;
+
+    #[test]
+    fn it_is_the_elimination_of_the_sum() {
+        at_each_level(|| {
+            for (m, n, below, count) in
+                [(0, 3, 1, 2), (1, 1, 0, 0), (3, 6, 1, 5), (7, 14, 8, 7), (9, 18, 10, 12), (16, 5, 3, 1)]
+            {
+                let (size, rows) = (m + n, m + n + below);
+                let (stride, ldx, reach) = (rows + SLACK, rows + 4 * SLACK, rows - below / 2);
+                let entry = |i: usize, j: usize| ((i * 31 + j * 17 + 5) % 23) as f64 / 23.0 - 0.4;
+                let (mut h, mut x) = (vec![0.0; stride * size], vec![0.0; ldx * count]);
+                for (i, j) in (0..rows).flat_map(|i| (0..size).map(move |j| (i, j))) {
+                    h[j * stride + i] = entry(i.max(j), i.min(j)) + if i == j { 30.0 } else { 0.0 };
+                }
+                for (i, k) in (0..reach).flat_map(|i| (0..count).map(move |k| (i, k))) {
+                    x[k * ldx + i] = entry(i + 3, k);
+                }
+                let (mut expected, view, shape) = (h.clone(), View::new(&x, ldx), [rows, size, m]);
+                add_product_lower(&mut expected, stride, [rows, size, count], view, view);
+                eliminate(&mut expected, stride, shape).unwrap();
+                eliminate_sum(&mut h, stride, shape, view, [reach, count]).unwrap();
+                for (i, j) in (0..rows).flat_map(|i| (0..size.min(i + 1)).map(move |j| (i, j))) {
+                    let (found, expected) = (h[j * stride + i], expected[j * stride + i]);
+                    assert!((found - expected).abs() < TOLERANCE, "entry ({i}, {j}) of {shape:?}: {found}, {expected}");
+                }
+            }
+            let mut h = vec![0.0; 30];
+            (h[0], h[11]) = (4.0, -3.0);
+            let none = View::new(&[], 1);
+            assert_eq!(eliminate_sum(&mut h, 10, [2, 2, 2], none, [2, 0]), Err((1, -3.0)));
+        });
+    }
+}

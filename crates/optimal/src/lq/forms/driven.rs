@@ -1,0 +1,139 @@
+//! Knots as the equations of inverse dynamics, of small robots all of whose coordinates are driven and are numbers: arms.
+//!
+//! It is the form of [`inverse_dynamics`](super::inverse_dynamics) where every coordinate is an unknown, y = δv + w, and T = E = 1:
+//!
+//! ```text
+//!     ⎡ Π ·   ·      ⎤   over (w, δv, δq)
+//! H = ⎢ Π Π   ·      ⎥ + cost + Uᵀ (R + ϱ 1) U + Gᵀ a″ G
+//!     ⎣ Nᵀ Nᵀ P₁₁    ⎦
+//! ```
+//!
+//! The rows of U and G, scaled to be squares, are added to H in the tiles of the elimination.
+#![allow(non_snake_case)] // the names of the literature, and N, Π, U
+
+use super::super::inverse_dynamics_form::InverseDynamicsForm;
+use super::super::node::{LqKnot, LqNode};
+use super::super::workspace::Workspace;
+use super::{Controls, Curvature, Form, inverse_dynamics};
+use condyle_linalg::{
+    SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_level, copy_scaled, eliminate_sum, transpose_block,
+};
+
+/// The most coordinates. More are better off where the zeros of rows are known.
+const MOST: usize = 16;
+/// The most rows of costs.
+const MOST_COSTS: usize = 16;
+
+/// The form, with its scratch.
+#[derive(Debug, Clone)]
+pub(super) struct Driven {
+    /// The scaled rows of U and G over (w, δv, δq), each with its part of the gradient, and zeros. Shape: `stride` × MOST +
+    /// MOST_COSTS, or none for larger robots.
+    rows: Vec<f64>,
+    stride: usize,
+    /// The number of rows.
+    count: usize,
+    /// See [`inverse_dynamics::recover_gains`].
+    y: Vec<f64>,
+}
+
+impl Driven {
+    /// Scratch for n states.
+    pub(super) fn new(n: usize) -> Self {
+        let nv = if n <= 2 * MOST { n / 2 } else { 0 };
+        let stride = 4 * nv + 1 + 4 * SLACK;
+        Self { rows: vec![0.0; stride * (nv + MOST_COSTS)], stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
+    }
+
+    /// Whether the form is that of a node, when R gets so much on its diagonal.
+    pub(super) fn takes(node: &LqNode, regularisation: f64) -> bool {
+        let (nv, InverseDynamicsForm { own, slopes, diagonal, .. }) = (node.ndx() / 2, &node.inverse_dynamics);
+        nv <= MOST
+            && *own == [[0, 0, nv]]
+            && node.nu() == nv
+            && node.structure.euler().is_some_and(|(_, blocks)| blocks.is_empty())
+            && slopes.len() <= MOST_COSTS
+            && slopes.iter().all(|slopes| slopes[1] > 0.0)
+            && diagonal[nv..].iter().all(|r| r + regularisation > 0.0)
+    }
+}
+
+impl Form for Driven {
+    fn turn(&self, n: usize) -> usize {
+        n / 2
+    }
+
+    /// H but for the squares, and below it U.
+    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
+        self.count = node.nu() + node.inverse_dynamics.slopes.len();
+        at_level(Write { rows: &mut self.rows, stride: self.stride, work, node, regularisation });
+    }
+
+    fn write_below(&mut self, _: &mut Workspace, _: &LqNode, _: &[f64]) {
+        unreachable!("segments of a horizon take the form for all robots");
+    }
+
+    /// As [`inverse_dynamics`], with the squares.
+    fn eliminate(
+        &self,
+        work: &mut Workspace,
+        _: &mut Controls,
+        node: &LqNode,
+        _: &mut LqKnot,
+    ) -> Result<usize, (usize, f64)> {
+        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+        let shape = [m + n + 1 + m, m + n, m];
+        eliminate_sum(&mut work.H, ld, shape, View::new(&self.rows, self.stride), [m + n + 1, self.count])?;
+        Ok(m)
+    }
+
+    fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
+        inverse_dynamics::recover_gains(work, node, knot, &mut self.y);
+    }
+}
+
+/// The loops of [`Driven::write`].
+struct Write<'a> {
+    rows: &'a mut [f64],
+    stride: usize,
+    work: &'a mut Workspace,
+    node: &'a LqNode,
+    regularisation: f64,
+}
+
+impl Vectorized for Write<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { rows, stride, work, node, regularisation } = self;
+        let (nv, ld, form) = (node.nu(), work.stride(node.nu()), &node.inverse_dynamics);
+        let (n, all, size) = (2 * nv, 3 * nv, form.stride);
+        let (dt, _) = node.structure.euler().expect("the form is that of Euler steps");
+        let Workspace { P, p, H, .. } = work;
+        let (P, Q) = (View::new(P, n + SLACK), View::new(node.Q.as_slice(), n));
+        let (v, q) = (nv * ld, n * ld); // the columns of δv and δq
+
+        // Nᵀ = Δt P₁₁ + P₁₂,   Π = Δt (Nᵀ + P₂₁) + P₂₂,   and Q + P₁₁ for δq
+        let places = ([n, v + n], [0, nv, v + nv]);
+        add_in_turn::<V, 2, 3>(H, ld, places, P.at(0, nv), P, dt, [nv, nv]);
+        add_blocks::<V>(&mut H[q + n..], ld, Q, P, [nv, nv]);
+        let ((p_q, p_v), (gradient_q, gradient_v)) = (p.split_at(nv), node.q.as_slice().split_at(nv));
+        for j in 0..nv {
+            let y = dt * p_q[j] + p_v[j];
+            H[j * ld + all] = y;
+            H[v + j * ld + nv + j] += form.diagonal[j];
+            H[v + j * ld + all] = y + gradient_v[j];
+            H[q + j * ld + all] = gradient_q[j] + p_q[j];
+        }
+        transpose_block::<V>(&mut H[all + 1..], ld, View::new(&form.efforts.numbers, size), [all, nv]);
+
+        // √a″ x, and a′ / √a″ for the gradient
+        let (efforts, costs) = (form.efforts.numbers.chunks_exact(size), form.costs.numbers.chunks_exact(size));
+        for (k, (x, row)) in efforts.chain(costs).zip(rows.chunks_exact_mut(stride)).enumerate() {
+            let [d, dd] =
+                if k < nv { [node.r[k], form.diagonal[nv + k] + regularisation] } else { form.slopes[k - nv] };
+            let root = condyle_spatial::Scalar::sqrt(dd);
+            copy_scaled::<V>(row, &x[..all], root);
+            row[all] = d / root;
+        }
+    }
+}
