@@ -1,11 +1,9 @@
 #!/usr/bin/env bash
-# Runs the tests of vectors on a 64-bit Arm that qemu plays, where there is what this takes:
-#
-# - a compiler for it: `rustup target add aarch64-unknown-linux-gnu`, or one that RUSTC names;
-# - aarch64-linux-gnu-gcc to link, and the C library that it links to;
-# - qemu-aarch64-static or qemu-aarch64.
+# Runs the tests of vectors on a 64-bit Arm that qemu plays, where there is what this takes (`tests/targets.sh install arm`):
+# a compiler for it, aarch64-linux-gnu-gcc to link with the C library, and qemu-aarch64-static or qemu-aarch64.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. tests/targets.sh
 
 target=aarch64-unknown-linux-gnu
 
@@ -17,8 +15,7 @@ skip() {
 case $(uname -m) in
     aarch64 | arm64) skip "this is an Arm, whose vectors all tests run on" ;;
 esac
-library=$("${RUSTC:-rustc}" --print target-libdir --target $target)
-compgen -G "$library/libstd-*.rlib" >/dev/null || skip "the compiler has no library for $target"
+compiler_for $target std || exit 0
 command -v aarch64-linux-gnu-gcc >/dev/null || skip "there is no aarch64-linux-gnu-gcc to link with"
 qemu=$(command -v qemu-aarch64-static || command -v qemu-aarch64) || skip "there is no qemu-aarch64"
 libc=$(aarch64-linux-gnu-gcc -print-file-name=libc.so.6)
@@ -26,22 +23,20 @@ libc=$(aarch64-linux-gnu-gcc -print-file-name=libc.so.6)
 
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="$qemu -L $(realpath "$(dirname "$libc")/..")"
-cargo=$(rustup which cargo 2>/dev/null || echo cargo) # rustup's own would not look at RUSTC
+export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}/arm # to run beside other builds
+export CARGO_PROFILE_DEV_DEBUG=false
+export CONDYLE_EMULATED=1 # fewer cases of what takes minutes
 
-# $1: a package; $2, $3, …: what of it, and `--` with the names of tests.
+# All programs of one build, so that what they share is compiled once. $1, …: which of them, and `--` with the names of tests.
 run() {
-    local package=$1
-    shift
-    "$cargo" test --locked --target $target --package "$package" "$@"
+    "${cargo[@]}" test --locked --target $target --package condyle-spatial --package condyle-linalg \
+        --package condyle-dynamics --package condyle-optimal "$@"
 }
 
-run condyle-spatial --lib --tests -- --skip refused_levels # which starts itself: qemu would have to be told
-run condyle-dynamics --test vectors
-run condyle-dynamics --test suite -- limbs::
-run condyle-linalg --lib --tests
-run condyle-optimal --test contacts -- side_by_side implicit
+# registers and packers; dense kernels; batches and limbs, but for how much memory they take; sweeps
+run --test vectors --test sin_cos --test kernels --test tree --test lqr -- --skip memory_by_state
+run --test contacts -- side_by_side implicit
 
 # a vector instruction that was not inlined shows in any program that has kernels
-program=$("$cargo" test --locked --target $target --package condyle-dynamics --test vectors --no-run --message-format=json |
-    sed -nE 's/.*"executable":"([^"]+)".*/\1/p')
+program=$(run --test contacts --no-run --message-format=json | sed -nE 's/.*"executable":"([^"]+)".*/\1/p')
 "${PYTHON:-python3}" tests/symbols.py "$program"

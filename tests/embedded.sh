@@ -1,40 +1,29 @@
 #!/usr/bin/env bash
 # Checks that what runs without an operating system compiles for two processors, and runs the example of it on a Cortex-M4 that
-# qemu plays, where there is what this takes:
-#
-# - `rustup target add thumbv7em-none-eabihf riscv32imac-unknown-none-elf`;
-# - qemu-system-arm.
+# qemu plays, where there is what this takes (`tests/targets.sh install embedded`): compilers for them, and qemu-system-arm.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-
-missing() {
-    local library
-    library=$("${RUSTC:-rustc}" --print target-libdir --target "$1")
-    ! compgen -G "$library/libcore-*.rlib" >/dev/null
-}
+. tests/targets.sh
 
 for target in riscv32imac-unknown-none-elf thumbv7em-none-eabihf; do
-    if missing $target; then
-        echo "NOT RUN: the compiler has no library for $target"
-    else
-        cargo check --locked --target $target --package condyle-dynamics --no-default-features --features libm,serde
+    if compiler_for $target core,alloc; then
+        "${cargo[@]}" check --locked --target $target --package condyle-dynamics --no-default-features --features libm,serde
     fi
 done
 
-if missing thumbv7em-none-eabihf; then
-    exit
-fi
+compiler_for thumbv7em-none-eabihf core,alloc >/dev/null || exit 0
+[ -z "$linker" ] || export CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER=$linker
 here=$(mktemp)
 board=$(mktemp)
 trap 'rm -f "$here" "$board"' EXIT
 cargo run --quiet --locked --package condyle-dynamics --example arm >"$here"
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}/embedded
 cd examples/embedded # whose .cargo/config.toml says how its program is linked and run
-cargo build --release
+"${cargo[@]}" build --release
 if ! command -v qemu-system-arm >/dev/null; then
     echo "NOT RUN: there is no qemu-system-arm"
     exit
 fi
-timeout 120 cargo run --quiet --release >"$board" || { cat "$board"; exit 1; }
+timeout 120 "${cargo[@]}" run --quiet --release >"$board" || { cat "$board"; exit 1; }
 grep memory "$board"
 "${PYTHON:-python3}" ../../tests/same_numbers.py "$board" "$here" --only tau

@@ -28,9 +28,10 @@ check condyle-wholebody "" loaders threads
 check condyle-codegen "" cuda
 check condyle "" loaders serde threads
 
-for crate in spatial linalg model; do
+for crate in spatial model; do
     cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
 done
+cargo test --locked --package condyle-linalg --no-default-features --features libm --tests
 cargo test --locked --package condyle-linalg --no-default-features --features std
 cargo clippy --locked --package condyle-codegen --features cuda --all-targets -- -D warnings
 cargo test --locked --package condyle-codegen --features cuda --test cuda

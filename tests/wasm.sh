@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Runs dynamics and optimal control as WebAssembly in headless Chromium (in Node.js where there is none), without vectors and
 # with SIMD128, and compares all numbers with those of this machine. With WASM_PROFILE=release it also prints how long an
-# iteration of FDDP takes in each. Needs `rustup target add wasm32-unknown-unknown` and Node.js; Chromium is the one that
-# tests/page/run.sh installs.
+# iteration of FDDP takes in each. Needs a compiler for it (`tests/targets.sh install wasm`) and Node.js; Chromium is the one
+# that tests/page/run.sh installs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. tests/targets.sh
 
 skip() {
     echo "NOT RUN: $1"
@@ -12,8 +13,7 @@ skip() {
 }
 
 target=wasm32-unknown-unknown
-library=$("${RUSTC:-rustc}" --print target-libdir --target $target)
-compgen -G "$library/libstd-*.rlib" >/dev/null || skip "the compiler has no library for $target"
+compiler_for $target std,panic_abort || exit 0
 command -v node >/dev/null || skip "there is no Node.js"
 browser=chromium
 if [ ! -d .venv/page/node_modules ]; then
@@ -28,7 +28,8 @@ log=$(mktemp -d)
 trap 'rm -rf "$log"' EXIT
 
 cargo build --locked --profile "$profile" --package condyle-optimal --example numbers
-RUSTFLAGS="-C target-feature=+simd128" cargo build --locked --profile "$profile" --target $target \
+[ -z "$linker" ] || export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$linker
+RUSTFLAGS="-C target-feature=+simd128" "${cargo[@]}" build --locked --profile "$profile" --target $target \
     --package condyle-optimal --example numbers --no-default-features --features loaders
 times() {
     [ "$profile" = dev ] || sed -n "s/^time/$1:/p" "$log/$2"

@@ -24,14 +24,3 @@ pub fn identifier(name: &str) -> String {
     }
     own
 }
-
-#[cfg(test)]
-mod tests {
-    use super::identifiers;
-
-    #[test]
-    fn names_become_identifiers() {
-        let names = identifiers(["LF_foot", "tool 1", "tool-1", "7th", "é"].into_iter());
-        assert_eq!(names, ["LF_foot", "tool_1", "tool_1_2", "robot7th", "robot_"]);
-    }
-}

@@ -9,10 +9,10 @@
 //!
 //! # Features
 //! `threads` and `std` are on by default; without `std` the crate needs `alloc` and the feature `libm`.
-#![cfg_attr(not(any(feature = "std", test)), no_std)]
+#![cfg_attr(not(feature = "std"), no_std)]
 #![allow(non_snake_case)]
 
-#[cfg_attr(not(any(feature = "std", test)), macro_use)]
+#[cfg_attr(not(feature = "std"), macro_use)]
 extern crate alloc;
 
 #[doc(hidden)]

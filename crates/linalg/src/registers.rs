@@ -185,23 +185,3 @@ pub fn at_level(work: impl Vectorized) {
         _ => Short::enter(On::<_, Short>(work, PhantomData)),
     }
 }
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use condyle_spatial::level::{Level, level, pin};
-    use std::sync::Mutex;
-
-    /// The level belongs to the whole process.
-    static PINNED: Mutex<()> = Mutex::new(());
-
-    /// Runs `f` at every level of this processor.
-    pub(crate) fn at_each_level(f: impl Fn()) {
-        let _guard = PINNED.lock();
-        let before = level();
-        for level in Level::ALL.into_iter().filter(|level| level.is_supported()) {
-            pin(level).unwrap();
-            f();
-        }
-        pin(before).unwrap();
-    }
-}

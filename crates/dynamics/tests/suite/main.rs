@@ -23,7 +23,6 @@ mod inertial_parameters;
 mod inputs;
 mod islands;
 mod kinematics;
-mod limbs;
 mod mimic;
 mod mjcf;
 mod model_files;

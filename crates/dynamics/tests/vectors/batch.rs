@@ -127,11 +127,16 @@ fn a_place_that_is_missing() {
 }
 
 /// Whatever the number of states, full groups or not, and of threads; and on one thread, once a function has been called,
-/// without allocating.
+/// without allocating. On a processor that a program plays, which `CONDYLE_EMULATED` says, two robots and the first group
+/// that is not full stand for all.
 #[test]
 fn every_state_is_a_single_call() {
     const MOST: usize = 19;
-    let all = models(2);
+    let (mut all, mut counts) = (models(2), &[1, 8, MOST][..]);
+    if std::env::var_os("CONDYLE_EMULATED").is_some() {
+        let mimics = all.remove(4);
+        (all, counts) = (vec![all.remove(1), mimics], &[1, 6]);
+    }
     let table = table::<f64>();
     each_level(|level| {
         for (seed, model) in all.iter().enumerate() {
@@ -145,7 +150,7 @@ fn every_state_is_a_single_call() {
                 (batch, constraints)
             });
             for row in &table {
-                for n in [1, 8, MOST] {
+                for &n in counts {
                     let (mut expected, all) = (Found::default(), States::of(&inputs[..n]));
                     for input in &inputs[..n] {
                         expected.again();

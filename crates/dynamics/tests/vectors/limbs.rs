@@ -1,5 +1,6 @@
 //! The limbs of one robot side by side: the numbers of body after body. (At the baseline, both are that.)
 
+use crate::best_level;
 use crate::common::contacts::random_constraints;
 use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
@@ -135,6 +136,7 @@ fn compare_inverses(
 
 #[test]
 fn the_numbers_of_body_after_body() {
+    let _level = best_level();
     let mut worst = sums_and_inverses();
     let axis = [0.0, 0.6, 0.8].into();
     for seed in 0..24 {
@@ -175,6 +177,7 @@ fn compare_constrained(
 /// Contacts and loops between all kinds of bodies, the one that carries all others and the world among them.
 #[test]
 fn constrained_dynamics_of_body_after_body() {
+    let _level = best_level();
     let mut worst = sums_and_inverses();
     let axis = [0.0, 0.6, 0.8].into();
     let roots = [Joint::FreeFlyer, Joint::Revolute { axis }, Joint::Planar];
@@ -193,6 +196,7 @@ fn constrained_dynamics_of_body_after_body() {
 /// The humanoid on a sole that is held twice, by rows of which six depend on others, and on its other sole's points.
 #[test]
 fn redundant_constraints_of_body_after_body() {
+    let _level = best_level();
     let mut worst = sums_and_inverses();
     let model = robots::humanoid();
     let [left, right] = ["left_sole", "right_sole"].map(|name| model.frame(name).unwrap());
@@ -208,6 +212,7 @@ fn redundant_constraints_of_body_after_body() {
 /// Another armature, gravity or inertia is seen by the same `Data`.
 #[test]
 fn of_the_model_that_is_given() {
+    let _level = best_level();
     let quadruped = robots::quadruped();
     let mut data = Data::new(&quadruped);
     let State { q, v, a, .. } = State::random(&quadruped, &mut rng(0));
@@ -230,6 +235,7 @@ fn of_the_model_that_is_given() {
 /// Scratch that was cloned, before a force was ever given, computes the same way.
 #[test]
 fn with_cloned_data() {
+    let _level = best_level();
     let quadruped = robots::quadruped();
     let State { q, v, a, f_ext, .. } = State::random(&quadruped, &mut rng(0));
     let mut data = Data::new(&quadruped);
@@ -246,6 +252,7 @@ fn with_cloned_data() {
 /// A number that is not one comes out at the limb that holds it and at the base, and nowhere else.
 #[test]
 fn what_is_not_a_number_stays_in_its_limb() {
+    let _level = best_level();
     let model = robots::quadruped();
     let State { q, mut v, a, .. } = State::random(&model, &mut rng(0));
     v[7] = f64::NAN; // the first leg's second joint
@@ -256,6 +263,7 @@ fn what_is_not_a_number_stays_in_its_limb() {
 
 #[test]
 fn a_robot_of_loose_bodies() {
+    let _level = best_level();
     let mut builder = ModelBuilder::new("loose");
     for k in 0..7 {
         let joint = if k % 2 == 0 { Joint::Translation } else { Joint::FreeFlyer };
@@ -269,6 +277,7 @@ fn a_robot_of_loose_bodies() {
 /// Bodies without any body in all lanes, of which the first ones are not those that are computed first.
 #[test]
 fn fingers_of_all_lengths() {
+    let _level = best_level();
     let mut worst = sums_and_inverses();
     for (seed, lengths) in [&[1, 3, 2, 4, 1][..], &[2, 1, 5], &[1, 1, 4, 4, 4, 4, 2]].into_iter().enumerate() {
         let mut rng = rng(seed as u64);
@@ -287,6 +296,7 @@ fn fingers_of_all_lengths() {
 /// there are none.
 #[test]
 fn calls_leave_their_placements() {
+    let _level = best_level();
     let mut worst = Worst::new("placements left behind", TOLERANCE);
     let models = all_models(10).into_iter().chain((0..8).map(|seed| many_limbs(seed, Joint::FreeFlyer)));
     for (seed, model) in models.enumerate().filter(|(_, model)| model.singular_joints().is_empty()) {

@@ -1,5 +1,7 @@
 //! Vectors of numbers: in each lane what a single number gives, to the last bit.
 
+mod packers;
+
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real, Witness};
 use condyle_spatial::level::{Level, Unsupported};

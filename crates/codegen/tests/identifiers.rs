@@ -1,0 +1,13 @@
+//! Names that code can have: the module is compiled into this program, without the rest of the library once more.
+
+#[allow(dead_code)] // functions use all of it
+#[path = "../src/identifiers.rs"]
+mod identifiers;
+
+use identifiers::identifiers;
+
+#[test]
+fn names_become_identifiers() {
+    let names = identifiers(["LF_foot", "tool 1", "tool-1", "7th", "é"].into_iter());
+    assert_eq!(names, ["LF_foot", "tool_1", "tool_1_2", "robot7th", "robot_"]);
+}

@@ -1,0 +1,99 @@
+//! Products of matrices.
+
+use crate::at_each_level;
+use condyle_linalg::{
+    SLACK, View, add_blocks, add_in_turn, add_matrix, add_product, add_product_lower, add_transposed_product_lower,
+    product, product_of_upper_lower, product_with_upper, product_without_slack,
+};
+use nalgebra::DMatrix;
+
+/// Entries of size one, sums of 30 of them: 1e-12 leaves room for rounding and nothing else.
+const TOLERANCE: f64 = 1e-12;
+
+fn entry(i: usize, j: usize) -> f64 {
+    ((i * 31 + j * 17 + 5) % 23) as f64 / 23.0 - 0.4
+}
+
+/// A copy with slack rows.
+fn padded(a: &DMatrix<f64>) -> (Vec<f64>, usize) {
+    let stride = a.nrows() + SLACK;
+    let mut out = vec![0.0; stride * a.ncols()];
+    for j in 0..a.ncols() {
+        out[j * stride..][..a.nrows()].copy_from_slice(a.column(j).as_slice());
+    }
+    (out, stride)
+}
+
+/// Each of the products of A with B.
+fn check_products(a: &DMatrix<f64>, b: &DMatrix<f64>) {
+    let (rows, columns, length) = (a.nrows(), b.nrows(), a.ncols());
+    let (shape, expected) = ([rows, columns, length], a * b.transpose());
+    let ((a, lda), (b, ldb)) = (padded(a), padded(b));
+    let (a, b) = (View::new(&a, lda), View::new(&b, ldb));
+    let all = || (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+    let check = |c: &[f64], ldc: usize, (i, j): (usize, usize), expected: f64| {
+        assert!((c[j * ldc + i] - expected).abs() < TOLERANCE, "entry ({i}, {j}) of shape {shape:?}");
+    };
+
+    let mut c = vec![0.0; lda * columns];
+    product(&mut c, lda, shape, a, b);
+    all().for_each(|at| check(&c, lda, at, expected[at]));
+    add_product(&mut c, lda, shape, a, b);
+    all().for_each(|at| check(&c, lda, at, 2.0 * expected[at]));
+    add_matrix(&mut c, lda, a, [rows, columns.min(length)]);
+    all().for_each(|(i, j)| {
+        let more = if j < length { a.data[j * lda + i] } else { 0.0 };
+        check(&c, lda, (i, j), 2.0 * expected[(i, j)] + more);
+    });
+    let mut c = vec![0.0; rows * columns];
+    product_without_slack(&mut c, rows, shape, a, b);
+    all().for_each(|at| check(&c, rows, at, expected[at]));
+
+    if columns <= rows {
+        let mut c = vec![1.0; lda * columns];
+        add_product_lower(&mut c, lda, shape, a, b);
+        all().filter(|(i, j)| j <= i).for_each(|at| check(&c, lda, at, expected[at] + 1.0));
+    }
+    if columns == rows && length == rows {
+        let (mut c, mut scratch) = (vec![1.0; lda * columns], vec![0.0; lda * columns]);
+        add_transposed_product_lower(&mut c, lda, rows, a, b, &mut scratch, lda);
+        all().filter(|(i, j)| j <= i).for_each(|(i, j)| check(&c, lda, (i, j), expected[(j, i)] + 1.0));
+    }
+}
+
+#[test]
+fn products_match_nalgebra_for_every_edge() {
+    at_each_level(|| {
+        for rows in 1..20 {
+            for columns in [1, 2, 3, 4, 5, 7, 8, 9, 12, 17, rows] {
+                for length in [0, 1, 6, 13, rows] {
+                    let a = DMatrix::from_fn(rows, length, entry);
+                    let b = DMatrix::from_fn(columns, length, |i, j| entry(j, i + 3));
+                    check_products(&a, &b);
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn products_with_a_triangle_match_nalgebra() {
+    at_each_level(|| {
+        for n in 1..20 {
+            let upper = DMatrix::from_fn(n, n, |i, j| if i <= j { entry(i, j) } else { 0.0 });
+            let full = DMatrix::from_fn(n, n, |i, j| entry(j, i));
+            let (upper, other) = (&upper, &full);
+            let ((u, ldu), (f, ldf)) = (padded(upper), padded(other));
+            let (u, f, mut c) = (View::new(&u, ldu), View::new(&f, ldf), vec![0.0; ldu * n]);
+            let expected = [other * upper.transpose(), upper * other.transpose()];
+            product_with_upper(&mut c, ldu, [n, n], f, u);
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                assert!((c[j * ldu + i] - expected[0][(i, j)]).abs() < TOLERANCE);
+            }
+            product_of_upper_lower(&mut c, ldu, n, u, f);
+            for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                assert!((c[j * ldu + i] - expected[1][(i, j)]).abs() < TOLERANCE);
+            }
+        }
+    });
+}
