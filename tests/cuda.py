@@ -9,7 +9,6 @@ expected one is not in the result.
 """
 
 import argparse
-import ctypes
 import importlib.util
 import re
 import subprocess
@@ -18,11 +17,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import condyle
-import condyle.codegen
+import condyle.cuda
 
 WHEELS = ["nvidia-cuda-nvrtc-cu12==12.9.86", "nvidia-cuda-nvcc-cu12==12.9.86"]
-ARCHITECTURE = "90"
-"""Hopper, by its compute capability."""
+CAPABILITY = (9, 0)
+"""Hopper."""
 FUNCTIONS = {
     "arm7": ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives", "frames", "centroidal"],
     "quadruped": ["rnea", "aba", "rnea_derivatives", "aba_derivatives", "constrained_dynamics"],
@@ -44,41 +43,15 @@ def wheel(pattern: str) -> Path | None:
     return None
 
 
-def ptx(nvrtc: ctypes.CDLL, text: str, name: str) -> bytes:
-    """The text in NVIDIA's intermediate language."""
-    program = ctypes.c_void_p()
-    check(nvrtc, nvrtc.nvrtcCreateProgram(ctypes.byref(program), text.encode(), name.encode(), 0, None, None))
-    options = [f"--gpu-architecture=compute_{ARCHITECTURE}".encode()]
-    status = nvrtc.nvrtcCompileProgram(program, len(options), (ctypes.c_char_p * len(options))(*options))
-    if status != 0:
-        size = ctypes.c_size_t()
-        nvrtc.nvrtcGetProgramLogSize(program, ctypes.byref(size))
-        log = ctypes.create_string_buffer(size.value)
-        nvrtc.nvrtcGetProgramLog(program, log)
-        sys.exit(f"{name}: {log.value.decode()}")
-    size = ctypes.c_size_t()
-    check(nvrtc, nvrtc.nvrtcGetPTXSize(program, ctypes.byref(size)))
-    made = ctypes.create_string_buffer(size.value)
-    check(nvrtc, nvrtc.nvrtcGetPTX(program, made))
-    nvrtc.nvrtcDestroyProgram(ctypes.byref(program))
-    return made.value
-
-
-def check(nvrtc: ctypes.CDLL, status: int) -> None:
-    if status != 0:
-        nvrtc.nvrtcGetErrorString.restype = ctypes.c_char_p
-        sys.exit(f"nvrtc: {nvrtc.nvrtcGetErrorString(status).decode()}")
-
-
 def resources(ptxas: Path, made: bytes) -> str:
     """What the assembler says that kernels use."""
     with TemporaryDirectory() as folder:
         source = Path(folder) / "kernel.ptx"
-        source.write_bytes(made)
+        source.write_bytes(made.rstrip(b"\0"))
         call = [
             ptxas,
             "--verbose",
-            f"--gpu-name=sm_{ARCHITECTURE}",
+            f"--gpu-name=sm_{CAPABILITY[0]}{CAPABILITY[1]}",
             source,
             "--output-file",
             Path(folder) / "kernel.cubin",
@@ -97,21 +70,19 @@ def main() -> None:
         if subprocess.run(call, check=False).returncode != 0:
             print("NOT RUN: NVIDIA's compilers cannot be installed here")
             return
-    library, ptxas = wheel("cuda_nvrtc/lib/libnvrtc.so.*"), wheel("cuda_nvcc/bin/ptxas")
-    if library is None or ptxas is None:
+    ptxas = wheel("cuda_nvcc/bin/ptxas")
+    if ptxas is None or wheel("cuda_nvrtc/lib/libnvrtc.so.*") is None:
         print(f"NOT RUN: NVIDIA's compilers are not installed (pip install {' '.join(WHEELS)})")
         return
-    nvrtc = ctypes.CDLL(str(library))
     print("robot, kernel, type: registers, bytes of stack, of spills (stores, loads)")
     for robot, names in FUNCTIONS.items():
         model = getattr(condyle.robots, robot)()
         frames = FRAMES[robot]
         contacts = [condyle.ContactConstraint(frame, "point") for frame in frames]
-        for language, real in (("cuda", "f64"), ("cuda-float", "f32")):
+        for dtype, real in (("float64", "f64"), ("float32", "f32")):
             for name in names:
-                files = condyle.codegen.source(model, name, language, frames=frames, constraints=contacts)
-                [(file, text)] = files.items()
-                said = resources(ptxas, ptx(nvrtc, text, file))
+                options = {"capability": CAPABILITY, "frames": frames, "constraints": contacts}
+                said = resources(ptxas, condyle.cuda.ptx(model, name, dtype=dtype, **options))
                 kernel = f"{robot}_{name}"
                 registers = {entry: int(count) for entry, count in REGISTERS.findall(said)}
                 used = {entry: numbers for entry, *numbers in USAGE.findall(said)}
