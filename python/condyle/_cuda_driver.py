@@ -7,11 +7,10 @@ import threading
 from collections import deque
 from collections.abc import Sequence
 from ctypes import POINTER, byref, c_char_p, c_int, c_size_t, c_uint, c_uint64, c_void_p
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-_HANDLE, _ADDRESS = c_void_p, c_uint64
+_HANDLE = c_void_p
 _DRIVER: dict[str, list[Any]] = {
     "cuInit": [c_uint],
     "cuGetErrorName": [c_int, POINTER(c_char_p)],
@@ -24,11 +23,11 @@ _DRIVER: dict[str, list[Any]] = {
     "cuCtxPushCurrent_v2": [_HANDLE],
     "cuCtxPopCurrent_v2": [POINTER(_HANDLE)],
     "cuCtxSynchronize": [],
-    "cuMemAlloc_v2": [POINTER(_ADDRESS), c_size_t],
-    "cuMemFree_v2": [_ADDRESS],
-    "cuMemcpyHtoDAsync_v2": [_ADDRESS, c_void_p, c_size_t, _HANDLE],
-    "cuMemcpyDtoHAsync_v2": [c_void_p, _ADDRESS, c_size_t, _HANDLE],
-    "cuPointerGetAttribute": [c_void_p, c_int, _ADDRESS],
+    "cuMemAlloc_v2": [POINTER(c_uint64), c_size_t],
+    "cuMemFree_v2": [c_uint64],
+    "cuMemcpyHtoDAsync_v2": [c_uint64, c_void_p, c_size_t, _HANDLE],
+    "cuMemcpyDtoHAsync_v2": [c_void_p, c_uint64, c_size_t, _HANDLE],
+    "cuPointerGetAttribute": [c_void_p, c_int, c_uint64],
     "cuStreamSynchronize": [_HANDLE],
     "cuStreamWaitEvent": [_HANDLE, _HANDLE, c_uint],
     "cuEventCreate": [POINTER(_HANDLE), c_uint],
@@ -114,9 +113,16 @@ class Driver:
         return ", ".join(said)
 
 
-@cache
+_MADE: dict[object, Any] = {}
+"""What has been loaded: "driver", "compiler", and devices by their numbers."""
+
+
 def driver() -> Driver:
-    return Driver()
+    """The driver, loaded when it is first asked for."""
+    if "driver" not in _MADE:
+        _MADE["driver"] = Driver()
+    made: Driver = _MADE["driver"]
+    return made
 
 
 def names() -> list[str]:
@@ -190,9 +196,12 @@ class Device:
         dropped.clear()  # without the lock: what is let go of may run anything
 
 
-@cache
 def device(ordinal: int) -> Device:
-    return Device(ordinal)
+    """The device of that number."""
+    if ordinal not in _MADE:
+        _MADE[ordinal] = Device(ordinal)
+    made: Device = _MADE[ordinal]
+    return made
 
 
 class Memory:
@@ -340,6 +349,9 @@ class Compiler:
         return buffer.raw
 
 
-@cache
 def compiler() -> Compiler:
-    return Compiler()
+    """The compiler, loaded when it is first asked for."""
+    if "compiler" not in _MADE:
+        _MADE["compiler"] = Compiler()
+    made: Compiler = _MADE["compiler"]
+    return made

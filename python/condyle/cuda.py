@@ -36,7 +36,6 @@ from ._types import ContactConstraint
 
 __all__ = ["DeviceArray", "Kernel", "array", "compile", "devices", "ptx"]
 
-Real = Literal["float64", "float32"]
 _LANGUAGES = {"float64": "cuda", "float32": "cuda-float"}
 _PLACES = 2**31 - 1
 """Places in arrays are numbers of 32 bits."""
@@ -50,7 +49,7 @@ def devices() -> list[str]:
     return _cuda_driver.names()
 
 
-def array(numbers: ArrayLike, dtype: Real | None = None, *, device: int = 0) -> DeviceArray:
+def array(numbers: ArrayLike, dtype: Literal["float64", "float32"] | None = None, *, device: int = 0) -> DeviceArray:
     """A copy of an array in the memory of a device, in row order: of NumPy's or what NumPy understands.
 
     Raises `RuntimeError` if there is no driver, or too little memory.
@@ -115,7 +114,9 @@ class Kernel:
     It may be called from several threads at a time.
     """
 
-    def __init__(self, name: str, dtype: Real, function: Function, inputs: list[Any], outputs: list[Any]) -> None:
+    def __init__(
+        self, name: str, dtype: Literal["float64", "float32"], function: Function, inputs: list[Any], outputs: list[Any]
+    ) -> None:
         self.name: str = name
         self.dtype: np.dtype[Any] = np.dtype(dtype)
         self._real: str = dtype
@@ -221,7 +222,9 @@ class Kernel:
         device.hold(event, lent)
 
 
-def _generated(model: Model, name: str, dtype: Real, options: dict[str, Any]) -> tuple[str, str, Any]:
+def _generated(
+    model: Model, name: str, dtype: Literal["float64", "float32"], options: dict[str, Any]
+) -> tuple[str, str, Any]:
     """The symbol of a kernel, its text, and what it takes and gives."""
     if dtype not in _LANGUAGES:
         raise ValueError(f"dtype: expected 'float64' or 'float32', found {dtype!r}")
@@ -233,7 +236,7 @@ def ptx(
     model: Model,
     name: str,
     *,
-    dtype: Real = "float64",
+    dtype: Literal["float64", "float32"] = "float64",
     capability: tuple[int, int] = (7, 5),
     frames: Sequence[str] = (),
     constraints: Sequence[ContactConstraint] = (),
@@ -266,7 +269,7 @@ def compile(  # noqa: A001
     model: Model,
     name: str,
     *,
-    dtype: Real = "float64",
+    dtype: Literal["float64", "float32"] = "float64",
     device: int = 0,
     frames: Sequence[str] = (),
     constraints: Sequence[ContactConstraint] = (),

@@ -36,12 +36,9 @@ def cuda_libraries(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[P
     patch.setenv("CONDYLE_CUDA_LIBRARY", str(driver))
     patch.setenv("CONDYLE_NVRTC_LIBRARY", str(compiler))
     patch.setenv("CONDYLE_CACHE", str(tmp_path_factory.mktemp("cache")))
-    caches = (_cuda_driver.driver, _cuda_driver.device, _cuda_driver.compiler)
-    for made in caches:
-        made.cache_clear()
+    _cuda_driver._MADE.clear()
     yield driver, compiler
-    for made in caches:
-        made.cache_clear()
+    _cuda_driver._MADE.clear()
     patch.undo()
 
 
