@@ -1,17 +1,34 @@
 //! Copies of matrices: whole ones, triangles and transposes.
 #![allow(unsafe_code)]
 
-use crate::compiled::compiled;
+use crate::compiled::{compiled, narrow};
 use crate::registers::Vector;
 use crate::tile::{SLACK, View, holds};
 use crate::vectors::copy;
 
-compiled! {
+narrow! {
     /// OUT = A, on `rows` rows and `columns` columns.
     pub fn copy_matrix<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
         copy_block::<V>(out, ldo, a, shape);
     }
 
+    /// OUT = the symmetric matrix whose lower triangle is that of A, of `size` rows, turned: row i of A is row i + `turn` of OUT,
+    /// counted around, and so are its columns. Both have slack rows; those of OUT change.
+    pub fn copy_symmetric_turned<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize, turn: usize) {
+        turned::<V>(out, ldo, a, [size - turn, turn]);
+    }
+
+    /// OUT = A on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², where some entries may count two
+    /// or three times: enough to see whether one has diverged.
+    pub fn copy_with_squares<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) -> f64 {
+        match out.is_empty() {
+            true => squares::<V, false>(out, 0, a, shape),
+            false => squares::<V, true>(out, ldo, a, shape),
+        }
+    }
+}
+
+compiled! {
     /// The lower triangle of OUT = that of A, both square of `size` rows.
     pub fn copy_lower<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
         lower::<V>(out, ldo, a, size);
@@ -28,21 +45,6 @@ compiled! {
             j += V::N;
         }
         lower::<V>(out, ldo, a, size);
-    }
-
-    /// OUT = the symmetric matrix whose lower triangle is that of A, of `size` rows, turned: row i of A is row i + `turn` of OUT,
-    /// counted around, and so are its columns. Both have slack rows; those of OUT change.
-    pub fn copy_symmetric_turned<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize, turn: usize) {
-        turned::<V>(out, ldo, a, [size - turn, turn]);
-    }
-
-    /// OUT = A on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², where some entries may count two
-    /// or three times: enough to see whether one has diverged.
-    pub fn copy_with_squares<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) -> f64 {
-        match out.is_empty() {
-            true => squares::<V, false>(out, 0, a, shape),
-            false => squares::<V, true>(out, ldo, a, shape),
-        }
     }
 
     /// OUT = Aᵀ, for an A of `rows` rows and `columns` columns.
@@ -100,20 +102,6 @@ unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: u
     unsafe { V::load(x.get_unchecked(from..from + V::N)).store(to.get_unchecked_mut(at..at + V::N)) };
 }
 
-/// Copies some numbers in whole registers, of which the last one may reach N − 1 numbers further.
-///
-/// # Safety
-/// Both have so many numbers there.
-#[inline(always)]
-unsafe fn move_rows<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: usize, count: usize) {
-    let mut i = 0;
-    while i < count {
-        // SAFETY: by the caller.
-        unsafe { move_register::<V>(to, at + i, x, from + i) };
-        i += V::N;
-    }
-}
-
 /// Copies a block of N rows and columns, or minus the block, from a place in `x` to its transpose's place in `to`.
 ///
 /// # Safety
@@ -144,6 +132,26 @@ unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
     }
 }
 
+/// The first row of the block after that of row i, of `size` rows in all; `size` if there is none.
+#[inline(always)]
+fn next_block<V: Vector>(i: usize, size: usize) -> usize {
+    if i + V::N >= size { size } else { (i + V::N).min(size - V::N) }
+}
+
+/// Copies a block of N rows and columns to a place in `to`, and its transpose to another.
+///
+/// # Safety
+/// As of [`move_transposed`].
+#[inline(always)]
+unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[f64], from: usize, ldx: usize) {
+    for k in 0..V::N {
+        // SAFETY: by the caller.
+        unsafe { move_register::<V>(to, at[0] + k * ldo, x, from + k * ldx) };
+    }
+    // SAFETY: by the caller.
+    unsafe { move_transposed::<V, false>(to, at[1], ldo, x, from, ldx) };
+}
+
 /// See [`copy_symmetric_turned`]: A = [VV ·; QV QQ] with `split` and `turn` rows becomes [QQ QV; VQ VV].
 #[inline(always)]
 fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [usize; 2]) {
@@ -163,40 +171,38 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         }
         return;
     }
-    // What a register writes behind the rows that are meant is slack, or is written later.
-    // SAFETY: both matrices have `size` columns of `size` rows and N − 1 more.
-    unsafe {
-        for j in 0..if turn > 0 { split } else { 0 } {
-            move_rows::<V>(out, (turn + j) * ldo, x, j * stride + split, turn); // QV
-        }
-        for (to, from, size) in [(turn, 0, split), (0, split, turn)] {
-            if size == 0 {
-                continue;
+    // In square blocks, of which the last ones overlap those before.
+    for (to, from, size) in [(turn, 0, split), (0, split, turn)] {
+        let (to, from, mut j) = (to * (ldo + 1), from * (stride + 1), 0);
+        while j < size {
+            let (at, from) = (to + j * (ldo + 1), from + j * (stride + 1));
+            // SAFETY: both matrices have `size` columns of `size` rows and N − 1 more.
+            unsafe { move_transposed::<V, false>(out, at, ldo, x, from, stride) };
+            for k in 0..V::N {
+                // Over what lies below the diagonal; behind the last row is slack, or what is written later.
+                // SAFETY: as above.
+                unsafe { move_register::<V>(out, at + k * (ldo + 1), x, from + k * (stride + 1)) };
             }
-            let (to, from) = (to * (ldo + 1), from * (stride + 1));
-            // the upper triangle, in blocks of which the last ones overlap those before; then the lower one
-            let mut j = 0;
-            loop {
-                let mut i = j;
-                loop {
-                    move_transposed::<V, false>(out, to + i * ldo + j, ldo, x, from + j * stride + i, stride);
-                    if i + V::N >= size {
-                        break;
-                    }
-                    i = (i + V::N).min(size - V::N);
-                }
-                if j + V::N >= size {
-                    break;
-                }
-                j = (j + V::N).min(size - V::N);
+            let mut i = next_block::<V>(j, size);
+            while i < size {
+                let (low, high, from) = (to + j * ldo + i, to + i * ldo + j, from - j + i);
+                // SAFETY: as above.
+                unsafe { move_both::<V>(out, [low, high], ldo, x, from, stride) };
+                i = next_block::<V>(i, size);
             }
-            for j in 0..size {
-                move_rows::<V>(out, to + j * (ldo + 1), x, from + j * (stride + 1), size - j);
-            }
+            j = next_block::<V>(j, size);
         }
-        if turn > 0 {
-            transposed::<V, false>(&mut out[turn..], ldo, a.at(split, 0), [turn, split]); // VQ
+    }
+    let mut j = if turn > 0 { 0 } else { split };
+    while j < split {
+        let mut i = 0;
+        while i < turn {
+            let (from, places) = (j * stride + split + i, [(turn + j) * ldo + i, i * ldo + turn + j]);
+            // SAFETY: as above.
+            unsafe { move_both::<V>(out, places, ldo, x, from, stride) }; // QV and VQ
+            i = next_block::<V>(i, turn);
         }
+        j = next_block::<V>(j, split);
     }
 }
 
@@ -219,7 +225,7 @@ fn squares<V: Vector, const COPY: bool>(out: &mut [f64], ldo: usize, a: View<'_>
         }
     }
     let (last, mut i) = (rows.saturating_sub(V::N), 0);
-    while rows >= V::N {
+    while i <= last && rows >= V::N {
         let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
         for _ in 0..columns {
             for (sum, i) in sums.iter_mut().zip([i, k]) {
@@ -234,10 +240,7 @@ fn squares<V: Vector, const COPY: bool>(out: &mut [f64], ldo: usize, a: View<'_>
             }
             (at, from) = (at + ldo, from + a.stride);
         }
-        if k == last {
-            break;
-        }
-        i = (k + V::N).min(last);
+        i = if k == last { rows } else { (k + V::N).min(last) };
     }
     let mut numbers = [0.0; SLACK];
     sums[0].add(sums[1]).store(&mut numbers);

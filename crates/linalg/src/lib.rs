@@ -53,7 +53,7 @@ pub use product::{
     add_blocks, add_in_turn, add_matrix, add_product, add_product_lower, add_transposed_product_lower, product,
     product_of_upper_lower, product_with_upper, product_without_slack,
 };
-pub use registers::{Vector, Vectorized, at_level};
+pub use registers::{Vector, Vectorized, at_level, at_narrow_level};
 pub use small_elimination::eliminate_sum;
 pub use tile::{SLACK, View};
 pub use vectors::{add_product_vector, add_scaled_product, copy, copy_scaled, dot, max_abs, transposed_product_vector};

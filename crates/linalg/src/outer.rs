@@ -24,36 +24,33 @@ impl SparseRows {
     }
 
     /// Notes which blocks are not zero.
+    #[inline(always)]
     pub fn mark(&mut self, stride: usize) {
-        mark_rows(&mut self.masks, &self.numbers, stride);
+        for (to, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
+            *to = mask(row);
+        }
     }
 }
 
 /// The blocks of a row that are not zero: bit k stands for the columns from k times [`block`] on.
+#[inline(always)]
 pub fn mask(row: &[f64]) -> u64 {
-    let mut masks = [0];
-    mark_rows(&mut masks, row, row.len());
-    masks[0]
+    let (fours, rest) = row.as_chunks::<4>();
+    let (wide, mut last, mut mask) = (block(row.len()).trailing_zeros() - 2, [0.0; 4], 0);
+    for (k, x) in fours.iter().enumerate() {
+        mask |= u64::from(any(x)) << (k >> wide);
+    }
+    if rest.is_empty() {
+        return mask;
+    }
+    last[..rest.len()].copy_from_slice(rest);
+    mask | u64::from(any(&last)) << (fours.len() >> wide)
 }
 
-compiled! {
-    /// The [`mask`] of each row of `stride` numbers.
-    fn mark_rows<V, COLUMNS>(masks: &mut [u64], numbers: &[f64], stride: usize) {
-        let wide = block(stride) / 8;
-        for (to, row) in masks.iter_mut().zip(numbers.chunks_exact(stride)) {
-            let (eights, rest) = row.as_chunks::<8>();
-            let (mut last, mut mask, mut bit, mut left) = ([0.0; 8], 0, 1, wide);
-            for x in eights {
-                mask |= if V::any(x) { bit } else { 0 };
-                left -= 1;
-                if left == 0 {
-                    (bit, left) = (bit << 1, wide);
-                }
-            }
-            last[..rest.len()].copy_from_slice(rest);
-            *to = if V::any(&last) { mask | bit } else { mask };
-        }
-    }
+/// Whether one of four numbers is not zero: one that has a bit beside its sign, as a NaN has.
+#[inline(always)]
+fn any(x: &[f64; 4]) -> bool {
+    (x[0].to_bits() | x[1].to_bits() | x[2].to_bits() | x[3].to_bits()) << 1 != 0
 }
 
 /// y −= Σ aᵢ xᵢ in whole registers: less than one at the end, if there is less, stays.
@@ -81,7 +78,7 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
 /// The number of columns that one bit of a [`mask`] stands for, in rows of `stride` numbers: a power of two.
 #[inline(always)]
 pub fn block(stride: usize) -> usize {
-    8 * stride.div_ceil(8 * 64).next_power_of_two()
+    4 * stride.div_ceil(4 * 64).next_power_of_two()
 }
 
 /// A run of outer products, of some rows on the left, one after the other, each with one of as many on the right.
@@ -94,15 +91,14 @@ struct Run {
     masks: [u64; 2],
 }
 
-/// A run that some columns of the sum have a part in.
+/// Where a run is in the rows.
 #[derive(Debug, Clone, Copy, Default)]
-struct Active {
-    /// The places of its first rows.
+struct Place {
+    /// The first numbers on the left and on the right.
     at: [usize; 2],
-    /// The numbers from its first row on the left to behind its last.
+    /// The numbers from the first row on the left to behind the last.
     length: usize,
-    /// The mask of its rows on the left.
-    mask: u64,
+    masks: [u64; 2],
 }
 
 /// A sum Σ left rightᵀ of outer products, without the blocks that are zero. Each row has a number more than the sum has
@@ -118,15 +114,15 @@ pub struct OuterProducts {
     /// The number of rows.
     count: usize,
     runs: Vec<Run>,
-    /// Scratch for the runs of a block of columns. Shape: runs.
-    active: Vec<Active>,
+    /// Scratch for the places of the runs.
+    places: Vec<Place>,
 }
 
 impl OuterProducts {
     /// Room for `numbers` numbers of all rows together, and for `products` products.
     pub fn with_capacity(numbers: usize, products: usize) -> Self {
-        let active = Vec::with_capacity(products);
-        Self { rows: vec![0.0; numbers], runs: Vec::with_capacity(products), active, ..Self::default() }
+        let places = Vec::with_capacity(products);
+        Self { rows: vec![0.0; numbers], runs: Vec::with_capacity(products), places, ..Self::default() }
     }
 
     /// An empty sum with `size` columns, of rows that are `stride` apart.
@@ -193,9 +189,12 @@ impl OuterProducts {
     /// Adds the lower triangle of the sum, and the gradient below it, to H (with some of what is above the diagonal). H has
     /// slack rows.
     pub fn add_to(&mut self, h: &mut [f64], ldh: usize) {
-        let Self { rows, stride, size, runs, active, .. } = self;
-        active.resize(runs.len(), Active::default());
-        add_products(h, ldh, Sum { rows, stride: *stride, size: *size, runs }, active);
+        let Self { rows, stride, size, runs, places, .. } = self;
+        places.clear();
+        for &Run { rows, count, masks } in &*runs {
+            places.push(Place { at: rows.map(|row| row * *stride), length: count * *stride, masks });
+        }
+        add_products(h, ldh, Sum { rows, stride: *stride, size: *size, places });
     }
 }
 
@@ -205,45 +204,31 @@ struct Sum<'a> {
     rows: &'a [f64],
     stride: usize,
     size: usize,
-    runs: &'a [Run],
+    places: &'a [Place],
 }
 
 compiled! {
     /// See [`OuterProducts::add_to`].
-    fn add_products<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: Sum<'_>, active: &mut [Active]) {
-        let Sum { rows, stride, size, runs } = sum;
+    fn add_products<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: Sum<'_>) {
+        let Sum { rows, stride, size, places } = sum;
         assert!(size + SLACK <= stride, "rows without slack");
-        let (wide, most) = (block(stride).trailing_zeros(), rows.len() / stride);
-        for Run { rows: [left, right], count, .. } in runs {
-            assert!(left.max(right) + count <= most, "a product of rows that there are not");
+        for Place { at: [left, right], length, .. } in places {
+            let inside = [left, right].iter().all(|at| **at <= rows.len() && *length <= rows.len() - **at);
+            assert!(inside, "a product of rows that there are not");
         }
-        assert!(active.len() >= runs.len(), "too little scratch");
-        let (mut j, mut many, mut listed) = (0, 0, 0);
+        let (wide, mut j) = (block(stride).trailing_zeros(), 0);
         while j < size {
-            let columns = bits(wide, j, COLUMNS.min(size - j));
-            if columns != listed {
-                (many, listed) = (0, columns);
-                for run in runs {
-                    let [left, right] = run.rows;
-                    debug_assert!(many < active.len());
-                    // SAFETY: there are as many places as runs, and each takes one at most.
-                    let place = unsafe { active.get_unchecked_mut(many) };
-                    let (at, length) = ([left * stride, right * stride], run.count * stride);
-                    *place = Active { at, length, mask: run.masks[0] };
-                    many += usize::from(run.masks[1] & columns != 0);
-                }
-            }
-            let (active, mut i) = (&active[..many], j);
+            let (columns, mut i) = (bits(wide, j, COLUMNS.min(size - j)), j);
             while i <= size {
                 let strip = next_strip::<V>(size + 1 - i);
-                let mask = bits(wide, i, strip * V::N);
-                // SAFETY: the places in `active` are those of rows that exist, of which each has `stride` numbers, and the
-                // last of the strip's at most `SLACK` behind the sum's size.
+                let masks = [bits(wide, i, strip * V::N), columns];
+                // SAFETY: the places are those of rows that exist, of which each has `stride` numbers, and the last of the
+                // strip's is at most `SLACK` behind the sum's size.
                 unsafe {
                     match strip {
-                        1 => add_strip::<V, 1, COLUMNS>(h, ldh, sum, active, mask, [i, j]),
-                        2 => add_strip::<V, 2, COLUMNS>(h, ldh, sum, active, mask, [i, j]),
-                        _ => add_strip::<V, 3, COLUMNS>(h, ldh, sum, active, mask, [i, j]),
+                        1 => add_strip::<V, 1, COLUMNS>(h, ldh, sum, masks, [i, j]),
+                        2 => add_strip::<V, 2, COLUMNS>(h, ldh, sum, masks, [i, j]),
+                        _ => add_strip::<V, 3, COLUMNS>(h, ldh, sum, masks, [i, j]),
                     }
                 }
                 i += strip * V::N;
@@ -269,13 +254,12 @@ unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
     h: &mut [f64],
     ldh: usize,
     sum: Sum<'_>,
-    active: &[Active],
-    mask: u64,
+    masks: [u64; 2],
     [i, j]: [usize; 2],
 ) {
     let mut tile = [[V::splat(0.0); S]; COLUMNS];
-    for run in active {
-        if run.mask & mask == 0 {
+    for run in sum.places {
+        if run.masks[0] & masks[0] == 0 || run.masks[1] & masks[1] == 0 {
             continue;
         }
         let [left, right] = run.at;

@@ -39,8 +39,6 @@ pub trait Vector: Copy {
     fn mul(self, b: Self) -> Self;
     /// The transpose of N registers: number i of register k becomes number k of register i.
     fn transpose(rows: &mut [Self]);
-    /// Whether one of eight numbers is not zero; a NaN is not.
-    fn any(x: &[f64; 8]) -> bool;
 }
 
 /// Two numbers, which the compiler keeps in a register of the kind that every processor has.
@@ -84,14 +82,6 @@ impl Vector for Pair {
         let (a, b) = (rows[0].0, rows[1].0);
         (rows[0], rows[1]) = (Self([a[0], b[0]]), Self([a[1], b[1]]));
     }
-    #[inline(always)]
-    fn any(x: &[f64; 8]) -> bool {
-        let mut any = false;
-        for i in 0..8 {
-            any |= x[i] != 0.0;
-        }
-        any
-    }
 }
 
 impl<S: Block<Number = f64>> Vector for S {
@@ -129,16 +119,6 @@ impl<S: Block<Number = f64>> Vector for S {
     fn transpose(rows: &mut [Self]) {
         Block::transpose(rows);
     }
-    #[inline(always)]
-    fn any(x: &[f64; 8]) -> bool {
-        let (zero, one) = (<S as Scalar>::zero(), S::one());
-        let least = <S as Scalar>::splat(f64::from_bits(1)); // only zeros are smaller
-        let mut any = zero;
-        for x in x.chunks_exact(S::LANES) {
-            any = S::select(<S as Block>::load(x).abs().lt(least), any, one);
-        }
-        S::any(zero.lt(any))
-    }
 }
 
 /// Work with vector loops, generic over the registers; see [`at_level`].
@@ -170,18 +150,28 @@ pub trait Vectorized: Sized {
 /// assert_eq!(x, [3.0; 8]);
 /// ```
 pub fn at_level(work: impl Vectorized) {
-    /// Work on registers V, as the gate takes it.
-    struct On<W, V>(W, PhantomData<V>);
-    impl<W: Vectorized, V: Vector> Kernel for On<W, V> {
-        #[inline(always)]
-        fn run(self) {
-            self.0.run::<V>();
-        }
-    }
     match level() {
         #[cfg(target_arch = "x86_64")]
         Level::Avx512 => Long::enter(On::<_, Long>(work, PhantomData)),
+        _ => at_narrow_level(work),
+    }
+}
+
+/// As [`at_level`], with registers of four numbers at most: for work that mostly moves rows, of which many are shorter than
+/// eight numbers.
+pub fn at_narrow_level(work: impl Vectorized) {
+    match level() {
         Level::Baseline => work.run::<Pair>(),
         _ => Short::enter(On::<_, Short>(work, PhantomData)),
+    }
+}
+
+/// Work on registers V, as the gate takes it.
+struct On<W, V>(W, PhantomData<V>);
+
+impl<W: Vectorized, V: Vector> Kernel for On<W, V> {
+    #[inline(always)]
+    fn run(self) {
+        self.0.run::<V>();
     }
 }

@@ -1,14 +1,14 @@
 //! The elimination of a few columns of a small matrix, with a sum of squares that comes into its tiles as they are computed.
 #![allow(unsafe_code, non_snake_case)] // H, X
 
-use crate::compiled::compiled;
+use crate::compiled::narrow;
 use crate::registers::Vector;
 use crate::tile::{View, add_outer, has_strip, holds};
 
 /// Columns of a tile.
 const COLUMNS: usize = 4;
 
-compiled! {
+narrow! {
     /// As [`eliminate`](crate::eliminate), of H + Σ xₖ xₖᵀ for columns x of X. `shape` = [rows, columns, m], and `length` = [numbers
     /// in a column of X, columns]; behind these numbers, up to four registers behind H's last row, X has zeros. H has slack rows.
     ///

@@ -188,11 +188,18 @@ pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
         }
         return;
     }
+    // Two registers at a time, of which the last ones may overlap those before.
     let (a, last, mut i) = (V::splat(a), length - V::N, 0);
-    while i < last {
-        // SAFETY: i + N < length, and both have so many numbers.
-        unsafe { V::load(x.get_unchecked(i..i + V::N)).mul(a).store(to.get_unchecked_mut(i..i + V::N)) };
-        i += V::N;
+    loop {
+        let k = (i + V::N).min(last);
+        // SAFETY: i and k are N or more before the end, and both have so many numbers.
+        unsafe {
+            V::load(x.get_unchecked(i..i + V::N)).mul(a).store(to.get_unchecked_mut(i..i + V::N));
+            V::load(x.get_unchecked(k..k + V::N)).mul(a).store(to.get_unchecked_mut(k..k + V::N));
+        }
+        if k == last {
+            return;
+        }
+        i = (k + V::N).min(last);
     }
-    V::load(&x[last..]).mul(a).store(&mut to[last..]);
 }

@@ -20,7 +20,7 @@ pub(crate) struct InverseDynamicsForm {
     pub(crate) own: Vec<[usize; 3]>,
     /// The other coordinates.
     pub(crate) dependent: Vec<usize>,
-    /// U: δu = U (w, δv, δq).
+    /// U: δu = U (w, δv, δq). Its masks are not written: not every form reads them.
     pub(crate) efforts: SparseRows,
     /// D, a row for each dependent coordinate.
     pub(crate) steps: SparseRows,

@@ -16,7 +16,8 @@ use super::super::node::{LqKnot, LqNode};
 use super::super::workspace::Workspace;
 use super::{Controls, Curvature, Form, inverse_dynamics};
 use condyle_linalg::{
-    SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_level, copy_scaled, eliminate_sum, transpose_block,
+    SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_narrow_level, copy_scaled, eliminate_sum,
+    transpose_block,
 };
 
 /// The most coordinates. More are better off where the zeros of rows are known.
@@ -66,7 +67,7 @@ impl Form for Driven {
     /// H but for the squares, and below it U.
     fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
         self.count = node.nu() + node.inverse_dynamics.slopes.len();
-        at_level(Write { rows: &mut self.rows, stride: self.stride, work, node, regularisation });
+        at_narrow_level(Write { rows: &mut self.rows, stride: self.stride, work, node, regularisation });
     }
 
     fn write_below(&mut self, _: &mut Workspace, _: &LqNode, _: &[f64]) {

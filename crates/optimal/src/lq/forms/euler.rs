@@ -8,7 +8,7 @@ use super::dense::{add_to_diagonal, write_cost};
 use super::{Curvature, Form};
 use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_in_turn, add_matrix, add_product_lower, add_transposed_product_lower,
-    at_level, product, transpose,
+    at_narrow_level, product, transpose,
 };
 
 /// The form of Euler steps with the controls as unknowns, and with the states in the order (v, q).
@@ -106,7 +106,7 @@ impl Steps {
         let (dt, blocks) = steps_of(node);
         let n = node.ndx();
         times_blocks(&mut self.PB, &work.P, n + SLACK, n, blocks, |block| &block.E);
-        at_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
+        at_narrow_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
     }
 
     /// H_qq += TᵀP₁₁T,   Qx_q += Tᵀp_q.
@@ -115,7 +115,7 @@ impl Steps {
         let (nv, ld) = (n / 2, work.stride(m));
         let Workspace { P, p, H, .. } = work;
         times_blocks(&mut self.PB, P, n + SLACK, nv, blocks, |block| &block.T);
-        at_level(AddPositions { steps: self, P, p, H: &mut H[(m + nv) * (ld + 1)..], ld, blocks });
+        at_narrow_level(AddPositions { steps: self, P, p, H: &mut H[(m + nv) * (ld + 1)..], ld, blocks });
     }
 
     /// Ψ = Δt Θ_q E + Θ_v, in W with the stride of Θ.

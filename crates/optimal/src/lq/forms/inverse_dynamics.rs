@@ -27,8 +27,8 @@ use super::super::workspace::Workspace;
 use super::euler::Steps;
 use super::{Controls, Curvature, Form};
 use condyle_linalg::{
-    OuterProducts, SLACK, Vector, Vectorized, View, add_product, add_product_vector, at_level, copy, copy_block,
-    copy_matrix, eliminate, transpose,
+    OuterProducts, SLACK, Vector, Vectorized, View, add_product, add_product_vector, at_narrow_level, copy_block,
+    copy_matrix, copy_scaled, eliminate, mask, transpose,
 };
 
 /// The form, with its scratch.
@@ -79,7 +79,7 @@ impl Form for InverseDynamics {
         self.steps.write(work, node);
         self.half.resize((count + SLACK) * count, 0.0);
         let Self { steps, products, half, .. } = self;
-        at_level(WriteRows { steps, products, half, node, regularisation, H: &mut work.H, ld });
+        at_narrow_level(WriteRows { steps, products, half, node, regularisation, H: &mut work.H, ld });
 
         // The last rows are D and (Π y + N δq)_d, which becomes Z.
         let Z = products.count() - count;
@@ -220,8 +220,8 @@ impl Vectorized for WriteRows<'_> {
 
         // Uᵀ (R + ϱ 1) U and Gᵀ a″ G
         products.clear(all, size);
-        for (k, (row, &mask)) in imp.efforts.numbers.chunks_exact(size).zip(&imp.efforts.masks).enumerate() {
-            products.square::<V>(row, mask, [node.r[k], imp.diagonal[nv + k] + regularisation]);
+        for (k, row) in imp.efforts.numbers.chunks_exact(size).enumerate() {
+            products.square::<V>(row, mask(row), [node.r[k], imp.diagonal[nv + k] + regularisation]);
         }
         for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
             products.square::<V>(row, mask, slopes);
@@ -231,19 +231,42 @@ impl Vectorized for WriteRows<'_> {
         let first = products.add_rows(count) * size;
         copy_block::<V>(&mut products.rows[first..], size, View::new(&imp.steps.numbers, size), [size, count]);
         let first = products.add_rows(count);
-        for (j, &d) in imp.dependent.iter().enumerate() {
-            let (Pi, N) = (&Pi[d * ldn..][..nv], &N[d * ldn..][..nv]);
-            let row = &mut products.rows[(first + j) * size..][..size];
+        let (mut j, zero) = (0, V::splat(0.0));
+        while j < count {
+            // the rows of coordinates that follow each other
+            let (d, together) = (imp.dependent[j], run(&imp.dependent[j..]));
+            let rows = &mut products.rows[(first + j) * size..];
+            let (own, others) = (View::new(&Pi[d * ldn..], ldn), View::new(&N[d * ldn..], ldn));
             for &[c, k, length] in &imp.own {
-                copy::<V>(&mut row[k..], &Pi[c..c + length]);
+                copy_block::<V>(&mut rows[k..], size, own.at(c, 0), [length, together]);
             }
-            row[forces..m].fill(0.0);
-            copy::<V>(&mut row[m..], Pi);
-            copy::<V>(&mut row[m + nv..], N);
-            row[all] = py[d];
-            for (i, &d) in imp.dependent.iter().enumerate() {
-                half[j * (count + SLACK) + i] = 0.5 * Pi[d]; // symmetric
+            for i in 0..together {
+                let row = &mut rows[i * size..][..size];
+                for zeros in row[forces..].chunks_exact_mut(V::N).take((m - forces).div_ceil(V::N)) {
+                    zero.store(zeros); // and some of what is written next
+                }
+                row[all] = py[d + i];
+                let mut at = 0;
+                while at < count {
+                    let (by, length) = (imp.dependent[at], run(&imp.dependent[at..]));
+                    let half = &mut half[(j + i) * (count + SLACK) + at..];
+                    copy_scaled::<V>(half, &Pi[(d + i) * ldn + by..][..length], 0.5); // symmetric
+                    at += length;
+                }
             }
+            copy_block::<V>(&mut rows[m..], size, own, [nv, together]);
+            copy_block::<V>(&mut rows[m + nv..], size, others, [nv, together]);
+            j += together;
         }
     }
+}
+
+/// How many numbers, of one or more, follow each other.
+#[inline(always)]
+fn run(numbers: &[usize]) -> usize {
+    let mut length = 1;
+    while length < numbers.len() && numbers[length] == numbers[0] + length {
+        length += 1;
+    }
+    length
 }

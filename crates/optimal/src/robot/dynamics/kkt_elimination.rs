@@ -268,7 +268,6 @@ impl Vectorized for Run<'_> {
                 force += 1;
             }
         }
-        form.efforts.mark(size);
         form.steps.mark(size);
         *done = true;
     }
