@@ -2,8 +2,8 @@
 
 use crate::at_each_level;
 use condyle_linalg::{
-    SLACK, View, add_blocks, add_in_turn, add_matrix, add_product, add_product_lower, add_transposed_product_lower,
-    product, product_of_upper_lower, product_with_upper, product_without_slack,
+    SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, add_matrix, add_product, add_product_lower,
+    add_transposed_product_lower, at_level, product, product_of_upper_lower, product_with_upper, product_without_slack,
 };
 use nalgebra::DMatrix;
 
@@ -72,6 +72,38 @@ fn products_match_nalgebra_for_every_edge() {
                     check_products(&a, &b);
                 }
             }
+        }
+    });
+}
+
+/// The sums of some rows and columns, each written to two places.
+struct Sums<'a>(&'a mut [f64], usize, [View<'a>; 2], [usize; 2]);
+
+impl Vectorized for Sums<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self(out, ldo, [a, b], shape @ [rows, columns]) = self;
+        let places = ([0, ldo * columns], [rows, ldo * columns + rows]);
+        add_in_turn::<V, 2, 2>(out, ldo, places, a, b, 0.5, shape);
+        add_blocks::<V>(&mut out[2 * ldo * columns..], ldo, a, b, [2 * rows, columns]);
+    }
+}
+
+#[test]
+fn sums_match_nalgebra_for_every_edge() {
+    at_each_level(|| {
+        for (rows, columns) in (1..12).flat_map(|rows| [1, 2, 5].map(|columns| (rows, columns))) {
+            let [a, b] = [0, 3].map(|k| DMatrix::from_fn(2 * rows, columns, |i, j| entry(i + k, j)));
+            let mut out = DMatrix::zeros(2 * rows, 3 * columns);
+            let views = [&a, &b].map(|x| View::new(x.as_slice(), 2 * rows));
+            at_level(Sums(out.as_mut_slice(), 2 * rows, views, [rows, columns]));
+            let x = a.rows(0, rows) + b.rows(0, rows) * 0.5;
+            let y = a.rows(rows, rows) + (&x + b.rows(rows, rows)) * 0.5;
+            for k in 0..2 {
+                assert!((out.view((0, k * columns), (rows, columns)) - &x).amax() < TOLERANCE);
+                assert!((out.view((rows, k * columns), (rows, columns)) - &y).amax() < TOLERANCE);
+            }
+            assert!((out.columns(2 * columns, columns) - (a + b)).amax() < TOLERANCE);
         }
     });
 }
