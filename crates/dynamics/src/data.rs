@@ -26,7 +26,7 @@ use crate::workspace::{Long, Short, Size};
 use alloc::boxed::Box;
 use condyle_model::Model;
 use condyle_spatial::Scalar;
-use condyle_spatial::gate::{is, renamed};
+use condyle_spatial::gate::{in_use, is, renamed};
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
 ///
@@ -76,6 +76,7 @@ impl<S: Scalar> Data<S> {
         if !S::COMPILED || !is::<R, f64>() {
             return Self::allocate(model);
         }
+        in_use(); // which allocates once, and so must not wait for the first call
         // SAFETY: R is f64, and S is the scalar of the data that is given back.
         unsafe {
             if is::<S, f64>() {
