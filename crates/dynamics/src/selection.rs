@@ -37,6 +37,12 @@ pub(crate) fn inverse_by_gauss_jordan<R>(model: &Model<R>) -> bool {
     chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
 }
 
+/// Whether −M⁻¹ B of recorded numbers is solved by the factor of M, which has so many entries: twice as many products and sums a
+/// column, where a product with M⁻¹ takes nv².
+pub(crate) fn solve_by_factor(nonzeros: usize, nv: usize) -> bool {
+    2 * nonzeros < nv * nv
+}
+
 /// Whether −M⁻¹ B is solved by the articulated bodies. Joints must not share coordinates.
 pub(crate) fn solve_by_tree(columns: &[Column], nv: usize) -> bool {
     let depths: usize = columns.iter().map(|c| c.depth).sum();

@@ -8,7 +8,7 @@
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
-use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
+use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan, solve_by_factor};
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
@@ -64,10 +64,9 @@ impl<S> Workspace<S> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Whether solving by the factor, which there is then, takes fewer operations than a product with M⁻¹.
+    /// Whether there is a factor by which to solve instead of a product with M⁻¹.
     pub(crate) fn has_short_factor(&self) -> bool {
-        let nv = self.Minv.nrows();
-        !self.by_gauss_jordan && 2 * self.factor.nonzeros() < nv * nv
+        !self.by_gauss_jordan && solve_by_factor(self.factor.nonzeros(), self.Minv.nrows())
     }
 
     /// x = M⁻¹ b in place of b, after `from_matrix`.
