@@ -8,7 +8,7 @@
 mod group;
 pub mod kinematics;
 mod motion;
-mod placement;
+pub mod placement;
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
@@ -16,7 +16,6 @@ use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 pub use group::GroupJacobian;
 pub use motion::{ClassicalMotion, JointMotion};
-pub use placement::{Carried, JointPlacement};
 
 /// The kind of a joint, with what it needs to know.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,7 +11,8 @@ use crate::passes::rnea::centripetal;
 use alloc::vec;
 use alloc::vec::Vec;
 use condyle_model::Model;
-use condyle_model::joint::{Carried, ClassicalMotion, Joint, JointMotion, JointPlacement};
+use condyle_model::joint::placement::{Carried, JointPlacement};
+use condyle_model::joint::{ClassicalMotion, Joint, JointMotion};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 
