@@ -67,7 +67,7 @@ def arrows(source: Path) -> dict[Module, set[Module]]:
         uses[module] = set()
         for path in named:
             here, rest = module, list(path)
-            if rest[0] not in ("crate", "super", "self"):
+            if rest[0] not in ("crate", "super", "self") and (*module, rest[0]) not in files:
                 continue
             while rest and rest[0] in ("crate", "super", "self"):
                 first = rest.pop(0)

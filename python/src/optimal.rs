@@ -5,6 +5,7 @@ mod alone;
 mod cones;
 mod costs;
 mod evaluation;
+mod integrators;
 mod inverse;
 mod models;
 mod own;

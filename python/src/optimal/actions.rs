@@ -1,10 +1,10 @@
 //! Actions of robots.
 
 use super::costs::{Cost, Limit};
+use super::integrators;
 use super::robot_action::{Reduced, RobotAction};
 use crate::arrays::{bounds, matrix};
 use crate::constrained::constraint;
-use crate::exceptions::wrong_word;
 use crate::model::Model;
 use condyle::optimal as rust;
 use nalgebra::DMatrix;
@@ -12,32 +12,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rust::robot::{self, Actuation, ControlBounds, ControlPolynomial, Dynamics, Integrator, Knot};
+use rust::robot::{self, Actuation, ControlBounds, ControlPolynomial, Dynamics, Knot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-pub(super) fn integrator(name: &str) -> PyResult<Integrator> {
-    match name {
-        "semi_implicit_euler" => Ok(Integrator::SemiImplicitEuler),
-        "runge_kutta_2" => Ok(Integrator::RungeKutta2),
-        "runge_kutta_3" => Ok(Integrator::RungeKutta3),
-        "runge_kutta_4" => Ok(Integrator::RungeKutta4),
-        other => {
-            let allowed = "'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'";
-            Err(wrong_word("integrator", allowed, other))
-        }
-    }
-}
-
-/// How controls go through the time of a knot.
-pub(super) fn polynomial(name: &str) -> PyResult<ControlPolynomial> {
-    match name {
-        "constant" => Ok(ControlPolynomial::Constant),
-        "linear" => Ok(ControlPolynomial::Linear),
-        "quadratic" => Ok(ControlPolynomial::Quadratic),
-        other => Err(wrong_word("controls", "'constant', 'linear' or 'quadratic'", other)),
-    }
-}
 
 /// The matrix S if one is given, or none, which drives every joint but a free-flyer at the root; and the number of
 /// controls.
@@ -153,7 +130,7 @@ impl FreeDynamics {
             };
             return Ok(Self(RobotAction::new(model, kept, end)?));
         };
-        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
+        let (integrator, controls) = (integrators::integrator(integrator)?, integrators::polynomial(controls)?);
         let kept = kept_at(model.py(), &costs, &costs_at, &limits, &limits_at);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let (actuation, nu) = self::actuation(model, actuation)?;
@@ -226,7 +203,7 @@ impl ContactDynamics {
         limits_at: At<'_, Limit>,
         controls: &str,
     ) -> PyResult<Self> {
-        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
+        let (integrator, controls) = (integrators::integrator(integrator)?, integrators::polynomial(controls)?);
         let kept = kept_at(model.py(), &costs, &costs_at, &limits, &limits_at);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let ((actuation, nu), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);

@@ -1,7 +1,8 @@
 //! Actions of robots whose accelerations are controls.
 
-use super::actions::{At, Limits, actuation, contacts, integrator, kept_at, knot, polynomial};
+use super::actions::{At, Limits, actuation, contacts, kept_at, knot};
 use super::costs::{Cost, Limit};
+use super::integrators;
 use super::robot_action::{Reduced, RobotAction};
 use crate::arrays::bounds;
 use crate::model::Model;
@@ -37,7 +38,7 @@ impl InverseDynamics {
         limits: Limits<'_>,
         controls: &str,
     ) -> PyResult<Self> {
-        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
+        let (integrator, controls) = (integrators::integrator(integrator)?, integrators::polynomial(controls)?);
         let kept = kept_at(model.py(), &costs, &None, &limits, &None);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let bounds = bounds(model.nv(), lower, upper)?;
@@ -114,7 +115,7 @@ impl ContactInverseDynamics {
         limits_at: At<'_, Limit>,
         controls: &str,
     ) -> PyResult<Self> {
-        let (integrator, controls) = (self::integrator(integrator)?, polynomial(controls)?);
+        let (integrator, controls) = (integrators::integrator(integrator)?, integrators::polynomial(controls)?);
         let kept = kept_at(model.py(), &costs, &costs_at, &limits, &limits_at);
         Ok(Self(RobotAction::new(model, kept, |model| {
             let ((actuation, _), contacts) = (self::actuation(model, actuation)?, self::contacts(model, contacts)?);

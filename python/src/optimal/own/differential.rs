@@ -99,9 +99,10 @@ impl DifferentialAction {
         if dt.is_none() && nu > 0 {
             return Err(PyValueError::new_err(format!("nu: expected 0 for a terminal knot, without dt, found {nu}")));
         }
-        let step = dt.map(|dt| Ok::<_, PyErr>((crate::optimal::actions::integrator(integrator)?, dt))).transpose()?;
+        let step =
+            dt.map(|dt| Ok::<_, PyErr>((crate::optimal::integrators::integrator(integrator)?, dt))).transpose()?;
         let written = Written { nv, nu, functions: Functions::new(calc, calc_diff), space, way: Way::default() };
-        let (bounds, controls) = (bounds(nu, lower, upper)?, crate::optimal::actions::polynomial(controls)?);
+        let (bounds, controls) = (bounds(nu, lower, upper)?, crate::optimal::integrators::polynomial(controls)?);
         let action = Self { written, bounds, step, controls, model: model.map(Bound::unbind) };
         action.boxed(&Fault::default())?;
         Ok(action)
