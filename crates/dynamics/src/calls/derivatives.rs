@@ -295,26 +295,40 @@ fn over_matrix<S: Scalar, R: Constant<S>>(
     data.minv.solve(&mut a); // q̈ = M⁻¹ (τ − h)
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &a, f_ext, &[]);
     data.aba_derivatives.a = a;
-    if data.minv.has_short_factor() {
-        let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
-        let mut branches = Branches::new(&data.minv.factor);
-        for (dtau, da) in [(&d.dtau_dq, &mut out.da_dq), (&d.dtau_dv, &mut out.da_dv)] {
-            for (b, x) in dtau.column_iter().zip(da.as_mut_slice().chunks_exact_mut(model.nv())) {
-                x.iter_mut().zip(b.iter()).for_each(|(x, &b)| *x = -b);
-                branches.solve(x); // ∂q̈ = −M⁻¹ ∂τ
-            }
+    if !data.minv.has_short_factor() {
+        return multiply(model, data);
+    }
+    let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+    let floating = if out.float_freely(model) { &out.floating[..] } else { &[] };
+    let known = |j: usize, numbers: usize| floating.iter().any(|f| (f.first..f.first + numbers).contains(&j));
+    let mut branches = Branches::new(&data.minv.factor);
+    for (dtau, da, numbers) in [(&d.dtau_dq, &mut out.da_dq, 6), (&d.dtau_dv, &mut out.da_dv, 3)] {
+        for (j, (b, x)) in dtau.column_iter().zip(da.as_mut_slice().chunks_exact_mut(model.nv())).enumerate() {
+            let is_known = known(j, numbers);
+            x.iter_mut().zip(b.iter()).for_each(|(x, &b)| *x = if is_known { S::zero() } else { -b });
+            branches.solve(x); // ∂q̈ = −M⁻¹ ∂τ
         }
-    } else {
-        multiply(model, data);
+    }
+    for &aba::Floating { body, first } in floating {
+        let g = data.world.oX[body].rotation.transpose_mul(model.gravity().lift());
+        aba::set_cross(&mut out.da_dq, first, first + 3, g); // (Rᵀ g)×
+    }
+    if !floating.is_empty() {
+        aba::boost(out, &d.qd);
     }
 }
 
 /// ∂q̈ = −M⁻¹ ∂τ, after `rnea_derivatives` and `minv`.
 fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
+    let float_freely = out.float_freely(model);
+    let nonzero_rows = if float_freely { &out.nonzero_rows } else { model.nonzero_rows() };
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    minus_products(data.minv.matrix().as_slice(), dtau, da, model.nonzero_rows());
+    minus_products(data.minv.matrix().as_slice(), dtau, da, nonzero_rows);
+    if float_freely {
+        aba::boost(out, &d.qd);
+    }
 }
 
 /// The derivatives of the centroidal momentum, its rate, and the centre of mass and its velocity and acceleration, with

@@ -6,16 +6,33 @@
 //! ```text
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
+//!
+//! What a body carries that floats feels neither where it is nor a velocity that all of it has, and gravity accelerates all of it
+//! alike. So of the linear and angular coordinates of its free joint, with the velocities v₀ and ω, one knows without any product
+//! (R: its rotation, g: the acceleration of free fall)
+//!
+//! ```text
+//! ∂q̈/∂p₀ = 0,   ∂v̇₀/∂v₀ = −ω×,   ∂v̇₀/∂θ₀ = (Rᵀ g)×,   and zeros in all other rows
+//! ```
 
 use crate::derivatives::tree_solve::{self, minus_solve};
 use crate::passes::aba::{self};
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
-use condyle_model::Model;
-use condyle_spatial::Scalar;
+use condyle_linalg::sparsity::NonzeroRows;
+use condyle_model::{Joint, Model};
 use condyle_spatial::kernel;
+use condyle_spatial::{Constant, Scalar, Vec3};
 use nalgebra::DMatrix;
+
+/// A body with a free joint in the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Floating {
+    pub body: usize,
+    /// The first coordinate of its joint.
+    pub first: usize,
+}
 
 #[derive(Clone, Debug)]
 #[repr(C)]
@@ -26,6 +43,10 @@ pub(crate) struct Workspace<S> {
     pub da_dq: DMatrix<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
     pub da_dv: DMatrix<S>,
+    /// The bodies that float. Written by: `new`.
+    pub floating: Vec<Floating>,
+    /// The rows of ∂τ by which M⁻¹ is multiplied: none for linear coordinates of bodies that float. Written by: `new`.
+    pub nonzero_rows: Vec<NonzeroRows>,
     pub solve: tree_solve::Workspace<S>,
 }
 
@@ -33,7 +54,40 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         let solve = tree_solve::Workspace::new(model.columns(), size.nv);
-        Self { a: filled(S::zero, size.nv), da_dq: square.clone(), da_dv: square, solve }
+        let free = |i: &usize| model.nodes()[*i].parent == 0 && model.nodes()[*i].joint == Joint::FreeFlyer;
+        let floating = (1..size.bodies).filter(free).map(|i| Floating { body: i, first: model.nodes()[i].idx_v });
+        let floating: Vec<Floating> = floating.collect();
+        let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
+        for &Floating { first, .. } in &floating {
+            rows[first..first + 3].iter_mut().for_each(Vec::clear);
+        }
+        let nonzero_rows = NonzeroRows::of_columns(rows);
+        Self { a: filled(S::zero, size.nv), da_dq: square.clone(), da_dv: square, floating, nonzero_rows, solve }
+    }
+
+    /// Whether the bodies that float do so freely: whether their linear coordinates have no armature.
+    pub(crate) fn float_freely<R: Constant<S>>(&self, model: &Model<R>) -> bool {
+        let is_free = |f: &Floating| model.armature()[f.first..f.first + 3].iter().all(|&x| x.lift() == S::zero());
+        self.floating.iter().all(is_free)
+    }
+}
+
+/// Writes u× as a block among rows and columns of an n × n matrix.
+#[inline(always)]
+pub(crate) fn set_cross<S: Scalar>(matrix: &mut DMatrix<S>, row: usize, column: usize, u: Vec3<S>) {
+    let n = matrix.nrows();
+    for (k, x) in u.skew().columns().into_iter().enumerate() {
+        matrix.as_mut_slice()[(column + k) * n + row..][..3].copy_from_slice(&x.to_array());
+    }
+}
+
+kernel! {
+    /// ∂v̇₀/∂v₀ of bodies that float, where all else is zero.
+    pub(crate) fn boost<S>(d: &mut Workspace<S>, v: &[S]) {
+        for &Floating { first, .. } in &d.floating {
+            let omega = Vec3::new(v[first + 3], v[first + 4], v[first + 5]);
+            set_cross(&mut d.da_dv, first, first, -omega);
+        }
     }
 }
 
