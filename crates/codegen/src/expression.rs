@@ -172,6 +172,10 @@ impl Scalar for Expression {
         graph([self], |graph, [a]| graph.abs(a))
     }
     #[inline(never)]
+    fn kept(self) -> Self {
+        graph([self], |graph, [a]| graph.kept(a))
+    }
+    #[inline(never)]
     fn lt(self, other: Self) -> Mask {
         Mask(graph([self, other], |graph, [a, b]| graph.less(a, b)))
     }

@@ -223,7 +223,7 @@ impl Function {
                 Node::Sub(a, b) => at(a) - at(b),
                 Node::Mul(a, b) => at(a) * at(b),
                 Node::Div(a, b) => at(a) / at(b),
-                Node::Neg(a) => -at(a),
+                Node::Neg(a) | Node::Minus(a) => -at(a),
                 Node::Sqrt(a) => at(a).sqrt(),
                 Node::Sin(a) => Scalar::sin_cos(at(a)).0,
                 Node::Cos(a) => Scalar::sin_cos(at(a)).1,

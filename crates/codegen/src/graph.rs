@@ -27,6 +27,8 @@ pub(crate) enum Node {
     Mul(Id, Id),
     Div(Id, Id),
     Neg(Id),
+    /// −a as a value of its own: its sign is not taken out.
+    Minus(Id),
     Sqrt(Id),
     Sin(Id),
     Cos(Id),
@@ -50,7 +52,9 @@ impl Node {
     pub(crate) fn operands(self) -> impl DoubleEndedIterator<Item = Id> {
         let (n, all) = match self {
             Self::Constant(_) | Self::Input(_) => (0, [0; 3]),
-            Self::Neg(a) | Self::Sqrt(a) | Self::Sin(a) | Self::Cos(a) | Self::Abs(a) => (1, [a, 0, 0]),
+            Self::Neg(a) | Self::Minus(a) | Self::Sqrt(a) | Self::Sin(a) | Self::Cos(a) | Self::Abs(a) => {
+                (1, [a, 0, 0])
+            }
             Self::Select(m, a, b) => (3, [m, a, b]),
             Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) | Self::Div(a, b) => (2, [a, b, 0]),
             Self::Atan2(a, b) | Self::Less(a, b) | Self::And(a, b) | Self::Or(a, b) => (2, [a, b, 0]),
@@ -67,6 +71,7 @@ impl Node {
             Self::Mul(a, b) => Self::Mul(to(a), to(b)),
             Self::Div(a, b) => Self::Div(to(a), to(b)),
             Self::Neg(a) => Self::Neg(to(a)),
+            Self::Minus(a) => Self::Minus(to(a)),
             Self::Sqrt(a) => Self::Sqrt(to(a)),
             Self::Sin(a) => Self::Sin(to(a)),
             Self::Cos(a) => Self::Cos(to(a)),
@@ -121,6 +126,10 @@ impl Graph {
             Node::Mul(a, b) => self.mul(a, b),
             Node::Div(a, b) => self.div(a, b),
             Node::Neg(a) => self.neg(a),
+            Node::Minus(a) => {
+                let minus = self.neg(a);
+                self.kept(minus)
+            }
             Node::Sqrt(a) => self.sqrt(a),
             Node::Sin(a) => self.sin_cos(a).0,
             Node::Cos(a) => self.sin_cos(a).1,
@@ -176,6 +185,11 @@ impl Graph {
             (None, Some(x)) => self.constant(-x),
             _ => self.find(Node::Neg(a)),
         }
+    }
+
+    /// A value whose sign is not taken out where it is multiplied.
+    pub(crate) fn kept(&mut self, a: Id) -> Id {
+        self.negated(a).map_or(a, |x| self.find(Node::Minus(x)))
     }
 
     pub(crate) fn add(&mut self, a: Id, b: Id) -> Id {

@@ -20,6 +20,7 @@
 #[cfg(feature = "cuda")]
 pub mod cuda;
 mod derivative;
+mod entries;
 mod error;
 mod expression;
 mod function;

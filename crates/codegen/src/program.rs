@@ -1,9 +1,11 @@
 //! A function as a program: its steps in order, in parts of bounded size, with the places of what one part leaves to others.
 
+use crate::entries::Term;
 use crate::function::Function;
 use crate::graph::Id;
 use crate::order::order;
 use crate::steps::{Angle, Step, Steps};
+use core::iter::successors;
 use core::ops::Range;
 
 /// The steps that a part may have: compilers take more than twice as long for twice as many.
@@ -98,6 +100,29 @@ fn cut(steps: &Steps) -> Vec<Range<usize>> {
     parts
 }
 
+/// The values from which loops compute entries, each behind the one of the entry before.
+fn side_by_side(steps: &Steps) -> Vec<Id> {
+    let (mut next, mut is_first) = (vec![None; steps.values], vec![true; steps.values]);
+    let mut all = Vec::new();
+    for step in &steps.all {
+        let Step::Entries(entries) = step else { continue };
+        for Term { each, .. } in &entries.terms {
+            all.extend(each);
+            for pair in each.windows(2) {
+                next[pair[0] as usize] = Some(pair[1]);
+                is_first[pair[1] as usize] = false;
+            }
+        }
+    }
+    let mut placed = Vec::new();
+    for id in all {
+        if core::mem::take(&mut is_first[id as usize]) {
+            placed.extend(successors(Some(id), |&id| next[id as usize]));
+        }
+    }
+    placed
+}
+
 /// The places of all values, and the size of the work space.
 fn place(steps: &Steps, parts: &[Range<usize>], part_of: &[usize]) -> (Vec<Place>, usize) {
     let mut places = vec![Place::Given; steps.values];
@@ -111,6 +136,11 @@ fn place(steps: &Steps, parts: &[Range<usize>], part_of: &[usize]) -> (Vec<Place
         steps.all[part.clone()].iter().flat_map(Step::takes).for_each(|id| last_part[id as usize] = p);
     }
     let (mut size, mut free) = (2 * n, Vec::new());
+    let side_by_side = side_by_side(steps);
+    for (k, &id) in side_by_side.iter().enumerate() {
+        places[id as usize] = Place::Work(size + k);
+    }
+    size += side_by_side.len();
     let mut to_free: Vec<Vec<usize>> = vec![Vec::new(); parts.len()];
     for (p, part) in parts.iter().enumerate() {
         if p > 0 {
@@ -118,6 +148,9 @@ fn place(steps: &Steps, parts: &[Range<usize>], part_of: &[usize]) -> (Vec<Place
         }
         for id in steps.all[part.clone()].iter().flat_map(Step::makes) {
             let id: Id = id;
+            if let Place::Work(_) = places[id as usize] {
+                continue;
+            }
             let last = last_part[id as usize];
             places[id as usize] = if last > p {
                 let slot = free.pop().unwrap_or_else(|| {

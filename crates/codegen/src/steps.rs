@@ -1,6 +1,7 @@
-//! The steps of a function: its graph with products fused into the sums that they go into, and both parts of an angle computed
-//! together.
+//! The steps of a function: its graph with products fused into the sums that they go into, both parts of an angle computed
+//! together, and entries of a result that are alike in a loop.
 
+use crate::entries::{self, Entries};
 use crate::function::{Function, Operations};
 use crate::graph::{Id, Node};
 use crate::sums::Sums;
@@ -19,31 +20,35 @@ pub(crate) enum Step {
     SubMul(Id, [Id; 3]),
     /// The sine and the cosine of an angle.
     SinCos(Angle),
+    /// A loop.
+    Entries(Entries),
 }
 
 impl Step {
     /// The values that it computes.
     pub(crate) fn makes(&self) -> impl Iterator<Item = Id> {
-        match *self {
-            Self::Plain(id, _) | Self::MulAdd(id, _) | Self::MulSub(id, _) | Self::SubMul(id, _) => [Some(id), None],
-            Self::SinCos(Angle { sin, cos, .. }) => [sin, cos],
-        }
-        .into_iter()
-        .flatten()
+        let (few, many) = match *self {
+            Self::Plain(id, _) | Self::MulAdd(id, _) | Self::MulSub(id, _) | Self::SubMul(id, _) => {
+                ([Some(id), None], &[][..])
+            }
+            Self::SinCos(Angle { sin, cos, .. }) => ([sin, cos], &[][..]),
+            Self::Entries(ref entries) => ([None; 2], &entries.ids[..]),
+        };
+        few.into_iter().flatten().chain(many.iter().copied())
     }
 
     /// The values from which it computes them.
     pub(crate) fn takes(&self) -> impl Iterator<Item = Id> {
-        match *self {
+        let (few, many) = match *self {
             Self::Plain(_, node) => {
                 let mut operands = node.operands();
-                [operands.next(), operands.next(), operands.next()]
+                ([operands.next(), operands.next(), operands.next()], &[][..])
             }
-            Self::MulAdd(_, abc) | Self::MulSub(_, abc) | Self::SubMul(_, abc) => abc.map(Some),
-            Self::SinCos(Angle { angle, .. }) => [Some(angle), None, None],
-        }
-        .into_iter()
-        .flatten()
+            Self::MulAdd(_, abc) | Self::MulSub(_, abc) | Self::SubMul(_, abc) => (abc.map(Some), &[][..]),
+            Self::SinCos(Angle { angle, .. }) => ([Some(angle), None, None], &[][..]),
+            Self::Entries(ref entries) => ([None; 3], &entries.terms[..]),
+        };
+        few.into_iter().flatten().chain(many.iter().flat_map(|term| term.each.iter().copied().chain(term.common)))
     }
 }
 
@@ -124,6 +129,7 @@ impl<'f> Steps<'f> {
         });
         let mut steps = Self { nodes, values: nodes.len(), all, angles, results: &function.results };
         steps.drop_unused();
+        entries::gather(&mut steps.all, &function.results, &function.outputs);
         steps
     }
 
@@ -153,6 +159,10 @@ impl<'f> Steps<'f> {
                 Step::Plain(_, Node::Mul(..)) => n.products += 1,
                 Step::Plain(_, Node::Div(..) | Node::Sqrt(_)) => n.quotients += 1,
                 Step::Plain(..) => n.others += 1,
+                Step::Entries(ref entries) => {
+                    n.products += if entries.terms[0].common.is_some() { entries.ids.len() } else { 0 };
+                    n.fused += entries.ids.len() * (entries.terms.len() - 1);
+                }
             }
         }
         n

@@ -3,11 +3,12 @@
 //! Where no number of b stands on the way from place k to an ancestor, all that x_k knows of b comes through that ancestor:
 //!
 //! ```text
-//! x_k = −Σ L_ke x_e = −Σ G_ke x_e     with G_ke = L_ke − Σ L_kf G_fe
+//! x_k = −Σ L_ke x_e = Σ G_ke x_e     with G_ke = −L_ke − Σ L_kf G_fe
 //! ```
 //!
 //! where e goes over the ancestor and what is before it, and f over the places between. Rows of G are as short as the
-//! branches' common way to the root, and serve all b whose numbers stand in other branches.
+//! branches' common way to the root, and serve all b whose numbers stand in other branches. Those of one branch make sums
+//! that are alike, for which compilers can use vectors.
 
 use crate::elimination_tree::NONE;
 use crate::{Ltdl, check};
@@ -21,18 +22,33 @@ pub struct Branches<'f, S> {
     factor: &'f Ltdl<S>,
     /// The places before each on the way from the root.
     before: Vec<Vec<usize>>,
+    /// How many of them are before the branch of each, which begins behind the last place with several ones behind it.
+    before_branch: Vec<usize>,
+    /// −D⁻¹.
+    minus_inverse_diagonal: Vec<S>,
     rows: BTreeMap<(usize, usize), Vec<S>>,
 }
 
 impl<'f, S: Scalar> Branches<'f, S> {
     /// Those of a factor.
     pub fn new(factor: &'f Ltdl<S>) -> Self {
-        let mut before: Vec<Vec<usize>> = Vec::new();
-        for &parent in &factor.tree().parent {
-            let way = if parent == NONE { Vec::new() } else { [&before[parent][..], &[parent]].concat() };
+        let parents = &factor.tree().parent;
+        let (mut before, mut before_branch): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
+        for &parent in parents {
+            let (way, of_branch) = match parent {
+                NONE => (Vec::new(), 0),
+                _ => {
+                    let way = [&before[parent][..], &[parent]].concat();
+                    let forks = parents.iter().filter(|&&other| other == parent).count() > 1;
+                    let of_branch = if forks { way.len() } else { before_branch[parent] };
+                    (way, of_branch)
+                }
+            };
             before.push(way);
+            before_branch.push(of_branch);
         }
-        Self { factor, before, rows: BTreeMap::new() }
+        let minus_inverse_diagonal = factor.inverse_diagonal().iter().map(|&x| (-x).kept()).collect();
+        Self { factor, before, before_branch, minus_inverse_diagonal, rows: BTreeMap::new() }
     }
 
     /// G_ke for the first m places e before k.
@@ -41,47 +57,52 @@ impl<'f, S: Scalar> Branches<'f, S> {
             return row.clone();
         }
         let L = self.factor.row_from_root(k);
-        let mut row = L[..m].to_vec();
+        let mut row: Vec<S> = L[..m].iter().map(|&x| -x).collect();
         for p in m..L.len() {
             let G = self.row(self.before[k][p], m);
             for (x, g) in row.iter_mut().zip(G) {
-                *x -= L[p] * g; // G_ke = L_ke − Σ L_kf G_fe
+                *x -= L[p] * g; // G_ke = −L_ke − Σ L_kf G_fe
             }
         }
+        row.iter_mut().for_each(|x| *x = x.kept());
         self.rows.insert((k, m), row.clone());
         row
     }
 
-    /// −Σ G_ke x_e over the first m places before k, x being given by place.
-    fn through(&mut self, k: usize, m: usize, x: impl Fn(usize) -> S) -> S {
+    /// A number + Σ G_ke x_e over the first m places before k, x being given by place.
+    fn through(&mut self, k: usize, m: usize, start: S, x: impl Fn(usize) -> S) -> S {
         let G = self.row(k, m);
-        (0..m).fold(S::zero(), |sum, p| sum - G[p] * x(self.before[k][p]))
+        (0..m).fold(start, |sum, p| sum + G[p] * x(self.before[k][p]))
     }
 
-    /// x = M⁻¹ b in place of b. Numbers that are zero are left out.
+    /// x = −M⁻¹ b in place of b. Numbers that are zero are left out.
     ///
     /// # Panics
     /// If `b` has not nv numbers.
-    pub fn solve(&mut self, b: &mut [S]) {
+    pub fn minus_solve(&mut self, b: &mut [S]) {
         let (factor, n) = (self.factor, self.before.len());
         check("b", b.len(), n);
-        let mut x: Vec<S> = factor.order().iter().map(|&row| b[row]).collect();
+        let mut y: Vec<S> = factor.order().iter().map(|&row| b[row]).collect();
         for k in (0..n).rev() {
-            let y = x[k];
+            let y_k = y[k];
             for (&e, &L) in self.before[k].iter().zip(factor.row_from_root(k)) {
-                x[e] -= L * y; // Lᵀ y = b
+                y[e] -= L * y_k; // Lᵀ y = b
             }
         }
-        let is_given: Vec<bool> = x.iter().map(|&y| y != S::zero()).collect();
+        let is_given: Vec<bool> = y.iter().map(|&y| y != S::zero()).collect();
+        let (mut x, mut own) = (vec![S::zero(); n], vec![S::zero(); n]);
         for k in 0..n {
-            let way = self.before[k].clone();
-            let m = if is_given[k] { way.len() } else { way.iter().rposition(|&e| is_given[e]).map_or(0, |p| p + 1) };
-            x[k] = if m < way.len() {
-                self.through(k, m, |e| x[e])
+            let (way, L) = (&self.before[k][..], factor.row_from_root(k));
+            // L x = −D⁻¹ y: what the own branch brings, then what comes through the places before it
+            let m = if is_given[k] {
+                let m = self.before_branch[k];
+                let start = y[k] * self.minus_inverse_diagonal[k];
+                own[k] = (m..way.len()).fold(start, |sum, p| sum - L[p] * own[way[p]]).kept();
+                m
             } else {
-                let L = factor.row_from_root(k);
-                (0..m).fold(x[k] * factor.inverse_diagonal()[k], |sum, p| sum - L[p] * x[way[p]]) // L x = D⁻¹ y
+                way.iter().rposition(|&e| is_given[e]).map_or(0, |p| p + 1)
             };
+            x[k] = self.through(k, m, own[k], |e| x[e]).kept();
         }
         for (&row, x) in factor.order().iter().zip(x) {
             b[row] = x;
@@ -104,12 +125,13 @@ impl<'f, S: Scalar> Branches<'f, S> {
                 // of a place on the way from the root, all that are before k
                 let m =
                     if self.before[k].get(common.wrapping_sub(1)) == Some(&j) { self.before[k].len() } else { common };
-                let x = self.through(k, m, |e| X[at(e, j)]);
+                let x = self.through(k, m, S::zero(), |e| X[at(e, j)]).kept();
                 (X[at(k, j)], X[at(j, k)]) = (x, x);
             }
             let L = factor.row_from_root(k);
             let start = factor.inverse_diagonal()[k];
-            X[at(k, k)] = (0..L.len()).fold(start, |sum, p| sum - L[p] * X[at(self.before[k][p], k)]);
+            let x = (0..L.len()).fold(start, |sum, p| sum - L[p] * X[at(self.before[k][p], k)]);
+            X[at(k, k)] = x.kept();
         }
     }
 }

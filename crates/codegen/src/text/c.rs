@@ -47,10 +47,10 @@ impl Dialect for C {
             _ => format!("{}{suffix}", digits(x)),
         }
     }
-    fn element(&self, array: &str, index: usize) -> String {
+    fn element(&self, array: &str, index: &str) -> String {
         if self.is_vector() { format!("AT({array}, {index})") } else { format!("{array}[{index}]") }
     }
-    fn work(&self, slot: usize) -> String {
+    fn work(&self, slot: &str) -> String {
         self.element("w", slot)
     }
     fn whole(&self, value: String) -> String {
@@ -211,7 +211,7 @@ fn function(writer: &Writer<C>, name: &str) -> String {
         });
     }
     for (k, angle) in program.angles().iter().enumerate() {
-        body.push(format!("{} = {};", writer.dialect.element("w", k), writer.angle(angle.angle)));
+        body.push(format!("{} = {};", writer.dialect.element("w", &k.to_string()), writer.angle(angle.angle)));
     }
     if n > 0 {
         body.push(format!("{name}_sin_cos({0}, w, w + {0});", lanes * n));

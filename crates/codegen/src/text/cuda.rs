@@ -13,8 +13,8 @@ impl Dialect for Cuda {
     fn number(&self, x: f64) -> String {
         self.0.number(x)
     }
-    fn element(&self, array: &str, index: usize) -> String {
-        format!("{array}[{index} * n + i]")
+    fn element(&self, array: &str, index: &str) -> String {
+        if index.contains(' ') { format!("{array}[({index}) * n + i]") } else { format!("{array}[{index} * n + i]") }
     }
     fn variable(&self, name: &str, expression: &str, is_mask: bool) -> String {
         self.0.variable(name, expression, is_mask)

@@ -5,6 +5,7 @@ mod casadi;
 mod cuda;
 mod rust;
 
+use crate::entries::{Entries, Term};
 use crate::function::{Array, Function};
 use crate::graph::{Id, Node};
 use crate::program::{Place, Program};
@@ -128,12 +129,16 @@ pub(crate) trait Dialect {
     /// A constant.
     fn number(&self, x: f64) -> String;
     /// A number of an array.
-    fn element(&self, array: &str, index: usize) -> String {
+    fn element(&self, array: &str, index: &str) -> String {
         format!("{array}[{index}]")
     }
     /// A number of the work space.
-    fn work(&self, slot: usize) -> String {
+    fn work(&self, slot: &str) -> String {
         format!("w[{slot}]")
+    }
+    /// A loop of one line over k = 0, 1, …, n − 1, where k goes by some name.
+    fn repeat(&self, k: &str, n: usize, line: &str) -> String {
+        format!("for (int {k} = 0; {k} < {n}; {k}++) {line}")
     }
     /// A value where no operation makes one for each state of a constant.
     fn whole(&self, value: String) -> String {
@@ -191,11 +196,11 @@ impl<'p, D: Dialect> Writer<'p, D> {
             Node::Constant(bits) => self.dialect.number(f64::from_bits(bits)),
             Node::Input(place) => {
                 let (array, index) = self.inputs[place as usize];
-                self.dialect.element(&self.program.function.inputs[array].name, index)
+                self.dialect.element(&self.program.function.inputs[array].name, &index.to_string())
             }
             _ => match self.program.places[id as usize] {
                 Place::Work(slot) if self.program.part_of[id as usize] != p => {
-                    let number = self.dialect.work(slot);
+                    let number = self.dialect.work(&slot.to_string());
                     if is_mask { self.dialect.mask_from_work(&number) } else { number }
                 }
                 _ => format!("t{id}"),
@@ -214,7 +219,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
             Node::Sub(a, b) => format!("{} - {}", number(a), number(b)),
             Node::Mul(a, b) => format!("{} * {}", number(a), number(b)),
             Node::Div(a, b) => format!("{} / {}", number(a), number(b)),
-            Node::Neg(a) => format!("-{}", number(a)),
+            Node::Neg(a) | Node::Minus(a) => format!("-{}", number(a)),
             Node::Sqrt(a) => d.call("sqrt", &number(a)),
             Node::Abs(a) => d.call("abs", &number(a)),
             Node::Atan2(y, x) => d.atan2(&number(y), &number(x)),
@@ -238,6 +243,10 @@ impl<'p, D: Dialect> Writer<'p, D> {
                 Step::MulAdd(id, abc) => (id, fused(abc, false, false), false),
                 Step::MulSub(id, abc) => (id, fused(abc, false, true), false),
                 Step::SubMul(id, abc) => (id, fused(abc, true, false), false),
+                Step::Entries(ref entries) => {
+                    lines.extend(self.entries(p, entries));
+                    continue;
+                }
                 Step::SinCos(Angle { angle, sin, cos }) => {
                     let name =
                         |half: Option<Id>, other| half.map_or(format!("unused_{angle}_{other}"), |id| format!("t{id}"));
@@ -268,7 +277,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         if let Place::Work(slot) = self.program.places[id as usize] {
             let name = format!("t{id}");
             let number = if is_mask { self.dialect.mask_to_work(&name) } else { name };
-            lines.push(format!("{} = {number};", self.dialect.work(slot)));
+            lines.push(format!("{} = {number};", self.dialect.work(&slot.to_string())));
         }
         for &k in &self.goes_to[id as usize] {
             lines.push(format!("{} = t{id};", self.output(k)));
@@ -278,7 +287,52 @@ impl<'p, D: Dialect> Writer<'p, D> {
     /// A number among all outputs.
     fn output(&self, k: usize) -> String {
         let (array, index) = self.outputs[k];
-        self.dialect.element(&self.program.function.outputs[array].name, index)
+        self.dialect.element(&self.program.function.outputs[array].name, &index.to_string())
+    }
+
+    /// The loop that computes some entries, and the lines that write them elsewhere too.
+    fn entries(&self, p: usize, entries: &Entries) -> Vec<String> {
+        let k = self.counter();
+        let n = entries.ids.len();
+        let sum = entries.terms.iter().enumerate().map(|(at, Term { minus, each, common })| {
+            let Place::Work(slot) = self.program.places[each[0] as usize] else { unreachable!("it was given a place") };
+            let value = self.dialect.work(&format!("{slot} + {k}"));
+            let sign = if *minus {
+                " - "
+            } else if at > 0 {
+                " + "
+            } else {
+                ""
+            };
+            match common {
+                Some(common) => format!("{sign}{value} * {}", self.value(p, *common, false)),
+                None => value,
+            }
+        });
+        let sum: String = sum.collect();
+        let to = |k: usize| {
+            let (array, index) = self.outputs[k];
+            (&*self.program.function.outputs[array].name, index)
+        };
+        let (array, first) = to(entries.first);
+        let entry = self.dialect.element(array, &format!("{first} + {k}"));
+        let mut lines = vec![self.dialect.repeat(&k, n, &format!("{entry} = {sum};"))];
+        for (at, &id) in entries.ids.iter().enumerate() {
+            let entry = self.dialect.element(array, &(first + at).to_string());
+            let others = self.goes_to[id as usize].iter().filter(|&&k| to(k) != (array, first + at));
+            lines.extend(others.map(|&k| format!("{} = {entry};", self.output(k))));
+        }
+        lines
+    }
+
+    /// A name that no array has.
+    fn counter(&self) -> String {
+        let arrays = || self.program.function.inputs.iter().chain(&self.program.function.outputs);
+        let mut name = "k".to_owned();
+        while arrays().any(|array| array.name == name) {
+            name.push('_');
+        }
+        name
     }
 
     /// The lines that write results which no part computes: constants, inputs, sines and cosines of inputs.

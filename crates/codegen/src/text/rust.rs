@@ -25,6 +25,9 @@ impl Dialect for Rust {
             _ => digits(x),
         }
     }
+    fn repeat(&self, k: &str, n: usize, line: &str) -> String {
+        format!("for {k} in 0..{n} {{ {line} }}")
+    }
     fn variable(&self, name: &str, expression: &str, _: bool) -> String {
         format!("let {name} = {expression};")
     }

@@ -305,8 +305,8 @@ fn over_matrix<S: Scalar, R: Constant<S>>(
     for (dtau, da, numbers) in [(&d.dtau_dq, &mut out.da_dq, 6), (&d.dtau_dv, &mut out.da_dv, 3)] {
         for (j, (b, x)) in dtau.column_iter().zip(da.as_mut_slice().chunks_exact_mut(model.nv())).enumerate() {
             let is_known = known(j, numbers);
-            x.iter_mut().zip(b.iter()).for_each(|(x, &b)| *x = if is_known { S::zero() } else { -b });
-            branches.solve(x); // ∂q̈ = −M⁻¹ ∂τ
+            x.iter_mut().zip(b.iter()).for_each(|(x, &b)| *x = if is_known { S::zero() } else { b });
+            branches.minus_solve(x); // ∂q̈ = −M⁻¹ ∂τ
         }
     }
     for &aba::Floating { body, first } in floating {

@@ -86,6 +86,13 @@ pub trait Scalar:
     fn atan2(self, x: Self) -> Self;
     /// |self|.
     fn abs(self) -> Self;
+    /// The same number; of a recorded one, a value whose sign is not taken out of products, so that sums which are alike are
+    /// written alike.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn kept(self) -> Self {
+        self
+    }
     /// self < other.
     fn lt(self, other: Self) -> Self::Mask;
     /// a where the mask holds, b elsewhere.

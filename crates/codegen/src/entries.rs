@@ -1,0 +1,179 @@
+//! Entries of a result that follow one another and are alike: sums of products with the same common factors, as those of a product of
+//! matrices are. They are computed in a loop, for which compilers use vectors, and which is a fraction of the code.
+
+use crate::function::Array;
+use crate::graph::{Id, Node};
+use crate::steps::Step;
+
+/// The entries that a loop has at least.
+const FEWEST: usize = 4;
+
+/// Sums Σ ± eachₖ common for each k.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Entries {
+    /// The sums, from which nothing is computed.
+    pub ids: Vec<Id>,
+    /// The place of the first one among all results; the others follow.
+    pub first: usize,
+    /// The first one is added.
+    pub terms: Vec<Term>,
+}
+
+/// A term of each sum.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Term {
+    /// Whether it is subtracted.
+    pub minus: bool,
+    /// The value in each sum. These values follow one another in the work space.
+    pub each: Vec<Id>,
+    /// What it is multiplied by in all sums. The first term may be values alone.
+    pub common: Option<Id>,
+}
+
+/// A term of one sum: whether it is subtracted, and its factors, of which a value has one.
+type Of = (bool, [Option<Id>; 2]);
+
+/// Puts loops in the place of steps.
+pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], outputs: &[Array]) {
+    let mut gatherer = Gatherer::new(steps, results);
+    let (mut loops, mut start) = (Vec::new(), 0);
+    for array in outputs {
+        let end = start + array.len();
+        while start < end {
+            let found = gatherer.alike(&results[start..end], start);
+            start += found.as_ref().map_or(1, |found| found.ids.len());
+            loops.extend(found);
+        }
+    }
+    let mut replaced: Vec<Option<Step>> = steps.drain(..).map(Some).collect();
+    for entries in loops {
+        let mut last = 0;
+        for &id in &entries.ids {
+            let mut sum = Some(id);
+            for _ in entries.terms.iter().filter(|term| term.common.is_some()) {
+                let Some(k) = sum.map(|id| gatherer.maker[id as usize]) else { break };
+                last = last.max(k);
+                sum = replaced[k].take().and_then(|step| rest(&step));
+            }
+        }
+        replaced[last] = Some(Step::Entries(entries));
+    }
+    steps.extend(replaced.into_iter().flatten());
+}
+
+/// The product that a step computes: whether it is subtracted, and its factors.
+fn product(step: &Step) -> Option<Of> {
+    match *step {
+        Step::MulAdd(_, [a, b, _]) | Step::Plain(_, Node::Mul(a, b)) => Some((false, [Some(a), Some(b)])),
+        Step::SubMul(_, [a, b, _]) => Some((true, [Some(a), Some(b)])),
+        _ => None,
+    }
+}
+
+/// The value to which a step adds a product, or from which it subtracts it.
+fn rest(step: &Step) -> Option<Id> {
+    match *step {
+        Step::MulAdd(_, [.., c]) | Step::SubMul(_, [.., c]) => Some(c),
+        _ => None,
+    }
+}
+
+/// What is known of the values while loops are looked for.
+struct Gatherer {
+    /// The step that makes each; `usize::MAX` if none does.
+    maker: Vec<usize>,
+    /// The terms of each that is a sum of products, and perhaps one value; the last one first.
+    sums: Vec<Option<Vec<Of>>>,
+    /// Whether nothing is computed from it, and it is no entry of a loop yet.
+    is_free: Vec<bool>,
+    /// The value behind each in the work space.
+    next: Vec<Option<Id>>,
+    /// Whether it is behind another one or has one behind it.
+    has_place: Vec<bool>,
+}
+
+impl Gatherer {
+    fn new(steps: &[Step], results: &[Id]) -> Self {
+        let values = steps.iter().flat_map(|step| step.makes().chain(step.takes())).chain(results.iter().copied());
+        let n = values.max().map_or(0, |id| id as usize + 1);
+        let (mut maker, mut uses) = (vec![usize::MAX; n], vec![0; n]);
+        for (k, step) in steps.iter().enumerate() {
+            step.makes().for_each(|id| maker[id as usize] = k);
+            step.takes().for_each(|id| uses[id as usize] += 1);
+        }
+        let is_free: Vec<bool> = uses.iter().map(|&uses| uses == 0).collect();
+        results.iter().for_each(|&id| uses[id as usize] += 1);
+        let mut sums: Vec<Option<Vec<Of>>> = vec![None; n];
+        for step in steps {
+            let (Some(product), Some(id)) = (product(step), step.makes().next()) else { continue };
+            let rest = rest(step).map(|rest| {
+                let part = sums[rest as usize].take_if(|_| uses[rest as usize] == 1);
+                part.unwrap_or_else(|| vec![(false, [Some(rest), None])])
+            });
+            sums[id as usize] = Some([&[product], &rest.unwrap_or_default()[..]].concat());
+        }
+        Self { maker, sums, is_free, next: vec![None; n], has_place: vec![false; n] }
+    }
+
+    /// As many of the entries from a place on as are alike.
+    fn alike(&mut self, entries: &[Id], place: usize) -> Option<Entries> {
+        let sum = |of: &Self, id: Id| of.sums[id as usize].clone().filter(|_| of.is_free[id as usize]);
+        let first = sum(self, entries[0]).filter(|sum| sum.len() > 1)?;
+        let second = sum(self, *entries.get(1)?)?;
+        let common = |(one, other): (&Of, &Of)| {
+            let mut both = one.1.into_iter().filter(|factor| other.1.contains(factor));
+            both.next().filter(|_| both.next().is_none())
+        };
+        let common: Vec<Option<Id>> = first.iter().zip(&second).map(common).collect::<Option<_>>()?;
+        let mut terms: Vec<Term> = Vec::new();
+        for (&(minus, factors), &common) in first.iter().zip(&common) {
+            terms.push(Term { minus, each: vec![other(factors, common)?], common });
+        }
+        if terms.iter().any(|term| self.maker[term.each[0] as usize] == usize::MAX) {
+            return None;
+        }
+        terms.iter().for_each(|term| self.has_place[term.each[0] as usize] = true);
+        let mut ids = vec![entries[0]];
+        'entries: for &id in &entries[1..] {
+            let Some(sum) = sum(self, id).filter(|sum| sum.len() == first.len() && !ids.contains(&id)) else { break };
+            let mut values = Vec::new();
+            for (term, (minus, factors)) in terms.iter().zip(sum) {
+                let value = other(factors, term.common).filter(|_| minus == term.minus);
+                match (term.each.last(), value) {
+                    (Some(&last), Some(value)) if self.follows(last, value) => values.push(value),
+                    _ => break 'entries,
+                }
+            }
+            terms.iter_mut().zip(values).for_each(|(term, value)| term.each.push(value));
+            ids.push(id);
+        }
+        if ids.len() < FEWEST {
+            return None;
+        }
+        ids.iter().for_each(|&id| self.is_free[id as usize] = false);
+        terms.reverse();
+        Some(Entries { ids, first: place, terms })
+    }
+
+    /// Puts a value behind another one in the work space, if it is not there already; whether it is there.
+    fn follows(&mut self, last: Id, id: Id) -> bool {
+        match self.next[last as usize] {
+            Some(next) => next == id,
+            None if self.has_place[id as usize] || self.maker[id as usize] == usize::MAX => false,
+            None => {
+                self.next[last as usize] = Some(id);
+                self.has_place[id as usize] = true;
+                true
+            }
+        }
+    }
+}
+
+/// The one of two factors that is not the other.
+fn other([a, b]: [Option<Id>; 2], common: Option<Id>) -> Option<Id> {
+    match (a == common, b == common) {
+        (true, false) => b,
+        (false, true) => a,
+        _ => None,
+    }
+}
