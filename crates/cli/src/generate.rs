@@ -7,7 +7,7 @@ use condyle::ContactConstraint;
 use condyle_codegen::{FUNCTIONS, Language, Settings, generate};
 use std::path::PathBuf;
 
-/// Write a robot's dynamics as straight-line code: C, Rust or CUDA, without loops, branches or dependencies
+/// Write a robot's dynamics as straight-line code: C, Rust or CUDA, without branches or dependencies
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   condyle generate panda.urdf --functions aba,aba_derivatives --out panda/

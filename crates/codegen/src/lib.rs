@@ -14,7 +14,7 @@
 //! [`record`] runs any closure that is generic over the scalar on [`Expression`]s, which leave a graph: constants folded, what is
 //! 0 left out, each value computed once. [`functions`] does it with the algorithms of a robot, [`Language`] writes the graph as
 //! C, Rust or CUDA, and [`generate`] puts that into files. What does not depend on the robot's position is not computed at run
-//! time, and the code has neither loops nor branches nor memory of its own.
+//! time, and the code has neither branches nor memory of its own, nor loops but of a few entries of a result that are alike.
 #![allow(non_snake_case)]
 
 #[cfg(feature = "cuda")]

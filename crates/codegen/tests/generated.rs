@@ -342,6 +342,43 @@ fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
     vec![penalty * penalty + both, tool.y.atan2(tool.x), q[1].abs() * S::splat(3.0)]
 }
 
+/// A product of a matrix and vectors, the sums of which are loops, one whose sums begin with a value, and a copy of an entry.
+#[test]
+fn entries_that_are_alike_are_computed_in_loops() {
+    let function = record("alike", "Products with a matrix of squares.", |r| {
+        let x = r.input("k", 6, "six numbers");
+        let M: Vec<Vec<_>> = (0..6).map(|i| (0..3).map(|j| x[i] * x[i] + x[j]).collect()).collect();
+        let product =
+            |y: &[_]| -> Vec<_> { M.iter().map(|row| row[0] * y[0] + row[1] * y[1] - row[2] * y[2]).collect() };
+        let (one, other) = (product(&x[..3]), product(&x[3..]));
+        r.output("one", &one, "a product");
+        let sines: Vec<_> = x.iter().map(|x| x.sin_cos().0).collect();
+        let value = |(i, y): (usize, _)| sines[i] * x[i] + y;
+        let values: Vec<_> = M.iter().enumerate().map(|(i, row)| value((i, row[1] * x[2])) + row[0] * x[4]).collect();
+        r.output("other", &[&other[..], &one[2..3]].concat(), "another one, and a number of the first");
+        r.output("values", &values, "sums that begin with other products");
+    });
+    let all = [function];
+    let text = &Language::C.text("k", &all)[1].text;
+    assert_eq!(text.matches("for (int k_ = 0; k_ < 6; k_++)").count(), 2, "{text}");
+    let x: Vec<f64> = (1..=6).map(|x| f64::from(x).sin()).collect();
+    let expected = all[0].evaluate(&[&x]);
+    let mut programs = Vec::new();
+    if is_there("cc") {
+        programs.push((Program::c(&folder("alike_c"), &all, Language::C, &["-O3"]), 1));
+        programs.push((Program::c(&folder("alike_c8"), &all, Language::CEight, &["-O3"]), 8));
+    }
+    if is_there("rustc") {
+        programs.push((Program::rust(&folder("alike_rust"), &all, false), 1));
+    }
+    for (program, lanes) in &programs {
+        let inputs = x.iter().flat_map(|&x| vec![x; *lanes]).collect();
+        let found = &program.run(&[vec![inputs]])[0];
+        let found: Vec<Vec<f64>> = found.iter().map(|y| y.iter().copied().step_by(*lanes).collect()).collect();
+        assert_equal("compiled", &all[0], &found, &expected, ROUNDING);
+    }
+}
+
 #[test]
 fn functions_of_ones_own_with_their_derivatives() {
     let arm = robots::arm7();

@@ -57,6 +57,9 @@ impl Dialect for C {
         let is_number = value.starts_with(|c: char| c.is_ascii_digit() || c == '(');
         if self.is_vector() && is_number { format!("WHOLE({value})") } else { value }
     }
+    fn fence(&self) -> Option<&'static str> {
+        Some("FENCE;")
+    }
     fn variable(&self, name: &str, expression: &str, is_mask: bool) -> String {
         let Self { real, name: file, .. } = self;
         match (self.is_vector(), is_mask) {
@@ -148,6 +151,8 @@ pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, lanes:
     let _ = write!(source, "#include \"{name}.h\"\n\n#include <math.h>\n\n");
     source += "/* The parts of a function are compiled one by one. */\n\
                #ifdef __GNUC__\n#define PART static __attribute__((noinline))\n#else\n#define PART static\n#endif\n\n";
+    source += "/* Without fences clang loads numbers long before they are needed. */\n\
+               #ifdef __clang__\n#define FENCE __asm__ volatile(\"\" ::: \"memory\")\n#else\n#define FENCE\n#endif\n\n";
     if programs.iter().any(|p| p.steps.operations().angles > 0) {
         source += &sin_cos(name, real);
     }

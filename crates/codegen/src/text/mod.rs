@@ -144,6 +144,10 @@ pub(crate) trait Dialect {
     fn whole(&self, value: String) -> String {
         value
     }
+    /// A line that keeps a compiler from moving what reads and writes memory across it.
+    fn fence(&self) -> Option<&'static str> {
+        None
+    }
     /// A new variable, a mask or a number.
     fn variable(&self, name: &str, expression: &str, is_mask: bool) -> String;
     /// New variables for the sine and the cosine of an angle.
@@ -169,6 +173,10 @@ pub(crate) trait Dialect {
     /// 0 or 1 as a mask.
     fn truth(&self, holds: bool) -> &'static str;
 }
+
+/// The steps from one fence to the next. LLVM's scheduler moves loads so far ahead of what they are for that what is in registers
+/// has to leave them: behind fences, vectors of talos' derivatives take 0.72 of the time, and as much for 20 as for 200 steps.
+const FENCED: usize = 50;
 
 /// Writes the parts of a program.
 pub(crate) struct Writer<'p, D> {
@@ -233,7 +241,10 @@ impl<'p, D: Dialect> Writer<'p, D> {
     /// The lines of part p.
     pub(crate) fn lines(&self, p: usize) -> Vec<String> {
         let mut lines = Vec::new();
-        for step in &self.program.steps.all[self.program.parts[p].clone()] {
+        for (k, step) in self.program.steps.all[self.program.parts[p].clone()].iter().enumerate() {
+            if k > 0 && k % FENCED == 0 {
+                lines.extend(self.dialect.fence().map(str::to_owned));
+            }
             let number = |id| self.value(p, id, false);
             let fused = |[a, b, c]: [Id; 3], minus_product, minus| {
                 self.dialect.mul_add(minus_product, &number(a), &number(b), minus, &number(c))

@@ -25,6 +25,9 @@ impl Dialect for Rust {
             _ => digits(x),
         }
     }
+    fn fence(&self) -> Option<&'static str> {
+        Some("core::sync::atomic::compiler_fence(core::sync::atomic::Ordering::SeqCst);")
+    }
     fn repeat(&self, k: &str, n: usize, line: &str) -> String {
         format!("for {k} in 0..{n} {{ {line} }}")
     }

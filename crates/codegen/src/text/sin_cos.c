@@ -40,7 +40,7 @@ static inline void NAME_sin_cos(int n, double *restrict sine, double *restrict c
         const double s1 = half != 0.0 ? c0 : s0;
         const double c1 = half != 0.0 ? s0 : c0;
         sine[k] = quadrant >= 2.0 ? -s1 : s1;
-        cosine[k] = (quadrant == 1.0) | (quadrant == 2.0) ? -c1 : c1;
+        cosine[k] = ((quadrant == 1.0) | (quadrant == 2.0)) ? -c1 : c1;
     }
 }
 
@@ -81,7 +81,7 @@ static inline void NAME_sin_cos(int n, float *restrict sine, float *restrict cos
         const float s1 = half != 0.0f ? c0 : s0;
         const float c1 = half != 0.0f ? s0 : c0;
         sine[k] = quadrant >= 2.0f ? -s1 : s1;
-        cosine[k] = (quadrant == 1.0f) | (quadrant == 2.0f) ? -c1 : c1;
+        cosine[k] = ((quadrant == 1.0f) | (quadrant == 2.0f)) ? -c1 : c1;
     }
 }
 
