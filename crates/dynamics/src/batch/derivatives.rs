@@ -1,102 +1,105 @@
 //! Derivatives in many states.
 
 use super::group::{DA, DTAU, MINV};
+use super::places::{Places, Put};
 use super::results::{Matrices, Take, Taken, results};
 use super::table::{COLUMNS, NV, batched};
 use crate::calls::derivatives::{
-    aba_derivatives, centroidal_derivatives, coriolis_derivatives, energy_derivatives, rnea_derivatives,
-    static_torque_derivative,
+    AbaDerivatives, CoriolisDerivatives, RneaDerivatives, aba_derivatives, centroidal_derivatives,
+    coriolis_derivatives, energy_derivatives, rnea_derivatives, static_torque_derivative,
 };
 use crate::calls::parameter_derivatives::Input;
-use crate::calls::second_derivatives::{aba_hessian, each_unit_hessian, rnea_hessian};
+use crate::calls::second_derivatives::{AbaHessian, RneaHessian, aba_hessian, each_unit_hessian, rnea_hessian};
+use crate::derivatives::centroidal_derivatives::CentroidalDerivatives;
+use crate::passes::energy::EnergyDerivatives;
 use condyle_spatial::block::Real;
 
 results! {
     /// The derivatives of τ = rnea(q, v, a) in many states: see [`RneaDerivatives`](crate::RneaDerivatives).
-    BatchRneaDerivatives {
+    BatchRneaDerivatives of RneaDerivatives {
         /// ∂τ/∂q in the tangent space.
-        dtau_dq: Matrices<'b, T>,
+        dtau_dq: Matrices<'b, T> = [NV, NV];
         /// ∂τ/∂v.
-        dtau_dv: Matrices<'b, T>,
+        dtau_dv: Matrices<'b, T> = [NV, NV];
         /// ∂τ/∂a = M(q), armature included.
-        dtau_da: Matrices<'b, T>,
+        dtau_da: Matrices<'b, T> = [NV, NV];
     }
 
     /// q̈ = aba(q, v, τ) and its derivatives in many states: see [`AbaDerivatives`](crate::AbaDerivatives).
-    BatchAbaDerivatives {
+    BatchAbaDerivatives of AbaDerivatives {
         /// q̈ itself, nv numbers for each state.
-        a: &'b [T],
+        a: &'b [T] = [NV];
         /// ∂q̈/∂q in the tangent space.
-        da_dq: Matrices<'b, T>,
+        da_dq: Matrices<'b, T> = [NV, NV];
         /// ∂q̈/∂v.
-        da_dv: Matrices<'b, T>,
+        da_dv: Matrices<'b, T> = [NV, NV];
         /// ∂q̈/∂τ = M(q)⁻¹.
-        da_dtau: Matrices<'b, T>,
+        da_dtau: Matrices<'b, T> = [NV, NV];
     }
 
     /// The derivatives of C(q, v) v in many states: see [`CoriolisDerivatives`](crate::CoriolisDerivatives).
-    BatchCoriolisDerivatives {
+    BatchCoriolisDerivatives of CoriolisDerivatives {
         /// ∂(C v)/∂q, nv × nv.
-        dq: Matrices<'b, T>,
+        dq: Matrices<'b, T> = [NV, NV];
         /// ∂(C v)/∂v, nv × nv.
-        dv: Matrices<'b, T>,
+        dv: Matrices<'b, T> = [NV, NV];
     }
 
     /// The derivatives of the energies in many states: see [`EnergyDerivatives`](crate::EnergyDerivatives).
-    BatchEnergyDerivatives {
+    BatchEnergyDerivatives of EnergyDerivatives {
         /// ∂T/∂q, nv numbers for each state.
-        dT_dq: &'b [T],
+        dT_dq: &'b [T] = [NV];
         /// ∂T/∂v, nv numbers for each state.
-        dT_dv: &'b [T],
+        dT_dv: &'b [T] = [NV];
         /// ∂V/∂q, nv numbers for each state.
-        dV_dq: &'b [T],
+        dV_dq: &'b [T] = [NV];
     }
 
     /// The second derivatives of λᵀ rnea(q, v, a) in many states: see [`RneaHessian`](crate::RneaHessian).
-    BatchRneaHessian {
+    BatchRneaHessian of RneaHessian {
         /// ∂²φ/∂q∂q, nv × nv.
-        dqdq: Matrices<'b, T>,
+        dqdq: Matrices<'b, T> = [NV, NV];
         /// ∂²φ/∂v∂q, nv × nv.
-        dvdq: Matrices<'b, T>,
+        dvdq: Matrices<'b, T> = [NV, NV];
         /// ∂²φ/∂v∂v, nv × nv.
-        dvdv: Matrices<'b, T>,
+        dvdv: Matrices<'b, T> = [NV, NV];
         /// ∂²φ/∂a∂q, nv × nv.
-        dadq: Matrices<'b, T>,
+        dadq: Matrices<'b, T> = [NV, NV];
     }
 
     /// The second derivatives of λᵀ aba(q, v, τ) in many states: see [`AbaHessian`](crate::AbaHessian).
-    BatchAbaHessian {
+    BatchAbaHessian of AbaHessian {
         /// ∂²ψ/∂q∂q, nv × nv.
-        dqdq: Matrices<'b, T>,
+        dqdq: Matrices<'b, T> = [NV, NV];
         /// ∂²ψ/∂v∂q, nv × nv.
-        dvdq: Matrices<'b, T>,
+        dvdq: Matrices<'b, T> = [NV, NV];
         /// ∂²ψ/∂v∂v, nv × nv.
-        dvdv: Matrices<'b, T>,
+        dvdv: Matrices<'b, T> = [NV, NV];
         /// ∂²ψ/∂τ∂q, nv × nv.
-        dtaudq: Matrices<'b, T>,
+        dtaudq: Matrices<'b, T> = [NV, NV];
     }
 
     /// The derivatives of centroidal momentum, its rate and the centre of mass in many states: see
     /// [`CentroidalDerivatives`](crate::CentroidalDerivatives).
-    BatchCentroidalDerivatives {
+    BatchCentroidalDerivatives of CentroidalDerivatives {
         /// ∂hg/∂q, 6 × nv.
-        dh_dq: Matrices<'b, T>,
+        dh_dq: Matrices<'b, T> = [6, NV];
         /// ∂hg/∂v, 6 × nv.
-        dh_dv: Matrices<'b, T>,
+        dh_dv: Matrices<'b, T> = [6, NV];
         /// ∂dhg/∂q, 6 × nv.
-        drate_dq: Matrices<'b, T>,
+        drate_dq: Matrices<'b, T> = [6, NV];
         /// ∂dhg/∂v, 6 × nv.
-        drate_dv: Matrices<'b, T>,
+        drate_dv: Matrices<'b, T> = [6, NV];
         /// ∂dhg/∂a, 6 × nv.
-        drate_da: Matrices<'b, T>,
+        drate_da: Matrices<'b, T> = [6, NV];
         /// ∂c/∂q, 3 × nv.
-        dcom_dq: Matrices<'b, T>,
+        dcom_dq: Matrices<'b, T> = [3, NV];
         /// ∂ċ/∂q, 3 × nv.
-        dvcom_dq: Matrices<'b, T>,
+        dvcom_dq: Matrices<'b, T> = [3, NV];
         /// ∂c̈/∂q, 3 × nv.
-        dacom_dq: Matrices<'b, T>,
+        dacom_dq: Matrices<'b, T> = [3, NV];
         /// ∂c̈/∂v, 3 × nv.
-        dacom_dv: Matrices<'b, T>,
+        dacom_dv: Matrices<'b, T> = [3, NV];
     }
 }
 
@@ -107,10 +110,10 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn rnea_derivatives(model, data, to; q, v, a, f_ext) -> BatchRneaDerivatives<'_, T> [[NV, NV], [NV, NV], [NV, NV]]
+    fn rnea_derivatives(model, data => to; q, v, a, f_ext)
     keeps [
         rnea_derivatives.dtau_dq: DTAU[0], rnea_derivatives.dtau_dv: DTAU[1], rnea_derivatives.dtau_da: DTAU[2]
-    ] {
+    ] -> BatchRneaDerivatives<'_, T> {
         rnea_derivatives(model, data, q, v, a, f_ext);
     }
 
@@ -120,10 +123,9 @@ batched! {
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
-    fn aba_derivatives(model, data, to; q, v, tau, f_ext) -> BatchAbaDerivatives<'_, T>
-    [[NV], [NV, NV], [NV, NV], [NV, NV]]
-    keeps [aba_derivatives.da_dq: DA[0], aba_derivatives.da_dv: DA[1], minv.Minv: MINV] {
-        to.numbers(aba_derivatives(model, data, q, v, tau, f_ext).a);
+    fn aba_derivatives(model, data; q, v, tau, f_ext)
+    keeps [aba_derivatives.da_dq: DA[0], aba_derivatives.da_dv: DA[1], minv.Minv: MINV] -> BatchAbaDerivatives<'_, T> {
+        aba_derivatives(model, data, q, v, tau, f_ext).a
     }
 
     /// [`static_torque_derivative`](crate::static_torque_derivative()) of each state, nv × nv.
@@ -132,8 +134,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn static_torque_derivative(model, data, to; q, f_ext) -> Matrices<'_, T> [[NV, NV]] {
-        to.matrix(static_torque_derivative(model, data, q, f_ext));
+    fn static_torque_derivative(model, data; q, f_ext) -> Matrices<'_, T> [[NV, NV]] {
+        static_torque_derivative(model, data, q, f_ext)
     }
 
     /// [`coriolis_derivatives`](crate::coriolis_derivatives) of each state, two matrices nv × nv.
@@ -142,10 +144,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn coriolis_derivatives(model, data, to; q, v) -> BatchCoriolisDerivatives<'_, T> [[NV, NV], [NV, NV]] {
-        let d = coriolis_derivatives(model, data, q, v);
-        to.matrix(d.dq);
-        to.matrix(d.dv);
+    fn coriolis_derivatives(model, data; q, v) -> BatchCoriolisDerivatives<'_, T> {
+        coriolis_derivatives(model, data, q, v)
     }
 
     /// [`energy_derivatives`](crate::energy_derivatives) of each state, nv numbers each.
@@ -154,12 +154,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn energy_derivatives(model, data, to; q, v) -> BatchEnergyDerivatives<'_, T> [[NV], [NV], [NV]] {
-        let d = energy_derivatives(model, data, q, v);
-        to.numbers(d.dT_dq);
-        to.numbers(d.dT_dv);
-        to.numbers(d.dV_dq);
-    }
+    fn energy_derivatives(model, data; q, v) -> BatchEnergyDerivatives<'_, T> { energy_derivatives(model, data, q, v) }
 
     /// [`centroidal_derivatives`](crate::centroidal_derivatives()) of each state, 6 × nv and 3 × nv.
     ///
@@ -167,18 +162,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn centroidal_derivatives(model, data, to; q, v, a) -> BatchCentroidalDerivatives<'_, T>
-    [[6, NV], [6, NV], [6, NV], [6, NV], [6, NV], [3, NV], [3, NV], [3, NV], [3, NV]] {
-        let d = centroidal_derivatives(model, data, q, v, a);
-        to.matrix(d.dh_dq);
-        to.matrix(d.dh_dv);
-        to.matrix(d.drate_dq);
-        to.matrix(d.drate_dv);
-        to.matrix(d.drate_da);
-        to.matrix(d.dcom_dq);
-        to.matrix(d.dvcom_dq);
-        to.matrix(d.dacom_dq);
-        to.matrix(d.dacom_dv);
+    fn centroidal_derivatives(model, data; q, v, a) -> BatchCentroidalDerivatives<'_, T> {
+        centroidal_derivatives(model, data, q, v, a)
     }
 
     /// [`rnea_hessian`](crate::rnea_hessian()) of each state, four matrices nv × nv.
@@ -187,13 +172,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn rnea_hessian(model, data, to; q, v, a, f_ext, lambda) -> BatchRneaHessian<'_, T>
-    [[NV, NV], [NV, NV], [NV, NV], [NV, NV]] {
-        let h = rnea_hessian(model, data, q, v, a, f_ext, lambda);
-        to.matrix(h.dqdq);
-        to.matrix(h.dvdq);
-        to.matrix(h.dvdv);
-        to.matrix(h.dadq);
+    fn rnea_hessian(model, data; q, v, a, f_ext, lambda) -> BatchRneaHessian<'_, T> {
+        rnea_hessian(model, data, q, v, a, f_ext, lambda)
     }
 
     /// [`aba_hessian`](crate::aba_hessian()) of each state, four matrices nv × nv.
@@ -202,13 +182,8 @@ batched! {
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
-    fn aba_hessian(model, data, to; q, v, tau, f_ext, lambda) -> BatchAbaHessian<'_, T>
-    [[NV, NV], [NV, NV], [NV, NV], [NV, NV]] {
-        let h = aba_hessian(model, data, q, v, tau, f_ext, lambda);
-        to.matrix(h.dqdq);
-        to.matrix(h.dvdq);
-        to.matrix(h.dvdv);
-        to.matrix(h.dtaudq);
+    fn aba_hessian(model, data; q, v, tau, f_ext, lambda) -> BatchAbaHessian<'_, T> {
+        aba_hessian(model, data, q, v, tau, f_ext, lambda)
     }
 
     /// [`rnea_second_derivatives`](crate::rnea_second_derivatives) of each state: the matrices of all τ_i, nv × nv each, one
@@ -218,8 +193,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn rnea_second_derivatives(model, data, to; q, v, a, f_ext) -> BatchRneaHessian<'_, T>
-    [[NV, NV, NV], [NV, NV, NV], [NV, NV, NV], [NV, NV, NV]] with wide {
+    fn rnea_second_derivatives(model, data => to; q, v, a, f_ext)
+    with wide -> BatchRneaHessian<'_, T> [[NV, NV, NV], [NV, NV, NV], [NV, NV, NV], [NV, NV, NV]] {
         let nv = model.nv();
         each_unit_hessian(model, data, [q, v, a], f_ext, &mut wide[..nv], |i, matrices| {
             for (result, matrix) in matrices.into_iter().enumerate() {
@@ -234,8 +209,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if the input names no moving body or a smoothing that is not positive.
-    fn rnea_input_derivative(model, data, to; q, v, a, f_ext; input: Input) -> Matrices<'_, T> [[NV, COLUMNS]]
-    with wide columns (input.len(model)) {
+    fn rnea_input_derivative(model, data => to; q, v, a, f_ext; input: Input)
+    with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));
         let out = &mut wide[..n * columns];
         rnea_derivatives(model, data, q, v, a, f_ext).write_input(input, out);
@@ -248,8 +223,8 @@ batched! {
     ///
     /// # Panics
     /// As [`aba`](Self::aba), or if the input names no moving body or a smoothing that is not positive.
-    fn aba_input_derivative(model, data, to; q, v, tau, f_ext; input: Input) -> Matrices<'_, T> [[NV, COLUMNS]]
-    with wide columns (input.len(model)) {
+    fn aba_input_derivative(model, data => to; q, v, tau, f_ext; input: Input)
+    with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));
         let out = &mut wide[..n * columns];
         aba_derivatives(model, data, q, v, tau, f_ext).write_input(input, out);

@@ -18,7 +18,7 @@ batched! {
     /// # Panics
     /// If an argument has the wrong length, there are more states than there is room for, or the batch was made for a
     /// model of another tree; so do all below.
-    fn rnea(model, data, to; q, v, a, f_ext) -> &[T] [[NV]] { to.numbers(rnea(model, data, q, v, a, f_ext)); }
+    fn rnea(model, data; q, v, a, f_ext) -> &[T] [[NV]] { rnea(model, data, q, v, a, f_ext) }
 
     /// [`nonlinear_effects`](crate::nonlinear_effects): h of each state, nv numbers.
     ///
@@ -26,7 +26,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn nonlinear_effects(model, data, to; q, v) -> &[T] [[NV]] { to.numbers(nonlinear_effects(model, data, q, v)); }
+    fn nonlinear_effects(model, data; q, v) -> &[T] [[NV]] { nonlinear_effects(model, data, q, v) }
 
     /// [`gravity`](crate::gravity): g of each state, nv numbers.
     ///
@@ -34,7 +34,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn gravity(model, data, to; q) -> &[T] [[NV]] { to.numbers(gravity(model, data, q)); }
+    fn gravity(model, data; q) -> &[T] [[NV]] { gravity(model, data, q) }
 
     /// [`static_torque`](crate::static_torque()): τ of each state, nv numbers.
     ///
@@ -42,7 +42,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn static_torque(model, data, to; q, f_ext) -> &[T] [[NV]] { to.numbers(static_torque(model, data, q, f_ext)); }
+    fn static_torque(model, data; q, f_ext) -> &[T] [[NV]] { static_torque(model, data, q, f_ext) }
 
     /// [`coriolis_matrix`](crate::coriolis_matrix): C of each state, nv × nv.
     ///
@@ -50,9 +50,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn coriolis_matrix(model, data, to; q, v) -> Matrices<'_, T> [[NV, NV]] {
-        to.matrix(coriolis_matrix(model, data, q, v));
-    }
+    fn coriolis_matrix(model, data; q, v) -> Matrices<'_, T> [[NV, NV]] { coriolis_matrix(model, data, q, v) }
 
     /// [`aba`](crate::aba()): q̈ of each state, nv numbers.
     ///
@@ -60,7 +58,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if M is singular ([`Model::singular_joints`](crate::Model::singular_joints)).
-    fn aba(model, data, to; q, v, tau, f_ext) -> &[T] [[NV]] { to.numbers(aba(model, data, q, v, tau, f_ext)); }
+    fn aba(model, data; q, v, tau, f_ext) -> &[T] [[NV]] { aba(model, data, q, v, tau, f_ext) }
 
     /// [`forward_dynamics`](crate::forward_dynamics()): q̈ of each state by a method of choice, nv numbers.
     ///
@@ -68,8 +66,8 @@ batched! {
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
-    fn forward_dynamics(model, data, to; q, v, tau, f_ext; method: Option<ForwardDynamicsMethod>) -> &[T] [[NV]] {
-        to.numbers(forward_dynamics(model, data, q, v, tau, f_ext, method));
+    fn forward_dynamics(model, data; q, v, tau, f_ext; method: Option<ForwardDynamicsMethod>) -> &[T] [[NV]] {
+        forward_dynamics(model, data, q, v, tau, f_ext, method)
     }
 
     /// [`crba`](crate::crba()): M of each state, nv × nv.
@@ -78,7 +76,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn crba(model, data, to; q) -> Matrices<'_, T> [[NV, NV]] keeps [crba.M: M] { crba(model, data, q); }
+    fn crba(model, data => to; q) keeps [crba.M: M] -> Matrices<'_, T> [[NV, NV]] { crba(model, data, q); }
 
     /// [`minv`](crate::minv()): M⁻¹ of each state, nv × nv.
     ///
@@ -86,7 +84,7 @@ batched! {
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
-    fn minv(model, data, to; q) -> Matrices<'_, T> [[NV, NV]] keeps [minv.Minv: MINV] { minv(model, data, q); }
+    fn minv(model, data => to; q) keeps [minv.Minv: MINV] -> Matrices<'_, T> [[NV, NV]] { minv(model, data, q); }
 
     /// [`passive_torque`](crate::passive_torque): τ of each state, nv numbers.
     ///
@@ -94,10 +92,10 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if `smoothing` is not positive.
-    fn passive_torque(model, data, to; v; smoothing: f64) -> &[T] [[NV]] with wide {
+    fn passive_torque(model, data; v; smoothing: f64) with wide -> &[T] [[NV]] {
         let tau = &mut wide[..v.len()];
         passive_torque(model, v, smoothing, tau);
-        to.numbers(tau);
+        &*tau
     }
 
     /// [`passive_torque_derivative`](crate::passive_torque_derivative): the diagonal of ∂τ/∂v of each state, nv numbers.
@@ -106,10 +104,10 @@ batched! {
     ///
     /// # Panics
     /// As [`passive_torque`](Self::passive_torque).
-    fn passive_torque_derivative(model, data, to; v; smoothing: f64) -> &[T] [[NV]] with wide {
+    fn passive_torque_derivative(model, data; v; smoothing: f64) with wide -> &[T] [[NV]] {
         let slope = &mut wide[..v.len()];
         passive_torque_derivative(model, v, smoothing, slope);
-        to.numbers(slope);
+        &*slope
     }
 
     /// [`joint_torque_regressor`](crate::joint_torque_regressor): Y of each state, nv × 10 (bodies − 1).
@@ -118,8 +116,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn joint_torque_regressor(model, data, to; q, v, a) -> Matrices<'_, T> [[NV, PARAMETERS]] {
-        to.matrix(joint_torque_regressor(model, data, q, v, a));
+    fn joint_torque_regressor(model, data; q, v, a) -> Matrices<'_, T> [[NV, PARAMETERS]] {
+        joint_torque_regressor(model, data, q, v, a)
     }
 
     /// [`kinetic_energy_regressor`](crate::kinetic_energy_regressor): y of each state, 10 (bodies − 1) numbers.
@@ -128,8 +126,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn kinetic_energy_regressor(model, data, to; q, v) -> &[T] [[PARAMETERS]] {
-        to.numbers(kinetic_energy_regressor(model, data, q, v));
+    fn kinetic_energy_regressor(model, data; q, v) -> &[T] [[PARAMETERS]] {
+        kinetic_energy_regressor(model, data, q, v)
     }
 
     /// [`potential_energy_regressor`](crate::potential_energy_regressor): y of each state, 10 (bodies − 1) numbers.
@@ -138,7 +136,5 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn potential_energy_regressor(model, data, to; q) -> &[T] [[PARAMETERS]] {
-        to.numbers(potential_energy_regressor(model, data, q));
-    }
+    fn potential_energy_regressor(model, data; q) -> &[T] [[PARAMETERS]] { potential_energy_regressor(model, data, q) }
 }

@@ -79,7 +79,9 @@ pub(super) struct States<'w, S: Block> {
     pub data: &'w mut Data<S>,
     pub q: &'w [S],
     pub v: &'w [S],
-    pub x: &'w [S],
+    pub a: &'w [S],
+    /// The same as a: a pass has one of the two.
+    pub tau: &'w [S],
     pub lambda: &'w [S],
     pub f_ext: &'w [Force<S>],
     pub constraints: Option<&'w mut ConstraintSet<S>>,
@@ -198,9 +200,9 @@ fn one_by_one<T: Real, S: Block<Number = T>>(
             gather(of(FORCES), n, flat_mut(f_ext));
         }
         places.go_to(first, n);
-        let [q, v, x, lambda] = &*numbers;
+        let [q, v, a, lambda] = &*numbers;
         let (kept, constraints) = (matrices.next(), constraints.as_deref_mut());
-        work(States { model, data, q, v, x, lambda, f_ext, constraints, six, wide, kept }, &mut places);
+        work(States { model, data, q, v, a, tau: a, lambda, f_ext, constraints, six, wide, kept }, &mut places);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Places and motions of bodies and frames in many states.
 
+use super::places::{Places, Put};
 use super::results::{Matrices, Poses, Take, Taken, results};
 use super::table::{BODIES, NV, batched};
 use crate::calls::kinematics::{
@@ -7,14 +8,21 @@ use crate::calls::kinematics::{
 };
 use crate::passes::frames::ReferenceFrame;
 use condyle_spatial::block::Real;
+use nalgebra::DMatrix;
+
+/// The derivatives of an acceleration, in the matrices of a single call.
+struct AccelerationDerivatives<'s, S> {
+    da_dq: &'s DMatrix<S>,
+    da_dv: &'s DMatrix<S>,
+}
 
 results! {
     /// The derivatives of an acceleration in many states.
-    BatchAccelerationDerivatives {
+    BatchAccelerationDerivatives of AccelerationDerivatives {
         /// ∂a/∂q in the tangent space, 6 × nv.
-        da_dq: Matrices<'b, T>,
+        da_dq: Matrices<'b, T> = [6, NV];
         /// ∂a/∂v, 6 × nv.
-        da_dv: Matrices<'b, T>,
+        da_dv: Matrices<'b, T> = [6, NV];
     }
 }
 
@@ -33,7 +41,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
-    fn forward_kinematics(model, data, to; q) -> Poses<'_, T> [[BODIES, 4, 4]] {
+    fn forward_kinematics(model, data => to; q) -> Poses<'_, T> [[BODIES, 4, 4]] {
         let (placements, n) = (forward_kinematics(model, data, q), model.bodies().len());
         for body in 0..n {
             to.pose(0, [body, n], placements.body(body));
@@ -46,7 +54,7 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_placement(model, data, to; q; frame: usize) -> Poses<'_, T> [[4, 4]] {
+    fn frame_placement(model, data => to; q; frame: usize) -> Poses<'_, T> [[4, 4]] {
         to.pose(0, [0, 1], forward_kinematics(model, data, q).frame(frame));
     }
 
@@ -56,9 +64,9 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_jacobian(model, data, to; q; frame: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]] with six {
+    fn frame_jacobian(model, data; q; frame: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         frame_jacobian(model, q, frame, reference, &mut six[0]);
-        to.matrix(&six[0]);
+        &six[0]
     }
 
     /// [`body_jacobian`](crate::body_jacobian): J of each state, 6 × nv.
@@ -67,9 +75,9 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such body.
-    fn body_jacobian(model, data, to; q; body: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]] with six {
+    fn body_jacobian(model, data; q; body: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         body_jacobian(model, q, body, reference, &mut six[0]);
-        to.matrix(&six[0]);
+        &six[0]
     }
 
     /// [`Velocities::frame_velocity`](crate::Velocities::frame_velocity): v of each state, six numbers.
@@ -78,8 +86,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_velocity(model, data, to; q, v; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
-        to.numbers(&forward_velocities(model, data, q, v).frame_velocity(frame, reference).to_array());
+    fn frame_velocity(model, data; q, v; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        forward_velocities(model, data, q, v).frame_velocity(frame, reference)
     }
 
     /// [`Velocities::body_velocity`](crate::Velocities::body_velocity): v of each state, six numbers.
@@ -88,8 +96,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such body.
-    fn body_velocity(model, data, to; q, v; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
-        to.numbers(&forward_velocities(model, data, q, v).body_velocity(body, reference).to_array());
+    fn body_velocity(model, data; q, v; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        forward_velocities(model, data, q, v).body_velocity(body, reference)
     }
 
     /// [`Accelerations::frame_acceleration`](crate::Accelerations::frame_acceleration): a of each state, six numbers.
@@ -98,8 +106,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_acceleration(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
-        to.numbers(&forward_accelerations(model, data, q, v, a).frame_acceleration(frame, reference).to_array());
+    fn frame_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        forward_accelerations(model, data, q, v, a).frame_acceleration(frame, reference)
     }
 
     /// [`Accelerations::body_acceleration`](crate::Accelerations::body_acceleration): a of each state, six numbers.
@@ -108,8 +116,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such body.
-    fn body_acceleration(model, data, to; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
-        to.numbers(&forward_accelerations(model, data, q, v, a).body_acceleration(body, reference).to_array());
+    fn body_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        forward_accelerations(model, data, q, v, a).body_acceleration(body, reference)
     }
 
     /// [`Accelerations::frame_classical_acceleration`](crate::Accelerations::frame_classical_acceleration): v̇ + ω × v, ω̇ of each state, six numbers.
@@ -118,8 +126,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_classical_acceleration(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
-        to.numbers(&forward_accelerations(model, data, q, v, a).frame_classical_acceleration(frame, reference).to_array());
+    fn frame_classical_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        forward_accelerations(model, data, q, v, a).frame_classical_acceleration(frame, reference)
     }
 
     /// [`Accelerations::body_classical_acceleration`](crate::Accelerations::body_classical_acceleration): v̇ + ω × v, ω̇ of each state, six numbers.
@@ -128,8 +136,8 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such body.
-    fn body_classical_acceleration(model, data, to; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
-        to.numbers(&forward_accelerations(model, data, q, v, a).body_classical_acceleration(body, reference).to_array());
+    fn body_classical_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
+        forward_accelerations(model, data, q, v, a).body_classical_acceleration(body, reference)
     }
 
     /// [`Velocities::frame_jacobian_rate`](crate::Velocities::frame_jacobian_rate): dJ/dt of each state, 6 × nv.
@@ -138,10 +146,10 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_jacobian_rate(model, data, to; q, v; frame: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
-    with six {
+    fn frame_jacobian_rate(model, data; q, v; frame: usize, reference: ReferenceFrame)
+    with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_jacobian_rate(frame, reference, &mut six[0]);
-        to.matrix(&six[0]);
+        &six[0]
     }
 
     /// [`Velocities::body_jacobian_rate`](crate::Velocities::body_jacobian_rate): dJ/dt of each state, 6 × nv.
@@ -150,10 +158,10 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such body.
-    fn body_jacobian_rate(model, data, to; q, v; body: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
-    with six {
+    fn body_jacobian_rate(model, data; q, v; body: usize, reference: ReferenceFrame)
+    with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_jacobian_rate(body, reference, &mut six[0]);
-        to.matrix(&six[0]);
+        &six[0]
     }
 
     /// [`Velocities::frame_velocity_derivative`](crate::Velocities::frame_velocity_derivative): ∂v/∂q of each state, 6 × nv.
@@ -162,10 +170,10 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_velocity_derivative(model, data, to; q, v; frame: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
-    with six {
+    fn frame_velocity_derivative(model, data; q, v; frame: usize, reference: ReferenceFrame)
+    with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_velocity_derivative(frame, reference, &mut six[0]);
-        to.matrix(&six[0]);
+        &six[0]
     }
 
     /// [`Velocities::body_velocity_derivative`](crate::Velocities::body_velocity_derivative): ∂v/∂q of each state, 6 × nv.
@@ -174,10 +182,10 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such body.
-    fn body_velocity_derivative(model, data, to; q, v; body: usize, reference: ReferenceFrame) -> Matrices<'_, T> [[6, NV]]
-    with six {
+    fn body_velocity_derivative(model, data; q, v; body: usize, reference: ReferenceFrame)
+    with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_velocity_derivative(body, reference, &mut six[0]);
-        to.matrix(&six[0]);
+        &six[0]
     }
 
     /// [`Accelerations::frame_acceleration_derivatives`](crate::Accelerations::frame_acceleration_derivatives) of each
@@ -187,12 +195,11 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_acceleration_derivatives(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame)
-    -> BatchAccelerationDerivatives<'_, T> [[6, NV], [6, NV]] with six {
-        let [by_q, by_v] = six;
-        forward_accelerations(model, data, q, v, a).frame_acceleration_derivatives(frame, reference, by_q, by_v);
-        to.matrix(by_q);
-        to.matrix(by_v);
+    fn frame_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
+    with six -> BatchAccelerationDerivatives<'_, T> {
+        let [da_dq, da_dv] = six;
+        forward_accelerations(model, data, q, v, a).frame_acceleration_derivatives(frame, reference, da_dq, da_dv);
+        AccelerationDerivatives { da_dq, da_dv }
     }
 
     /// [`Accelerations::body_acceleration_derivatives`](crate::Accelerations::body_acceleration_derivatives) of each
@@ -202,12 +209,11 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such body.
-    fn body_acceleration_derivatives(model, data, to; q, v, a; body: usize, reference: ReferenceFrame)
-    -> BatchAccelerationDerivatives<'_, T> [[6, NV], [6, NV]] with six {
-        let [by_q, by_v] = six;
-        forward_accelerations(model, data, q, v, a).body_acceleration_derivatives(body, reference, by_q, by_v);
-        to.matrix(by_q);
-        to.matrix(by_v);
+    fn body_acceleration_derivatives(model, data; q, v, a; body: usize, reference: ReferenceFrame)
+    with six -> BatchAccelerationDerivatives<'_, T> {
+        let [da_dq, da_dv] = six;
+        forward_accelerations(model, data, q, v, a).body_acceleration_derivatives(body, reference, da_dq, da_dv);
+        AccelerationDerivatives { da_dq, da_dv }
     }
 
     /// [`Accelerations::frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives) of each
@@ -217,11 +223,10 @@ batched! {
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if there is no such frame.
-    fn frame_classical_acceleration_derivatives(model, data, to; q, v, a; frame: usize, reference: ReferenceFrame)
-    -> BatchAccelerationDerivatives<'_, T> [[6, NV], [6, NV]] with six {
-        let [by_q, by_v] = six;
-        forward_accelerations(model, data, q, v, a).frame_classical_acceleration_derivatives(frame, reference, by_q, by_v);
-        to.matrix(by_q);
-        to.matrix(by_v);
+    fn frame_classical_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
+    with six -> BatchAccelerationDerivatives<'_, T> {
+        let [da_dq, da_dv] = six;
+        forward_accelerations(model, data, q, v, a).frame_classical_acceleration_derivatives(frame, reference, da_dq, da_dv);
+        AccelerationDerivatives { da_dq, da_dv }
     }
 }

@@ -1,8 +1,8 @@
 //! The places to which passes of a batch put their results: of each state, one after the other.
 
 use super::group::SYMMETRIC;
-use condyle_spatial::block::{Block, MOST, Real, Strided, scatter, scatter_matrix};
-use condyle_spatial::{Inertia, Se3};
+use condyle_spatial::block::{Block, MOST, Strided, scatter, scatter_matrix};
+use condyle_spatial::{Force, Inertia, Motion, Scalar, Se3, Vec3};
 use core::mem;
 use nalgebra::DMatrix;
 
@@ -46,17 +46,12 @@ impl<'a, T> Places<'a, T> {
     }
 }
 
-impl<T: Real> Places<'_, T> {
+impl<T> Places<'_, T> {
     /// Writes some numbers of each state.
     #[inline(never)]
     pub(super) fn numbers<S: Block<Number = T>>(&mut self, x: &[S]) {
         scatter(x, self.states, &mut self.to[self.next][self.first * x.len()..][..self.states * x.len()]);
         self.next += 1;
-    }
-
-    /// Writes a matrix of each state, by rows.
-    pub(super) fn matrix<S: Block<Number = T>>(&mut self, x: &DMatrix<S>) {
-        self.columns(x.as_slice(), x.ncols());
     }
 
     /// Writes a matrix of each state, of so many columns, by rows.
@@ -96,16 +91,42 @@ impl<T: Real> Places<'_, T> {
         let columns = [R.x.x, R.x.y, R.x.z, o, R.y.x, R.y.y, R.y.z, o, R.z.x, R.z.y, R.z.z, o, p.x, p.y, p.z, e];
         self.part(result, k, &columns, 4);
     }
+}
 
-    /// Writes the inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī].
-    #[inline(always)]
-    pub(super) fn inertia<S: Block<Number = T>>(&mut self, I: &Inertia<S>) {
-        let mut columns = [S::zero(); 36];
-        let axes = I.rotational.full().columns();
-        for k in 0..3 {
-            columns[7 * k] = I.mass;
-            columns[6 * (3 + k) + 3..6 * (4 + k)].copy_from_slice(&axes[k].to_array());
+/// What a single call gives, which goes to the next places.
+pub(super) trait Put<S: Block> {
+    fn put(self, to: &mut Places<'_, S::Number>);
+}
+
+macro_rules! put {
+    ($($Kind:ty: $x:ident => $method:ident($($argument:expr),*);)*) => {$(
+        impl<S: Block> Put<S> for $Kind {
+            #[inline(always)]
+            fn put(self, to: &mut Places<'_, S::Number>) {
+                let $x = self;
+                to.$method($($argument),*);
+            }
         }
-        self.columns(&columns, 6);
+    )*};
+}
+put! {
+    S: x => numbers(&[x]);
+    &[S]: x => numbers(x);
+    Vec3<S>: x => numbers(&x.to_array());
+    Motion<S>: x => numbers(&x.to_array());
+    Force<S>: x => numbers(&x.to_array());
+    &DMatrix<S>: x => columns(x.as_slice(), x.ncols());
+    Inertia<S>: I => columns(&centroidal_matrix(I), 6);
+}
+
+/// The inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī], by columns.
+#[inline(always)]
+fn centroidal_matrix<S: Scalar>(I: Inertia<S>) -> [S; 36] {
+    let mut columns = [S::zero(); 36];
+    let axes = I.rotational.full().columns();
+    for k in 0..3 {
+        columns[7 * k] = I.mass;
+        columns[6 * (3 + k) + 3..6 * (4 + k)].copy_from_slice(&axes[k].to_array());
     }
+    columns
 }

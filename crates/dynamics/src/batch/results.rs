@@ -83,6 +83,9 @@ pub(super) struct Taken<'b, T: Real> {
 
 /// A kind of results.
 pub(super) trait Take<'b, T: Real> {
+    /// The shapes of its results, where no function says them.
+    const SHAPES: &'static [&'static [usize]] = &[];
+
     fn take(from: &mut Taken<'b, T>) -> Self;
 }
 
@@ -208,9 +211,15 @@ fn check_state(k: usize, states: usize) {
     assert!(k < states, "k: expected a number below that of the states, {states}, found {k}");
 }
 
-/// Structs of results, of which the single call's struct says what they are.
+/// Structs of results, each made of a single call's struct: its members of these names are put one after the other, in places
+/// of the shapes in brackets.
 macro_rules! results {
-    ($($(#[$doc:meta])* $Name:ident { $($(#[$member_doc:meta])* $member:ident: $Kind:ty,)* })*) => {$(
+    ($(
+        $(#[$doc:meta])*
+        $Name:ident of $Single:ident {
+            $($(#[$member_doc:meta])* $member:ident: $Kind:ty = $([$($size:expr),*]),+;)*
+        }
+    )*) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
         pub struct $Name<'b, T: Real> {
@@ -218,8 +227,17 @@ macro_rules! results {
         }
 
         impl<'b, T: Real> Take<'b, T> for $Name<'b, T> {
+            const SHAPES: &'static [&'static [usize]] = &[$($(&[$($size),*]),+),*];
+
             fn take(from: &mut Taken<'b, T>) -> Self {
                 Self { $($member: Take::take(from)),* }
+            }
+        }
+
+        impl<S: condyle_spatial::block::Block> Put<S> for $Single<'_, S> {
+            #[inline(always)]
+            fn put(self, to: &mut Places<'_, S::Number>) {
+                $(Put::<S>::put(self.$member, to);)*
             }
         }
     )*};

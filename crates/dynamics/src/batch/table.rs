@@ -2,16 +2,17 @@
 //!
 //! ```text
 //! /// [`coriolis_matrix`](crate::coriolis_matrix): C of each state, nv × nv.
-//! fn coriolis_matrix(model, data, to; q, v) -> Matrices<'_, T> [[NV, NV]] {
-//!     to.matrix(coriolis_matrix(model, data, q, v));
-//! }
+//! fn coriolis_matrix(model, data; q, v) -> Matrices<'_, T> [[NV, NV]] { coriolis_matrix(model, data, q, v) }
 //! ```
 //!
 //! the methods of `Batch` and of `BatchWriter` of that name: they take the arguments of all states, check them, and run the
-//! body on groups of states, a lane for each, where it puts each result to the places that have the shapes in brackets. After
-//! the arguments of states may stand some that all share, with their types; `with` names more of what a pass has, `columns`
-//! says what `COLUMNS` is in a shape, and `keeps` names the matrices of `Data` that stay in lanes instead, the last ones of
-//! the shapes; a writer writes them too.
+//! body on groups of states, a lane for each. What it gives is put to the places that have the shapes in brackets; results in
+//! a struct have theirs there (`results!`). With `data => to` the body writes to places itself. After the arguments of states
+//! may stand some that all share, with their types; `with` names more of what a pass has, `columns` says what `COLUMNS` is in a
+//! shape, and `keeps` names the matrices of `Data` that stay in lanes instead, the last ones of the shapes; a writer writes
+//! them too.
+
+use super::group::FORCES;
 
 /// Sizes that depend on the robot, in shapes.
 pub(super) const NV: usize = usize::MAX;
@@ -39,60 +40,59 @@ macro_rules! given {
 }
 pub(super) use given;
 
-/// An argument with its name and its place.
-macro_rules! placed {
-    (q, $x:expr) => {
-        $crate::batch::table::Given { name: "q", at: 0, numbers: $x }
-    };
-    (v, $x:expr) => {
-        $crate::batch::table::Given { name: "v", at: 1, numbers: $x }
-    };
-    (a, $x:expr) => {
-        $crate::batch::table::Given { name: "a", at: 2, numbers: $x }
-    };
-    (tau, $x:expr) => {
-        $crate::batch::table::Given { name: "tau", at: 2, numbers: $x }
-    };
-    (lambda, $x:expr) => {
-        $crate::batch::table::Given { name: "lambda", at: 3, numbers: $x }
-    };
+/// The numbers of an argument.
+macro_rules! numbers {
     (f_ext, $x:expr) => {
-        $crate::batch::table::Given {
-            name: "f_ext",
-            at: $crate::batch::group::FORCES,
-            numbers: condyle_spatial::block::flat($x),
-        }
+        condyle_spatial::block::flat($x)
+    };
+    ($name:ident, $x:expr) => {
+        $x
     };
 }
-pub(super) use placed;
+pub(super) use numbers;
 
-/// An argument as a pass sees it, in lanes.
-macro_rules! of_states {
-    ($s:ident, a) => {
-        $s.x
-    };
-    ($s:ident, tau) => {
-        $s.x
-    };
-    ($s:ident, $name:ident) => {
-        $s.$name
-    };
+/// The place of an argument among those of a pass, by its name.
+pub(super) const fn place(name: &str) -> usize {
+    match name.as_bytes() {
+        b"q" => 0,
+        b"v" => 1,
+        b"a" | b"tau" => 2,
+        b"lambda" => 3,
+        _ => FORCES,
+    }
 }
-pub(super) use of_states;
+
+/// Puts what a pass gives to the next places, if it has not written to places itself.
+macro_rules! put {
+    ($places:ident, $body:block) => {
+        $crate::batch::places::Put::<S>::put($body, $places)
+    };
+    ($places:ident => $to:ident, $body:block) => {{
+        let $to = &mut *$places;
+        $body
+    }};
+}
+pub(super) use put;
+
+/// The shapes of results: as a function says, or as the struct that it gives does.
+macro_rules! shapes {
+    ($Out:ty, [$([$($size:expr),*]),*]) => { &[$(&[$($size),*]),*] };
+    ($Out:ty,) => { <$Out as $crate::batch::results::Take<T>>::SHAPES };
+}
+pub(super) use shapes;
 
 macro_rules! batched {
     ($(
         $(#[$doc:meta])*
-        fn $name:ident($model:ident, $data:ident, $to:ident $(, $set:ident: BatchConstraints)?;
-            $($given:ident),* $(; $($shared:ident: $Shared:ty),*)?) -> $Out:ty [$([$($size:expr),*]),*]
-        $(with $($scratch:ident),+)? $(columns ($columns:expr))? $(keeps [$($($place:ident).+: $kind:expr),+])?
-        $body:block
+        fn $name:ident($model:ident, $data:ident $(, $set:ident: BatchConstraints)? $(=> $to:ident)?;
+            $($given:ident),* $(; $($shared:ident: $Shared:ty),*)?)
+        $(with $scratch:ident)? $(columns ($columns:expr))? $(keeps [$($($place:ident).+: $kind:expr),+])?
+        -> $Out:ty $([$($shape:tt),*])? $body:block
     )*) => {
         $(mod $name {
             use super::*;
             use $crate::batch::group::{Pass, States};
             use $crate::batch::places::Places;
-            use $crate::batch::table::of_states;
 
             #[derive(Clone, Copy)]
             struct Work { $($($shared: $Shared),*)? }
@@ -102,11 +102,11 @@ macro_rules! batched {
 
                 #[inline(always)]
                 #[allow(unused_variables)] // by passes that need no `Data`, or leave what they give
-                fn run<S: condyle_spatial::block::Block<Number = T>>(self, s: States<'_, S>, $to: &mut Places<'_, T>) {
+                fn run<S: condyle_spatial::block::Block<Number = T>>(self, s: States<'_, S>, to: &mut Places<'_, T>) {
                     let Self { $($($shared),*)? } = self;
                     let ($model, $data) = (s.model, s.data);
-                    $(let $given = of_states!(s, $given);)*
-                    $($(let $scratch = s.$scratch;)+)?
+                    $(let $given = s.$given;)*
+                    $(let $scratch = s.$scratch;)?
                     $(let $set = s.constraints.expect("a pass under constraints has them");)?
                     $(
                         let mut kept = s.kept;
@@ -114,10 +114,10 @@ macro_rules! batched {
                             $(core::mem::swap(&mut $data.$($place).+, &mut kept[$kind]);)+
                         }
                     )?
-                    $body
+                    $crate::batch::table::put!(to $(=> $to)?, $body);
                     $(match kept {
                         Some(kept) => { $(core::mem::swap(&mut $data.$($place).+, &mut kept[$kind]);)+ }
-                        None => { $($to.kind($kind, &$data.$($place).+);)+ }
+                        None => { $(to.kind($kind, &$data.$($place).+);)+ }
                     })?
                 }
             }
@@ -133,8 +133,12 @@ macro_rules! batched {
                 written: Option<&mut [&mut [T]]>,
             ) {
                 let (columns, constraints) = (0 $(+ $columns)?, None $(.or(Some($set)))?);
-                let given: &[_] = &[$($crate::batch::table::placed!($given, $given)),*];
-                let shapes: &[&[usize]] = &[$(&[$($size),*]),*];
+                let given: &[_] = &[$($crate::batch::table::Given {
+                    name: stringify!($given),
+                    at: const { $crate::batch::table::place(stringify!($given)) },
+                    numbers: $crate::batch::table::numbers!($given, $given),
+                }),*];
+                let shapes: &[&[usize]] = $crate::batch::table::shapes!($Out, $([$($shape),*])?);
                 let work = Work { $($($shared),*)? };
                 batch.compute(work, $model, given, (shapes, columns), constraints, written);
             }
