@@ -4,7 +4,7 @@ use crate::common::table::Input;
 use crate::common::{fixed, rng};
 use crate::counting::{allocations, bytes};
 use crate::table::{Found, States, constraints, table};
-use crate::{each_level, models};
+use crate::{best_level, each_level, models};
 use condyle_dynamics::{
     Batch, ConstraintSet, ContactConstraint, Data, Force, Matrices, Model, Proximal, ReferenceFrame, Se3, Target,
     robots,
@@ -310,6 +310,7 @@ fn every_function_without_coordinates() {
 /// Targets move all states.
 #[test]
 fn targets_of_constraints() {
+    let _best = best_level();
     let model = &robots::arm7();
     let tool = ContactConstraint { kp: 100.0, ..ContactConstraint::point(model.frame("tool").unwrap()) };
     let inputs = random(model, 5, 0);
