@@ -135,7 +135,6 @@ impl Scalar for Expression {
     type Mask = Mask;
     /// It stands for as many numbers as the code will be called with: there is not one to look at.
     const LANES: usize = 2;
-    const RECORDED: bool = true;
 
     #[inline(never)]
     fn splat(x: f64) -> Self {

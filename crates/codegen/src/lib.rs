@@ -23,6 +23,7 @@ mod derivative;
 mod entries;
 mod error;
 mod expression;
+mod forms;
 mod function;
 mod generate;
 mod graph;
@@ -37,6 +38,9 @@ mod text;
 pub use derivative::{DualExpression, jacobian};
 pub use error::Error;
 pub use expression::{Expression, Mask};
+pub use forms::{ForwardDerivatives, aba, aba_derivatives, crba, minv};
+#[doc(hidden)]
+pub use forms::{branches::Branches, joint_placement::Carried, joint_placement::JointPlacement};
 pub use function::{Array, Function, Operations, Recorder, record};
 pub use generate::generate;
 pub use identifiers::identifier;

@@ -2,12 +2,13 @@
 
 use crate::error::Error;
 use crate::expression::Expression;
+use crate::forms::{aba, aba_derivatives, crba, minv};
 use crate::function::{Function, Recorder, record};
 use crate::identifiers::identifiers;
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, ReferenceFrame, aba, aba_derivatives, aba_hessian, centroidal_map_rate,
-    constrained_dynamics, constrained_dynamics_derivatives, crba, forward_kinematics, forward_velocities, gravity,
-    impulse_dynamics, minv, neutral, nonlinear_effects, rnea, rnea_derivatives, rnea_hessian,
+    ConstraintSet, ContactConstraint, Data, ReferenceFrame, aba_hessian, centroidal_map_rate, constrained_dynamics,
+    constrained_dynamics_derivatives, forward_kinematics, forward_velocities, gravity, impulse_dynamics, neutral,
+    nonlinear_effects, rnea, rnea_derivatives, rnea_hessian,
 };
 use condyle_model::inertial_parameters::to_inertia;
 use condyle_model::{Model, Vec3};
@@ -225,9 +226,9 @@ impl<'s> Robot<'s> {
     /// All that needs neither frames nor constraints.
     fn unconstrained(&mut self, r: &mut Recorder, name: &str) {
         match name {
-            "crba" => return r.matrix("M", crba(&self.model, &mut self.data, &self.q), "inertia matrix"),
+            "crba" => return r.matrix("M", &crba(&self.model, &self.q), "inertia matrix"),
             "minv" => {
-                return r.matrix("Minv", minv(&self.model, &mut self.data, &self.q), "inverse of the inertia matrix");
+                return r.matrix("Minv", &minv(&self.model, &mut self.data, &self.q), "inverse of the inertia matrix");
             }
             "gravity" => return r.output("g", gravity(&self.model, &mut self.data, &self.q), "efforts"),
             _ => {}
@@ -265,13 +266,13 @@ impl<'s> Robot<'s> {
                 }
                 let Self { model, data, q, .. } = self;
                 if name == "aba" {
-                    return r.output("a", aba(model, data, q, &v, &tau, &f_ext), "acceleration");
+                    return r.output("a", &aba(model, data, q, &v, &tau, &f_ext), "acceleration");
                 }
                 let d = aba_derivatives(model, data, q, &v, &tau, &f_ext);
-                r.output("a", d.a, "acceleration");
-                r.matrix("da_dq", d.da_dq, "derivative by q");
-                r.matrix("da_dv", d.da_dv, "derivative by v");
-                r.matrix("da_dtau", d.da_dtau, "derivative by tau, the inverse of the inertia matrix");
+                r.output("a", &d.a, "acceleration");
+                r.matrix("da_dq", &d.da_dq, "derivative by q");
+                r.matrix("da_dv", &d.da_dv, "derivative by v");
+                r.matrix("da_dtau", &d.da_dtau, "derivative by tau, the inverse of the inertia matrix");
             }
         }
     }

@@ -195,7 +195,7 @@ fn random_robots() {
             frames: vec!["f1".to_owned(), last],
             ..Settings::default()
         };
-        let names: Vec<_> = FUNCTIONS.into_iter().filter(|&name| name != "aba_hessian" || seed == 0).collect();
+        let names: Vec<_> = FUNCTIONS.into_iter().filter(|&name| name != "aba_hessian" || seed < 2).collect();
         let all = functions(&model, &names, &settings).unwrap();
         let state = state(&model, &mut rng);
         let inputs: Vec<_> = all.iter().map(|f| arguments(f, &state)).collect();

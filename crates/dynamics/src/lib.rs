@@ -36,7 +36,8 @@ mod differentiate;
 mod divide_conquer;
 mod lanes;
 mod passes;
-mod selection;
+#[doc(hidden)]
+pub mod selection;
 pub mod simulation;
 mod workspace;
 

@@ -23,24 +23,18 @@ const LONG_SUPPORT: usize = 4;
 
 /// Whether M⁻¹ comes from the factor of M, of which there are `nonzeros` entries. It is the only way for joints that share
 /// coordinates.
-pub(crate) fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
+pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }
 
 /// The most coordinates of an arm whose M is inverted without a factor: so many entries of a column are registers, and loops over them
 /// are none. The sparse factor of an arm of seven takes five times the instructions.
-pub(crate) const SHORT_CHAIN: usize = 8;
+pub const SHORT_CHAIN: usize = 8;
 
 /// Whether M⁻¹ of a chain, which has no zeros, comes from M without a factor.
-pub(crate) fn inverse_by_gauss_jordan<R>(model: &Model<R>) -> bool {
+pub fn inverse_by_gauss_jordan<R>(model: &Model<R>) -> bool {
     let chain = model.columns().iter().enumerate().all(|(k, column)| column.depth == k);
     chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
-}
-
-/// Whether −M⁻¹ B of recorded numbers is solved by the factor of M, which has so many entries: twice as many products and sums a
-/// column, where a product with M⁻¹ takes nv².
-pub(crate) fn solve_by_factor(nonzeros: usize, nv: usize) -> bool {
-    2 * nonzeros < nv * nv
 }
 
 /// Whether −M⁻¹ B is solved by the articulated bodies. Joints must not share coordinates.

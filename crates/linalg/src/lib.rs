@@ -17,7 +17,6 @@ extern crate alloc;
 
 #[doc(hidden)]
 pub mod axpy;
-pub mod branches;
 mod cast;
 mod cholesky;
 mod compiled;
@@ -26,6 +25,8 @@ mod diagonal_block;
 #[doc(hidden)]
 pub mod elimination_tree;
 mod factor;
+#[doc(hidden)]
+pub mod gauss_jordan;
 mod ltdl;
 mod outer;
 mod product;

@@ -8,7 +8,6 @@
 mod group;
 pub mod kinematics;
 mod motion;
-pub mod placement;
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
@@ -201,6 +200,12 @@ impl Joint {
             (_, Self::Continuous { axis }) => Ok(Self::Revolute { axis }),
             (_, joint) => Ok(joint),
         }
+    }
+
+    /// Whether its pose is a rotation about z, and nothing else.
+    #[doc(hidden)]
+    pub fn turns_about_z(self) -> bool {
+        matches!(self, Self::Revolute { .. } | Self::Continuous { .. })
     }
 
     /// Whether the group of its positions is commutative, so that q ⊕ v has the Jacobian 1.

@@ -165,6 +165,11 @@ impl<R> Model<R> {
     pub fn nonzero_rows(&self) -> &[NonzeroRows] {
         &self.tree.nonzero_rows
     }
+    /// The bodies that float: with a free joint in the world.
+    pub fn floating(&self) -> impl Iterator<Item = usize> {
+        let floats = |&i: &usize| self.nodes()[i].parent == 0 && self.nodes()[i].joint == Joint::FreeFlyer;
+        (1..self.nodes().len()).filter(floats)
+    }
     /// The bodies, children before parents, in the order in which their subtrees are closed.
     #[inline(always)]
     pub fn closed(&self) -> &[usize] {

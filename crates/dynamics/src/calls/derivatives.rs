@@ -11,8 +11,7 @@ use crate::derivatives::{aba_derivatives as aba, rnea_derivatives as rnea};
 use crate::lanes::limbs::LaneView;
 use crate::passes::energy::{self, EnergyDerivatives};
 use crate::passes::kinematics::{PlacementCache, positions};
-use crate::passes::{crba, minv, statics};
-use condyle_linalg::branches::Branches;
+use crate::passes::{minv, statics};
 use condyle_linalg::check;
 use condyle_linalg::tree_product::minus_products;
 use condyle_model::Model;
@@ -229,9 +228,7 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S, R> {
     check_forward(model, data, q, v, tau, f_ext);
-    if S::RECORDED && data.minv.by_factor() {
-        over_matrix(model, data, q, v, tau, f_ext);
-    } else if data.minv.by_factor()
+    if data.minv.by_factor()
         && !data.aba_derivatives.solve.pays()
         && run_limbs(Task::AbaDerivatives, model, data, q, v, tau, f_ext)
     {
@@ -269,52 +266,6 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
         aba::solves(&data.world, &data.aba, &mut data.aba_derivatives, dtau);
     } else {
         multiply(model, data);
-    }
-}
-
-/// `aba_derivatives` of numbers that are recorded: M and its factor serve the acceleration too, which takes fewer operations than
-/// articulated bodies, and ∂q̈ where the factor has fewer entries than M⁻¹.
-fn over_matrix<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &mut Data<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
-) {
-    let zero = core::mem::take(&mut data.forward_dynamics.zero);
-    super::inverse_dynamics::rnea(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
-    data.forward_dynamics.zero = zero;
-    positions(model, &mut data.world, q);
-    crba::run(model, &data.world, &mut data.crba);
-    minv::from_matrix(&mut data.minv, data.crba.matrix());
-    let mut a = core::mem::take(&mut data.aba_derivatives.a);
-    for k in 0..a.len() {
-        a[k] = tau[k] - data.rnea.tau()[k];
-    }
-    data.minv.solve(&mut a); // q̈ = M⁻¹ (τ − h)
-    rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &a, f_ext, &[]);
-    data.aba_derivatives.a = a;
-    if !data.minv.has_short_factor() {
-        return multiply(model, data);
-    }
-    let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
-    let floating = if out.float_freely(model) { &out.floating[..] } else { &[] };
-    let known = |j: usize, numbers: usize| floating.iter().any(|f| (f.first..f.first + numbers).contains(&j));
-    let mut branches = Branches::new(&data.minv.factor);
-    for (dtau, da, numbers) in [(&d.dtau_dq, &mut out.da_dq, 6), (&d.dtau_dv, &mut out.da_dv, 3)] {
-        for (j, (b, x)) in dtau.column_iter().zip(da.as_mut_slice().chunks_exact_mut(model.nv())).enumerate() {
-            let is_known = known(j, numbers);
-            x.iter_mut().zip(b.iter()).for_each(|(x, &b)| *x = if is_known { S::zero() } else { b });
-            branches.minus_solve(x); // ∂q̈ = −M⁻¹ ∂τ
-        }
-    }
-    for &aba::Floating { body, first } in floating {
-        let g = data.world.oX[body].rotation.transpose_mul(model.gravity().lift());
-        aba::set_cross(&mut out.da_dq, first, first + 3, g); // (Rᵀ g)×
-    }
-    if !floating.is_empty() {
-        aba::boost(out, &d.qd);
     }
 }
 

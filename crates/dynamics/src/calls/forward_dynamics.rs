@@ -4,9 +4,9 @@ use super::inertia::crba;
 use super::inverse_dynamics::rnea;
 use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
+use crate::passes::aba;
 use crate::passes::factored_dynamics::{ForwardDynamicsMethod, run_dense, run_sparse};
 use crate::passes::kinematics::positions;
-use crate::passes::{aba, aba_in_bodies};
 use crate::selection;
 use condyle_linalg::check;
 use condyle_model::Model;
@@ -44,9 +44,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> &'d [S] {
     check_arguments(model, data, q, v, tau, f_ext);
-    if S::RECORDED && !model.has_mimic() {
-        aba_in_bodies::run(model, &mut data.world, q, v, tau, f_ext, &mut data.aba.qdd);
-    } else if !run_limbs(Task::Aba, model, data, q, v, tau, f_ext) {
+    if !run_limbs(Task::Aba, model, data, q, v, tau, f_ext) {
         one_by_one(model, data, q, v, tau, f_ext);
     }
     &data.aba.qdd

@@ -3,7 +3,7 @@
 use super::limbs::{Task, run as run_limbs};
 use crate::data::Data;
 use crate::passes::kinematics::positions;
-use crate::passes::{aba, crba, crba_in_bodies, minv};
+use crate::passes::{aba, crba, minv};
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar};
@@ -28,10 +28,6 @@ use nalgebra::DMatrix;
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
     check("q", q.len(), model.nq());
-    if S::RECORDED {
-        crba_in_bodies::run(model, &mut data.world, q, &mut data.crba.M);
-        return &data.crba.M;
-    }
     if run_limbs(Task::Crba, model, data, q, &[], &[], &[]) {
         return &data.crba.M;
     }

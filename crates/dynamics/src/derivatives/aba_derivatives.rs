@@ -21,18 +21,10 @@ use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
-use condyle_model::{Joint, Model};
+use condyle_model::Model;
 use condyle_spatial::kernel;
 use condyle_spatial::{Constant, Scalar, Vec3};
 use nalgebra::DMatrix;
-
-/// A body with a free joint in the world.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Floating {
-    pub body: usize,
-    /// The first coordinate of its joint.
-    pub first: usize,
-}
 
 #[derive(Clone, Debug)]
 #[repr(C)]
@@ -43,8 +35,8 @@ pub(crate) struct Workspace<S> {
     pub da_dq: DMatrix<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
     pub da_dv: DMatrix<S>,
-    /// The bodies that float. Written by: `new`.
-    pub floating: Vec<Floating>,
+    /// The first coordinate of each body that floats. Written by: `new`.
+    pub floating: Vec<usize>,
     /// The rows of ∂τ by which M⁻¹ is multiplied: none for linear coordinates of bodies that float. Written by: `new`.
     pub nonzero_rows: Vec<NonzeroRows>,
     pub solve: tree_solve::Workspace<S>,
@@ -54,11 +46,9 @@ impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
         let square = zero_matrix(size.nv, size.nv);
         let solve = tree_solve::Workspace::new(model.columns(), size.nv);
-        let free = |i: &usize| model.nodes()[*i].parent == 0 && model.nodes()[*i].joint == Joint::FreeFlyer;
-        let floating = (1..size.bodies).filter(free).map(|i| Floating { body: i, first: model.nodes()[i].idx_v });
-        let floating: Vec<Floating> = floating.collect();
+        let floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect();
         let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
-        for &Floating { first, .. } in &floating {
+        for &first in &floating {
             rows[first..first + 3].iter_mut().for_each(Vec::clear);
         }
         let nonzero_rows = NonzeroRows::of_columns(rows);
@@ -67,26 +57,20 @@ impl<S: Scalar> Workspace<S> {
 
     /// Whether the bodies that float do so freely: whether their linear coordinates have no armature.
     pub(crate) fn float_freely<R: Constant<S>>(&self, model: &Model<R>) -> bool {
-        let is_free = |f: &Floating| model.armature()[f.first..f.first + 3].iter().all(|&x| x.lift() == S::zero());
+        let is_free = |&first: &usize| model.armature()[first..first + 3].iter().all(|&x| x.lift() == S::zero());
         self.floating.iter().all(is_free)
-    }
-}
-
-/// Writes u× as a block among rows and columns of an n × n matrix.
-#[inline(always)]
-pub(crate) fn set_cross<S: Scalar>(matrix: &mut DMatrix<S>, row: usize, column: usize, u: Vec3<S>) {
-    let n = matrix.nrows();
-    for (k, x) in u.skew().columns().into_iter().enumerate() {
-        matrix.as_mut_slice()[(column + k) * n + row..][..3].copy_from_slice(&x.to_array());
     }
 }
 
 kernel! {
     /// ∂v̇₀/∂v₀ of bodies that float, where all else is zero.
     pub(crate) fn boost<S>(d: &mut Workspace<S>, v: &[S]) {
-        for &Floating { first, .. } in &d.floating {
+        let n = v.len();
+        for &first in &d.floating {
             let omega = Vec3::new(v[first + 3], v[first + 4], v[first + 5]);
-            set_cross(&mut d.da_dv, first, first, -omega);
+            for (k, x) in (-omega).skew().columns().into_iter().enumerate() {
+                d.da_dv.as_mut_slice()[(first + k) * n + first..][..3].copy_from_slice(&x.to_array());
+            }
         }
     }
 }

@@ -8,12 +8,12 @@
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
-use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan, solve_by_factor};
+use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
-use condyle_linalg::branches::Branches;
+use condyle_linalg::gauss_jordan::gauss_jordan;
 use condyle_model::Model;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
@@ -60,67 +60,6 @@ impl<S> Workspace<S> {
 
     pub(crate) fn matrix(&self) -> &DMatrix<S> {
         &self.Minv
-    }
-}
-
-impl<S: Scalar> Workspace<S> {
-    /// Whether there is a factor by which to solve instead of a product with M⁻¹.
-    pub(crate) fn has_short_factor(&self) -> bool {
-        !self.by_gauss_jordan && solve_by_factor(self.factor.nonzeros(), self.Minv.nrows())
-    }
-
-    /// x = M⁻¹ b in place of b, after `from_matrix`.
-    pub(crate) fn solve(&self, b: &mut [S]) {
-        if !self.by_gauss_jordan {
-            return self.factor.solve(b);
-        }
-        let Minv = self.Minv.as_slice().chunks_exact(b.len().max(1));
-        let x: Vec<S> = Minv.map(|row| (0..row.len()).fold(S::zero(), |sum, j| row[j].mul_add(b[j], sum))).collect();
-        b.copy_from_slice(&x);
-    }
-}
-
-/// X = M⁻¹ for at most `SHORT_CHAIN` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
-///
-/// ```text
-/// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
-/// ```
-///
-/// of which the lower triangle is read: in lanes it is all that is computed, of a single number whole columns are, which
-/// are registers.
-#[inline(always)]
-fn gauss_jordan<S: Scalar>(M: &DMatrix<S>, X: &mut DMatrix<S>) {
-    let n = X.nrows();
-    assert!(M.nrows() == n && n <= SHORT_CHAIN, "M: expected {n} × {n}, found {:?}", M.shape());
-    let mut A = [[S::zero(); SHORT_CHAIN]; SHORT_CHAIN]; // column by column
-    for (column, from) in A.iter_mut().zip(M.as_slice().chunks_exact(n.max(1))) {
-        column[..n].copy_from_slice(from);
-    }
-    for k in 0..n {
-        let (mut c, d) = (A[k], A[k][k].recip());
-        for i in 0..k {
-            c[i] = A[i][k];
-        }
-        let mut scaled = c;
-        for i in 0..SHORT_CHAIN {
-            scaled[i] = c[i] * d;
-        }
-        for j in 0..n {
-            let (factor, rows) = (-scaled[j], if S::LANES == 1 { 0..SHORT_CHAIN } else { j..n });
-            for i in rows {
-                A[j][i] = c[i].mul_add(factor, A[j][i]);
-            }
-        }
-        for j in 0..k {
-            A[j][k] = scaled[j];
-        }
-        A[k] = scaled;
-        A[k][k] = -d;
-    }
-    for j in 0..n {
-        for i in j..n {
-            (X[(i, j)], X[(j, i)]) = (-A[j][i], -A[j][i]);
-        }
     }
 }
 
@@ -179,12 +118,9 @@ kernel! {
     /// M⁻¹ from M.
     pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &DMatrix<S>) {
         if d.by_gauss_jordan {
-            return gauss_jordan(M, &mut d.Minv);
+            return gauss_jordan::<S, SHORT_CHAIN>(M, &mut d.Minv);
         }
         d.factor.factorize(M);
-        if S::RECORDED {
-            return Branches::new(&d.factor).inverse(&mut d.Minv);
-        }
         d.factor.inverse(&mut d.Minv);
     }
 }

@@ -4,14 +4,12 @@
 //! checks, limbs or batches. Its kernels run it on one body after the other.
 
 pub(crate) mod aba;
-pub(crate) mod aba_in_bodies;
 pub(crate) mod all_terms;
 pub(crate) mod answers;
 pub(crate) mod centroidal;
 mod com;
 pub(crate) mod coriolis;
 pub(crate) mod crba;
-pub(crate) mod crba_in_bodies;
 pub(crate) mod energy;
 pub(crate) mod factored_dynamics;
 pub(crate) mod frames;

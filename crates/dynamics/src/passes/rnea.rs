@@ -67,19 +67,6 @@ impl<S> Workspace<S> {
     }
 }
 
-/// K = ω̇× + ω× ω×.
-#[inline(always)]
-pub(crate) fn centripetal<S: Scalar>(w: Vec3<S>, dw: Vec3<S>) -> Mat3<S> {
-    let minus = -w;
-    let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
-    let (xx, yy) = (minus.x * w.x, minus.y * w.y);
-    Mat3 {
-        x: Vec3::new(minus.z.mul_add(w.z, yy), xy + dw.z, xz - dw.y),
-        y: Vec3::new(xy - dw.z, minus.z.mul_add(w.z, xx), yz + dw.x),
-        z: Vec3::new(xz + dw.y, yz - dw.x, xx + yy),
-    }
-}
-
 /// The whole algorithm, down and up each branch in turn.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
@@ -106,7 +93,7 @@ pub(crate) fn pass<L: Layout>(
         let a = l.parent_on_stack(K, i).mul_add(Xi.translation, parent.a); // a_λ + K_λ p
         let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
         let m = vJ.added_to(aJ, m);
-        let Ki = centripetal(m.w, m.dw);
+        let Ki = m.centripetal();
         // Newton: f = m a + K h.  Euler: n = I ω̇ + ω × I ω + h × a
         let n = mass_com.cross_add(m.a, m.w.cross_add(rotational * m.w, rotational * m.dw));
         let mut fi = Force::new(Ki.mul_add(mass_com, m.a.scale(mass)), n);

@@ -71,7 +71,12 @@ impl Joint {
     /// λXi = X_T X_J(q), for joint i of a pass, whose sine and cosine are known.
     #[inline(always)]
     pub fn placement_with<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
-        let X_T = l.placement(i);
+        Self::placement_on(l, i, l.placement(i), q, sin, cos)
+    }
+
+    /// X_T X_J(q), for any X_T.
+    #[inline(always)]
+    pub fn placement_on<L: Layout>(l: &L, i: usize, X_T: Se3<L::S>, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         match l.joint(i) {
             Self::Revolute { .. } | Self::Continuous { .. } => rotated_about_z(X_T, sin, cos),
             Self::Prismatic { .. } => {
@@ -137,11 +142,11 @@ impl Joint {
 }
 
 #[inline(always)]
-pub(super) fn quaternion<L: Layout>(l: &L, i: usize, q: &[L::S], at: usize) -> Quaternion<L::S> {
+fn quaternion<L: Layout>(l: &L, i: usize, q: &[L::S], at: usize) -> Quaternion<L::S> {
     Quaternion::new(l.position(q, i, at), l.position(q, i, at + 1), l.position(q, i, at + 2), l.position(q, i, at + 3))
 }
 
 #[inline(always)]
-pub(super) fn point<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Vec3<L::S> {
+fn point<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Vec3<L::S> {
     Vec3::new(l.position(q, i, 0), l.position(q, i, 1), l.position(q, i, 2))
 }

@@ -1,6 +1,6 @@
 //! The motion of a joint, and how it adds to that of a body.
 
-use condyle_spatial::{Motion, Scalar, Vec3};
+use condyle_spatial::{Mat3, Motion, Scalar, Vec3};
 
 /// A joint's velocity S q̇ or acceleration S q̈ in the body's frame, in the form that costs least to compute with.
 #[derive(Clone, Copy)]
@@ -36,6 +36,21 @@ pub struct ClassicalMotion<S> {
     pub dw: Vec3<S>,
     /// The classical acceleration of the origin.
     pub a: Vec3<S>,
+}
+
+impl<S: Scalar> ClassicalMotion<S> {
+    /// K = ω̇× + ω× ω×: a point r of the body has the acceleration a + K r.
+    #[inline(always)]
+    pub fn centripetal(&self) -> Mat3<S> {
+        let (w, dw, minus) = (self.w, self.dw, -self.w);
+        let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
+        let (xx, yy) = (minus.x * w.x, minus.y * w.y);
+        Mat3 {
+            x: Vec3::new(minus.z.mul_add(w.z, yy), xy + dw.z, xz - dw.y),
+            y: Vec3::new(xy - dw.z, minus.z.mul_add(w.z, xx), yz + dw.x),
+            z: Vec3::new(xz + dw.y, yz - dw.x, xx + yy),
+        }
+    }
 }
 
 impl<S: Scalar> JointMotion<S> {

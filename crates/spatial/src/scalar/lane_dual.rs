@@ -83,7 +83,6 @@ impl<S: Scalar> SubAssign for LaneDual<S> {
 impl<S: Scalar> Scalar for LaneDual<S> {
     type Mask = S::Mask;
     const LANES: usize = S::LANES;
-    const RECORDED: bool = S::RECORDED;
 
     #[inline(always)]
     fn enter(kernel: impl Kernel) {

@@ -52,10 +52,6 @@ pub trait Scalar:
     /// Whether the crates that own algorithms have compiled them for it: `f64` and its lanes.
     #[doc(hidden)]
     const COMPILED: bool = false;
-    /// Whether it is recorded instead of computed with: algorithms then take the form that has fewest operations, since code that
-    /// is written for one robot has neither loops nor operations with zeros.
-    #[doc(hidden)]
-    const RECORDED: bool = false;
 
     /// Runs a kernel on this scalar, compiled for its level.
     #[doc(hidden)]

@@ -10,12 +10,11 @@
 //! branches' common way to the root, and serve all b whose numbers stand in other branches. Those of one branch make sums
 //! that are alike, for which compilers can use vectors.
 
-use crate::elimination_tree::NONE;
-use crate::{Ltdl, check};
-use alloc::collections::BTreeMap;
-use alloc::vec::Vec;
+use condyle_linalg::elimination_tree::NONE;
+use condyle_linalg::{Ltdl, check};
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 
 /// The rows of G, by the place k and the number of places before it that they go over.
 pub struct Branches<'f, S> {

@@ -1,34 +1,22 @@
 //! Forward dynamics by the articulated-body algorithm, in the bodies' own frames.
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, line by line, with the classical acceleration of
-//! each origin in place of the spatial one, as in `rnea.rs`: no linear velocity is needed. It is the form for code that is
+//! each origin in place of the spatial one, as in RNEA: no linear velocity is needed. It is the form for code that is
 //! recorded for one robot: what a joint carries turns about one axis at a time, and the constant turns and zeros of
-//! placements and inertias fold, while in the world's frame of `aba.rs` every number depends on every joint before.
+//! placements and inertias fold, while in the world's frame (`aba.rs` of `dynamics`) every number depends on every joint before.
 //! Generated code is tested against `aba.rs`.
 
-use crate::passes::kinematics::{PlacementCache, World};
-use crate::passes::rnea::centripetal;
-use alloc::vec;
-use alloc::vec::Vec;
-use condyle_model::Model;
-use condyle_model::joint::placement::{Carried, JointPlacement};
+use super::joint_placement::{Carried, JointPlacement};
+use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint, JointMotion};
-use condyle_model::layout::{Layout, Single};
-use condyle_spatial::{Act, ArticulatedInertia, Constant, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
+use condyle_model::layout::Layout;
+use condyle_spatial::{Act, ArticulatedInertia, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 
 /// The whole algorithm. Its memory is its own: of numbers that are recorded each takes some anyway.
-fn pass<L: Layout>(
-    l: &L,
-    world: &mut World<L::S>,
-    q: &[L::S],
-    qd: &[L::S],
-    tau: &[L::S],
-    f_ext: &[Force<L::S>],
-    qdd: &mut [L::S],
-) {
+pub(super) fn pass<L: Layout>(l: &L, q: &[L::S], qd: &[L::S], tau: &[L::S], f_ext: &[Force<L::S>], qdd: &mut [L::S]) {
     let n = l.bodies().end;
-    Joint::sin_cos(l, q, &mut world.sin_cos);
-    let (sin, cos) = (&world.sin_cos.sin[..], &world.sin_cos.cos[..]);
+    let mut angles = JointSinCos::new(n);
+    Joint::sin_cos(l, q, &mut angles);
     let still = JointMotion::General(Motion::zero());
     let identity = Se3::<L::S>::identity();
     let mut X = vec![(identity, JointPlacement::General(identity)); n]; // X_T, X_J
@@ -37,14 +25,14 @@ fn pass<L: Layout>(
     let (mut IA, mut pA) = (vec![ArticulatedInertia::zero(); n], vec![Force::zero(); n]);
     let mut U = vec![Vec::new(); n]; // U, D⁻¹, u of each column, the last one first
     for i in l.bodies() {
-        let (X_T, X_J) = (l.placement(i), Joint::own_placement(l, i, q, sin[i], cos[i])); // λXi = X_T X_J
+        let (X_T, X_J) = (l.placement(i), JointPlacement::of(l, i, q, angles.sin[i], angles.cos[i])); // λXi = X_T X_J
         let turn_inv = |x| X_J.turn_inv(X_T.rotation.transpose_mul(x));
         let a_p = l.parent(&K, i) * X_T.act(X_J.translation()); // K_λ p
         let carried = ClassicalMotion { w: turn_inv(l.parent(&w, i)), dw: Vec3::zero(), a: turn_inv(a_p) };
         let m = Joint::motion(l, i, qd).added_to(still, carried); // ω = Rᵀ ω_λ + ω_J
         c[i] = Motion::new(m.a, m.dw); // c_i, what is there without q̈
         let Inertia { mass_com, rotational, .. } = l.inertia(i);
-        let Ki = centripetal(m.w, Vec3::zero());
+        let Ki = ClassicalMotion { dw: Vec3::zero(), ..m }.centripetal();
         pA[i] = Force::new(Ki * mass_com, m.w.cross(rotational * m.w)); // p_i: K h, ω × I ω
         if let Some(external) = l.force(f_ext, i) {
             pA[i] -= external;
@@ -80,18 +68,4 @@ fn pass<L: Layout>(
         }
         a[i] = ai;
     }
-}
-
-/// Body by body, for numbers that are recorded.
-pub(crate) fn run<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    world: &mut World<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
-    qdd: &mut [S],
-) {
-    world.placed = PlacementCache::Nowhere;
-    pass(&Single::new(model), world, q, v, tau, f_ext, qdd);
 }

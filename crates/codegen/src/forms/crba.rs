@@ -4,28 +4,24 @@
 //! recorded for one robot: constant turns and zeros of placements and inertias fold, and S_eᵀ F is a number of F, while in the
 //! world's frame of `crba.rs` every number depends on every joint before. Generated code is tested against `crba.rs`.
 
-use crate::passes::kinematics::{PlacementCache, World};
-use alloc::vec;
-use alloc::vec::Vec;
-use condyle_model::Model;
+use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::Joint;
-use condyle_model::joint::placement::{Carried, JointPlacement};
-use condyle_model::layout::{Columns, Single};
-use condyle_spatial::{Act, Constant, Inertia, Scalar, Se3};
-use nalgebra::DMatrix;
+use condyle_model::joint::kinematics::JointSinCos;
+use condyle_model::layout::Columns;
+use condyle_spatial::{Act, Inertia, Se3};
 
 /// The whole algorithm. Its memory is its own: of numbers that are recorded each takes some anyway.
-fn pass<L: Columns>(l: &L, world: &mut World<L::S>, q: &[L::S], M: &mut [L::Number]) {
+pub(super) fn pass<L: Columns>(l: &L, q: &[L::S], M: &mut [L::Number]) {
     let n = l.bodies().end;
-    Joint::sin_cos(l, q, &mut world.sin_cos);
-    let (sin, cos) = (&world.sin_cos.sin[..], &world.sin_cos.cos[..]);
+    let mut angles = JointSinCos::new(n);
+    Joint::sin_cos(l, q, &mut angles);
     let identity = Se3::<L::S>::identity();
     let numbers: Vec<usize> = (0..n).collect();
     let mut IC = vec![Inertia::zero(); n];
     let mut X = vec![(identity, JointPlacement::General(identity)); n]; // X_T, X_J
     for i in l.bodies() {
         IC[i] = l.inertia(i);
-        X[i] = (l.placement(i), Joint::own_placement(l, i, q, sin[i], cos[i])); // λXi = X_T X_J
+        X[i] = (l.placement(i), JointPlacement::of(l, i, q, angles.sin[i], angles.cos[i])); // λXi = X_T X_J
     }
     l.clear(M);
     for i in l.bodies().rev() {
@@ -55,10 +51,4 @@ fn pass<L: Columns>(l: &L, world: &mut World<L::S>, q: &[L::S], M: &mut [L::Numb
         l.add_to_parent(&mut IC, i, carried); // Iᶜ_λ += λX*_i Iᶜ_i iXλ
     }
     l.add_armature(M);
-}
-
-/// Body by body, for numbers that are recorded.
-pub(crate) fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, world: &mut World<S>, q: &[S], M: &mut DMatrix<S>) {
-    world.placed = PlacementCache::Nowhere;
-    pass(&Single::new(model), world, q, M.as_mut_slice());
 }

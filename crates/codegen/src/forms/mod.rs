@@ -1,0 +1,208 @@
+//! Algorithms in the forms that have fewest operations when they are recorded for one robot.
+//!
+//! Code that is written for one robot has neither loops nor operations with zeros. So ABA and CRBA run in the bodies' frames,
+//! where constants fold, M and its factor serve accelerations and their derivatives where it is sparse, and M⁻¹ comes by the
+//! branches of the factor. These take the place of the library's functions of the same names, in functions of one's own too.
+
+mod aba;
+pub(crate) mod branches;
+mod crba;
+pub(crate) mod joint_placement;
+
+use branches::Branches;
+use condyle_dynamics::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
+use condyle_dynamics::{Data, forward_kinematics, rnea, rnea_derivatives};
+use condyle_linalg::gauss_jordan::gauss_jordan;
+use condyle_linalg::tree_product::minus_products;
+use condyle_linalg::{Ltdl, check};
+use condyle_model::Model;
+use condyle_model::layout::Single;
+use condyle_spatial::{Constant, Force, Scalar, Vec3};
+use nalgebra::{DMatrix, DVectorView};
+
+/// q̈ and its derivatives, as of [`condyle_dynamics::AbaDerivatives`].
+#[derive(Clone, Debug)]
+pub struct ForwardDerivatives<S> {
+    /// q̈ itself, nv numbers.
+    pub a: Vec<S>,
+    /// ∂q̈/∂q in the tangent space, nv × nv.
+    pub da_dq: DMatrix<S>,
+    /// ∂q̈/∂v, nv × nv.
+    pub da_dv: DMatrix<S>,
+    /// ∂q̈/∂τ = M⁻¹, nv × nv.
+    pub da_dtau: DMatrix<S>,
+}
+
+/// [`condyle_dynamics::crba`]: M, nv × nv.
+///
+/// # Panics
+/// If `q` has not nq numbers.
+pub fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S]) -> DMatrix<S> {
+    check("q", q.len(), model.nq());
+    let mut M = zeros(model);
+    crba::pass(&Single::<S, R>::new(model), q, M.as_mut_slice());
+    M
+}
+
+/// [`condyle_dynamics::aba`]: q̈, nv numbers.
+///
+/// # Panics
+/// As it does.
+pub fn aba<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> Vec<S> {
+    if model.has_mimic() {
+        let mut a = free_effort(model, data, q, v, tau, f_ext);
+        let mut factor = Ltdl::new(model);
+        factor.factorize(&crba(model, q));
+        factor.solve(&mut a); // q̈ = M⁻¹ (τ − h)
+        return a;
+    }
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("tau", tau.len(), model.nv());
+    let (found, bodies) = (f_ext.len(), model.bodies().len());
+    assert!(found == 0 || found == bodies, "f_ext: expected no force or {bodies} (one for each body), found {found}");
+    model.check_regular();
+    let mut a = vec![S::zero(); model.nv()];
+    aba::pass(&Single::<S, R>::new(model), q, v, tau, f_ext, &mut a);
+    a
+}
+
+/// [`condyle_dynamics::minv`]: M⁻¹, nv × nv.
+///
+/// # Panics
+/// As it does.
+pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> DMatrix<S> {
+    match Inverse::of(model, || crba(model, q)) {
+        Some(inverse) => inverse.Minv,
+        None => condyle_dynamics::minv(model, data, q).clone(),
+    }
+}
+
+/// [`condyle_dynamics::aba_derivatives`]. M and its factor serve the acceleration too, which takes fewer operations than
+/// articulated bodies, and ∂q̈ where the factor has fewer entries than M⁻¹.
+///
+/// # Panics
+/// As it does.
+pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> ForwardDerivatives<S> {
+    let mut a = free_effort(model, data, q, v, tau, f_ext);
+    let Some(inverse) = Inverse::of(model, || condyle_dynamics::crba(model, data, q).clone()) else {
+        let d = condyle_dynamics::aba_derivatives(model, data, q, v, tau, f_ext);
+        let [da_dq, da_dv, da_dtau] = [d.da_dq, d.da_dv, d.da_dtau].map(Clone::clone);
+        return ForwardDerivatives { a: d.a.to_vec(), da_dq, da_dv, da_dtau };
+    };
+    inverse.solve(&mut a); // q̈ = M⁻¹ (τ − h)
+    let d = rnea_derivatives(model, data, q, v, &a, f_ext);
+    let floating = floating::<S, R>(model);
+    let known = |numbers: usize| floating.iter().flat_map(|&(_, first)| first..first + numbers).collect::<Vec<_>>();
+    let [mut da_dq, mut da_dv] = inverse.minus_products(model, [(d.dtau_dq, &known(6)), (d.dtau_dv, &known(3))]); // ∂q̈ = −M⁻¹ ∂τ
+    for (body, first) in floating {
+        let turned = forward_kinematics(model, data, q).body(body).rotation.transpose_mul(model.gravity().lift());
+        let omega = Vec3::new(v[first + 3], v[first + 4], v[first + 5]);
+        for (da, column, u) in [(&mut da_dq, first + 3, turned), (&mut da_dv, first, -omega)] {
+            for (k, x) in u.skew().columns().into_iter().enumerate() {
+                da.as_mut_slice()[(column + k) * model.nv() + first..][..3].copy_from_slice(&x.to_array());
+            }
+        }
+    }
+    ForwardDerivatives { a, da_dq, da_dv, da_dtau: inverse.Minv }
+}
+
+/// The bodies that float without armature on their linear coordinates, and the first coordinate of each: all ∂q̈ by its first
+/// six positions and its first three velocities are known ([`condyle_dynamics::aba_derivatives`]).
+fn floating<S: Scalar, R: Constant<S>>(model: &Model<R>) -> Vec<(usize, usize)> {
+    let is_free =
+        |&(_, first): &(usize, usize)| model.armature()[first..first + 3].iter().all(|&x| x.lift() == S::zero());
+    model.floating().map(|i| (i, model.nodes()[i].idx_v)).filter(is_free).collect()
+}
+
+/// τ − h + Σ Jᵢᵀ f_ext,i.
+fn free_effort<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    q: &[S],
+    v: &[S],
+    tau: &[S],
+    f_ext: &[Force<S>],
+) -> Vec<S> {
+    let h = rnea(model, data, q, v, &vec![S::zero(); model.nv()], f_ext);
+    tau.iter().zip(h).map(|(&tau, &h)| tau - h).collect()
+}
+
+fn zeros<S: Scalar, R>(model: &Model<R>) -> DMatrix<S> {
+    DMatrix::from_element(model.nv(), model.nv(), S::zero())
+}
+
+/// M⁻¹, and the factor of M unless it came without one.
+struct Inverse<S> {
+    factor: Option<Ltdl<S>>,
+    Minv: DMatrix<S>,
+}
+
+impl<S: Scalar> Inverse<S> {
+    /// That of M, unless the model's comes without M.
+    fn of<R>(model: &Model<R>, M: impl FnOnce() -> DMatrix<S>) -> Option<Self> {
+        model.check_regular();
+        let (mut factor, mut Minv) = (Ltdl::new(model), zeros(model));
+        if !inverse_by_factor(model, factor.nonzeros()) {
+            return None;
+        }
+        if inverse_by_gauss_jordan(model) {
+            gauss_jordan::<S, SHORT_CHAIN>(&M(), &mut Minv);
+            return Some(Self { factor: None, Minv });
+        }
+        factor.factorize(&M());
+        Branches::new(&factor).inverse(&mut Minv);
+        Some(Self { factor: Some(factor), Minv })
+    }
+
+    /// x = M⁻¹ b in place of b.
+    fn solve(&self, b: &mut [S]) {
+        match &self.factor {
+            Some(factor) => factor.solve(b),
+            None => {
+                let row =
+                    |row: DVectorView<'_, S>| row.iter().zip(&*b).fold(S::zero(), |sum, (&m, &b)| m.mul_add(b, sum));
+                let x: Vec<S> = self.Minv.column_iter().map(row).collect(); // symmetric: a row is a column
+                b.copy_from_slice(&x);
+            }
+        }
+    }
+
+    /// −M⁻¹ B but for columns that are known, which stay zero; by the factor where it has so few entries that twice as many products
+    /// and sums are fewer than nv².
+    fn minus_products<R>(&self, model: &Model<R>, B: [(&DMatrix<S>, &[usize]); 2]) -> [DMatrix<S>; 2] {
+        let n = model.nv();
+        let mut all = B.map(|(B, known)| {
+            let mut B = B.clone();
+            known.iter().for_each(|&j| B.column_mut(j).fill(S::zero()));
+            B
+        });
+        match &self.factor {
+            Some(factor) if 2 * factor.nonzeros() < n * n => {
+                let mut branches = Branches::new(factor);
+                all.iter_mut().for_each(|X| X.as_mut_slice().chunks_exact_mut(n).for_each(|x| branches.minus_solve(x)));
+                all
+            }
+            _ => {
+                let [mut X, mut Y] = [zeros(model), zeros(model)];
+                let both = [X.as_mut_slice(), Y.as_mut_slice()];
+                minus_products(self.Minv.as_slice(), [0, 1].map(|k| all[k].as_slice()), both, model.nonzero_rows());
+                [X, Y]
+            }
+        }
+    }
+}

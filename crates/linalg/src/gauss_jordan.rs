@@ -1,0 +1,48 @@
+//! The inverse of a small symmetric matrix without a factor.
+
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+
+/// X = M⁻¹ for at most `MOST` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
+///
+/// ```text
+/// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
+/// ```
+///
+/// of which the lower triangle is read: in lanes it is all that is computed, of a single number whole columns are, which
+/// are registers.
+#[inline(always)]
+pub fn gauss_jordan<S: Scalar, const MOST: usize>(M: &DMatrix<S>, X: &mut DMatrix<S>) {
+    let n = X.nrows();
+    assert!(M.nrows() == n && n <= MOST, "M: expected {n} × {n}, found {:?}", M.shape());
+    let mut A = [[S::zero(); MOST]; MOST]; // column by column
+    for (column, from) in A.iter_mut().zip(M.as_slice().chunks_exact(n.max(1))) {
+        column[..n].copy_from_slice(from);
+    }
+    for k in 0..n {
+        let (mut c, d) = (A[k], A[k][k].recip());
+        for i in 0..k {
+            c[i] = A[i][k];
+        }
+        let mut scaled = c;
+        for i in 0..MOST {
+            scaled[i] = c[i] * d;
+        }
+        for j in 0..n {
+            let (factor, rows) = (-scaled[j], if S::LANES == 1 { 0..MOST } else { j..n });
+            for i in rows {
+                A[j][i] = c[i].mul_add(factor, A[j][i]);
+            }
+        }
+        for j in 0..k {
+            A[j][k] = scaled[j];
+        }
+        A[k] = scaled;
+        A[k][k] = -d;
+    }
+    for j in 0..n {
+        for i in j..n {
+            (X[(i, j)], X[(j, i)]) = (-A[j][i], -A[j][i]);
+        }
+    }
+}
