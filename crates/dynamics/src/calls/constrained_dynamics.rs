@@ -1,8 +1,8 @@
 //! Forward dynamics under constraints, its derivatives, and the equations differentiated.
 
 use super::limbs_constrained;
-use crate::constraints::constrained_derivatives::{invert, respond_to_q, respond_to_v};
-use crate::constraints::constrained_dynamics::{Inputs, constrain, equations, factorize, solve};
+use crate::constraints::constrained_derivatives::{By, invert, respond};
+use crate::constraints::constrained_dynamics::{Inputs, equations, evaluate, factorize, solve};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::kkt_derivatives::{differentiate_motion, load, turn};
 use crate::data::{Data, check_forces};
@@ -105,7 +105,8 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     let (world, d) = (&data.world, &mut data.constrained_dynamics);
     equations(model, world, d, v, tau, f_ext);
     factorize(d);
-    constrain(world, d, constraints);
+    evaluate(world, constraints, &d.v, &d.a);
+    core::mem::swap(&mut constraints.gamma, &mut constraints.error);
     solve(constraints, &d.factor, &d.effort, &mut d.qdd);
 }
 
@@ -267,8 +268,8 @@ pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     differentiate(model, data, constraints, inputs);
     let (d, id) = (&mut data.constrained_derivatives, &data.rnea_derivatives);
     invert(constraints, &data.constrained_dynamics.factor, &mut d.P);
-    respond_to_q(constraints, &d.P, &d.dtau_dq, &mut d.da_dq);
-    respond_to_v(constraints, &d.P, &id.dtau_dv, &mut d.da_dv);
+    respond(constraints, By::Position, &d.P, &d.dtau_dq, &mut d.da_dq);
+    respond(constraints, By::Velocity, &d.P, &id.dtau_dv, &mut d.da_dv);
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ConstrainedDerivatives {
         a: &data.constrained_dynamics.qdd,

@@ -1,6 +1,6 @@
 //! Impacts: how velocities jump when constraints set in, and the derivatives.
 
-use crate::constraints::constrained_derivatives::{invert, respond_to_q};
+use crate::constraints::constrained_derivatives::{By, invert, respond};
 use crate::constraints::constrained_dynamics::{factorize, inertia, solve};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::impulse_dynamics::{approach, differentiate_motion, part, respond_to_v_before};
@@ -157,7 +157,7 @@ pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
     differentiate_motion(model, world, out, constraints);
     invert(constraints, &data.constrained_dynamics.factor, &mut d.P);
-    respond_to_q(constraints, &d.P, &d.dtau_dq, &mut d.da_dq);
+    respond(constraints, By::Position, &d.P, &d.dtau_dq, &mut d.da_dq);
     respond_to_v_before(constraints, restitution, &mut d.da_dv);
     let (d, c) = (&data.constrained_derivatives, &*constraints);
     ImpulseDerivatives {

@@ -14,12 +14,10 @@
 //! programming for multi-phase rigid contact dynamics* (2018).
 
 use crate::constraints::constraint_set::ConstraintSet;
-use crate::constraints::islands::Island;
 use crate::workspace::{Size, filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
-use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::{minus_block_product, subtract_column};
 use condyle_spatial::kernel;
 use condyle_spatial::{Force, Scalar};
@@ -71,16 +69,7 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Λ, J̄ and P of K⁻¹, for M and J M⁻¹ Jᵀ that are factorised.
-    #[inline(always)]
-    fn invert(&mut self, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
-        factor.inverse(P); // M⁻¹
-        for k in 0..self.islands.len() {
-            self.invert_island(k, P);
-        }
-    }
-
-    /// The same of an island, for M⁻¹ in place of P.
+    /// Λ, J̄ and P of K⁻¹ of an island, for M⁻¹ in place of P, and J M⁻¹ Jᵀ that is factorised.
     #[inline(always)]
     fn invert_island(&mut self, k: usize, P: &mut DMatrix<S>) {
         let Self { U, Jbar, dlambda_dtau, delassus, proximal, .. } = self;
@@ -123,78 +112,45 @@ impl<S: Scalar> ConstraintSet<S> {
     }
 }
 
-/// The blocks of a right-hand side [r; c] of the equations differentiated, where they may differ from zero, and K⁻¹.
-struct Equations<'e, S> {
-    P: &'e DMatrix<S>,
-    Jbar: &'e DMatrix<S>,
-    /// −J̄ᵀ.
-    dlambda_dtau: &'e DMatrix<S>,
-    /// Λ.
-    inertia: &'e DMatrix<S>,
-    r: &'e DMatrix<S>,
-    c: &'e DMatrix<S>,
-    nonzero_rows: &'e [NonzeroRows],
-    touching: &'e [Vec<usize>],
-    islands: &'e [Island],
-}
-
-impl<S: Scalar> Equations<'_, S> {
-    #[inline(always)]
-    fn solve(self, da: &mut DMatrix<S>, dlambda: &mut DMatrix<S>) {
-        let (n, rows) = (da.nrows(), dlambda.nrows());
-        for island in self.islands {
-            let columns = &island.coordinates;
-            island.clear_beside(da.as_mut_slice(), n, S::zero());
-            let (P, r) = (self.P.as_slice(), self.r.as_slice());
-            minus_block_product(P, r, da.as_mut_slice(), self.nonzero_rows, columns.clone()); // −P r − J̄ c
-            if island.rows.is_empty() {
-                continue;
-            }
-            subtract_product(self.Jbar, self.c, da, self.touching, [columns, columns]);
-            for j in columns.clone() {
-                dlambda.as_mut_slice()[island.rows_of_column(j, rows)].fill(S::zero());
-            }
-            subtract_product(self.inertia, self.c, dlambda, self.touching, [&island.rows, columns]);
-            subtract_product(self.dlambda_dtau, self.r, dlambda, self.nonzero_rows, [&island.rows, columns]); // J̄ᵀ r − Λ c
+kernel! {
+    /// The blocks of K⁻¹.
+    pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
+        factor.inverse(P); // M⁻¹
+        for k in 0..set.islands.len() {
+            set.invert_island(k, P);
         }
     }
 }
 
-impl<S: Scalar> ConstraintSet<S> {
-    /// The derivatives of acceleration and forces with respect to q, for r and `dgamma_dq`.
-    #[inline(always)]
-    fn respond_to_q(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, dgamma_dq, dlambda_dq, .. } = self;
-        let (c, inertia) = (dgamma_dq, &delassus.inverse);
-        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching, islands }.solve(da, dlambda_dq);
-    }
-
-    /// The same with respect to v, for r and `dgamma_dv`.
-    #[inline(always)]
-    fn respond_to_v(&mut self, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        let Self { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, dgamma_dv, dlambda_dv, .. } = self;
-        let (c, inertia) = (dgamma_dv, &delassus.inverse);
-        Equations { P, Jbar, dlambda_dtau, inertia, r, c, nonzero_rows, touching, islands }.solve(da, dlambda_dv);
-    }
+/// What the equations are differentiated by.
+#[derive(Clone, Copy)]
+pub(crate) enum By {
+    Position,
+    Velocity,
 }
 
 kernel! {
-    /// The blocks of K⁻¹.
-    pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
-        set.invert(factor, P);
-    }
-}
-
-kernel! {
-    /// The derivatives of acceleration and forces with respect to q, for r and `dgamma_dq`.
-    pub(crate) fn respond_to_q<S>(set: &mut ConstraintSet<S>, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        set.respond_to_q(P, r, da);
-    }
-}
-
-kernel! {
-    /// The same with respect to v, for r and `dgamma_dv`.
-    pub(crate) fn respond_to_v<S>(set: &mut ConstraintSet<S>, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
-        set.respond_to_v(P, r, da);
+    /// The derivatives of acceleration and forces, for the blocks of K⁻¹, r, and c in the set, where they may differ from zero.
+    pub(crate) fn respond<S>(set: &mut ConstraintSet<S>, by: By, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
+        let ConstraintSet { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, .. } = set;
+        let (c, dlambda) = match by {
+            By::Position => (&set.dgamma_dq, &mut set.dlambda_dq),
+            By::Velocity => (&set.dgamma_dv, &mut set.dlambda_dv),
+        };
+        let (n, rows) = (da.nrows(), dlambda.nrows());
+        for island in islands {
+            let columns = &island.coordinates;
+            island.clear_beside(da.as_mut_slice(), n, S::zero());
+            minus_block_product(P.as_slice(), r.as_slice(), da.as_mut_slice(), nonzero_rows, columns.clone()); // −P r − J̄ c
+            if island.rows.is_empty() {
+                continue;
+            }
+            subtract_product(Jbar, c, da, touching, [columns, columns]);
+            for j in columns.clone() {
+                dlambda.as_mut_slice()[island.rows_of_column(j, rows)].fill(S::zero());
+            }
+            subtract_product(&delassus.inverse, c, dlambda, touching, [&island.rows, columns]);
+            subtract_product(dlambda_dtau, r, dlambda, nonzero_rows, [&island.rows, columns]); // J̄ᵀ r − Λ c
+        }
     }
 }

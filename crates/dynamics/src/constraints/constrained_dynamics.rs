@@ -120,30 +120,6 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// λ and the acceleration x for an effort, so that J x + γ = 0; for M that is factorised.
-    #[inline(always)]
-    fn solve(&mut self, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
-        x.copy_from_slice(effort);
-        factor.solve(x); // M⁻¹ (τ − h)
-        let mut b = core::mem::take(&mut self.error);
-        b.copy_from_slice(&self.gamma);
-        self.add_motion(x, &mut b);
-        for r in 0..b.len() {
-            self.lambda[r] = -b[r]; // −(γ + J M⁻¹ (τ − h))
-        }
-        self.delassus.redundant = S::zero();
-        for island in &self.islands {
-            self.delassus.multiply(&self.plans, island, &self.J, factor);
-            self.delassus.decompose(island, self.proximal, &mut self.lambda);
-        }
-        x.copy_from_slice(effort);
-        self.add_effort(x);
-        factor.solve(x); // q̈ = M⁻¹ (τ − h + Jᵀ λ)
-        b.copy_from_slice(&self.gamma);
-        self.add_motion(x, &mut b);
-        self.error = b; // J q̈ + γ
-    }
-
     /// The largest |J q̈ + γ|.
     pub(crate) fn residual(&self) -> S {
         let mut residual = S::zero();
@@ -208,22 +184,7 @@ kernel! {
 }
 
 kernel! {
-    /// J and γ, for bodies whose motion is known.
-    pub(crate) fn constrain<S>(world: &World<S>, d: &Workspace<S>, set: &mut ConstraintSet<S>) {
-        for (i, plan) in set.plans.iter().enumerate() {
-            let target = &set.targets[i];
-            let ends = FramePair::new(plan, target, world, &d.v, &d.a);
-            ends.jacobian(plan, &world.S, &mut set.J);
-            let gamma = ends.acceleration(plan, target).to_array();
-            for r in 0..plan.rows() {
-                set.gamma[plan.row + r] = gamma[r];
-            }
-        }
-    }
-}
-
-kernel! {
-    /// J and J q̈ + γ, for bodies whose velocities and accelerations are known.
+    /// J and J q̈ + γ, for bodies whose velocities and accelerations are known; for accelerations without q̈ it is γ.
     pub(crate) fn evaluate<S>(world: &World<S>, set: &mut ConstraintSet<S>, v: &[Motion<S>], a: &[Motion<S>]) {
         for (i, plan) in set.plans.iter().enumerate() {
             let target = &set.targets[i];
@@ -238,9 +199,27 @@ kernel! {
 }
 
 kernel! {
-    /// λ and the acceleration x for an effort.
+    /// λ and the acceleration x for an effort, so that J x + γ = 0; for M that is factorised.
     pub(crate) fn solve<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
-        set.solve(factor, effort, x);
+        x.copy_from_slice(effort);
+        factor.solve(x); // M⁻¹ (τ − h)
+        let mut b = core::mem::take(&mut set.error);
+        b.copy_from_slice(&set.gamma);
+        set.add_motion(x, &mut b);
+        for r in 0..b.len() {
+            set.lambda[r] = -b[r]; // −(γ + J M⁻¹ (τ − h))
+        }
+        set.delassus.redundant = S::zero();
+        for island in &set.islands {
+            set.delassus.multiply(&set.plans, island, &set.J, factor);
+            set.delassus.decompose(island, set.proximal, &mut set.lambda);
+        }
+        x.copy_from_slice(effort);
+        set.add_effort(x);
+        factor.solve(x); // q̈ = M⁻¹ (τ − h + Jᵀ λ)
+        b.copy_from_slice(&set.gamma);
+        set.add_motion(x, &mut b);
+        set.error = b; // J q̈ + γ
     }
 }
 

@@ -100,9 +100,29 @@ kernel! {
 }
 
 kernel! {
-    /// The derivatives with respect to the velocity before the impact.
+    /// The derivatives by the velocity before the impact: ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
     pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut DMatrix<S>) {
-        set.respond_to_v_before(restitution, dv);
+        let (n, rows) = (set.nv, set.lambda.len());
+        let (Jbar, inertia) = (set.Jbar.as_slice(), set.delassus.inverse.as_slice());
+        let (dv, dlambda) = (dv.as_mut_slice(), set.dlambda_dv.as_mut_slice());
+        let scale = -(S::one() + restitution);
+        dv.fill(S::zero());
+        dlambda.fill(S::zero());
+        for k in 0..n {
+            dv[k * (n + 1)] = S::one();
+        }
+        for island in &set.islands {
+            for plan in &set.plans[island.constraints.clone()] {
+                for r in 0..plan.rows() {
+                    let (J, row) = (&set.J[plan.range(r)], plan.row + r);
+                    for (k, &coordinate) in plan.coordinates.iter().enumerate() {
+                        let (x, own) = (J[k] * scale, island.rows_of_column(coordinate, rows));
+                        axpy(x, &Jbar[island.of_column(row, n)], &mut dv[island.of_column(coordinate, n)]);
+                        axpy(x, &inertia[island.rows_of_column(row, rows)], &mut dlambda[own]);
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -119,33 +139,5 @@ fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::
             v_i = S[c].scale_add(l.joint_velocity(w, i, k), v_i);
         }
         velocity[i] = v_i;
-    }
-}
-
-impl<S: Scalar> ConstraintSet<S> {
-    /// ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
-    #[inline(always)]
-    fn respond_to_v_before(&mut self, restitution: S, dv: &mut DMatrix<S>) {
-        let (n, rows) = (self.nv, self.lambda.len());
-        let (Jbar, inertia) = (self.Jbar.as_slice(), self.delassus.inverse.as_slice());
-        let (dv, dlambda) = (dv.as_mut_slice(), self.dlambda_dv.as_mut_slice());
-        let scale = -(S::one() + restitution);
-        dv.fill(S::zero());
-        dlambda.fill(S::zero());
-        for k in 0..n {
-            dv[k * (n + 1)] = S::one();
-        }
-        for island in &self.islands {
-            for plan in &self.plans[island.constraints.clone()] {
-                for r in 0..plan.rows() {
-                    let (J, row) = (&self.J[plan.range(r)], plan.row + r);
-                    for (k, &coordinate) in plan.coordinates.iter().enumerate() {
-                        let (x, own) = (J[k] * scale, island.rows_of_column(coordinate, rows));
-                        axpy(x, &Jbar[island.of_column(row, n)], &mut dv[island.of_column(coordinate, n)]);
-                        axpy(x, &inertia[island.rows_of_column(row, rows)], &mut dlambda[own]);
-                    }
-                }
-            }
-        }
     }
 }

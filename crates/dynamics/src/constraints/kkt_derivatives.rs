@@ -21,7 +21,7 @@ use crate::passes::frames::Placements;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Constant, Cross, Force, Motion, Scalar};
+use condyle_spatial::{Act, Cross, Force, Motion, Scalar};
 use nalgebra::DMatrix;
 
 impl<S: Scalar> ConstraintSet<S> {
@@ -48,27 +48,36 @@ impl<S: Scalar> ConstraintSet<S> {
             }
         }
     }
+}
 
+kernel! {
     /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
-    #[inline(always)]
-    fn load<R: Constant<S>>(&self, model: &Model<R>, world: &World<S>, f_ext: &[Force<S>], forces: &mut [Force<S>]) {
+    pub(crate) fn load<S, R>(
+        model: &Model<R>,
+        set: &ConstraintSet<S>,
+        world: &World<S>,
+        f_ext: &[Force<S>],
+        forces: &mut [Force<S>],
+    ) {
         forces.fill(Force::zero());
         forces[..f_ext.len()].copy_from_slice(f_ext);
-        for (i, plan) in self.plans.iter().enumerate() {
-            let ends = FramePair::at_rest(plan, &self.targets[i], world);
-            forces[plan.bodies[0]] += plan.placements[0].lift().act(self.local_force(i, &ends));
+        for (i, plan) in set.plans.iter().enumerate() {
+            let ends = FramePair::at_rest(plan, &set.targets[i], world);
+            forces[plan.bodies[0]] += plan.placements[0].lift().act(set.local_force(i, &ends));
             let oXb = Placements { model, world }.body(plan.bodies[1]);
-            forces[plan.bodies[1]] -= oXb.act_inv(self.reaction(i, &ends));
+            forces[plan.bodies[1]] -= oXb.act_inv(set.reaction(i, &ends));
         }
     }
+}
 
-    /// Adds to r = ∂(M q̈ + h − Jᵀ λ)/∂q what is different from forces that are fixed in their bodies.
-    #[inline(always)]
-    fn add_turning(&self, world: &World<S>, r: &mut DMatrix<S>) {
-        for (i, plan) in self.plans.iter().enumerate() {
+kernel! {
+    /// r_q, from the derivative for forces that are fixed in their bodies, to which is added what is different.
+    pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &DMatrix<S>, r: &mut DMatrix<S>) {
+        r.as_mut_slice().copy_from_slice(fixed.as_slice());
+        for (i, plan) in set.plans.iter().enumerate() {
             if plan.bodies[1] > 0 {
-                let ends = FramePair::at_rest(plan, &self.targets[i], world);
-                let f = self.reaction(i, &ends);
+                let ends = FramePair::at_rest(plan, &set.targets[i], world);
+                let f = set.reaction(i, &ends);
                 for e in &plan.touches {
                     if e.first == e.second {
                         continue;
@@ -91,10 +100,10 @@ impl<S: Scalar> ConstraintSet<S> {
                 }
             }
             if plan.aligned() {
-                let f = self.force(i);
+                let f = set.force(i);
                 let ends = match plan.kind {
                     ConstraintKind::Line | ConstraintKind::Plane => {
-                        Some(FramePair::at_rest(plan, &self.targets[i], world))
+                        Some(FramePair::at_rest(plan, &set.targets[i], world))
                     }
                     _ => None,
                 };
@@ -114,7 +123,7 @@ impl<S: Scalar> ConstraintSet<S> {
                     }
                     let turned = Motion::new(w.cross(f.linear), w.cross(f.angular)).to_array(); // ω × λ
                     for k in 0..plan.rows() {
-                        let J = &self.J[plan.range(k)];
+                        let J = &set.J[plan.range(k)];
                         for (at, &coordinate) in plan.coordinates.iter().enumerate() {
                             r[(coordinate, e.coordinate)] += J[at] * turned[k]; // Jᵀ (ω × λ)
                         }
@@ -122,27 +131,6 @@ impl<S: Scalar> ConstraintSet<S> {
                 }
             }
         }
-    }
-}
-
-kernel! {
-    /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
-    pub(crate) fn load<S, R>(
-        model: &Model<R>,
-        set: &ConstraintSet<S>,
-        world: &World<S>,
-        f_ext: &[Force<S>],
-        forces: &mut [Force<S>],
-    ) {
-        set.load(model, world, f_ext, forces);
-    }
-}
-
-kernel! {
-    /// r_q, from the derivative for forces that are fixed in their bodies.
-    pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &DMatrix<S>, r: &mut DMatrix<S>) {
-        r.as_mut_slice().copy_from_slice(fixed.as_slice());
-        set.add_turning(world, r);
     }
 }
 
