@@ -31,6 +31,7 @@ check condyle "" loaders serde threads
 for crate in spatial model; do
     cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
 done
+cargo test --locked --package condyle-model --no-default-features --features libm --test validate
 cargo test --locked --package condyle-linalg --no-default-features --features libm --tests
 cargo test --locked --package condyle-linalg --no-default-features --features std
 cargo clippy --locked --package condyle-codegen --features cuda --all-targets -- -D warnings

@@ -72,3 +72,20 @@ pub struct Limits {
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub effort: Vec<f64>,
 }
+
+/// Limits, losses and rotor of a joint; the default is none of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointOptions {
+    /// Least and greatest position (rad, m), for joints with one coordinate.
+    pub position: Option<(f64, f64)>,
+    /// Greatest speed (rad/s, m/s).
+    pub velocity: Option<f64>,
+    /// Greatest effort (N m, N).
+    pub effort: Option<f64>,
+    /// Viscous damping (N m s/rad, N s/m).
+    pub damping: f64,
+    /// Coulomb friction (N m, N).
+    pub friction: f64,
+    /// Inertia of the rotor as seen at the joint (kg m², kg).
+    pub armature: f64,
+}

@@ -1,12 +1,12 @@
 //! The builder: a model, body by body.
 
-use crate::body::{Body, Frame, FrameKind, Limits};
+use crate::body::{Body, Frame, FrameKind, JointOptions, Limits};
 use crate::error::Error;
 use crate::joint::{Joint, Mimic};
 use crate::limbs::Plan;
 use crate::model::Model;
 use crate::tree::Tree;
-use crate::validate::{CoordinateNumbers, check_body, check_frame};
+use crate::validate::{check_body, check_frame};
 use alloc::borrow::ToOwned;
 use alloc::collections::BTreeSet;
 use alloc::string::String;
@@ -19,41 +19,6 @@ pub struct BodyId(usize);
 
 /// The world, on which the first joints sit.
 pub const WORLD: BodyId = BodyId(0);
-
-/// Limits, losses and rotor of a joint; the default is none of them.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct JointOptions {
-    /// Least and greatest position (rad, m), for joints with one coordinate.
-    pub position: Option<(f64, f64)>,
-    /// Greatest speed (rad/s, m/s).
-    pub velocity: Option<f64>,
-    /// Greatest effort (N m, N).
-    pub effort: Option<f64>,
-    /// Viscous damping (N m s/rad, N s/m).
-    pub damping: f64,
-    /// Coulomb friction (N m, N).
-    pub friction: f64,
-    /// Inertia of the rotor as seen at the joint (kg m², kg).
-    pub armature: f64,
-}
-
-impl JointOptions {
-    /// Says what is wrong with the numbers of a joint.
-    fn check(&self, joint: &str) -> Result<(), Error> {
-        let (lower, upper) = self.position.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-        let infinite = f64::INFINITY;
-        CoordinateNumbers {
-            lower,
-            upper,
-            velocity: self.velocity.unwrap_or(infinite),
-            effort: self.effort.unwrap_or(infinite),
-            damping: self.damping,
-            friction: self.friction,
-            armature: self.armature,
-        }
-        .check(joint)
-    }
-}
 
 /// The most degrees of freedom that the joints of a model may have: algorithms have matrices of their number by their
 /// number.

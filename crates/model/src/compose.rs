@@ -1,7 +1,7 @@
 //! Models from models: chains of joints, appended robots, locked joints, joints that follow others.
 
 use crate::body::FrameKind;
-use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::{Joint, Mimic};
 use crate::layout::Single;
@@ -92,16 +92,10 @@ impl ModelBuilder {
                 place.push((on, pXb));
                 continue;
             }
-            let (iq, iv) = (body.idx_q, body.idx_v);
-            let finite = |x: f64| x.is_finite().then_some(x);
-            let options = JointOptions {
-                position: (body.joint.nq() == 1).then(|| (model.limits.lower[iq], model.limits.upper[iq])),
-                velocity: finite(model.limits.velocity[iv]),
-                effort: finite(model.limits.effort[iv]),
-                damping: model.damping[iv],
-                friction: model.friction[iv],
-                armature: if body.mimic.is_some() { 0.0 } else { model.armature[iv] }, // the leader's has all of it
-            };
+            let mut options = model.joint_options(body.idx_q, body.idx_v);
+            if body.mimic.is_some() {
+                options.armature = 0.0; // the leader's has all of it
+            }
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
             if model.between[i] {

@@ -68,8 +68,8 @@ pub mod tree;
 mod validate;
 mod variants;
 
-pub use body::{Body, Frame, FrameKind, Limits};
-pub use builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+pub use body::{Body, Frame, FrameKind, JointOptions, Limits};
+pub use builder::{BodyId, ModelBuilder, WORLD};
 pub use condyle_spatial::{Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
 pub use configuration::{
     DifferenceArgument, IntegrateArgument, difference, difference_jacobian, distance, integrate, integrate_jacobian,

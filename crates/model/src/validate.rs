@@ -1,7 +1,7 @@
 //! The validation of a model, by whatever way it is made: numbers that none can have are errors; inertias that no body has
 //! and degrees of freedom along which M is singular are warnings.
 
-use crate::body::{Body, Frame};
+use crate::body::{Body, Frame, JointOptions};
 use crate::configuration::random_configuration;
 use crate::error::{Error, Warning};
 use crate::joint::Joint;
@@ -56,22 +56,11 @@ fn check_placement(X: &Se3<f64>) -> Result<(), String> {
     Ok(())
 }
 
-/// The numbers that a joint has for each coordinate.
-pub(crate) struct CoordinateNumbers {
-    pub lower: f64,
-    pub upper: f64,
-    pub velocity: f64,
-    pub effort: f64,
-    pub damping: f64,
-    pub friction: f64,
-    pub armature: f64,
-}
-
-impl CoordinateNumbers {
-    /// Says what is wrong with the numbers of a joint. Limits may be infinite, losses and armature may not.
+impl JointOptions {
+    /// Says what is wrong with the numbers of a joint.
     pub(crate) fn check(&self, joint: &str) -> Result<(), Error> {
         let wrong = |what: String| Err(Error::Joint { joint: joint.to_owned(), what });
-        let Self { lower, upper, .. } = *self;
+        let (lower, upper) = self.position.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
         if lower.is_nan() || upper.is_nan() {
             return wrong(format!("limits of position {lower} and {upper}: expected numbers"));
         }
@@ -79,7 +68,7 @@ impl CoordinateNumbers {
             return wrong(format!("lower limit {lower} is above upper limit {upper}"));
         }
         for (name, x) in [("velocity", self.velocity), ("effort", self.effort)] {
-            if x.is_nan() || x < 0.0 {
+            if let Some(x) = x.filter(|x| x.is_nan() || *x < 0.0) {
                 return wrong(format!("limit of {name} is {x}, expected a number of at least 0"));
             }
         }
@@ -128,16 +117,7 @@ impl Model {
             for k in 0..q.len().max(v.len()) {
                 let q = (q.start + k).min(q.end - 1);
                 let v = (v.start + k).min(v.end - 1);
-                CoordinateNumbers {
-                    lower: self.limits.lower[q],
-                    upper: self.limits.upper[q],
-                    velocity: self.limits.velocity[v],
-                    effort: self.limits.effort[v],
-                    damping: self.damping[v],
-                    friction: self.friction[v],
-                    armature: self.armature[v],
-                }
-                .check(&body.joint_name)?;
+                self.joint_options(q, v).check(&body.joint_name)?;
             }
         }
         self.check_magnitudes()?;
@@ -150,6 +130,18 @@ impl Model {
         warnings.extend(self.warnings.drain(..).filter(|warning| matches!(warning, Warning::LeftOut { .. })));
         self.warnings = warnings;
         Ok(())
+    }
+
+    /// What a joint has of its own at these places of q and v.
+    pub(crate) fn joint_options(&self, q: usize, v: usize) -> JointOptions {
+        JointOptions {
+            position: Some((self.limits.lower[q], self.limits.upper[q])),
+            velocity: Some(self.limits.velocity[v]),
+            effort: Some(self.limits.effort[v]),
+            damping: self.damping[v],
+            friction: self.friction[v],
+            armature: self.armature[v],
+        }
     }
 
     /// Checks that a position is one of the robot's: finite numbers, and quaternions and (cos, sin) of length 1, up to 1e-3.
@@ -180,10 +172,10 @@ impl Model {
                     return wrong(format!("q[{k}] is {}, which is not finite", q[k]));
                 }
             }
-            let unit = body.joint.unit_entries();
+            let Some(unit) = body.joint.unit_part() else { continue };
             let (from, to) = (body.idx_q + unit.start, body.idx_q + unit.end);
             let length = Scalar::sqrt(q[from..to].iter().map(|x| x * x).sum::<f64>());
-            if !unit.is_empty() && (length - 1.0).abs() > UNIT_ROUNDING {
+            if (length - 1.0).abs() > UNIT_ROUNDING {
                 return wrong(format!("its rotation, q[{from}..{to}], has the length {length}, expected 1"));
             }
         }
@@ -325,64 +317,4 @@ impl<R> Model<R> {
 #[track_caller]
 fn singular(joint: &str) -> ! {
     panic!("{}", Warning::Singular { joint: joint.to_owned() });
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::builder::{ModelBuilder, WORLD};
-    use crate::joint::Joint;
-    use condyle_spatial::{Se3, Sym3, Vec3};
-
-    fn z() -> Joint {
-        Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) }
-    }
-
-    fn ball() -> Inertia<f64> {
-        Inertia::from_com(1.0, Vec3::new(0.1, 0.0, 0.0), Sym3::diagonal(0.01))
-    }
-
-    #[test]
-    fn a_massless_leaf_is_singular_and_named() {
-        let mut builder = ModelBuilder::new("leaf");
-        let arm = builder.body("arm", WORLD, z(), Se3::identity(), ball());
-        builder.body("leaf", arm, z(), Se3::new(Se3::identity().rotation, Vec3::new(1.0, 0.0, 0.0)), Inertia::zero());
-        let model = builder.build().unwrap();
-        assert_eq!(model.singular_joints(), [2]);
-        let said: Vec<String> = model.warnings().iter().map(ToString::to_string).collect();
-        assert_eq!(said[0], "body `leaf` moves and has no mass");
-        assert!(said[1].starts_with("joint `leaf` moves nothing"), "{said:?}");
-        assert!(model.with_armature(&[0.0, 0.1]).unwrap().singular_joints().is_empty());
-    }
-
-    #[test]
-    fn a_mass_point_on_its_axis_is_singular_wherever_it_is() {
-        let mut builder = ModelBuilder::new("point");
-        let far = Se3::new(Se3::identity().rotation, Vec3::new(3.0, -2.0, 1.0));
-        let arm = builder.body("arm", WORLD, z(), far, ball());
-        let point = Inertia::from_com(0.7, Vec3::new(0.0, 0.0, 0.3), Sym3::zero());
-        builder.body("point", arm, z(), far, point);
-        assert_eq!(builder.build().unwrap().singular_joints(), [2]);
-    }
-
-    #[test]
-    fn a_chain_may_have_massless_bodies_inside() {
-        let mut builder = ModelBuilder::new("chain");
-        builder.spherical_zyx("ball", WORLD, Se3::identity(), ball());
-        let model = builder.build().unwrap();
-        assert!(model.singular_joints().is_empty() && model.warnings().is_empty());
-    }
-
-    #[test]
-    fn impossible_inertias_are_named() {
-        let body = |rotational| {
-            let mut builder = ModelBuilder::new("odd");
-            builder.body("odd", WORLD, z(), Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), rotational));
-            builder.build().unwrap().warnings().to_vec()
-        };
-        let flat = |xx, yy, zz| Sym3 { xx, xy: 0.0, yy, xz: 0.0, yz: 0.0, zz };
-        assert!(matches!(body(flat(0.1, 0.1, 0.3))[..], [Warning::Triangle { .. }]));
-        assert!(matches!(body(flat(0.1, -0.1, 0.1))[..], [Warning::Negative { .. }]));
-        assert!(body(flat(0.1, 0.1, 0.2)).is_empty()); // a flat plate
-    }
 }

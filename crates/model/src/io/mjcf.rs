@@ -6,8 +6,8 @@ mod geometry;
 mod include;
 
 use super::xml::Element;
-use crate::body::FrameKind;
-use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+use crate::body::{FrameKind, JointOptions};
+use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::{Error, Warning};
 use crate::joint::Joint;
 use crate::model::Model;
@@ -93,10 +93,7 @@ fn model(root: &Element, options: &MjcfOptions) -> Result<Model, Error> {
     let (defaults, warnings) = (&defaults, Vec::new());
     let reader = Reader { options, compiler, defaults, bodies: 0, names, joints, mass: 0.0, warnings };
     let model = reader.model(root)?;
-    match model.warnings().first() {
-        Some(warning) if options.strict => Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() }),
-        _ => Ok(model),
-    }
+    root.accepted(model, options.strict)
 }
 
 /// The parts of a body, with those inside its `<frame>`s.

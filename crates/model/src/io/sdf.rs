@@ -4,8 +4,8 @@ mod mimics;
 mod poses;
 
 use super::xml::{Amount, Element};
-use crate::body::FrameKind;
-use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+use crate::body::{FrameKind, JointOptions};
+use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::{Error, Warning};
 use crate::joint::Joint;
 use crate::model::Model;
@@ -100,10 +100,7 @@ fn model(root: &Element, options: &SdfOptions) -> Result<Model, Error> {
     let gravity = world.and_then(|w| w.child("gravity")).map(|g| three(g, g)).transpose()?;
     let mut model = reader.build(gravity, options)?;
     model.warnings.append(&mut reader.warnings);
-    match model.warnings.first() {
-        Some(warning) if options.strict => Err(Error::Strict { file: root.file.to_string(), warning: warning.clone() }),
-        _ => Ok(model),
-    }
+    root.accepted(model, options.strict)
 }
 
 /// The name under which joints know the world.
@@ -328,10 +325,8 @@ impl<'a> Reader<'a> {
         if inertial.attribute("auto").is_some_and(|a| matches!(a, "true" | "1")) {
             return Err(link.wrong("inertial: auto is not supported"));
         }
-        let number = |e: Option<&Element>, tag: &str, otherwise| match e {
-            Some(e) => optional(link, e, tag, otherwise),
-            None => Ok(otherwise),
-        };
+        let number =
+            |e: Option<&Element>, tag: &str, otherwise| e.map_or(Ok(otherwise), |e| optional(link, e, tag, otherwise));
         let mass = number(Some(inertial), "mass", 1.0)?;
         if !(mass >= 0.0 && mass.is_finite()) {
             return Err(link.wrong(format!("mass is {mass} kg")));
@@ -361,10 +356,8 @@ fn pitch(joint: &Element) -> Result<f64, Error> {
 /// The options that an `<axis>` gives beside its direction. 1e16 and more is SDF's way to say that there is no limit, and so
 /// is a negative effort or velocity.
 fn limits(joint: &Element, axis: &Element, kind: Joint) -> Result<JointOptions, Error> {
-    let number = |inside: Option<&Element>, tag: &str, otherwise| match inside {
-        Some(inside) => optional(joint, inside, tag, otherwise),
-        None => Ok(otherwise),
-    };
+    let number =
+        |e: Option<&Element>, tag: &str, otherwise| e.map_or(Ok(otherwise), |e| optional(joint, e, tag, otherwise));
     let (limit, dynamics) = (axis.child("limit"), axis.child("dynamics"));
     let wide = |x: f64| if x.abs() >= 1e16 { x * f64::INFINITY } else { x };
     let lower = wide(number(limit, "lower", f64::NEG_INFINITY)?);

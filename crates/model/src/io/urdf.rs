@@ -4,8 +4,8 @@ mod origin;
 
 use super::packages;
 use super::xml::{self, Amount, Element};
-use crate::body::FrameKind;
-use crate::builder::{BodyId, JointOptions, ModelBuilder, WORLD};
+use crate::body::{FrameKind, JointOptions};
+use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::{Joint, Mimic};
 use crate::model::Model;
@@ -210,12 +210,7 @@ impl<'a> Reader<'a> {
             self.add_mimics(&mut builder, &bodies)?;
         }
         let model = builder.build().map_err(|e| self.locate(e))?;
-        match model.warnings().first() {
-            Some(warning) if options.strict => {
-                Err(Error::Strict { file: self.robot.file.to_string(), warning: warning.clone() })
-            }
-            _ => Ok(model),
-        }
+        self.robot.accepted(model, options.strict)
     }
 
     /// Lets joints follow others.

@@ -4,6 +4,7 @@
 //! attribute of an element with the others, and each namespace with those in scope.
 
 use crate::error::Error;
+use crate::model::Model;
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -193,6 +194,14 @@ impl Element {
     /// An error that names this element.
     pub(crate) fn wrong(&self, what: impl Into<String>) -> Error {
         self.wrong_inside(self, what)
+    }
+
+    /// The model that was read from this root, unless it must have no warnings and has one.
+    pub(crate) fn accepted(&self, model: Model, is_strict: bool) -> Result<Model, Error> {
+        match model.warnings.first() {
+            Some(warning) if is_strict => Err(Error::Strict { file: self.file.to_string(), warning: warning.clone() }),
+            _ => Ok(model),
+        }
     }
 
     /// An error that names this element, and the line of one inside it.

@@ -51,17 +51,6 @@ impl Joint {
         }
     }
 
-    /// The entries of the joint's position that are a direction or a quaternion, of length 1.
-    pub(crate) fn unit_entries(self) -> core::ops::Range<usize> {
-        match self {
-            Self::Continuous { .. } => 0..2,
-            Self::Planar => 2..4,
-            Self::Spherical => 0..4,
-            Self::FreeFlyer => 3..7,
-            Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => 0..0,
-        }
-    }
-
     /// q ⊕ v: the position after moving with v for one unit of time.
     pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
         match self {

@@ -1,5 +1,6 @@
 //! Dual numbers over lanes: derivatives in as many directions as there are lanes, or of as many states, in one pass.
 
+use super::operators::operators;
 use super::{Constant, Scalar};
 use crate::simd::kernel::Kernel;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -66,19 +67,7 @@ impl<S: Scalar> Neg for LaneDual<S> {
     }
 }
 
-impl<S: Scalar> AddAssign for LaneDual<S> {
-    #[inline(always)]
-    fn add_assign(&mut self, o: Self) {
-        *self = *self + o;
-    }
-}
-
-impl<S: Scalar> SubAssign for LaneDual<S> {
-    #[inline(always)]
-    fn sub_assign(&mut self, o: Self) {
-        *self = *self - o;
-    }
-}
+operators!(LaneDual<S>, S: Scalar);
 
 impl<S: Scalar> Scalar for LaneDual<S> {
     type Mask = S::Mask;
