@@ -3,7 +3,7 @@
 
 use crate::compiled::compiled;
 use crate::registers::Vector;
-use crate::tile::{SLACK, add_outer, has_strip, next_strip};
+use crate::tile::{SLACK, Store, add_outer, next_strip, store_tile};
 use crate::vectors::copy_scaled;
 use alloc::vec::Vec;
 
@@ -272,17 +272,5 @@ unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
             row += sum.stride;
         }
     }
-    let (at, columns) = (j * ldh + i, COLUMNS.min(sum.size - j));
-    assert!(has_strip::<V, S>(h, ldh, at, columns), "a matrix ends before its tile");
-    for jj in 0..COLUMNS {
-        if jj < columns {
-            let at = at + jj * ldh;
-            // SAFETY: column jj of the strip, all of which was found to be inside.
-            let column = unsafe { h.get_unchecked_mut(at..at + S * V::N) };
-            for s in 0..S {
-                let place = &mut column[s * V::N..];
-                V::load(place).add(tile[jj][s]).store(place);
-            }
-        }
-    }
+    store_tile(h, ldh, [i, j], COLUMNS.min(sum.size - j), &tile, Store::Add);
 }

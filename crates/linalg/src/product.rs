@@ -7,22 +7,17 @@ use crate::tile::{SLACK, Store, View, column_block, holds, tile_rows};
 compiled! {
     /// C = A Bᵀ, for `shape` = [rows of A, rows of B, columns of both]. C has slack rows.
     pub fn product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
-        whole::<V, COLUMNS>(c, ldc, shape, a, b, Store::Set);
+        whole::<V, COLUMNS, false>(c, ldc, shape, a, b, Store::Set);
     }
 
     /// C += A Bᵀ, for a shape as of [`product`]. C has slack rows.
     pub fn add_product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
-        whole::<V, COLUMNS>(c, ldc, shape, a, b, Store::Add);
+        whole::<V, COLUMNS, false>(c, ldc, shape, a, b, Store::Add);
     }
 
     /// The lower triangle (with some of the upper one) of C += A Bᵀ, for a shape as of [`product`]. C has slack rows.
     pub fn add_product_lower<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
-        let ([rows, columns, length], mut j) = (shape, 0);
-        while j < columns {
-            let width = COLUMNS.min(columns - j);
-            column_block::<V, COLUMNS>(c, ldc, j..rows, j, width, a, b, length, Store::Add);
-            j += COLUMNS;
-        }
+        whole::<V, COLUMNS, true>(c, ldc, shape, a, b, Store::Add);
     }
 
     /// The lower triangle of C += (A Bᵀ)ᵀ for square A and B of `size` rows, by way of the upper triangle of A Bᵀ, which is
@@ -213,9 +208,9 @@ pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'
     }
 }
 
-/// C ← A Bᵀ in blocks of columns.
+/// C ← A Bᵀ in blocks of columns, each from its diagonal on if only the lower triangle is wanted.
 #[inline(always)]
-fn whole<V: Vector, const COLUMNS: usize>(
+fn whole<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     c: &mut [f64],
     ldc: usize,
     [rows, columns, length]: [usize; 3],
@@ -225,7 +220,8 @@ fn whole<V: Vector, const COLUMNS: usize>(
 ) {
     let mut j = 0;
     while j < columns {
-        column_block::<V, COLUMNS>(c, ldc, 0..rows, j, COLUMNS.min(columns - j), a, b, length, how);
+        let first = if LOWER { j } else { 0 };
+        column_block::<V, COLUMNS>(c, ldc, first..rows, j, COLUMNS.min(columns - j), a, b, length, how);
         j += COLUMNS;
     }
 }

@@ -141,7 +141,7 @@ pub(crate) fn has_strip<V: Vector, const S: usize>(data: &[f64], stride: usize, 
 
 /// Stores the first `columns` columns of a tile in C, from entry (i, j) on.
 #[inline(always)]
-fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
+pub(crate) fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     c: &mut [f64],
     ldc: usize,
     [i, j]: [usize; 2],

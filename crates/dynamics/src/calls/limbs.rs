@@ -3,17 +3,16 @@
 
 use crate::data::Data;
 use crate::derivatives::rnea_derivatives;
-use crate::lanes::limbs::forces::six;
-use crate::lanes::limbs::lanes::{Limbs, numbers};
+use crate::lanes::limbs::lanes::Limbs;
 use crate::lanes::limbs::pass::{Arguments, Scratch, load, scatter};
-use crate::lanes::limbs::{LANES, Plan};
+use crate::lanes::limbs::{LaneView, Plan};
 use crate::passes::kinematics::{PlacementCache, World, place};
 use crate::passes::{aba, crba, rnea};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::gate::{Fused, Level, is, level, renamed};
 use condyle_spatial::register_kernel;
-use condyle_spatial::{Constant, Force, Mat3, Motion, Scalar, Se3, Vec3};
+use condyle_spatial::{Constant, Force, Scalar};
 
 /// The function that is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -164,17 +163,11 @@ fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments
 pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let Some(plan) = ready(model, data) else { return };
     let Data { limbs: Some(scratch), world: World { oX, S: columns, placed, .. }, .. } = data else { return };
-    // SAFETY: poses and motions are made of vectors.
-    let (poses, motions) = unsafe { (numbers(&scratch.world.oX), numbers(&scratch.world.S)) };
+    let view = LaneView::new(plan, scratch);
     for i in 1..oX.len() {
-        let ((step, lane), column) = (plan.place(i), model.nodes()[i].column);
-        let pose = &poses[12 * LANES * step + lane..][..11 * LANES + 1];
-        let number = |k: usize| S::splat(pose[k * LANES]);
-        let axis = |k: usize| Vec3::new(number(k), number(k + 1), number(k + 2));
-        oX[i] = Se3::new(Mat3 { x: axis(0), y: axis(3), z: axis(6) }, axis(9));
+        oX[i] = view.pose(i);
         for k in 0..model.nodes()[i].joint.nv() {
-            let motion = six(motions, (plan.steps[step].idx_v + k, lane));
-            columns[column + k] = Motion::from([0, 1, 2, 3, 4, 5].map(|r| S::splat(motion[r * LANES])));
+            columns[model.nodes()[i].column + k] = view.column(i, k);
         }
     }
     *placed = PlacementCache::Bodies;

@@ -3,6 +3,7 @@
 use condyle_model::Model;
 use condyle_model::joint::{GroupJacobian, Joint};
 use condyle_spatial::{Constant, Cross, Force, Motion, Scalar};
+use core::ops::Range;
 
 /// The largest block: a free body's.
 const SIX: usize = 6;
@@ -35,37 +36,25 @@ fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     sum
 }
 
+/// The blocks at y that are no identity, each with its coordinates.
+fn blocks<'a, S: Scalar, R>(
+    model: &'a Model<R>,
+    which: GroupJacobian,
+    y: &'a [S],
+) -> impl Iterator<Item = (Range<usize>, [[S; SIX]; SIX])> + 'a {
+    let own = |(joint, at): (Joint, usize)| (joint, at..at + joint.nv());
+    joints(model).map(own).filter_map(move |(joint, own)| block(joint, which, &y[own.clone()]).map(|J| (own, J)))
+}
+
 /// out = J(y) x.
 pub(super) fn multiply<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], x: &[S], out: &mut [S]) {
     out.copy_from_slice(x);
-    for (joint, at) in joints(model) {
-        let own = at..at + joint.nv();
-        if let Some(J) = block(joint, which, &y[own.clone()]) {
-            let out = &mut out[own.clone()];
-            out.fill(S::zero());
-            for (J, &x) in J.iter().zip(&x[own]) {
-                for (out, &J) in out.iter_mut().zip(J) {
-                    *out = J.mul_add(x, *out);
-                }
-            }
-        }
-    }
-}
-
-/// out = J(y)ᵀ x.
-pub(super) fn multiply_transposed<S: Scalar, R>(
-    model: &Model<R>,
-    which: GroupJacobian,
-    y: &[S],
-    x: &[S],
-    out: &mut [S],
-) {
-    out.copy_from_slice(x);
-    for (joint, at) in joints(model) {
-        let own = at..at + joint.nv();
-        if let Some(J) = block(joint, which, &y[own.clone()]) {
-            for (out, J) in out[own.clone()].iter_mut().zip(&J) {
-                *out = dot(&x[own.clone()], J);
+    for (own, J) in blocks(model, which, y) {
+        let out = &mut out[own.clone()];
+        out.fill(S::zero());
+        for (J, &x) in J.iter().zip(&x[own]) {
+            for (out, &J) in out.iter_mut().zip(J) {
+                *out = J.mul_add(x, *out);
             }
         }
     }
@@ -74,33 +63,27 @@ pub(super) fn multiply_transposed<S: Scalar, R>(
 /// A = A J(y), for a square matrix stored by columns.
 pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
     let nv = model.nv();
-    for (joint, at) in joints(model) {
-        let n = joint.nv();
-        if let Some(J) = block(joint, which, &y[at..at + n]) {
-            for i in 0..nv {
-                let mut row = [S::zero(); SIX];
-                for k in 0..n {
-                    row[k] = A[(at + k) * nv + i];
-                }
-                for k in 0..n {
-                    A[(at + k) * nv + i] = dot(&row, &J[k]);
-                }
+    for (own, J) in blocks(model, which, y) {
+        for i in 0..nv {
+            let mut row = [S::zero(); SIX];
+            for (x, j) in row.iter_mut().zip(own.clone()) {
+                *x = A[j * nv + i];
+            }
+            for (J, j) in J.iter().zip(own.clone()) {
+                A[j * nv + i] = dot(&row, J);
             }
         }
     }
 }
 
-/// A = J(y)ᵀ A, for a square matrix stored by columns.
+/// A = J(y)ᵀ A, for a vector or a matrix stored by columns.
 pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
-    for (joint, at) in joints(model) {
-        let n = joint.nv();
-        if let Some(J) = block(joint, which, &y[at..at + n]) {
-            for column in A.chunks_exact_mut(model.nv()) {
-                let mut old = [S::zero(); SIX];
-                old[..n].copy_from_slice(&column[at..at + n]);
-                for k in 0..n {
-                    column[at + k] = dot(&old, &J[k]);
-                }
+    for (own, J) in blocks(model, which, y) {
+        for column in A.chunks_exact_mut(model.nv()) {
+            let mut old = [S::zero(); SIX];
+            old[..own.len()].copy_from_slice(&column[own.clone()]);
+            for (x, J) in column[own.clone()].iter_mut().zip(&J) {
+                *x = dot(&old, J);
             }
         }
     }

@@ -119,8 +119,10 @@ fn evaluate<S: Scalar, R: Constant<S>>(
         d.f[k] = d.lagrangian.L_q[k] + input.tau[k] + d.passive[k]; // f = ∂L/∂q + τ
     }
     tangent::add_rotors(model, &d.w, &mut d.f);
-    tangent::multiply_transposed(model, Exp, &d.minus_y, &d.p, &mut d.carried); // J(−y)ᵀ p
-    tangent::multiply_transposed(model, Exp, &d.minus_x, &d.f, &mut d.pushed); // J(−y/2)ᵀ f
+    d.carried.copy_from_slice(&d.p);
+    tangent::multiply_left_transposed(model, Exp, &d.minus_y, &mut d.carried); // J(−y)ᵀ p
+    d.pushed.copy_from_slice(&d.f);
+    tangent::multiply_left_transposed(model, Exp, &d.minus_x, &mut d.pushed); // J(−y/2)ᵀ f
 }
 
 /// The slope of the equation in w; what `evaluate` has left of the derivatives is used up.
@@ -199,8 +201,10 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
             *w -= step;
         }
     }
-    tangent::multiply_transposed(model, Transport, &d.minus_y, &d.p, &mut d.carried);
-    tangent::multiply_transposed(model, Transport, &d.minus_x, &d.f, &mut d.pushed);
+    d.carried.copy_from_slice(&d.p);
+    tangent::multiply_left_transposed(model, Transport, &d.minus_y, &mut d.carried);
+    d.pushed.copy_from_slice(&d.f);
+    tangent::multiply_left_transposed(model, Transport, &d.minus_x, &mut d.pushed);
     for k in 0..model.nv() {
         v_next[k] = d.pushed[k].mul_add(h, d.carried[k]); // p' = Ad(y)ᵀ p + h Ad(y/2)ᵀ f
     }
